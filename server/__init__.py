@@ -1,0 +1,1 @@
+"""The shell of catgraph: everything that touches the world."""
