@@ -1,0 +1,104 @@
+"""One client's socket: a websockets connection that can be frozen, is bounded in all directions and writes ready-made frames."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from websockets.asyncio.server import Server, ServerConnection
+from websockets.protocol import State
+from websockets.server import ServerProtocol
+
+if TYPE_CHECKING:
+    from server.bridge.listener import Listener
+
+HANDSHAKE_S = 10.0  # a socket that has not become a WebSocket by then is closed
+LARGEST_BUFFER = 4_000_000  # bytes: beyond, the peer floods us with pings and does not read the pongs
+KEEPALIVE_S = 30  # TCP's own probe finds peers that vanished; rosbridge itself sends no pings
+
+
+class Connection(ServerConnection):
+    """While frozen it neither reads nor answers anything, pings and handshakes included, as a stopped process would."""
+
+    def __init__(self, listener: Listener, protocol: ServerProtocol, server: Server, **options: Any) -> None:
+        super().__init__(protocol, server, **options)
+        self._listener = listener
+        self._frozen = False
+        self._unread = bytearray()
+        self.on_ready: Callable[[], None] | None = None
+
+    @property
+    def is_ready(self) -> bool:
+        """Open, not frozen, and with room in the socket's buffer."""
+        return (
+            not self.paused
+            and not self._frozen
+            and self.protocol.state is State.OPEN
+            and not self.transport.is_closing()
+        )
+
+    def write(self, frame: bytes) -> None:
+        """Writes one whole frame. Frames are never split here, so they cannot fall into the middle of another."""
+        self.transport.write(frame)
+
+    def freeze(self) -> None:
+        self._frozen = True
+        self.transport.pause_reading()
+
+    def thaw(self) -> None:
+        self._frozen = False
+        unread = bytes(self._unread)
+        self._unread.clear()
+        if unread:
+            self.data_received(unread)
+        if not self.recv_messages.paused and not self.transport.is_closing():
+            self.transport.resume_reading()
+        self._tell_ready()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        _keep_alive(transport.get_extra_info("socket"))
+        if not self._listener.admit(self):
+            self.transport.abort()
+            return
+        if self._listener.is_frozen:
+            self.freeze()
+        self.loop.call_later(HANDSHAKE_S, self._end_handshake)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._listener.forget(self)
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        if self._frozen:  # websockets may have resumed reading by itself
+            self._unread += data
+            self.transport.pause_reading()
+            return
+        super().data_received(data)
+        if self.transport.get_write_buffer_size() > LARGEST_BUFFER:
+            self.transport.abort()
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        self._tell_ready()
+
+    def _tell_ready(self) -> None:
+        if self.on_ready is not None:
+            self.on_ready()
+
+    def _end_handshake(self) -> None:
+        if self.protocol.state is not State.CONNECTING:
+            return
+        if self._frozen:
+            self.loop.call_later(HANDSHAKE_S, self._end_handshake)
+        else:
+            self.transport.abort()
+
+
+def _keep_alive(sock: socket.socket) -> None:
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name in ("TCP_KEEPIDLE", "TCP_KEEPINTVL"):
+        if hasattr(socket, name):  # not on every system
+            sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), KEEPALIVE_S)

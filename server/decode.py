@@ -1,0 +1,348 @@
+"""From a ROS message, as rosbridge spells it, to a value of ours. The only place that looks into messages.
+
+Each function takes one message and gives one value, or raises Rejected with the reason in few words. Numbers that rosbridge
+had to flatten to null are NaN here; a value whose headline number is unknown is rejected, because a signal that says nothing
+must grow old and not look alive.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.values import (
+    Acceleration,
+    Bearing,
+    Component,
+    Diagnostics,
+    Distance,
+    Effort,
+    GpsFix,
+    Heading,
+    LaserScan,
+    Level,
+    MotionCommand,
+    Odometry,
+    Steering,
+    Twist,
+)
+
+Decode = Callable[[Any], Any]
+
+NONE_IN_RANGE_M = (81.0, 180.0)  # what the distance estimator says of nothing ahead: real car, simulator
+NONE_YET_M = 2147483647.0  # what its steering-based variant says before the first object
+FARTHEST_M = 1000.0  # no sensor on a car sees farther
+MAX_BEAMS = 65535
+MAX_COMPONENTS = 500
+FASTEST_MPS = 150.0  # beyond that a wheel sensor or a unit is broken, not the car fast
+
+
+class Rejected(ValueError):
+    """Not a proper message; `str()` is the reason, short, the same for the same kind of fault."""
+
+
+def number(message: Any, *path: str) -> float:
+    """The number at a path of fields; NaN where it is null. Raises Rejected for what is missing or is no number."""
+    value = message
+    for name in path:
+        if not isinstance(value, Mapping):
+            raise Rejected(f"{'.'.join(path)} is missing")
+        try:
+            value = value[name]
+        except KeyError:
+            raise Rejected(f"{'.'.join(path)} is missing") from None
+    if value is None:
+        return math.nan
+    if isinstance(value, (bool, str)) or not isinstance(value, (int, float, np.number)):
+        raise Rejected(f"{'.'.join(path)} is not a number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise Rejected(f"{'.'.join(path)} is too large") from None
+
+
+def finite(message: Any, *path: str) -> float:
+    """As `number`, and known: null, NaN and infinities are rejected."""
+    value = number(message, *path)
+    if not math.isfinite(value):
+        raise Rejected(f"{'.'.join(path)} is null")
+    return value
+
+
+def known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def text(message: Any, *path: str, default: str = "") -> str:
+    value = message
+    for name in path:
+        value = value.get(name) if isinstance(value, Mapping) else None
+    return value[:200] if isinstance(value, str) else default
+
+
+def stamp_s(message: Any) -> float | None:
+    """The header's stamp in seconds, ROS 1 or ROS 2; None where there is none or it is zero or absurd."""
+    header = message.get("header") if isinstance(message, Mapping) else None
+    stamp = header.get("stamp") if isinstance(header, Mapping) else None
+    if not isinstance(stamp, Mapping):
+        return None
+    seconds = stamp.get("secs", stamp.get("sec"))
+    nanoseconds = stamp.get("nsecs", stamp.get("nanosec"))
+    if type(seconds) is not int or type(nanoseconds) is not int:
+        return None
+    whole = seconds + nanoseconds * 1e-9
+    return whole if 0 < whole < 1e11 else None
+
+
+def _speed(value: float) -> float:
+    if abs(value) > FASTEST_MPS:
+        raise Rejected("a speed beyond any car")
+    return value
+
+
+def twist(message: Any) -> Twist:
+    yaw_rate = number(message, "angular", "z") if isinstance(message, Mapping) and "angular" in message else math.nan
+    return Twist(speed_mps=_speed(finite(message, "linear", "x")), yaw_rate_radps=known(yaw_rate))
+
+
+def twist_stamped(message: Any) -> Twist:
+    return twist(_inner(message, "twist"))
+
+
+def twist_of_odometry(message: Any) -> Twist:
+    return twist(_inner(_inner(message, "twist"), "twist"))
+
+
+def speed_of_float(message: Any) -> Twist:
+    return Twist(speed_mps=_speed(finite(message, "data")), yaw_rate_radps=None)
+
+
+def effort(message: Any) -> Effort:
+    """Percent in force.x of a Wrench, as the car's pedals have it."""
+    return Effort(percent=finite(message, "force", "x"))
+
+
+def effort_of_float(message: Any) -> Effort:
+    return Effort(percent=finite(message, "data"))
+
+
+def steering(message: Any) -> Steering:
+    """Percent in torque.z of a Wrench, negative = left."""
+    return Steering(percent=finite(message, "torque", "z"))
+
+
+def steering_of_float(message: Any) -> Steering:
+    return Steering(percent=finite(message, "data"))
+
+
+def distance(message: Any) -> Distance:
+    value = number(message, "data")
+    if math.isnan(value):
+        raise Rejected("data is null")
+    if value < 0:
+        raise Rejected("a distance below zero")
+    if value >= FARTHEST_M or any(abs(value - limit) < 1e-3 for limit in NONE_IN_RANGE_M):
+        return Distance(distance_m=None, none_in_range=True)
+    return Distance(distance_m=value, none_in_range=False)
+
+
+def bearing(message: Any) -> Bearing:
+    value = number(message, "data")
+    if not math.isfinite(value):
+        raise Rejected("data is null")
+    if abs(value) > 2 * math.pi:
+        raise Rejected("an angle beyond a full turn")
+    return Bearing(bearing_rad=value)
+
+
+def nav_sat_fix(message: Any) -> GpsFix:
+    """Position on WGS84. Raises Rejected for coordinates that are no place on Earth; without a fix they may be anything."""
+    status = number(message, "status", "status")
+    if not math.isfinite(status):
+        raise Rejected("status.status is null")
+    latitude, longitude = number(message, "latitude"), number(message, "longitude")
+    if int(status) >= 0 or not (math.isnan(latitude) or math.isnan(longitude)):
+        if math.isnan(latitude) or math.isnan(longitude):
+            raise Rejected("latitude or longitude is null")
+        if abs(latitude) > 90 or abs(longitude) > 360:
+            raise Rejected("latitude or longitude out of range")
+    kind = number(message, "position_covariance_type")
+    kind_is_known = math.isfinite(kind) and kind in (1, 2, 3)
+    return GpsFix(
+        lat_deg=latitude,
+        lon_deg=(longitude + 180) % 360 - 180 if abs(longitude) > 180 else longitude,
+        alt_m=known(number(message, "altitude")),
+        status=int(status),
+        covariance_type=int(kind) if kind_is_known else 0,
+        sigma_m=_sigma(message.get("position_covariance")) if kind_is_known else None,
+    )
+
+
+def _sigma(covariance: Any) -> float | None:
+    """Horizontal one-sigma error in m from the ENU covariance (row-major, m²); None where it is not to be trusted."""
+    if not isinstance(covariance, (list, tuple, np.ndarray)) or len(covariance) != 9:
+        return None
+    east, north = covariance[0], covariance[4]
+    for variance in (east, north):
+        if isinstance(variance, (bool, str)) or not isinstance(variance, (int, float, np.number)):
+            return None
+        if not (math.isfinite(variance) and variance > 0):
+            return None
+    return math.sqrt((float(east) + float(north)) / 2)
+
+
+def odometry(message: Any) -> Odometry:
+    pose = _inner(_inner(message, "pose"), "pose")
+    body = _inner(_inner(message, "twist"), "twist")
+    east, north = number(body, "linear", "x"), number(body, "linear", "y")
+    speed = math.hypot(east, 0.0 if math.isnan(north) else north)
+    return Odometry(
+        x_m=finite(pose, "position", "x"),
+        y_m=finite(pose, "position", "y"),
+        z_m=known(number(pose, "position", "z")),
+        yaw_rad=_yaw(pose),
+        speed_mps=known(speed),
+        frame_id=text(message, "header", "frame_id"),
+    )
+
+
+def _yaw(pose: Any) -> float | None:
+    """Yaw in rad, counter-clockwise from the frame's x axis (REP-103), from the pose's quaternion; None where it is none."""
+    x, y, z, w = (number(pose, "orientation", axis) for axis in "xyzw")
+    norm = x * x + y * y + z * z + w * w
+    if not 0.5 < norm < 1.5:  # NaN and the all-zero quaternion of drivers without a compass both fall out here
+        return None
+    return math.atan2(2 * (w * z + x * y), norm - 2 * (y * y + z * z))
+
+
+def acceleration_of_imu(message: Any) -> Acceleration:
+    return Acceleration(acceleration_mps2=finite(message, "linear_acceleration", "x"), source="topic")
+
+
+def acceleration_of_float(message: Any) -> Acceleration:
+    return Acceleration(acceleration_mps2=finite(message, "data"), source="topic")
+
+
+def heading_of_imu(message: Any) -> Heading:
+    """Compass heading from an IMU whose yaw 0 is east (REP-103)."""
+    yaw = _yaw(message)
+    if yaw is None:
+        raise Rejected("orientation is no rotation")
+    return Heading(heading_deg=(90 - math.degrees(yaw)) % 360, source="topic")
+
+
+def heading_of_float(message: Any) -> Heading:
+    return Heading(heading_deg=finite(message, "data") % 360, source="topic")
+
+
+def level(message: Any) -> Level:
+    return Level(value=finite(message, "data"), unit="%")
+
+
+def battery(message: Any) -> Level:
+    return Level(value=finite(message, "percentage") * 100, unit="%")
+
+
+def command(message: Any) -> MotionCommand:
+    """What a controller asks of the car. The real car's angular.z is NaN in every message: unknown, not wrong."""
+    return MotionCommand(
+        speed_mps=known(number(message, "linear", "x")), tyre_angle_rad=known(number(message, "angular", "z"))
+    )
+
+
+def command_stamped(message: Any) -> MotionCommand:
+    return command(_inner(message, "twist"))
+
+
+def laser_scan(message: Any) -> LaserScan:
+    """Ranges in m in the order of the beams; null becomes NaN, and ±Inf are kept where the transport kept them."""
+    ranges = _numbers(message, "ranges")
+    if ranges.size > MAX_BEAMS:
+        raise Rejected(f"more than {MAX_BEAMS} beams")
+    increment = finite(message, "angle_increment")
+    if increment == 0 and ranges.size > 1:
+        raise Rejected("angle_increment is zero")
+    nearest, farthest = finite(message, "range_min"), number(message, "range_max")
+    if math.isnan(farthest):
+        farthest = math.inf  # an open end; JSON cannot say so
+    if nearest < 0 or farthest <= nearest:
+        raise Rejected("range_min and range_max contradict each other")
+    return LaserScan(
+        ranges_m=ranges,
+        angle_min_rad=finite(message, "angle_min"),
+        angle_max_rad=finite(message, "angle_max"),
+        angle_increment_rad=increment,
+        time_increment_s=_or_zero(number(message, "time_increment")),
+        scan_time_s=_or_zero(number(message, "scan_time")),
+        range_min_m=nearest,
+        range_max_m=farthest,
+        frame_id=text(message, "header", "frame_id"),
+    )
+
+
+def _or_zero(value: float) -> float:
+    return value if math.isfinite(value) and value > 0 else 0.0  # 0: not given
+
+
+def _numbers(message: Any, name: str) -> npt.NDArray[np.float32]:
+    """A list of numbers and nulls as float32, nulls as NaN."""
+    values = message.get(name) if isinstance(message, Mapping) else None
+    if isinstance(values, np.ndarray) and values.ndim == 1 and values.dtype.kind in "fiu":
+        return values.astype(np.float32)
+    if not isinstance(values, (list, tuple)):
+        raise Rejected(f"{name} is missing" if values is None else f"{name} is not a list")
+    if not {type(value) for value in values} <= {float, int, type(None)}:
+        raise Rejected(f"{name} holds something that is not a number")
+    try:
+        with np.errstate(over="ignore"):  # 1e39 is infinitely far
+            return np.array(values, dtype=np.float32)
+    except (OverflowError, ValueError, TypeError):
+        raise Rejected(f"{name} holds something that is not a number") from None
+
+
+def diagnostics(message: Any) -> Diagnostics:
+    rows = message.get("status") if isinstance(message, Mapping) else None
+    if not isinstance(rows, (list, tuple)):
+        raise Rejected("status is not a list")
+    if len(rows) > MAX_COMPONENTS:
+        raise Rejected(f"more than {MAX_COMPONENTS} components")
+    return Diagnostics(
+        components=tuple(
+            Component(name=text(row, "name", default="unnamed"), level=_level(row), message=text(row, "message"))
+            for row in rows
+        )
+    )
+
+
+def _level(row: Any) -> int:
+    """0 OK, 1 WARN, 2 ERROR, 3 STALE; a `byte` comes as an integer, as base64 or as a character, by version."""
+    value = row.get("level") if isinstance(row, Mapping) else None
+    if isinstance(value, str):
+        if len(value) == 4:
+            try:
+                raw = base64.b64decode(value, validate=True)
+            except (binascii.Error, ValueError):
+                raw = b""
+            value = raw[0] if len(raw) == 1 else None
+        elif len(value) == 1:
+            value = int(value) if value in "0123" else ord(value)
+    elif isinstance(value, (bytes, bytearray)) and len(value) == 1:
+        value = value[0]
+    elif isinstance(value, (list, tuple)) and len(value) == 1:
+        value = value[0]
+    if type(value) is not int or value not in (0, 1, 2, 3):
+        raise Rejected("level is not one of OK, WARN, ERROR, STALE")
+    return value
+
+
+def _inner(message: Any, name: str) -> Any:
+    value = message.get(name) if isinstance(message, Mapping) else None
+    if not isinstance(value, Mapping):
+        raise Rejected(f"{name} is missing")
+    return value
