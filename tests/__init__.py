@@ -1,0 +1,1 @@
+"""Tests of catgraph: they mirror the source."""

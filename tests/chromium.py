@@ -1,0 +1,115 @@
+"""Finds a Chromium for the page's tests; `python -m tests.chromium` installs one where there is none."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = (
+    "--headless",
+    "--no-sandbox",  # as root and in containers Chromium's own sandbox cannot start
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+
+
+class NoChromium(Exception):
+    """No browser to test with; the text says what to do."""
+
+
+def find_chromium() -> str:
+    """The path of a Chromium that starts: $CATGRAPH_CHROMIUM, the system's, or Playwright's own. Raises NoChromium."""
+    named = os.environ.get("CATGRAPH_CHROMIUM")
+    if named:
+        if _starts(named):
+            return named
+        raise NoChromium(f"CATGRAPH_CHROMIUM names {named}, which does not start.")
+    for path in _candidates():
+        if _starts(path):
+            return path
+    raise NoChromium("No Chromium for the tests: run `python -m tests.chromium`, or name one in CATGRAPH_CHROMIUM.")
+
+
+def install_chromium() -> None:
+    """Install one: from the system's packages as root on Debian, else Playwright's build in the user's cache."""
+    if os.geteuid() == 0 and shutil.which("apt-get") and _is_debian():
+        apt = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+        packages = ["chromium", "fonts-liberation"]
+        subprocess.run(["apt-get", "update", "-q"], check=False, env=apt, stdin=subprocess.DEVNULL)
+        done = subprocess.run(
+            ["apt-get", "install", "-q", "-y", "--no-install-recommends", *packages],
+            check=False,
+            env=apt,
+            stdin=subprocess.DEVNULL,
+        )
+        if done.returncode == 0:
+            return
+    command = [sys.executable, "-m", "playwright", "install", "chromium"]
+    if os.geteuid() == 0 and shutil.which("apt-get"):
+        command.insert(-1, "--with-deps")
+    subprocess.run(command, check=False, stdin=subprocess.DEVNULL)
+
+
+def _candidates() -> Iterator[str]:
+    yield from filter(None, map(shutil.which, NAMES))
+    cache = Path(os.environ.get("PLAYWRIGHT_BROWSERS_PATH") or Path.home() / ".cache" / "ms-playwright")
+    yield from map(str, sorted(cache.glob("chromium-*/chrome-linux*/chrome"), reverse=True))
+
+
+def _starts(path: str) -> bool:
+    """Does it draw an empty page? Ubuntu's chromium-browser may be a stub without its snap, and libraries may lack."""
+    try:
+        done = subprocess.run(
+            [path, *FLAGS, "--dump-dom", "about:blank"],
+            capture_output=True,
+            check=False,
+            timeout=60,
+            stdin=subprocess.DEVNULL,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0 and b"<body>" in done.stdout
+
+
+def _is_debian() -> bool:
+    """Not Ubuntu, whose chromium package only points at a snap."""
+    try:
+        lines = Path("/etc/os-release").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return False
+    return "ID=debian" in lines
+
+
+def main() -> int:
+    """Print the path of the Chromium to use, after installing one where needed."""
+    try:
+        path = find_chromium()
+    except NoChromium:
+        if os.environ.get("CATGRAPH_CHROMIUM"):
+            raise
+        install_chromium()
+        try:
+            path = find_chromium()
+        except NoChromium:
+            print(
+                "No Chromium could be installed for the page's tests: install one with the system's packages "
+                "(or `playwright install-deps chromium` as root for the libraries it lacks), "
+                "or name one in CATGRAPH_CHROMIUM.",
+                file=sys.stderr,
+            )
+            return 1
+    print(f"Chromium: {path}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

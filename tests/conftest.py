@@ -1,0 +1,27 @@
+"""What several folders of tests need: the recordings and a browser."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.chromium import find_chromium
+
+PROJECT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Path:
+    """The folder of real drives: $CATGRAPH_DATA, else ../shared/data. Tests that need it are skipped without it."""
+    folder = Path(os.environ.get("CATGRAPH_DATA") or PROJECT.parent / "shared" / "data")
+    if not folder.is_dir():
+        pytest.skip(f"no recordings in {folder}: name their folder in CATGRAPH_DATA")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """The path of a Chromium that starts."""
+    return find_chromium()
