@@ -1,4 +1,4 @@
-"""One client's socket: a websockets connection that can be frozen, is bounded in all directions and writes ready-made frames."""
+"""One client's socket: a websockets connection that can be frozen, is bounded and writes ready-made frames."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class Outgoing:
         self._frames: dict[tuple[str, Encoding], bytes] = {}
 
     def frame(self, topic: str, encoding: Encoding) -> bytes:
-        """The WebSocket frame for clients which call the topic `topic` ("chatter" and "/chatter" may both be in use)."""
+        """The WebSocket frame for clients which write the topic so ("chatter" and "/chatter" may both be in use)."""
         key = (topic, encoding)
         made = self._frames.get(key)
         if made is None:

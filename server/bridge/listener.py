@@ -120,7 +120,9 @@ class Listener:
 
     def _turn_away(self, connection: ServerConnection, request: Request) -> Response | None:
         if self._clients >= self._max_clients:
-            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "This bridge has as many clients as it may have.\n")
+            return connection.respond(
+                HTTPStatus.SERVICE_UNAVAILABLE, "This bridge has as many clients as it may have.\n"
+            )
         return None
 
     async def _serve(self, connection: Connection) -> None:

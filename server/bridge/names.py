@@ -24,7 +24,7 @@ def canonical_name(name: str) -> str:
 
 
 def canonical_type(name: str, version: RosVersion, kind: str = "msg") -> str:
-    """`pkg/Type` in ROS 1, `pkg/msg/Type` in ROS 2, which also takes the ROS 1 spelling; ROS 1 does not take that of ROS 2."""
+    """`pkg/Type` in ROS 1, `pkg/msg/Type` in ROS 2. ROS 2 also takes the ROS 1 spelling, not the other way round."""
     parts = [part for part in name.split("/") if part]
     counts = (2,) if version == 1 else (2, 3)
     if len(name) > LONGEST_NAME or len(parts) not in counts or not all(map(_IDENTIFIER.fullmatch, parts)):

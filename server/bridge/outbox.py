@@ -32,7 +32,7 @@ class Wire(Protocol):
 
 
 class Lane:
-    """The frames of one subscription that wait their turn, oldest first. `limit` 0: only the client's byte limit holds."""
+    """The frames of one subscription that wait, oldest first. `limit` 0: only the client's byte limit holds."""
 
     __slots__ = ("frames", "limit")
 

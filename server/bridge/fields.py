@@ -1,0 +1,92 @@
+"""Reads the fields of a client's operation; says in one sentence what is wrong with them."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import orjson
+
+LONGEST_ID = 1_000  # letters; an id is echoed in every answer, and the longest real ones have 60
+
+
+class Refused(Exception):
+    """The operation cannot be done. The text is one sentence for the client."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text if len(text) <= 400 else text[:400] + "…")
+
+
+def parse(raw: bytes) -> dict[str, Any]:
+    """The JSON object of one frame or of reassembled fragments."""
+    try:
+        value = _loads(raw)
+    except (ValueError, RecursionError) as error:
+        raise Refused(f"this is not JSON: {error}") from None
+    if not isinstance(value, dict):
+        raise Refused(f"expected a JSON object with an op, got {_kind(value)}")
+    return value
+
+
+def _loads(raw: bytes) -> Any:
+    try:
+        return orjson.loads(raw)
+    except orjson.JSONDecodeError:
+        # Python clients write NaN and Infinity as bare words, and rosbridge, which reads with Python, takes them.
+        if b"NaN" not in raw and b"Infinity" not in raw:
+            raise
+        return json.loads(raw)
+
+
+def id_of(operation: dict[str, Any]) -> str | int | float | None:
+    """The client's id for this operation: text or number; anything else could not be echoed safely."""
+    value = operation.get("id")
+    if isinstance(value, bool) or not isinstance(value, str | int | float | None):
+        raise Refused(f"the id must be text or a number, got {_kind(value)}")
+    if isinstance(value, str) and len(value) > LONGEST_ID:
+        raise Refused(f"the id has {len(value)} letters, at most {LONGEST_ID} are taken")
+    return value
+
+
+def text(operation: dict[str, Any], name: str, default: str | None = None) -> str:
+    """A field that must be text; without a default it must be there."""
+    value = operation.get(name, default)
+    if not isinstance(value, str):
+        raise Refused(_complaint(operation, name, "text"))
+    return value
+
+
+def optional_text(operation: dict[str, Any], name: str) -> str | None:
+    return None if operation.get(name) is None else text(operation, name)
+
+
+def whole_number(operation: dict[str, Any], name: str, default: int | None = None) -> int:
+    """A field that must be a number ≥ 0 (fractions are cut off); without a default it must be there."""
+    value = operation.get(name, default)
+    if value is None and default is not None:
+        return default
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < 2**53:
+        raise Refused(_complaint(operation, name, "a number, 0 or more"))
+    return int(value)
+
+
+def _complaint(operation: dict[str, Any], name: str, expected: str) -> str:
+    if name not in operation:
+        return f"expected a field {name}, but there is none"
+    return f"the field {name} must be {expected}, got {_kind(operation[name])}"
+
+
+def _kind(value: Any) -> str:
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return "text"
+        case int() | float():
+            return f"the number {value}" if abs(value) < 1e15 else "a huge number"
+        case list():
+            return "a list"
+        case _:
+            return "an object"

@@ -1,0 +1,142 @@
+"""A rosbridge server (protocol v2) in front of a recording or a simulated car."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from server.bridge.client import Client
+from server.bridge.connection import Connection
+from server.bridge.encoding import Outgoing
+from server.bridge.graph import SOURCE, Graph
+from server.bridge.listener import CannotListen, Listener
+from server.bridge.names import canonical_name, canonical_type
+from server.bridge.outbox import Counters
+from server.bridge.rosapi import add_rosapi
+from server.bridge.services import Handler, Service, ServiceFailed, Services
+from server.source import Json, RosVersion
+
+__all__ = ["CannotListen", "RosBridge", "ServiceFailed"]
+
+
+class RosBridge:
+    """Speaks as the rosbridge of `ros_version` does; `now` is the ROS time that rosapi tells [s since 1970].
+
+    Everything but start, stop, kill and revive is synchronous and belongs on the loop on which the bridge was started.
+    """
+
+    def __init__(
+        self,
+        *,
+        ros_version: RosVersion = 1,
+        now: Callable[[], float] = time.time,
+        node: str = "/car",
+        max_clients: int = 256,
+        max_message_bytes: int = 10_000_000,
+    ) -> None:
+        self.ros_version: RosVersion = ros_version
+        self.now = now
+        self.node = node  # name under which rosapi shows what we publish ourselves
+        self.max_message_bytes = max_message_bytes
+        self.counters = Counters()
+        self.graph = Graph()
+        self.services = Services()
+        self.on_publish: list[Callable[[str, str, Json], None]] = []  # (topic, type, message) of what clients publish
+        self.on_subscribe: list[Callable[[str], None]] = []  # (topic) each time a client subscribes
+        self._listener = Listener(self._serve_client, max_clients=max_clients, max_message_bytes=max_message_bytes)
+        self._address: tuple[str, int] | None = None
+        add_rosapi(self)
+
+    @property
+    def sent(self) -> int:
+        """Messages handed to clients' sockets; one message to three clients counts three."""
+        return self.counters.sent
+
+    @property
+    def dropped(self) -> int:
+        """Messages lost because a client did not keep up, or went while they waited."""
+        return self.counters.dropped
+
+    @property
+    def bytes_sent(self) -> int:
+        return self.counters.bytes_sent
+
+    @property
+    def clients(self) -> int:
+        """Clients connected now."""
+        return self._listener.clients
+
+    async def start(self, host: str = "127.0.0.1", port: int = 0) -> int:
+        """Listens and answers the port, a free one for 0. Raises CannotListen with one sentence for a person."""
+        port = await self._listener.open(host, port)
+        self._address = (host, port)
+        return port
+
+    async def stop(self) -> None:
+        """Says goodbye to every client and stops listening."""
+        self._address = None
+        await self._listener.close(abruptly=False)
+
+    async def kill(self) -> None:
+        """Drops every connection as a killed process would, and refuses new ones until `revive()`."""
+        await self._listener.close(abruptly=True)
+
+    async def revive(self) -> None:
+        """Listens again on the same port. Raises CannotListen."""
+        if self._address is None:
+            raise RuntimeError("the bridge was never started")
+        await self._listener.open(*self._address)
+
+    def freeze(self) -> None:
+        """Keeps every connection but answers nothing, not even pings, as a stopped process would."""
+        self._listener.freeze()
+
+    def thaw(self) -> None:
+        """Goes on where it was frozen: what waited is read and sent."""
+        self._listener.thaw()
+
+    def message_type(self, name: str) -> str:
+        """A message type's name as this ROS version spells it. Raises BadName."""
+        return canonical_type(name, self.ros_version)
+
+    def advertise(self, topic: str, type: str, definition: str | None = None, *, latch: bool = False) -> None:
+        """Makes a topic exist. `latch`: newcomers get the last message at once. Raises BadName."""
+        type = self.message_type(type)
+        found = self.graph.find_or_make(topic, type)
+        found.type, found.definition, found.latches = type, definition, latch
+        found.publishers.add(SOURCE)
+        for subscription, client in list(found.subscribers.items()):
+            client.type_became(found, subscription)
+
+    def unadvertise(self, topic: str) -> None:
+        """The topic's source is gone; those who listen go on listening."""
+        found = self.graph.find(topic)
+        if found is not None:
+            found.publishers.discard(SOURCE)
+            self.graph.tidy(found)
+
+    def publish(self, topic: str, message: Json) -> None:
+        """Sends a message to all who listen, without ever waiting. The message must not change afterwards.
+
+        Raises LookupError where the topic was not advertised, Unencodable where it cannot be sent.
+        """
+        found = self.graph.find(topic)
+        if found is None or SOURCE not in found.publishers:
+            raise LookupError(f"{topic} was not advertised")
+        found.distribute(Outgoing(message))
+
+    def add_service(self, name: str, type: str, handler: Handler, arguments: tuple[str, ...] = ()) -> None:
+        """Offers a service. `handler(args)` answers the values, now or as an awaitable; what it raises is passed on.
+
+        `arguments` are their names in order, for the callers that send a list.
+        """
+        kind = canonical_type(type, self.ros_version, "srv")
+        self.services.add(Service(name=canonical_name(name), type=kind, handler=handler, arguments=arguments))
+
+    def subscribed(self, topic: str) -> None:
+        """Called by a client when it has subscribed."""
+        for callback in self.on_subscribe:
+            callback(topic)
+
+    async def _serve_client(self, connection: Connection) -> None:
+        await Client(self, connection).run()
