@@ -1,0 +1,25 @@
+"""What is known of the link to the vehicle; the shell fills it, the checks read it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Phase = Literal["idle", "connecting", "failed", "monitoring", "lost"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkFacts:
+    """The link at one moment; all times on the clock of `received_s`."""
+
+    phase: Phase = "idle"  # failed: never reached yet; lost: was open, is not; in both it keeps trying
+    since_s: float = 0.0  # when this phase began
+    attempts: int = 0
+    bridge_heard_s: float | None = None  # when the bridge last proved to be alive (pong, service answer, message)
+    bridge_answers: bool = False  # its ROS side answers (get_time)
+    problem_title: str | None = None  # one sentence
+    problem_hint: str | None = None  # what to do
+    topics_subscribed: int = 0
+    connected_s: float | None = None  # when the open connection was made
+    last_message_s: float | None = None  # when the car last said anything
+    published: frozenset[str] = frozenset()  # the signals that discovery found on the car

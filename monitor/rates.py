@@ -1,0 +1,161 @@
+"""How often a signal comes, how often it should, and from when on its silence is a fault."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+WINDOW_S = (
+    5.0  # the measured rate looks back this far: long against Wi-Fi bunching, short against an operator's patience …
+)
+WINDOW_PERIODS = 5  # … or this many periods, for slow signals
+STALE_PERIODS = 10  # rides out bunching on Wi-Fi …
+STALE_FLOOR_S = 1.0  # … and no shorter than this for fast signals
+STARTING_S = (
+    2.0  # before the rate is settled: lets a 1 Hz car pass where 10 Hz is usual, and still keeps the promise of 2 s
+)
+UNDECLARED_S = 10.0  # before the rate of a signal that may have any rate is settled
+BLOCK_S = 2.5  # two blocks in a row that agree are a steady rate: 5 s after connecting at the earliest
+BLOCK_INTERVALS = 5
+STEADY_WITHIN = 0.1  # relative
+DECIDED_BLOCKS = 4  # without agreement by then, the declared rate stands
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rate:
+    """Messages per second of one signal."""
+
+    measured_hz: float | None  # over the sliding window; None: not enough heard yet; 0.0: silent
+    expected_hz: float | None  # None: neither declared, set nor learned
+    settled: bool  # whether `expected_hz` may be held against the car
+
+
+class RateMeter:
+    """Follows the arrivals of one signal.
+
+    What to expect is, in this order: what the operator set; the car's own steady rate; the declared default. Rates
+    differ between healthy cars (a scan at 10, 30 or 75 Hz), so a car which holds its own rate for two blocks of 2.5 s
+    is taken at its word. Later only a steadily *higher* rate is learned: a falling one is what the operator wants to hear about.
+    """
+
+    __slots__ = (
+        "_arrivals",
+        "_block_n",
+        "_block_start_s",
+        "_blocks",
+        "_declared_hz",
+        "_first_s",
+        "_heard",
+        "_last_block_hz",
+        "_last_s",
+        "_learned_hz",
+        "_set_hz",
+    )
+
+    def __init__(self, declared_hz: float | None, set_hz: float | None = None) -> None:
+        self._declared_hz = declared_hz
+        self._set_hz = set_hz
+        self._learned_hz: float | None = None
+        self._blocks = 0
+        self._arrivals: deque[float] = deque(maxlen=20_000)
+        self.restart()
+
+    def restart(self) -> None:
+        """Measure anew: what came before a gap says nothing of the rate after it. What was learned stays."""
+        self._arrivals.clear()
+        self._first_s = 0.0
+        self._last_s: float | None = None
+        self._heard = 0
+        self._block_start_s: float | None = None
+        self._block_n = 0
+        self._last_block_hz: float | None = None
+
+    def expect(self, set_hz: float | None) -> None:
+        """The operator's own figure; None or 0 hands back to learning."""
+        self._set_hz = set_hz or None
+
+    def receive(self, at_s: float) -> None:
+        last_s = self._last_s
+        if last_s is not None and (at_s < last_s or at_s - last_s > self.horizon_s):
+            # A silence long enough to be called stale has its own alarm; a clock that went back tells nothing at all.
+            self.restart()
+            last_s = None
+        if last_s is None:
+            self._first_s = at_s
+        self._last_s = at_s
+        self._heard += 1
+        self._arrivals.append(at_s)
+        self._forget(at_s)
+        self._learn(at_s)
+
+    @property
+    def expected_hz(self) -> float | None:
+        return self._set_hz or self._learned_hz or self._declared_hz
+
+    @property
+    def is_settled(self) -> bool:
+        if self._set_hz or self._learned_hz:
+            return True
+        return self._declared_hz is not None and self._blocks >= DECIDED_BLOCKS
+
+    @property
+    def period_s(self) -> float | None:
+        """Seconds between two messages as far as known; until settled the longer of the declared and the observed."""
+        expected_hz = self.expected_hz
+        if self.is_settled or self._heard < 2 or self._last_s is None:
+            return None if expected_hz is None else 1.0 / expected_hz
+        observed_s = (self._last_s - self._first_s) / (self._heard - 1)
+        period_s = observed_s if expected_hz is None else max(observed_s, 1.0 / expected_hz)
+        return period_s if period_s > 0.0 else None
+
+    @property
+    def horizon_s(self) -> float:
+        """Age from which a reading is stale: max(10 periods, 1 s), more patient until the rate is settled."""
+        period_s = self.period_s
+        if self.is_settled:
+            floor_s = STALE_FLOOR_S
+        else:
+            floor_s = STARTING_S if self._declared_hz is not None else UNDECLARED_S
+        return max(STALE_PERIODS * (period_s or 0.0), floor_s)
+
+    def rate(self, now_s: float) -> Rate:
+        return Rate(measured_hz=self.measured_hz(now_s), expected_hz=self.expected_hz, settled=self.is_settled)
+
+    def measured_hz(self, now_s: float) -> float | None:
+        """Intervals per second within the window; a pause still going on counts from its first missed message."""
+        if self._last_s is None:
+            return None
+        self._forget(now_s)
+        arrivals = self._arrivals
+        if now_s - self._last_s > self.horizon_s:
+            return 0.0
+        if len(arrivals) < 2:
+            return None
+        first_s, last_s = arrivals[0], arrivals[-1]
+        span_s = max(last_s, now_s - (self.period_s or 0.0)) - first_s
+        return (len(arrivals) - 1) / span_s if span_s > 0.0 else None
+
+    def _forget(self, now_s: float) -> None:
+        window_s = max(WINDOW_S, WINDOW_PERIODS * (self.period_s or 0.0))
+        arrivals = self._arrivals
+        while len(arrivals) > 2 and now_s - arrivals[0] > window_s:
+            arrivals.popleft()
+
+    def _learn(self, at_s: float) -> None:
+        if self._block_start_s is None:
+            self._block_start_s = at_s
+            self._block_n = 0
+            return
+        self._block_n += 1
+        span_s = at_s - self._block_start_s
+        if span_s < BLOCK_S or self._block_n < BLOCK_INTERVALS:
+            return
+        block_hz, before_hz = self._block_n / span_s, self._last_block_hz
+        self._block_start_s, self._block_n, self._last_block_hz = at_s, 0, block_hz
+        self._blocks += 1
+        if before_hz is None or abs(block_hz - before_hz) > STEADY_WITHIN * max(block_hz, before_hz):
+            return
+        steady_hz = (block_hz + before_hz) / 2
+        # Only a clear step up is a new rate: following every wobble upward would ratchet the demand.
+        if self._learned_hz is None or min(block_hz, before_hz) > (1 + STEADY_WITHIN) * self._learned_hz:
+            self._learned_hz = steady_hz

@@ -1,0 +1,267 @@
+"""All that is known of one vehicle: readings as they come, and the immutable snapshot that checks judge."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Generic, Literal, TypeVar, overload
+
+from monitor.link import LinkFacts, Phase
+from monitor.rates import Rate, RateMeter
+from monitor.signals import SIGNALS
+from monitor.tracks import TrackPoint
+from monitor.values import (
+    Acceleration,
+    Bearing,
+    Diagnostics,
+    Distance,
+    Effort,
+    GpsFix,
+    Heading,
+    LaserScan,
+    Level,
+    MotionCommand,
+    Odometry,
+    Steering,
+    Twist,
+    Value,
+)
+
+__all__ = ["Extent", "Freshness", "LinkFacts", "NotFresh", "Phase", "Reading", "Snapshot", "State", "TrackPoint"]
+
+AGEING_PERIODS = 3
+AGEING_FLOOR_S = 0.25  # three periods of a 75 Hz signal are one hiccup of Wi-Fi
+RATES_EVERY_S = 0.1  # a rate over 5 s does not change faster
+
+Freshness = Literal["fresh", "ageing", "stale"]
+T_co = TypeVar("T_co", covariant=True)
+
+
+class NotFresh(Exception):
+    """A value is missing or too old to judge by; `short` is the reason in at most 7 letters."""
+
+    def __init__(self, why: str, short: str = "stale") -> None:
+        super().__init__(why)
+        self.why = why
+        self.short = short
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading(Generic[T_co]):
+    """The newest value of a signal, and how old it may grow. Times are on the receiver's monotonic clock."""
+
+    value: T_co
+    received_s: float
+    horizon_s: float  # older than this is stale
+    stamp_s: float | None = (
+        None  # the vehicle's own time, seconds since 1970; another clock: never subtract it from received_s
+    )
+    period_s: float | None = None  # seconds between two messages, as far as known
+    count: int = 0  # messages since connecting; 0 for a derived value
+    derived_from: str | None = None  # the signal it was computed from; None: published by the car
+
+    def age_s(self, now_s: float) -> float:
+        return max(0.0, now_s - self.received_s)
+
+    def is_fresh(self, now_s: float) -> bool:
+        # Both ways: a reading from far in the future says that the clock went back, not that the value is new.
+        return -self.horizon_s <= now_s - self.received_s <= self.horizon_s
+
+    def freshness(self, now_s: float) -> Freshness:
+        if not self.is_fresh(now_s):
+            return "stale"
+        if self.period_s is None:
+            return "fresh"
+        return "ageing" if self.age_s(now_s) > max(AGEING_PERIODS * self.period_s, AGEING_FLOOR_S) else "fresh"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Extent:
+    """Lowest and highest headline number since connecting."""
+
+    lowest: float
+    highest: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Snapshot:
+    """Everything known of a vehicle at one moment, immutable: any moment of a recording can be judged alone."""
+
+    now_s: float
+    readings: Mapping[str, Reading[Any]] = field(default_factory=dict)  # only signals that were ever heard or derived
+    link: LinkFacts = field(default_factory=LinkFacts)
+    rates: Mapping[str, Rate] = field(default_factory=dict)  # of every signal; up to 0.1 s old
+    paused: bool = False
+    heard_s: float | None = None  # when any signal last came
+    extents: Mapping[str, Extent] = field(default_factory=dict)  # where a headline number was ever heard
+    track: tuple[TrackPoint, ...] = ()  # where the car was, thinned and bounded, oldest first
+    track_m: float | None = None  # distance driven since connecting; None: never had a position
+
+    @overload
+    def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...
+    @overload
+    def get(self, signal: Literal["acceleration"]) -> Reading[Acceleration] | None: ...
+    @overload
+    def get(self, signal: Literal["brake", "accelerator"]) -> Reading[Effort] | None: ...
+    @overload
+    def get(self, signal: Literal["steering"]) -> Reading[Steering] | None: ...
+    @overload
+    def get(self, signal: Literal["distance"]) -> Reading[Distance] | None: ...
+    @overload
+    def get(self, signal: Literal["bearing"]) -> Reading[Bearing] | None: ...
+    @overload
+    def get(self, signal: Literal["position"]) -> Reading[GpsFix] | None: ...
+    @overload
+    def get(self, signal: Literal["odometry"]) -> Reading[Odometry] | None: ...
+    @overload
+    def get(self, signal: Literal["heading"]) -> Reading[Heading] | None: ...
+    @overload
+    def get(self, signal: Literal["scan"]) -> Reading[LaserScan] | None: ...
+    @overload
+    def get(self, signal: Literal["diagnostics"]) -> Reading[Diagnostics] | None: ...
+    @overload
+    def get(self, signal: Literal["command"]) -> Reading[MotionCommand] | None: ...
+    @overload
+    def get(self, signal: Literal["fuel"]) -> Reading[Level] | None: ...
+    @overload
+    def get(self, signal: str) -> Reading[Any] | None: ...
+    def get(self, signal: str) -> Reading[Any] | None:
+        """The newest reading whatever its age, None where there was none. To judge by a value use `need`."""
+        return self.readings.get(signal)
+
+    @overload
+    def need(self, signal: Literal["speed"]) -> Twist: ...
+    @overload
+    def need(self, signal: Literal["acceleration"]) -> Acceleration: ...
+    @overload
+    def need(self, signal: Literal["brake", "accelerator"]) -> Effort: ...
+    @overload
+    def need(self, signal: Literal["steering"]) -> Steering: ...
+    @overload
+    def need(self, signal: Literal["distance"]) -> Distance: ...
+    @overload
+    def need(self, signal: Literal["bearing"]) -> Bearing: ...
+    @overload
+    def need(self, signal: Literal["position"]) -> GpsFix: ...
+    @overload
+    def need(self, signal: Literal["odometry"]) -> Odometry: ...
+    @overload
+    def need(self, signal: Literal["heading"]) -> Heading: ...
+    @overload
+    def need(self, signal: Literal["scan"]) -> LaserScan: ...
+    @overload
+    def need(self, signal: Literal["diagnostics"]) -> Diagnostics: ...
+    @overload
+    def need(self, signal: Literal["command"]) -> MotionCommand: ...
+    @overload
+    def need(self, signal: Literal["fuel"]) -> Level: ...
+    @overload
+    def need(self, signal: str) -> Any: ...
+    def need(self, signal: str) -> Any:
+        """The value while it is fresh; raises `NotFresh`, which the runner turns into UNKNOWN, otherwise."""
+        reading = self.readings.get(signal)
+        label = SIGNALS[signal].label
+        if reading is None:
+            if signal in self.link.published:
+                raise NotFresh(f"{label}: nothing received yet", "no data")
+            raise NotFresh(f"{label} is not published", "no data")
+        if not reading.is_fresh(self.now_s):
+            raise NotFresh(f"{label} is {reading.age_s(self.now_s):.1f} s old", "stale")
+        return reading.value
+
+
+class _Heard:
+    """What the state keeps of one signal between messages."""
+
+    __slots__ = ("count", "meter")
+
+    def __init__(self, declared_hz: float | None, set_hz: float | None) -> None:
+        self.meter = RateMeter(declared_hz, set_hz)
+        self.count = 0
+
+
+class State:
+    """The one owner of what is known; only the session writes to it."""
+
+    def __init__(self, expected_hz: Mapping[str, float] | None = None) -> None:
+        self._expected_hz = dict(expected_hz or {})
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything but the operator's rates: another car, or monitoring begins anew."""
+        self._heard = {
+            name: _Heard(signal.expected_hz, self._expected_hz.get(name)) for name, signal in SIGNALS.items()
+        }
+        self._readings: dict[str, Reading[Any]] = {}
+        self._extents: dict[str, Extent] = {}
+        self._rates: Mapping[str, Rate] = MappingProxyType({})
+        self._rates_at_s: float | None = None
+        self._heard_s: float | None = None
+        self._link = LinkFacts()
+        self._paused = False
+
+    def expect(self, expected_hz: Mapping[str, float]) -> None:
+        """The operator's rates [Hz] by signal; 0 or absent: learn the car's own."""
+        self._expected_hz = dict(expected_hz)
+        for name, heard in self._heard.items():
+            heard.meter.expect(self._expected_hz.get(name))
+
+    def receive(self, signal: str, value: Value, received_s: float, stamp_s: float | None = None) -> tuple[str, ...]:
+        """Take one decoded value; returns every signal that changed by it, derived ones included, for `Monitor.step`."""
+        heard = self._heard[signal]
+        heard.count += 1
+        heard.meter.receive(received_s)
+        self._heard_s = received_s
+        self._readings[signal] = Reading(
+            value=value,
+            received_s=received_s,
+            stamp_s=stamp_s,
+            horizon_s=heard.meter.horizon_s,
+            period_s=heard.meter.period_s,
+            count=heard.count,
+        )
+        self._extend(signal, value)
+        return (signal,)
+
+    def link(self, facts: LinkFacts) -> None:
+        """What is now known of the link. A link that opens (again) starts the measuring of rates anew."""
+        before, self._link = self._link, facts
+        opened = before.phase != "monitoring" or before.connected_s != facts.connected_s
+        if facts.phase == "monitoring" and opened:
+            for heard in self._heard.values():
+                heard.meter.restart()
+
+    def set_paused(self, paused: bool) -> None:
+        self._paused = paused
+
+    def snapshot(self, now_s: float) -> Snapshot:
+        """What is known at `now_s`, which later messages do not change."""
+        return Snapshot(
+            now_s=now_s,
+            readings=MappingProxyType(self._readings.copy()),
+            link=self._link,
+            rates=self._measure(now_s),
+            paused=self._paused,
+            heard_s=self._heard_s,
+            extents=MappingProxyType(self._extents.copy()),
+        )
+
+    def _measure(self, now_s: float) -> Mapping[str, Rate]:
+        at_s = self._rates_at_s
+        if at_s is None or not 0.0 <= now_s - at_s < RATES_EVERY_S:
+            self._rates_at_s = now_s
+            self._rates = MappingProxyType({name: heard.meter.rate(now_s) for name, heard in self._heard.items()})
+        return self._rates
+
+    def _extend(self, signal: str, value: Value) -> None:
+        headline = SIGNALS[signal].headline
+        number = None if headline is None else getattr(value, headline, None)
+        if number is None or not math.isfinite(number):
+            return
+        extent = self._extents.get(signal)
+        if extent is None:
+            self._extents[signal] = Extent(lowest=number, highest=number)
+        elif not extent.lowest <= number <= extent.highest:
+            self._extents[signal] = Extent(lowest=min(extent.lowest, number), highest=max(extent.highest, number))

@@ -1,0 +1,179 @@
+"""What the messages of a vehicle say, decoded: SI units, degrees only for WGS84 and compass headings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from monitor import scan as _scan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Twist:
+    """Motion in the body frame, x forward."""
+
+    speed_mps: float  # forward positive
+    yaw_rate_radps: float | None = None  # counter-clockwise; None: the car does not fill it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Acceleration:
+    """Longitudinal acceleration in the body frame."""
+
+    acceleration_mps2: float
+    source: Literal["topic", "speed"] = "topic"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How far a pedal is pressed."""
+
+    percent: float  # 0 … 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Steering:
+    """How far the steering is turned."""
+
+    percent: float  # −100 … 100, negative = left
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Distance:
+    """Distance to the nearest object ahead."""
+
+    distance_m: float | None  # None: nothing in range, or the estimator did not say
+    none_in_range: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bearing:
+    """Where the nearest object is."""
+
+    bearing_rad: float | None  # counter-clockwise, 0 ahead; None: unknown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GpsFix:
+    """A position on the WGS84 ellipsoid with its horizontal one-sigma error."""
+
+    lat_deg: float
+    lon_deg: float
+    alt_m: float | None = None  # above the ellipsoid
+    status: int = 0  # NavSatStatus: −1 no fix, 0 fix, 1 satellite augmented, 2 ground augmented
+    covariance_type: int = 0
+    sigma_m: float | None = None  # None: quality unknown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Odometry:
+    """Pose in `frame_id` and forward speed in the body frame."""
+
+    x_m: float
+    y_m: float
+    z_m: float | None = None
+    yaw_rad: float | None = None  # counter-clockwise; in an earth-fixed frame 0 is east (REP-103)
+    speed_mps: float | None = None
+    frame_id: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Heading:
+    """Compass heading of the vehicle's nose."""
+
+    heading_deg: float  # 0 north, clockwise, 0 ≤ heading < 360
+    source: Literal["topic", "odometry", "track"] = "topic"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LaserScan:
+    """One sweep of a laser; beam i stands at angle_min_rad + i·angle_increment_rad in the laser's frame."""
+
+    ranges_m: NDArray[np.float32]  # NaN, +Inf and −Inf kept as they came (REP-117); never written to
+    angle_min_rad: float
+    angle_max_rad: float
+    angle_increment_rad: float  # may be negative
+    time_increment_s: float
+    scan_time_s: float
+    range_min_m: float
+    range_max_m: float
+    frame_id: str
+
+    @property
+    def beams(self) -> int:
+        return int(self.ranges_m.size)
+
+    @property
+    def usable(self) -> int:
+        """How many beams measured something: finite and within [range_min_m, range_max_m]."""
+        return int(np.count_nonzero(_scan.usable(self.ranges_m, self.range_min_m, self.range_max_m)))
+
+    @property
+    def nearest(self) -> tuple[float, float] | None:
+        """Range [m] and bearing [rad, counter-clockwise] of the nearest usable return, None without any."""
+        found = _scan.nearest(self.ranges_m, self.range_min_m, self.range_max_m)
+        if found is None:
+            return None
+        index, range_m = found
+        return range_m, self.angle_min_rad + index * self.angle_increment_rad
+
+    @property
+    def nearest_m(self) -> float | None:
+        found = _scan.nearest(self.ranges_m, self.range_min_m, self.range_max_m)
+        return None if found is None else found[1]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Component:
+    """One line of the vehicle's own diagnostics."""
+
+    name: str
+    level: int  # 0 OK, 1 WARN, 2 ERROR, 3 STALE
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnostics:
+    """The vehicle's own diagnostics."""
+
+    components: tuple[Component, ...] = ()
+
+    @property
+    def worst(self) -> int:
+        return max((component.level for component in self.components), default=0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionCommand:
+    """What the vehicle is asked to do."""
+
+    speed_mps: float | None
+    tyre_angle_rad: float | None  # counter-clockwise; not a yaw rate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Level:
+    """How much of something is left."""
+
+    value: float
+    unit: str  # "%" or "l"
+
+
+Value = (
+    Twist
+    | Acceleration
+    | Effort
+    | Steering
+    | Distance
+    | Bearing
+    | GpsFix
+    | Odometry
+    | Heading
+    | LaserScan
+    | Diagnostics
+    | MotionCommand
+    | Level
+)
