@@ -66,7 +66,9 @@ def parse(text: str) -> Address:
         raise _wrong_scheme(typed, scheme.lower())
     elif scheme.lower() not in ("ws", "wss"):
         raise BadAddress(
-            f"“{scheme[:20]}” is not a way to reach a car.", "Use ws:// or wss://, or only host and port.", code="scheme"
+            f"“{scheme[:20]}” is not a way to reach a car.",
+            "Use ws:// or wss://, or only host and port.",
+            code="scheme",
         )
     return _split(typed)
 

@@ -41,6 +41,7 @@ class LocalBus:
         self._handlers: dict[str, Handler] = {}
         self._watchers: dict[str, dict[int, Watcher]] = {}
         self._next_watcher = 0
+        self._wanted: dict[tuple[str, str], int] = {}
 
     def put(self, vehicle: str, kind: str, payload: str | bytes) -> None:
         """Replaces the newest frame of a kind and wakes those who watch the vehicle."""
@@ -92,7 +93,15 @@ class LocalBus:
         return lambda: self._watchers[vehicle].pop(key, None) and None
 
     def watched(self, vehicle: str) -> int:
+        """How many look at the vehicle."""
         return len(self._watchers.get(vehicle, ()))
+
+    def want(self, vehicle: str, kind: str, change: int) -> None:
+        """One looker more (+1) or fewer (−1) for a kind of frame that is only made while somebody looks."""
+        self._wanted[vehicle, kind] = self._wanted.get((vehicle, kind), 0) + change
+
+    def wanted(self, vehicle: str, kind: str) -> bool:
+        return self._wanted.get((vehicle, kind), 0) > 0
 
     def _wake(self, vehicle: str, kind: str) -> None:
         for watcher in tuple(self._watchers.get(vehicle, {}).values()):

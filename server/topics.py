@@ -18,7 +18,9 @@ class Topic:
     signal: str
     names: tuple[str, ...]  # tried in this order, whatever the case of their letters
     types: Mapping[str, Decode]  # ROS 1 spelling; the first is the expected one
-    by_type: tuple[str, ...] = ()  # types that only this signal has: taken under any name when none of the names is there
+    by_type: tuple[
+        str, ...
+    ] = ()  # types that only this signal has: taken under any name when none of the names is there
     queue_length: int = 50  # messages the bridge keeps for us in a burst; 1 for what is large and fast
     compression: str = "none"
 

@@ -1,0 +1,120 @@
+"""Builds one server: its sessions, its bus, its pages. No module-level state: two apps can live in one process."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from fastapi import FastAPI
+
+from server.bus import LocalBus
+from server.config import Config
+from server.hub import Hub
+from server.journal import Journal
+from server.session import Session
+from server.version import catgraph_version
+from server.web import api, docs, errors, metrics, pages
+from server.web.headers import SecurityHeaders
+
+log = logging.getLogger("catgraph.app")
+
+
+@dataclass(slots=True)
+class Running:
+    """What the routes of one app use."""
+
+    config: Config
+    bus: LocalBus
+    hub: Hub
+    sessions: dict[str, Session]
+    now: Callable[[], float]
+    wall_ms: Callable[[], int]
+    boot: str
+    version: str
+    started_s: float
+
+    def server_facts(self) -> dict[str, Any]:
+        """The `server` part of a state."""
+        return {
+            "time_ms": self.wall_ms(),
+            "boot": self.boot,
+            "version": self.version,
+            "pages": self.hub.pages,
+            "frames_skipped": self.hub.skipped,
+        }
+
+    def hello(self, vehicle: str) -> dict[str, Any]:
+        return {
+            "kind": "hello",
+            "version": self.version,
+            "boot": self.boot,
+            "vehicle": vehicle,
+            "vehicles": list(self.sessions),
+            "time_ms": self.wall_ms(),
+            "last_event": self.bus.last_event(vehicle),
+            "veil_after_s": 2.0,
+        }
+
+
+def create_app(
+    config: Config,
+    *,
+    now: Callable[[], float] = time.monotonic,
+    wall_ms: Callable[[], int] = lambda: time.time_ns() // 1_000_000,
+) -> FastAPI:
+    """The ASGI application; its sessions run from its start-up to its shut-down.
+
+    Raises OSError when the data folder cannot be used, AssetsMissing when the page's files are not there.
+    """
+    if config.data is not None:
+        config.data.mkdir(parents=True, exist_ok=True)
+    journal = Journal(config.data / "events.sqlite" if config.data is not None else None)
+    bus = LocalBus(journal, now=now)
+    running = Running(
+        config=config,
+        bus=bus,
+        hub=Hub(bus, now=now),
+        sessions={},
+        now=now,
+        wall_ms=wall_ms,
+        boot=secrets.token_hex(8),
+        version=catgraph_version(),
+        started_s=now(),
+    )
+    for vehicle in config.vehicles:
+        running.sessions[vehicle.name] = Session(
+            vehicle, bus, now=now, wall_ms=wall_ms, server=running.server_facts, allowed_hosts=config.allowed_hosts
+        )
+
+    @asynccontextmanager
+    async def life(_: FastAPI) -> AsyncIterator[None]:
+        for session in running.sessions.values():
+            await session.start()
+        try:
+            yield
+        finally:
+            await asyncio.gather(*(session.stop() for session in running.sessions.values()))
+            journal.close()
+
+    app = FastAPI(
+        title="catgraph",
+        version=running.version,
+        description="Operator control unit for a test vehicle: its state, its alarms, its connection.",
+        lifespan=life,
+        docs_url=None,  # FastAPI's own page loads its scripts from the internet
+        redoc_url=None,
+    )
+    app.state.running = running
+    app.add_middleware(SecurityHeaders)
+    errors.install(app)
+    app.include_router(api.router)
+    app.include_router(metrics.router)
+    app.include_router(docs.router)
+    pages.install(app)
+    return app

@@ -1,0 +1,70 @@
+"""What a page may ask for: one model a command, refused with a sentence where it does not fit."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+MAX_COMMAND_BYTES = 16 * 1024
+Name = Annotated[str, Field(min_length=1, max_length=120)]
+Number = Annotated[int, Field(ge=0, le=2**53)]
+
+
+class _Command(BaseModel):
+    model_config = ConfigDict(extra="ignore", strict=True, frozen=True)
+    id: Annotated[str, Field(max_length=80)] | None = None
+
+
+class Connect(_Command):
+    kind: Literal["connect"]
+    address: Annotated[str, Field(max_length=300)]
+
+
+class Retry(_Command):
+    kind: Literal["retry"]
+
+
+class Disconnect(_Command):
+    kind: Literal["disconnect"]
+
+
+class Pause(_Command):
+    kind: Literal["pause"]
+
+
+class Resume(_Command):
+    kind: Literal["resume"]
+
+
+class Acknowledge(_Command):
+    kind: Literal["acknowledge"]
+    alarm: Name
+    occurrence: Number
+
+
+class Shelve(_Command):
+    kind: Literal["shelve"]
+    alarm: Name
+    occurrence: Number
+    minutes: Annotated[float, Field(gt=0, le=15)] = 5.0
+
+
+Command = Connect | Retry | Disconnect | Pause | Resume | Acknowledge | Shelve
+_COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
+
+
+class NotUnderstood(ValueError):
+    """The command does not fit its model; `str()` is one sentence."""
+
+
+def read(command: Any) -> Command:
+    """The command in a decoded JSON value. Raises NotUnderstood."""
+    try:
+        return _COMMANDS.validate_python(command)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False, include_input=False)[0]
+        if first["type"] in ("union_tag_invalid", "union_tag_not_found"):
+            raise NotUnderstood("There is no such command.") from None
+        where = ".".join(str(part) for part in first["loc"][1:]) or "the command"
+        raise NotUnderstood(f"{where}: {first['msg']}.") from None

@@ -1,0 +1,203 @@
+"""The whole state of a vehicle as docs/protocol.md has it, from what the session, the monitor and the link know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from monitor import catalog
+from monitor.runner import Monitor
+from monitor.signals import SIGNALS, Signal
+from monitor.state import Reading, Snapshot
+from server import problems, wire
+from server.address import Address
+from server.link import RosLink
+from server.problems import Problem
+from server.reception import Reception, Tally
+from server.topics import Source
+
+CAR_SILENT_S = 1.4  # said before 2 s are over; the slowest of the fast signals comes ten times a second
+NO_MESSAGE_S = 5.0
+ROS_GONE_S = 2.5  # one unanswered question may be lost; three are a sign
+STANDING_MPS = 0.3  # below, a time gap says nothing
+REACTION_S = 1.0  # the safety driver's, with the foot ready
+BRAKING_MPS2 = 3.0  # what the driver brakes with, dry road, no emergency
+GAUGE_MAX_MPS = 15.0
+GAUGE_MAX_MPS2 = 3.0
+STANDOFF_M = 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Facts:
+    """What only the session knows; `…_s` without `for` are moments of its monotonic clock."""
+
+    vehicle: str
+    server: Mapping[str, Any]
+    now_s: float
+    wall_ms: int
+    phase: str
+    address: Address | None
+    ros_version: int | None
+    connected_s: float | None
+    paused_since_s: float | None
+    since_s: float
+    dialled_s: float
+    problem: Problem | None
+    link: RosLink | None
+    last_message_s: float | None
+    ros_answered_s: float | None
+    ros_alive: bool | None
+    offers_nothing: bool
+    bridge_answers: bool
+    reception: Reception
+    sources: Mapping[str, Source]
+    topics_heard: int
+
+
+def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str, Any]:
+    """The object of `GET /api/state`, without its `seq`."""
+    return {
+        "kind": "state",
+        "vehicle": facts.vehicle,
+        "server": dict(facts.server),
+        "session": _session(facts, snapshot),
+        "link": _link(facts, snapshot),
+        "signals": {name: _signal(signal, facts, snapshot) for name, signal in SIGNALS.items()},
+        "nearest": _nearest(snapshot),
+        "checks": [wire.tile(tile) for tile in monitor.tiles()],
+        "alarms": [wire.alarm(alarm, facts.now_s, facts.wall_ms) for alarm in monitor.standing()],
+        "limits": {
+            **catalog.flat(monitor.limits),
+            "gauge.speed_max_mps": GAUGE_MAX_MPS,
+            "gauge.acceleration_max_mps2": GAUGE_MAX_MPS2,
+            "obstacle.standoff_m": STANDOFF_M,
+        },
+        "recording": {"state": "off", "for_s": None},
+        "decelerate": {"state": "not_available", "why": "not configured"},
+        "control": {"holder": None},
+    }
+
+
+def _session(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
+    connected_for = facts.now_s - facts.connected_s if facts.connected_s is not None else None
+    return {
+        "phase": facts.phase,
+        "address": facts.address.url if facts.address else None,
+        "name": facts.address.shown if facts.address else None,
+        "ros_version": facts.ros_version,
+        "connected_for_s": wire.plain(connected_for, 1),
+        "paused": facts.paused_since_s is not None,
+        "paused_for_s": round(facts.now_s - facts.paused_since_s, 1) if facts.paused_since_s is not None else 0.0,
+        "track_m": wire.plain(snapshot.track_m, 1),
+        "received": facts.reception.received,
+        "rejected": facts.reception.rejected,
+    }
+
+
+def _link(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
+    cut, problem, heard_s = where_cut(facts, snapshot)
+    link = facts.link
+    bridge_heard_s = link.heard_s if link is not None else None
+    return {
+        "cut": cut,
+        "since_ms": round(facts.wall_ms - (facts.now_s - heard_s) * 1000) if cut and heard_s is not None else None,
+        "bridge_age_s": wire.plain(facts.now_s - bridge_heard_s, 2) if bridge_heard_s is not None else None,
+        "car_age_s": wire.plain(facts.now_s - facts.last_message_s, 2) if facts.last_message_s is not None else None,
+        "problem": problem.as_json() if problem else None,
+        "attempts": link.attempts if link is not None else 0,
+        "trying_for_s": round(facts.now_s - facts.dialled_s, 1)
+        if facts.phase in ("connecting", "failed", "lost")
+        else 0.0,
+        "topics_subscribed": len(link.subscriptions) if link is not None else 0,
+        "topics_heard": facts.topics_heard,
+        "unreadable_frames": facts.reception.frames.rejected,
+        "unreadable_why": facts.reception.frames.last_reason,
+    }
+
+
+def where_cut(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Problem | None, float | None]:
+    """Which wire of the chain is broken, why, and when what lies beyond it was last heard."""
+    if facts.phase == "idle":
+        return None, None, None
+    heard_s = facts.link.heard_s if facts.link is not None else None
+    if facts.phase in ("connecting", "failed"):
+        return ("server-bridge" if facts.phase == "failed" else None), facts.problem, heard_s
+    if facts.phase == "lost":
+        return "server-bridge", facts.problem, heard_s
+    if not facts.bridge_answers and facts.address is not None:
+        return "server-bridge", problems.bridge_silent(facts.address), heard_s
+    return _behind_the_bridge(facts, snapshot)
+
+
+def _behind_the_bridge(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Problem | None, float | None]:
+    last_s = facts.last_message_s
+    opened_s = max(facts.since_s, facts.connected_s or facts.since_s)
+    answered_s = facts.ros_answered_s
+    ros_is_gone = facts.ros_alive is False and answered_s is not None and facts.now_s - answered_s > ROS_GONE_S
+    if last_s is None:
+        if facts.now_s - opened_s < NO_MESSAGE_S:
+            return None, None, None
+        return "bridge-car", problems.NOTHING_KNOWN if facts.offers_nothing else problems.NO_MESSAGE, None
+    if facts.now_s - last_s < CAR_SILENT_S or any(r.is_fresh(facts.now_s) for r in snapshot.readings.values()):
+        return None, None, None
+    return "bridge-car", problems.ROS_GONE if ros_is_gone else problems.CAR_SILENT, last_s
+
+
+def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
+    source = facts.sources.get(signal.name)
+    reading: Reading[Any] | None = snapshot.readings.get(signal.name)
+    tally = facts.reception.by_signal.get(signal.name) or Tally()
+    rate = snapshot.rates.get(signal.name)
+    extent = snapshot.extents.get(signal.name)
+    if reading is not None:
+        freshness = reading.freshness(facts.now_s)
+    elif source is not None and source.decode is not None:
+        freshness = "never"
+    else:
+        freshness = "not_published"
+    return {
+        "label": signal.label,
+        "unit": signal.unit,
+        "freshness": freshness,
+        "age_s": wire.plain(reading.age_s(facts.now_s), 3) if reading else None,
+        "horizon_s": wire.plain(reading.horizon_s, 2) if reading else None,
+        "period_s": wire.plain(reading.period_s, 4) if reading else None,
+        "expected_hz": wire.plain(rate.expected_hz, 1) if rate else signal.expected_hz,
+        "rate_hz": wire.plain(rate.measured_hz, 1) if rate else None,
+        "topic": source.topic if source else None,
+        "type": source.type if source else None,
+        "note": source.note if source else None,
+        "count": tally.received,
+        "rejected": tally.rejected,
+        "rejected_why": tally.last_reason,
+        "repaired": tally.repaired,
+        "repaired_why": tally.repaired_why,
+        "value": wire.value(reading.value) if reading else None,
+        "lowest": wire.plain(extent.lowest) if extent else None,
+        "highest": wire.plain(extent.highest) if extent else None,
+    }
+
+
+def _nearest(snapshot: Snapshot) -> dict[str, float | None]:
+    """Time gap and stopping distance, from speed and nearest object while both are fresh.
+
+    Stopping distance = v·t + v²/2a (DOMAIN: reaction time t, deceleration a); time gap = gap / own speed (SAE J2944).
+    """
+    speed = _fresh(snapshot, "speed")
+    distance = _fresh(snapshot, "distance")
+    if speed is None:
+        return {"time_gap_s": None, "stopping_m": None}
+    v = abs(speed.speed_mps)
+    gap = (
+        distance.distance_m / v
+        if distance is not None and distance.distance_m is not None and v > STANDING_MPS
+        else None
+    )
+    stopping = v * REACTION_S + v * v / (2 * BRAKING_MPS2) if v > STANDING_MPS else 0.0
+    return {"time_gap_s": wire.plain(gap, 2), "stopping_m": wire.plain(stopping, 2)}
+
+
+def _fresh(snapshot: Snapshot, name: str) -> Any:
+    reading = snapshot.readings.get(name)
+    return reading.value if reading is not None and reading.is_fresh(snapshot.now_s) else None

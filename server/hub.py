@@ -1,0 +1,238 @@
+"""The pages of one server: each is offered what is new, takes the newest, and is told every event once.
+
+Nothing is pushed but offers and events, at most one of each unanswered (docs/protocol.md says why), so a page that stops
+reading costs nothing, delays nobody, and finds nothing old when it comes back.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import orjson
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from server import commands
+from server.bus import LocalBus, NotServed
+
+log = logging.getLogger("catgraph.hub")
+
+EVENTS_A_BATCH = 100
+MAX_PAGES = 500
+MAX_COMPLAINTS = 200  # a page that sends nothing sensible is let go
+FRAME_KINDS = ("state", "scan")
+
+
+class Page:
+    """One page's connection, from its acceptance to its end."""
+
+    def __init__(
+        self, socket: WebSocket, bus: LocalBus, vehicle: str, *, hello: Mapping[str, Any], now: Callable[[], float]
+    ):
+        self._socket = socket
+        self._bus = bus
+        self._vehicle = vehicle
+        self._hello = hello
+        self._now = now
+        self._wake = asyncio.Event()
+        self._sent = dict.fromkeys(FRAME_KINDS, 0)  # number of the newest frame of a kind this page got
+        self._watches_scan = False
+        self._seq = 0
+        self._offered = False  # an offer stands unanswered
+        self._take = False  # the page asked for the newest
+        self._replies: list[dict[str, Any]] = []
+        self._event = bus.last_event(vehicle)  # the last number sent
+        self._events_due = False
+        self._events_unanswered = False
+        self._said_hello = False
+        self._complaints = 0
+        self.skipped = 0  # frames that were replaced by newer ones before this page could take them
+
+    async def serve(self) -> None:
+        """Runs until the page leaves."""
+        unwatch = self._bus.watch(self._vehicle, self._something_new)
+        writer = asyncio.create_task(self._write(), name="page writer")
+        try:
+            await self._read()
+        except (WebSocketDisconnect, RuntimeError):
+            pass  # it left, perhaps while something was being sent
+        finally:
+            unwatch()
+            self._watch_scan(False)
+            writer.cancel()
+            with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError, OSError):
+                await writer
+
+    # -- from the bus ------------------------------------------------------------------------------------------------
+
+    def _something_new(self, kind: str) -> None:
+        if kind == "events":
+            self._events_due = True
+        elif self._offered or (kind == "scan" and not self._watches_scan):
+            if kind == "state":
+                self.skipped += 1
+            return
+        self._wake.set()
+
+    # -- from the page -----------------------------------------------------------------------------------------------
+
+    async def _read(self) -> None:
+        while self._complaints < MAX_COMPLAINTS:
+            received = await self._socket.receive()
+            if received["type"] == "websocket.disconnect":
+                return
+            text = received.get("text")
+            if text is None or len(text) > commands.MAX_COMMAND_BYTES:
+                self._complain("A page's message is text of at most 16 kB.")
+                continue
+            try:
+                message = orjson.loads(text)
+            except orjson.JSONDecodeError:
+                self._complain("That was not JSON.")
+                continue
+            if not isinstance(message, dict):
+                self._complain("A message is an object with a kind.")
+                continue
+            await self._obey(message)
+        await self._socket.close(code=1008, reason="too many messages that make no sense")
+
+    async def _obey(self, message: dict[str, Any]) -> None:
+        match message.get("kind"):
+            case "take":
+                self._offered = False
+                self._take = True
+                self._wake.set()
+            case "have":
+                self._events_unanswered = False
+                self._events_due = True
+                self._wake.set()
+            case "watch":
+                self._watch_scan(message.get("scan") is True)
+            case "hello":
+                self._hear_hello(message)
+            case _:
+                await self._command(message)
+
+    def _hear_hello(self, message: Mapping[str, Any]) -> None:
+        have = message.get("have_event")
+        if type(have) is int and 0 <= have <= self._bus.last_event(self._vehicle) and not self._said_hello:
+            self._event = have
+            self._events_due = True
+        self._said_hello = True
+        self._wake.set()
+
+    async def _command(self, message: dict[str, Any]) -> None:
+        identity = message.get("id")
+        if not isinstance(identity, str) or len(identity) > 80:
+            self._complain("A command carries an id of at most 80 letters.")
+            return
+        try:
+            answer = await self._bus.request(self._vehicle, message)
+        except NotServed as why:
+            answer = {"ok": False, "reason": f"{str(why).capitalize()}."}
+        self._replies.append({"kind": "reply", "id": identity, **answer})
+        self._wake.set()
+
+    def _complain(self, reason: str) -> None:
+        self._complaints += 1
+        self._replies.append({"kind": "problem", "reason": reason})
+        self._wake.set()
+
+    def _watch_scan(self, wanted: bool) -> None:
+        if wanted != self._watches_scan:
+            self._watches_scan = wanted
+            self._bus.want(self._vehicle, "scan", +1 if wanted else -1)
+
+    # -- to the page -------------------------------------------------------------------------------------------------
+
+    async def _write(self) -> None:
+        try:
+            await self._send(self._hello)
+            await self._send_newest("state", unasked=True)
+            while True:
+                await self._wake.wait()
+                self._wake.clear()
+                await self._write_round()
+        except (WebSocketDisconnect, RuntimeError, OSError):
+            return  # the reader notices the same end
+
+    async def _write_round(self) -> None:
+        replies, self._replies = self._replies, []
+        for reply in replies:
+            await self._send(reply)
+        if self._events_due and not self._events_unanswered:
+            await self._send_events()
+        if self._take:
+            self._take = False
+            await self._send_newest("state")
+            if self._watches_scan:
+                await self._send_newest("scan")
+        if not self._offered:
+            await self._offer()
+
+    async def _send_events(self) -> None:
+        self._events_due = False
+        events = self._bus.events_after(self._vehicle, self._event, EVENTS_A_BATCH)
+        if events:
+            self._events_unanswered = True
+            self._event = events[-1]["n"]
+            await self._send({"kind": "events", "events": events, "last": self._bus.last_event(self._vehicle)})
+
+    async def _offer(self) -> None:
+        fresh = [kind for kind in FRAME_KINDS if self._is_new(kind)]
+        if fresh:
+            self._seq += 1
+            self._offered = True
+            await self._send({"kind": "offer", "seq": self._seq, "of": fresh})
+
+    def _is_new(self, kind: str) -> bool:
+        if kind == "scan" and not self._watches_scan:
+            return False
+        frame = self._bus.newest(self._vehicle, kind)
+        return frame is not None and frame.number > self._sent[kind]
+
+    async def _send_newest(self, kind: str, *, unasked: bool = False) -> None:
+        frame = self._bus.newest(self._vehicle, kind)
+        if frame is None or (frame.number <= self._sent[kind] and not unasked):
+            return
+        self._sent[kind] = frame.number
+        if isinstance(frame.payload, bytes):
+            await self._socket.send_bytes(frame.payload)
+        else:
+            await self._socket.send_text(frame.payload)
+
+    async def _send(self, message: Mapping[str, Any]) -> None:
+        await self._socket.send_text(orjson.dumps(message).decode())
+
+
+class Hub:
+    """All pages of the server."""
+
+    def __init__(self, bus: LocalBus, *, now: Callable[[], float]) -> None:
+        self._bus = bus
+        self._now = now
+        self._pages: set[Page] = set()
+
+    @property
+    def pages(self) -> int:
+        return len(self._pages)
+
+    @property
+    def skipped(self) -> int:
+        return sum(page.skipped for page in self._pages)
+
+    async def serve(self, socket: WebSocket, vehicle: str, hello: Mapping[str, Any]) -> None:
+        """Serves one page until it leaves."""
+        await socket.accept()
+        if len(self._pages) >= MAX_PAGES:
+            await socket.close(code=1013, reason="too many pages")
+            return
+        page = Page(socket, self._bus, vehicle, hello=hello, now=self._now)
+        self._pages.add(page)
+        try:
+            await page.serve()
+        finally:
+            self._pages.discard(page)

@@ -1,0 +1,44 @@
+"""Every error as a problem document (RFC 9457), with one sentence for a person."""
+
+from __future__ import annotations
+
+import logging
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+log = logging.getLogger("catgraph.web")
+
+
+def problem(status: int, detail: str, **more: Any) -> JSONResponse:
+    """A problem document; `type` is about:blank, so `title` is the status in words."""
+    body = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail, **more}
+    return JSONResponse(body, status_code=status, media_type="application/problem+json")
+
+
+def install(app: FastAPI) -> None:
+    """Lets the app answer all its errors this way."""
+
+    @app.exception_handler(HTTPException)
+    async def of_http(_: Request, error: HTTPException) -> JSONResponse:
+        answer = problem(error.status_code, str(error.detail))
+        answer.headers.update(error.headers or {})
+        return answer
+
+    @app.exception_handler(RequestValidationError)
+    async def of_validation(_: Request, error: RequestValidationError) -> JSONResponse:
+        faults = [
+            {"where": ".".join(str(part) for part in fault["loc"][1:]), "what": fault["msg"]}
+            for fault in error.errors()
+        ]
+        first = faults[0] if faults else {"where": "", "what": "not understood"}
+        return problem(422, f"{first['where'] or 'The request'}: {first['what']}.", errors=faults[:20])
+
+    @app.exception_handler(Exception)
+    async def of_bug(_: Request, error: Exception) -> JSONResponse:
+        log.error("a request failed", exc_info=error)
+        return problem(500, "The server made a mistake; it is in its log.")

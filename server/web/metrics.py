@@ -1,0 +1,49 @@
+"""Counters for a Prometheus that watches the server, in its text format."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request
+from fastapi.responses import PlainTextResponse
+
+from server.web.api import running
+
+router = APIRouter()
+_TEXT = "text/plain; version=0.0.4; charset=utf-8"
+
+
+@router.get("/metrics", tags=["server"], summary="Counters, as Prometheus reads them", response_class=PlainTextResponse)
+async def metrics(request: Request) -> PlainTextResponse:
+    app = running(request)
+    lines = []
+
+    def add(name: str, kind: str, help: str, rows: list[tuple[str, float]]) -> None:
+        lines.append(f"# HELP catgraph_{name} {help}")
+        lines.append(f"# TYPE catgraph_{name} {kind}")
+        lines.extend(f"catgraph_{name}{labels} {value:g}" for labels, value in rows)
+
+    add("pages", "gauge", "Pages connected.", [("", app.hub.pages)])
+    add(
+        "frames_skipped_total",
+        "counter",
+        "Frames replaced by newer ones before a page took them.",
+        [("", app.hub.skipped)],
+    )
+    add("up_seconds", "gauge", "Seconds since the server started.", [("", app.now() - app.started_s)])
+    received, rejected, open_, lag = [], [], [], []
+    for name, session in app.sessions.items():
+        vehicle = f'vehicle="{name}"'
+        for signal, tally in session.tallies().items():
+            received.append((f'{{{vehicle},signal="{signal}"}}', float(tally.received)))
+            rejected.append((f'{{{vehicle},signal="{signal}"}}', float(tally.rejected)))
+        open_.append((f"{{{vehicle}}}", float(session.phase == "monitoring")))
+        lag.append((f"{{{vehicle}}}", session.lag_s))
+    add("messages_received_total", "counter", "Messages of the car, proper or not, since it was connected.", received)
+    add(
+        "messages_rejected_total",
+        "counter",
+        "Messages that were not proper ones, since the car was connected.",
+        rejected,
+    )
+    add("link_open", "gauge", "1 while the bridge is connected.", open_)
+    add("tick_lag_seconds", "gauge", "How late the newest tick was.", lag)
+    return PlainTextResponse("\n".join(lines) + "\n", media_type=_TEXT)

@@ -1,0 +1,61 @@
+"""The page and its files."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from pathlib import Path
+
+from fastapi import FastAPI, Request
+from fastapi.responses import HTMLResponse, Response
+from fastapi.templating import Jinja2Templates
+from starlette.exceptions import HTTPException
+from starlette.responses import FileResponse
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from server.web.api import running, vehicle_of
+from server.web.assets import check_vendor, static_dir, templates_dir
+
+_YEAR = "public, max-age=31536000, immutable"
+
+
+class StampedFiles(StaticFiles):
+    """Static files; those asked for with the hash of their content may be kept for ever."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        query = scope.get("query_string", b"")
+        response.headers["Cache-Control"] = _YEAR if query.startswith(b"v=") else "no-cache"
+        return response
+
+
+def install(app: FastAPI) -> None:
+    """Serves `/`, `/static/…` and the manifest. Raises AssetsMissing when the page's files are not there."""
+    check_vendor()
+    static = static_dir()
+    templates = Jinja2Templates(directory=templates_dir())
+
+    @lru_cache(maxsize=512)
+    def digest(path: Path, changed_ns: int) -> str:
+        return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+
+    def asset(name: str) -> str:
+        """The address of a static file, with the hash of its content so that no stale copy is ever used."""
+        path = static / name
+        return f"/static/{name}?v={digest(path, path.stat().st_mtime_ns)}"
+
+    templates.env.globals["asset"] = asset
+    app.mount("/static", StampedFiles(directory=static), name="static")
+
+    @app.get("/", response_class=HTMLResponse, include_in_schema=False)
+    async def page(request: Request, vehicle: str | None = None) -> HTMLResponse:
+        context = {"version": running(request).version, "vehicle": vehicle_of(running(request), vehicle)}
+        return templates.TemplateResponse(request, "page.html", context)
+
+    @app.get("/manifest.webmanifest", include_in_schema=False)
+    async def manifest() -> FileResponse:
+        path = static / "manifest.webmanifest"
+        if not path.is_file():
+            raise HTTPException(404, "There is no manifest.")
+        return FileResponse(path, media_type="application/manifest+json")

@@ -1,0 +1,193 @@
+"""What a page is told, as docs/protocol.md has it: signals, alarms and events as JSON, scans as bytes. Pure functions."""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor import values
+from monitor.alarm import Alarm, Transition
+from monitor.check import Quantity
+from monitor.runner import Tile
+
+SCAN_MAGIC = 0x53
+SCAN_VERSION = 1
+SCAN_HEADER = struct.Struct("<BBHIfffff")  # 28 bytes, so that the ranges that follow are aligned
+UNUSABLE, TOO_CLOSE, NOTHING, INVALID = 0, 65535, 65534, 65533
+_STEPS = 65000  # units from 0 to range_max: 1.2 mm for a range of 81 m
+_OPEN_RANGE_M = 200.0  # the scale's end for a sensor that states none
+SHOWN_COMPONENTS = 50
+
+
+def plain(number: float | None, digits: int = 4) -> float | None:
+    """A number as JSON may carry it: rounded, never NaN or infinite."""
+    return round(float(number), digits) if number is not None and math.isfinite(number) else None
+
+
+def value(reading: Any) -> dict[str, Any] | None:
+    """The fields of a signal's value, as the table of docs/protocol.md names them."""
+    match reading:
+        case values.Twist():
+            return {"speed_mps": plain(reading.speed_mps), "yaw_rate_radps": plain(reading.yaw_rate_radps)}
+        case values.Acceleration():
+            return {"acceleration_mps2": plain(reading.acceleration_mps2), "source": reading.source}
+        case values.Effort() | values.Steering():
+            return {"percent": plain(reading.percent)}
+        case values.Distance():
+            return {"distance_m": plain(reading.distance_m), "none_in_range": reading.none_in_range}
+        case values.Bearing():
+            return {"bearing_rad": plain(reading.bearing_rad)}
+        case values.GpsFix():
+            return {
+                "lat_deg": plain(reading.lat_deg, 8),
+                "lon_deg": plain(reading.lon_deg, 8),
+                "alt_m": plain(reading.alt_m, 2),
+                "status": reading.status,
+                "sigma_m": plain(reading.sigma_m, 2),
+            }
+        case values.Odometry():
+            return {
+                "x_m": plain(reading.x_m, 3),
+                "y_m": plain(reading.y_m, 3),
+                "yaw_rad": plain(reading.yaw_rad),
+                "speed_mps": plain(reading.speed_mps),
+            }
+        case values.Heading():
+            return {"heading_deg": plain(reading.heading_deg, 1), "source": reading.source}
+        case values.LaserScan():
+            return _scan_summary(reading)
+        case values.Diagnostics():
+            rows = [{"name": c.name, "level": c.level, "message": c.message} for c in reading.components]
+            worst = max((c.level for c in reading.components), default=0)
+            return {"worst": worst, "components": sorted(rows, key=lambda row: -row["level"])[:SHOWN_COMPONENTS]}
+        case values.MotionCommand():
+            return {"speed_mps": plain(reading.speed_mps), "tyre_angle_rad": plain(reading.tyre_angle_rad)}
+        case values.Level():
+            return {"value": plain(reading.value, 1), "unit": reading.unit}
+    return None
+
+
+def usable(scan: values.LaserScan) -> npt.NDArray[np.bool_]:
+    """Which beams carry a range inside [range_min, range_max]; shape (beams,). NaN falls out."""
+    return (scan.ranges_m >= scan.range_min_m) & (scan.ranges_m <= scan.range_max_m)
+
+
+def _scan_summary(scan: values.LaserScan) -> dict[str, Any]:
+    good = usable(scan)
+    nearest = bearing = None
+    if good.any():
+        at = int(np.argmin(np.where(good, scan.ranges_m, np.inf)))
+        nearest = float(scan.ranges_m[at])
+        bearing = scan.angle_min_rad + at * scan.angle_increment_rad
+    return {
+        "beams": int(scan.ranges_m.size),
+        "usable": int(np.count_nonzero(good)),
+        "angle_min_rad": plain(scan.angle_min_rad),
+        "angle_increment_rad": plain(scan.angle_increment_rad, 6),
+        "range_min_m": plain(scan.range_min_m),
+        "range_max_m": plain(scan.range_max_m),
+        "nearest_m": plain(nearest),
+        "nearest_bearing_rad": plain(bearing),
+        "frame_id": scan.frame_id,
+    }
+
+
+def scan_frame(scan: values.LaserScan, *, number: int, age_s: float, kinds_kept: bool) -> bytes:
+    """The scan's binary frame. `kinds_kept`: the transport told NaN and ±Inf apart; else they are all one code.
+
+    Source of the meaning of ±Inf and NaN: REP-117.
+    """
+    ranges = scan.ranges_m
+    end_m = scan.range_max_m if math.isfinite(scan.range_max_m) else _OPEN_RANGE_M
+    scale = max(end_m, 0.1) / _STEPS
+    codes = np.zeros(ranges.size, dtype="<u2")
+    good = usable(scan)
+    codes[good] = np.clip(np.rint(ranges[good] / scale), 1, _STEPS)
+    with np.errstate(invalid="ignore"):
+        codes[(ranges > 0) & (ranges < scan.range_min_m)] = TOO_CLOSE
+        beyond = (ranges > scan.range_max_m) if not kinds_kept else (ranges > scan.range_max_m) | np.isposinf(ranges)
+        codes[beyond & ~good] = NOTHING
+        if kinds_kept:
+            codes[np.isneginf(ranges)] = TOO_CLOSE
+            codes[np.isnan(ranges)] = INVALID
+    header = SCAN_HEADER.pack(
+        SCAN_MAGIC,
+        SCAN_VERSION,
+        ranges.size,
+        number & 0xFFFFFFFF,
+        min(age_s, 1e9),
+        scan.angle_min_rad,
+        scan.angle_increment_rad,
+        end_m,
+        scale,
+    )
+    return header + codes.tobytes()
+
+
+def tile(tile: Tile) -> dict[str, Any]:
+    return {
+        "id": tile.id,
+        "label": tile.label,
+        "verdict": str(tile.verdict),
+        "text": tile.text,
+        "brief": tile.brief,
+        "checks": list(tile.checks),
+    }
+
+
+def alarm(alarm: Alarm, now_s: float, wall_ms: int) -> dict[str, Any]:
+    """A standing alarm. Its times are turned from the monitor's clock into time of day by their age."""
+    spec = alarm.spec
+    finding = alarm.finding or alarm.trip
+    raised_for_s = now_s - alarm.raised_s if alarm.raised_s is not None else 0.0
+    place = spec.place if alarm.active or spec.place_after is None else spec.place_after
+    until_s = alarm.shelved_until_s
+    return {
+        "id": alarm.id,
+        "occurrence": alarm.occurrence,
+        "title": spec.title,
+        "priority": str(spec.priority),
+        "place": str(place),
+        "sound": str(spec.sound),
+        "state": str(alarm.state),
+        "active": alarm.active,
+        "needs_ack": spec.needs_ack,
+        "raised_ms": round(wall_ms - raised_for_s * 1000),
+        "for_s": round(raised_for_s, 1),
+        "text": finding.text if finding else "",
+        "trip_text": alarm.trip.text if alarm.trip else "",
+        "measured": _quantity(finding.measured if finding else None),
+        "limit": _quantity(finding.limit if finding else None),
+        "causes": list(finding.causes) if finding else [],
+        "actions": [str(action) for action in spec.actions],
+        "advice": spec.advice,
+        "shelved_until_ms": round(wall_ms + (until_s - now_s) * 1000) if until_s is not None else None,
+    }
+
+
+def _quantity(quantity: Quantity | None) -> dict[str, Any] | None:
+    if quantity is None:
+        return None
+    return {"label": quantity.label, "value": plain(quantity.value), "unit": quantity.unit}
+
+
+def event(transition: Transition, alarm: Alarm, at_ms: int) -> dict[str, Any]:
+    """A transition as the log keeps it and the pages get it; the log adds its number."""
+    spec = alarm.spec
+    return {
+        "at_ms": at_ms,
+        "alarm": transition.alarm_id,
+        "occurrence": transition.occurrence,
+        "change": transition.change,
+        "title": spec.title,
+        "priority": str(spec.priority),
+        "place": str(spec.place),
+        "sound": str(spec.sound),
+        "text": transition.text,
+        "by": transition.by,
+        "announces": transition.announces,
+    }
