@@ -125,7 +125,8 @@ def _wrong_scheme(typed: str, scheme: str) -> BadAddress:
 
 
 def refuse_forbidden(ip: str) -> None:
-    """Raises BadAddress for an IP address that is never dialled: link-local, metadata services, multicast, unspecified."""
+    """Raises BadAddress for an IP address that is never dialled: link-local, metadata services, multicast,
+    unspecified."""
     address = ipaddress.ip_address(ip.split("%")[0])
     mapped = getattr(address, "ipv4_mapped", None)
     if mapped is not None:

@@ -1,6 +1,7 @@
 """The only thing between a session and the pages: newest frames by key, numbered events, requests with a deadline.
 
-A session puts and serves, a page's handler reads and asks; neither knows the other. `LocalBus` is the one in this process; a
+A session puts and serves, a page's handler reads and asks; neither knows the other. `LocalBus` is the one in this
+process; a
 broker can take its place.
 """
 

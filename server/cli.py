@@ -1,4 +1,5 @@
-"""The command line: one sub-command a job, each answering with an exit code and, where it cannot go on, one sentence."""
+"""The command line: one sub-command a job, each answering with an exit code and, where it cannot go on, one
+sentence."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from server.version import catgraph_version
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Command:
-    """A sub-command; its module has `add_arguments(parser)` and `run(args) -> int` and is loaded only when it is asked for."""
+    """A sub-command; its module has `add_arguments(parser)` and `run(args) -> int` and is loaded only when it is
+    asked for."""
 
     module: str
     help: str

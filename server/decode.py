@@ -1,7 +1,9 @@
 """From a ROS message, as rosbridge spells it, to a value of ours. The only place that looks into messages.
 
-Each function takes one message and gives one value, or raises Rejected with the reason in few words. Numbers that rosbridge
-had to flatten to null are NaN here; a value whose headline number is unknown is rejected, because a signal that says nothing
+Each function takes one message and gives one value, or raises Rejected with the reason in few words. Numbers that
+rosbridge
+had to flatten to null are NaN here; a value whose headline number is unknown is rejected, because a signal that
+says nothing
 must grow old and not look alive.
 """
 
@@ -162,7 +164,8 @@ def bearing(message: Any) -> Bearing:
 
 
 def nav_sat_fix(message: Any) -> GpsFix:
-    """Position on WGS84. Raises Rejected for coordinates that are no place on Earth; without a fix they may be anything."""
+    """Position on WGS84. Raises Rejected for coordinates that are no place on Earth; without a fix they may be
+    anything."""
     status = number(message, "status", "status")
     if not math.isfinite(status):
         raise Rejected("status.status is null")
@@ -213,7 +216,8 @@ def odometry(message: Any) -> Odometry:
 
 
 def _yaw(pose: Any) -> float | None:
-    """Yaw in rad, counter-clockwise from the frame's x axis (REP-103), from the pose's quaternion; None where it is none."""
+    """Yaw in rad, counter-clockwise from the frame's x axis (REP-103), from the pose's quaternion; None where it
+    is none."""
     x, y, z, w = (number(pose, "orientation", axis) for axis in "xyzw")
     norm = x * x + y * y + z * z + w * w
     if not 0.5 < norm < 1.5:  # NaN and the all-zero quaternion of drivers without a compass both fall out here

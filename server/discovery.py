@@ -1,4 +1,5 @@
-"""What a car offers, asked of its bridge through rosapi: topics and types, the version of ROS, whether ROS still lives."""
+"""What a car offers, asked of its bridge through rosapi: topics and types, the version of ROS, whether ROS still
+lives."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import contextlib
 import sys
 import time
 from typing import Any
@@ -16,6 +17,7 @@ from server.reception import Reception
 from server.topics import BY_SIGNAL, TOPICS, Source, map_signals
 
 CONNECT_WITHIN_S = 5.0
+ROS_SILENT = "DOES NOT ANSWER (get_time); after a restart of roscore restart rosbridge"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,6 +43,7 @@ class _Ear:
 
     def __init__(self) -> None:
         self.opened = asyncio.Event()
+        self.decided = asyncio.Event()  # opened, or the first try failed
         self.spoke = asyncio.Event()
         self.problem: Problem | None = None
         self.reception = Reception()
@@ -51,12 +54,14 @@ class _Ear:
 
     def link_opened(self) -> None:
         self.opened.set()
+        self.decided.set()
 
     def link_closed(self, problem: Problem) -> None:
         self.problem = problem
 
     def dial_failed(self, problem: Problem) -> None:
         self.problem = problem
+        self.decided.set()
 
     def message_received(self, topic: str, message: Any, note: str | None) -> None:
         self.spoke.set()
@@ -79,9 +84,8 @@ async def _examine(address: Address, seconds: float) -> int:
     link = RosLink(address, ear, now=time.monotonic)
     link.start()
     try:
-        deadline = time.monotonic() + CONNECT_WITHIN_S
-        while not ear.opened.is_set() and time.monotonic() < deadline and ear.problem is None:
-            await asyncio.sleep(0.05)
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(ear.decided.wait(), CONNECT_WITHIN_S)
         if not ear.opened.is_set():
             problem = ear.problem
             print(
@@ -108,9 +112,7 @@ async def _report(address: Address, link: RosLink, ear: _Ear, seconds: float) ->
         print(f"catgraph: {problem.title} {problem.hint}", file=sys.stderr)
         return 2
     print(f"rosbridge on {address.shown}: answers" + (f", ROS {offer.ros}" if offer and offer.ros else ""))
-    print(
-        f"ROS behind it: {'answers' if alive else 'DOES NOT ANSWER (get_time); after a restart of roscore restart rosbridge'}"
-    )
+    print(f"ROS behind it: {'answers' if alive else ROS_SILENT}")
     if offer is None:
         print("It has no rosapi: topics and types cannot be asked for. Start rosapi beside rosbridge.")
         return 1

@@ -1,6 +1,7 @@
 """The pages of one server: each is offered what is new, takes the newest, and is told every event once.
 
-Nothing is pushed but offers and events, at most one of each unanswered (docs/protocol.md says why), so a page that stops
+Nothing is pushed but offers and events, at most one of each unanswered (docs/protocol.md says why), so a page that
+stops
 reading costs nothing, delays nobody, and finds nothing old when it comes back.
 """
 

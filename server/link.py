@@ -1,6 +1,7 @@
 """The connection to one rosbridge: roslibpy on our own event loop, watched, and without its queues.
 
-The only file that imports roslibpy, or knows its inside. Written against roslibpy 2.1.0; each thing assumed of it is named
+The only file that imports roslibpy, or knows its inside. Written against roslibpy 2.1.0; each thing assumed of it
+is named
 in `ASSUMPTIONS` and held by a test of its own. What is replaced, and why:
 
 - its transport runs a loop in a thread: `_OwnLoop` adopts the running one;
@@ -33,7 +34,7 @@ log = logging.getLogger("catgraph.link")
 
 ASSUMPTIONS = {
     "roslibpy": "2.1.0",
-    "factory": "AsyncioRosBridgeClientFactory dials in _connect_async, again by _schedule_reconnect, from _open_connection",
+    "factory": "AsyncioRosBridgeClientFactory dials in _connect_async; _schedule_reconnect and _open_connection repeat it",
     "manager": "the factory takes its loop from `manager.loop` and asks a manager only for run()",
     "protocol": "onOpen calls factory.ready(self), onClose factory.connection_lost(self), frames arrive in onMessage",
     "ros": "Ros.__init__ sets _id_counter, factory and is_connecting and then calls connect()",
@@ -135,7 +136,8 @@ class _Dialler(AsyncioRosBridgeClientFactory):  # type: ignore[misc]
         self.link = link
         self._dialling: asyncio.Task[None] | None = None
         self._waiting: asyncio.TimerHandle | None = None
-        self.setProtocolOptions(  # no permessage-deflate is offered: it would cost the car's computer more than the network
+        # no permessage-deflate is offered: it would cost the car's computer more than the network
+        self.setProtocolOptions(
             autoPingInterval=PING_EVERY_S,
             autoPingTimeout=PING_ANSWER_WITHIN_S,
             maxMessagePayloadSize=MAX_MESSAGE_BYTES,

@@ -1,4 +1,5 @@
-"""Why the car cannot be reached, in the operator's words: one sentence, one hint, one mark for the picture of the chain."""
+"""Why the car cannot be reached, in the operator's words: one sentence, one hint, one mark for the picture of the
+chain."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ def _announce(config: Config, port: int) -> None:
 
 def _reachable(host: str) -> str:
     """The address to type into a phone for a server that listens on `host`."""
-    if host not in ("0.0.0.0", "::", ""):  # noqa: S104 (only compared)
+    if host not in ("0.0.0.0", "::", ""):
         return host
     for adapter in ifaddr.get_adapters():
         for ip in adapter.ips:

@@ -1,4 +1,4 @@
-"""The one owner and single writer of a vehicle's state: hears the link, lets the monitor judge, puts frames and events on the bus."""
+"""The one owner and single writer of a vehicle's state: hears the link, lets the monitor judge, tells the bus."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import orjson
 
 from monitor.runner import Monitor, Refused, Transition
 from monitor.signals import SIGNALS
-from monitor.state import LinkFacts, State
+from monitor.state import LinkFacts, Phase, State
 from monitor.values import LaserScan
 from server import address, commands, decode, discovery, problems, wire
 from server.address import BadAddress
@@ -65,7 +65,7 @@ class Session:
 
     def _clear(self) -> None:
         """Forgets one connection's facts before another begins."""
-        self._phase = "idle"
+        self._phase: Phase = "idle"
         self._address: address.Address | None = None
         self._link: RosLink | None = None
         self._problem: Problem | None = None
@@ -149,7 +149,8 @@ class Session:
         return self._reception.by_signal
 
     def tick(self, *, put: bool = True) -> None:
-        """Time judges: freshness, silence, delays. Then the pages get a state, unless the loop is too late to be trusted."""
+        """Time judges: freshness, silence, delays. Then the pages get a state, unless the loop is too late to be
+        trusted."""
         now_s = self._now()
         self._watch_link(now_s)
         self._judge(now_s, None)
@@ -311,7 +312,7 @@ class Session:
         self._heard.add(topic)
         self._last_message_s = now_s
         self._reception.received += 1
-        changed = set()
+        changed: set[str] = set()
         proper = True
         for source in sources:
             value = self._reception.read(source, message, note)
@@ -418,7 +419,7 @@ class Session:
 
     def _subscribe_by_name(self, link: RosLink) -> None:
         """Without rosapi: every name of the table, its type left to the bridge."""
-        by_topic = {}
+        by_topic: dict[str, tuple[Source, ...]] = {}
         for row in TOPICS:
             for name in row.names:
                 source = Source(

@@ -14,8 +14,10 @@ RosVersion = Literal[1, 2]
 class Message:
     """One ROS message on its way.
 
-    `message` has the field names of ROS as rosbridge spells them. Numbers may be NaN or infinite and arrays may be numpy
-    arrays: whoever writes JSON turns those into null and lists. Stamps are `secs`/`nsecs` in ROS 1, `sec`/`nanosec` in ROS 2.
+    `message` has the field names of ROS as rosbridge spells them. Numbers may be NaN or infinite and arrays may be
+    numpy
+    arrays: whoever writes JSON turns those into null and lists. Stamps are `secs`/`nsecs` in ROS 1, `sec`/`nanosec`
+    in ROS 2.
     """
 
     at_s: float  # seconds since 1970 on the source's own clock

@@ -1,4 +1,5 @@
-"""Every signal's topics: the names looked for, the types accepted, how each is decoded, and which found topic fills it."""
+"""Every signal's topics: the names looked for, the types accepted, how each is decoded, and which found topic
+fills it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a page is told, as docs/protocol.md has it: signals, alarms and events as JSON, scans as bytes. Pure functions."""
+"""What a page is told, as docs/protocol.md has it: signals, alarms and events as JSON, scans as bytes."""
 
 from __future__ import annotations
 
