@@ -1,0 +1,71 @@
+"""Reads MCAP files that are no ROS 2 bags: ROS 1 messages in MCAP, and messages written as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import IO, Any, Literal, cast
+
+from mcap.reader import McapReader, make_reader
+
+from server.recording.errors import RecordingUnreadable
+from server.recording.source import Channel, DefinitionFormat
+from server.source import RosVersion
+
+_FORMATS: dict[str, DefinitionFormat] = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
+
+
+def profile_of(path: Path) -> str:
+    """The profile that an MCAP file names in its header: "ros1", "ros2", another or none."""
+    with path.open("rb") as file:
+        return make_reader(cast("IO[bytes]", file)).get_header().profile
+
+
+class McapFile:
+    """An MCAP file of any profile."""
+
+    distro: str | None = None
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = path.open("rb")
+        try:
+            self._reader: McapReader = make_reader(self._file)
+            summary = self._reader.get_summary()
+            if summary is None or summary.statistics is None:
+                raise RecordingUnreadable(f"{path.name} ends too early: it has no index")
+            statistics = summary.statistics
+            self.start_ns, self.end_ns = statistics.message_start_time, statistics.message_end_time
+            counts = statistics.channel_message_counts
+            self.channels: Sequence[Channel] = [
+                _channel(channel, summary.schemas.get(channel.schema_id), counts.get(channel.id, 0))
+                for channel in summary.channels.values()
+            ]
+        except BaseException:
+            self._file.close()
+            raise
+        is_ros2 = any(c.encoding == "cdr" or "/msg/" in c.type for c in self.channels if c.encoding != "ros1")
+        self.ros_version: RosVersion = 2 if is_ros2 else 1
+
+    def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
+        for _, channel, message in self._reader.iter_messages(start_time=start_ns):
+            if channel.id in numbers:
+                yield message.log_time, channel.id, message.data
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def _channel(channel: Any, schema: Any, count: int) -> Channel:
+    name = schema.name if schema else ""
+    parts = name.split("/")
+    return Channel(
+        number=channel.id,
+        topic=channel.topic,
+        type=f"{parts[0]}/msg/{parts[1]}" if channel.message_encoding == "ros1" and len(parts) == 2 else name,
+        definition=schema.data.decode("utf-8", "replace") if schema else "",
+        format=_FORMATS.get(schema.encoding, "none") if schema else "none",
+        encoding=cast('Literal["ros1", "cdr", "json"]', channel.message_encoding),
+        count=count,
+        is_latched="durability: transient_local" in channel.metadata.get("offered_qos_profiles", "").lower(),
+    )

@@ -1,0 +1,62 @@
+"""Reads ROS 2 bags through rosbags: a directory with its metadata, or one bare .mcap or .db3 file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from rosbags.interfaces import MessageDefinitionFormat, QosDurability
+from rosbags.rosbag2.reader import DirectoryReader
+from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
+
+from server.recording.source import Channel, DefinitionFormat
+from server.source import RosVersion
+
+_READERS: dict[str, Any] = {"directory": DirectoryReader, "mcap": McapReader, "db3": Sqlite3Reader}
+_FORMATS: dict[Any, DefinitionFormat] = {
+    MessageDefinitionFormat.NONE: "none",
+    MessageDefinitionFormat.MSG: "msg",
+    MessageDefinitionFormat.IDL: "idl",
+}
+
+
+class Bag2:
+    """A ROS 2 bag."""
+
+    ros_version: RosVersion = 2
+
+    def __init__(self, path: Path, kind: Literal["directory", "mcap", "db3"]) -> None:
+        self.path = path
+        self._reader = _READERS[kind](path)
+        self._reader.open()
+        self._connections = dict(enumerate(self._reader.connections))
+        self.channels: Sequence[Channel] = [
+            _channel(number, connection) for number, connection in self._connections.items()
+        ]
+        self.distro: str | None = self._reader.metadata.ros_distro
+        self.start_ns = self._reader.metadata.start_time
+        self.end_ns = self._reader.metadata.end_time - 1
+
+    def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
+        wanted = {number: self._connections[number] for number in numbers}
+        number_of = {connection.id: number for number, connection in wanted.items()}
+        for connection, time_ns, raw in self._reader.messages(list(wanted.values()), start_ns, None):
+            yield time_ns, number_of[connection.id], raw
+
+    def close(self) -> None:
+        self._reader.close()
+
+
+def _channel(number: int, connection: Any) -> Channel:
+    return Channel(
+        number=number,
+        topic=connection.topic,
+        type=connection.msgtype,
+        definition=connection.msgdef.data,
+        format=_FORMATS[connection.msgdef.format],
+        encoding=connection.ext.serialization_format,
+        count=connection.msgcount,
+        is_latched=any(qos.durability == QosDurability.TRANSIENT_LOCAL for qos in connection.ext.offered_qos_profiles),
+    )
