@@ -1,14 +1,22 @@
-"""The life of one alarm after ISA-18.2: independent flags, a state derived from them, and pure steps between them."""
+"""The life of one alarm after ISA-18.2: independent flags, a state derived from them, and one pure step of time.
+
+- *Delays* count only time in which the check really said so: UNKNOWN stops the count to raising (what was seen still
+  counts) and starts the count to clearing anew; so UNKNOWN neither raises nor clears.
+- *Occurrence* counts announcements: a raise, a new or worse cause, the end of shelving. Each asks for its own
+  acknowledgement, and an acknowledgement names the one it saw.
+- *Suppressed* alarms neither raise nor clear, and come back as they were: known ones are not announced again.
+- A clock that goes back moves the alarm's own times with it: no delay gets longer, none is skipped.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Literal
+from typing import Any, Literal
 
 from monitor.alarm_spec import AlarmSpec, Place, Sound
-from monitor.check import Finding
+from monitor.check import Finding, Verdict
 
 Change = Literal["raised", "cleared", "acknowledged", "recaused", "shelved", "unshelved", "suppressed", "unsuppressed"]
 
@@ -45,12 +53,20 @@ class Transition:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Cause:
+    """One reason an alarm was announced for."""
+
+    name: str
+    absent_s: float | None = None  # how long the alarm has stood without it; None: it is there
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Alarm:
     """One alarm as it stands now."""
 
     id: str
     spec: AlarmSpec
-    occurrence: int = 0  # counts announcements; an acknowledgement names the one it saw
+    occurrence: int = 0  # counts announcements
     condition: bool = False  # what the check last said, without delays; UNKNOWN leaves it
     active: bool = False  # the same with delays: what the operator is told
     acknowledged: bool = True
@@ -59,12 +75,16 @@ class Alarm:
     shelved_by: str | None = None
     suppressed_by: tuple[str, ...] = ()  # alarm ids, or "paused"
     out_of_service: bool = False
-    raised_s: float | None = None  # when the standing or last occurrence was raised
+    raised_s: float | None = None  # when the standing or last activity began
+    announced_s: float | None = None  # when the operator was last told
     cleared_s: float | None = None
     acknowledged_by: str | None = None
-    finding: Finding | None = None  # the newest
+    finding: Finding | None = None  # the newest while the alarm is awake
     trip: Finding | None = None  # as announced
     worst: Finding | None = None  # furthest beyond its limit since raised
+    causes: tuple[Cause, ...] = ()  # what the operator was told of
+    held_s: float = 0.0  # how long the other side (fault while not active, ok while active) has held
+    at_s: float | None = None  # when last judged
 
     @property
     def state(self) -> AlarmState:
@@ -93,8 +113,203 @@ class Alarm:
         """What it sounds like now: silent once it is gone, acknowledged, shelved or suppressed."""
         return self.spec.sound if self.state is AlarmState.UNACKED else Sound.NONE
 
+    @property
+    def _is_at_rest(self) -> bool:
+        return not (
+            self.condition
+            or self.active
+            or not self.acknowledged
+            or self.suppressed_by
+            or self.shelved_until_s is not None
+        )
+
 
 def advance(
     alarm: Alarm, finding: Finding, now_s: float, inhibited_by: Collection[str] = ()
 ) -> tuple[Alarm, tuple[Transition, ...]]:
-    raise NotImplementedError
+    """One judgement at `now_s`: the alarm after it and what happened; `inhibited_by` explains the alarm away for now."""
+    if alarm.out_of_service:
+        return alarm, ()
+    if finding.verdict is not Verdict.FAULT and not inhibited_by and alarm._is_at_rest:
+        return alarm, ()  # by far the most frequent case, and nothing of it needs remembering
+    step = _Step(_rebased(alarm, now_s), finding, now_s)
+    step.unshelve_when_due()
+    step.suppress(tuple(inhibited_by))
+    step.judge()
+    return step.result()
+
+
+def end(alarm: Alarm, now_s: float, why: str) -> tuple[Alarm, tuple[Transition, ...]]:
+    """Monitoring ends: the alarm goes back to normal, and says so where it stood."""
+    fresh = Alarm(id=alarm.id, spec=alarm.spec, occurrence=alarm.occurrence, out_of_service=alarm.out_of_service)
+    if not alarm.is_standing:
+        return fresh, ()
+    told = Transition(alarm_id=alarm.id, occurrence=alarm.occurrence, change="cleared", at_s=now_s, text=why)
+    return fresh, (told,)
+
+
+def _rebased(alarm: Alarm, now_s: float) -> Alarm:
+    """The alarm with its times moved along when the clock went back, so that every duration stays what it was."""
+    if alarm.at_s is None or now_s >= alarm.at_s:
+        return alarm
+    shift_s = now_s - alarm.at_s
+
+    def moved(at_s: float | None) -> float | None:
+        return None if at_s is None else at_s + shift_s
+
+    return replace(
+        alarm,
+        at_s=now_s,
+        raised_s=moved(alarm.raised_s),
+        announced_s=moved(alarm.announced_s),
+        cleared_s=moved(alarm.cleared_s),
+        shelved_until_s=moved(alarm.shelved_until_s),
+    )
+
+
+def _names(finding: Finding) -> tuple[str, ...]:
+    """What the finding blames; each degree of badness counts as a cause of its own, so a worse one is a new one."""
+    return (*finding.causes, *(f"level {level}" for level in range(1, finding.level + 1)))
+
+
+def _beyond(finding: Finding | None) -> float:
+    if finding is None or finding.measured is None or finding.limit is None:
+        return -1.0
+    return abs(finding.measured.value - finding.limit.value)
+
+
+class _Step:
+    """Collects the changes of one judgement, so that a new `Alarm` is made once."""
+
+    def __init__(self, alarm: Alarm, finding: Finding, now_s: float) -> None:
+        self._alarm = alarm
+        self._finding = finding
+        self._now_s = now_s
+        self._dt_s = 0.0 if alarm.at_s is None else now_s - alarm.at_s
+        self._verdict_before = None if alarm.finding is None else alarm.finding.verdict
+        self._active = alarm.active
+        self._acknowledged = alarm.acknowledged
+        self._occurrence = alarm.occurrence
+        self._shelved = alarm.shelved_until_s is not None
+        self._suppressed = bool(alarm.suppressed_by)
+        self._set: dict[str, Any] = {"finding": finding, "at_s": now_s}
+        self._transitions: list[Transition] = []
+
+    def result(self) -> tuple[Alarm, tuple[Transition, ...]]:
+        alarm = replace(
+            self._alarm,
+            active=self._active,
+            acknowledged=self._acknowledged,
+            occurrence=self._occurrence,
+            **self._set,
+        )
+        return alarm, tuple(self._transitions)
+
+    def unshelve_when_due(self) -> None:
+        until_s = self._alarm.shelved_until_s
+        if until_s is None or self._now_s < until_s:
+            return
+        self._shelved = False
+        self._set |= {"shelved_until_s": None, "shelved_by": None}
+        if self._active:
+            self._announce("unshelved")
+        else:
+            self._tell("unshelved")
+
+    def suppress(self, by: tuple[str, ...]) -> None:
+        before = self._suppressed
+        self._suppressed = bool(by)
+        if by != self._alarm.suppressed_by:
+            self._set["suppressed_by"] = by
+        if before != self._suppressed and (self._active or not self._acknowledged):
+            self._tell("suppressed" if self._suppressed else "unsuppressed")
+
+    def judge(self) -> None:
+        match self._finding.verdict:
+            case Verdict.FAULT:
+                self._fault()
+            case Verdict.OK:
+                self._ok()
+            case Verdict.UNKNOWN:
+                if self._active:
+                    self._set["held_s"] = 0.0
+
+    def _fault(self) -> None:
+        self._set["condition"] = True
+        self._set["latched"] = False
+        if self._active:
+            self._set["held_s"] = 0.0
+            if _beyond(self._finding) > _beyond(self._alarm.worst):
+                self._set["worst"] = self._finding
+            if not self._suppressed:
+                self._blame()
+            return
+        if self._suppressed:
+            self._set["held_s"] = 0.0
+            return
+        held_s = self._alarm.held_s + (self._dt_s if self._verdict_before is Verdict.FAULT else 0.0)
+        self._set["held_s"] = held_s
+        if held_s >= self._alarm.spec.on_delay_s:
+            self._active = True
+            self._set |= {
+                "held_s": 0.0,
+                "raised_s": self._now_s,
+                "cleared_s": None,
+                "worst": self._finding,
+                "causes": tuple(Cause(name=name) for name in _names(self._finding)),
+            }
+            self._announce("raised")
+
+    def _blame(self) -> None:
+        """A cause the operator was not told of re-alarms; one that was away no longer than the off-delay is not new."""
+        names = _names(self._finding)
+        if not names and not self._alarm.causes:
+            return
+        causes: dict[str, float | None] = {}
+        for cause in self._alarm.causes:
+            absent_s = None if cause.absent_s is None else cause.absent_s + self._dt_s
+            if absent_s is None or absent_s <= self._alarm.spec.off_delay_s:
+                causes[cause.name] = 0.0 if absent_s is None else absent_s
+        is_new = any(name not in causes for name in names)
+        causes |= dict.fromkeys(names)
+        self._set["causes"] = tuple(Cause(name=name, absent_s=absent_s) for name, absent_s in causes.items())
+        if is_new:
+            self._announce("recaused")
+
+    def _ok(self) -> None:
+        self._set["condition"] = False
+        if not self._active:
+            self._set["held_s"] = 0.0
+            return
+        held_s = self._alarm.held_s + (self._dt_s if self._verdict_before is Verdict.OK else 0.0)
+        self._set["held_s"] = held_s
+        if self._suppressed or held_s < self._alarm.spec.off_delay_s:
+            return
+        if self._alarm.spec.latches and not self._acknowledged:
+            self._set["latched"] = True
+            return
+        self._active = False
+        self._set |= {"held_s": 0.0, "cleared_s": self._now_s, "latched": False, "causes": ()}
+        if not self._alarm.spec.needs_ack:
+            self._acknowledged = True
+        self._tell("cleared")
+
+    def _announce(self, change: Change) -> None:
+        self._occurrence += 1
+        self._acknowledged = False
+        self._set |= {"acknowledged_by": None, "announced_s": self._now_s}
+        if self._finding.verdict is Verdict.FAULT:
+            self._set["trip"] = self._finding
+        self._tell(change, announces=not (self._shelved or self._suppressed))
+
+    def _tell(self, change: Change, *, announces: bool = False) -> None:
+        self._transitions.append(
+            Transition(
+                alarm_id=self._alarm.id,
+                occurrence=self._occurrence,
+                change=change,
+                at_s=self._now_s,
+                text=self._finding.text,
+                announces=announces,
+            )
+        )

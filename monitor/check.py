@@ -163,6 +163,7 @@ class Check(Generic[L]):
     group: str = ""  # name of its thresholds; a family shares one; "" = id
     tile: str = ""  # the tile of the home tab it belongs to; "" = label
     scope: Scope = Scope.CAR
+    order: int = 500  # place of its tile on the home tab, which never moves: smaller comes first
 
     @property
     def limits_group(self) -> str:

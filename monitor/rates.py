@@ -35,7 +35,8 @@ class RateMeter:
 
     What to expect is, in this order: what the operator set; the car's own steady rate; the declared default. Rates
     differ between healthy cars (a scan at 10, 30 or 75 Hz), so a car which holds its own rate for two blocks of 2.5 s
-    is taken at its word. Later only a steadily *higher* rate is learned: a falling one is what the operator wants to hear about.
+    is taken at its word. Later only a steadily *higher* rate is learned: a falling one is what the operator wants to
+    hear about.
     """
 
     __slots__ = (

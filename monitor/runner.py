@@ -2,72 +2,213 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from traceback import format_exception
+from typing import Any
 
-from monitor.alarm import Alarm, Refused, Transition
-from monitor.catalog import AllLimits, AnyCheck
-from monitor.check import Finding, Verdict
-from monitor.state import Snapshot
+from monitor import response
+from monitor.alarm import Alarm, Refused, Transition, advance, end
+from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
+from monitor.catalog import CHECKS, AllLimits, AnyCheck, compose
+from monitor.check import OK, Finding, Scope, Verdict, fault, unknown
+from monitor.inhibition import table_of
+from monitor.state import NotFresh, Snapshot
+from monitor.tiles import Tile, tiles
 
 __all__ = ["Crash", "Monitor", "Refused", "Tile", "Transition"]
 
+IMPAIRED = "monitoring_impaired"
+IMPAIRED_SPEC = AlarmSpec(
+    title="Monitoring impaired",
+    priority=Priority.WARNING,
+    place=Place.SNACKBAR,
+    sound=Sound.MEDIUM,
+    needs_ack=True,
+    off_delay_s=10.0,  # a check that fails now and then is one failing check
+    actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+    advice="What is named is not watched. Tell whoever keeps catgraph.",
+)
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tile:
-    """One tile of the home tab: the worst of the checks it stands for. The protocol's `checks` are these."""
-
-    id: str
-    label: str
-    verdict: Verdict
-    text: str
-    brief: str  # at most 20 letters
-    checks: tuple[str, ...]  # ids
+NO_LINK = unknown("No link to the car", short="no link")
+PAUSED = unknown("Monitoring is paused", short="paused")
+ENDED = "Monitoring ended"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crash:
-    """A check that failed, for the shell to log once."""
+    """A check that fails, for the shell to log once."""
 
     check_id: str
     error: str  # "ZeroDivisionError: division by zero"
     where: str  # traceback
-    count: int
+    count: int  # ever; 1 is worth a line in the log
 
 
 class Monitor:
-    """All checks of one vehicle and their alarms."""
+    """All checks of one vehicle and their alarms.
 
-    findings: dict[str, Finding]  # by check id
-    alarms: dict[str, Alarm]  # by alarm id, which is the check's
-    crashes: dict[str, Crash]  # checks that fail now, by id
+    The caller reads `findings` (by check id), `alarms` (by alarm id, which is the check's) and `crashes` (checks that
+    fail now, by check id), and never writes to them.
+    """
 
     def __init__(self, checks: Sequence[AnyCheck] | None = None, limits: AllLimits | None = None) -> None:
-        raise NotImplementedError
+        """Without `checks` all there are, without `limits` their defaults. Raises ValueError when the checks contradict
+        each other: two of one id, a circle of inhibition."""
+        declared = CHECKS if checks is None else tuple(checks)
+        self.findings: dict[str, Finding] = {}
+        self.crashes: dict[str, Crash] = {}
+        self._failed: dict[str, int] = {}
+        self.alarms = {check.id: Alarm(id=check.id, spec=check.alarm) for check in declared}
+        if len(self.alarms) < len(declared):
+            raise ValueError("two checks have one id")
+        self.alarms[IMPAIRED] = Alarm(id=IMPAIRED, spec=IMPAIRED_SPEC)
+        self._declared = declared
+        self._causes = table_of(self.alarms.values())
+        by_id = {check.id: check for check in declared}
+        self._checks = tuple(by_id[name] for name in self._causes.order if name in by_id)
+        self._by_signal: dict[str, tuple[AnyCheck, ...]] = {}
+        for check in self._checks:
+            for signal in check.needs:
+                self._by_signal[signal] = (*self._by_signal.get(signal, ()), check)
+        self.limits = compose(declared)() if limits is None else limits  # type: ignore[assignment]
 
-    limits: AllLimits  # may be replaced at any time; judged by from the next step
+    @property
+    def limits(self) -> AllLimits:
+        """What is judged by; may be replaced at any time, and counts from the next step."""
+        return self._limits
+
+    @limits.setter
+    def limits(self, limits: AllLimits) -> None:
+        self._limits = limits
+        self._limits_of: dict[str, Any] = {
+            check.id: getattr(limits, check.limits_group, None) or check.limits() for check in self._declared
+        }
 
     def step(self, snapshot: Snapshot, changed: Collection[str] | None = None) -> tuple[Transition, ...]:
         """Judge. None: a tick, all checks; else only those that need one of the `changed` signals.
 
         With the link idle every alarm ends: there is nothing to monitor.
         """
-        raise NotImplementedError
+        if snapshot.link.phase == "idle":
+            return self.end(snapshot.now_s)
+        checks = self._checks if changed is None else self._needing(changed)
+        if not checks:
+            return ()
+        transitions: list[Transition] = []
+        for check in checks:
+            transitions += self._judge(check, snapshot)
+        if changed is None or self.crashes:
+            transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
+        return tuple(transitions)
+
+    def end(self, now_s: float) -> tuple[Transition, ...]:
+        """Monitoring ends by the operator's wish: nothing is judged and nothing stands any more."""
+        transitions: list[Transition] = []
+        for alarm_id, alarm in self.alarms.items():
+            self.alarms[alarm_id], happened = end(alarm, now_s, ENDED)
+            transitions += happened
+        self.findings.clear()
+        self.crashes.clear()
+        self._causes.clear()
+        return tuple(transitions)
 
     def standing(self) -> list[Alarm]:
-        """Alarms to show, most urgent first: active or unacknowledged, shelved ones included, suppressed ones not."""
-        raise NotImplementedError
+        """Alarms to show, most urgent first: active or unacknowledged, shelved ones last, suppressed ones not."""
+        shown = [
+            alarm
+            for alarm in self.alarms.values()
+            if (alarm.is_standing or alarm.shelved_until_s is not None)
+            and not alarm.suppressed_by
+            and not alarm.out_of_service
+        ]
+        return sorted(
+            shown,
+            key=lambda alarm: (
+                alarm.shelved_until_s is not None,
+                alarm.spec.priority.rank,
+                -(alarm.announced_s or 0.0),
+            ),
+        )
 
     def tiles(self) -> list[Tile]:
-        """What the home tab shows of the checks."""
-        raise NotImplementedError
+        """What the home tab shows of the checks: a tile for each label, at its fixed place."""
+        return tiles(self._declared, self.findings)
 
     def acknowledge(self, alarm_id: str, occurrence: int, by: str, now_s: float) -> tuple[Transition, ...]:
         """Raises Refused with the reason, as do `shelve` and `unshelve`."""
-        raise NotImplementedError
+        return self._respond(alarm_id, lambda alarm: response.acknowledge(alarm, occurrence, by, now_s))
 
     def shelve(self, alarm_id: str, occurrence: int, minutes: float, by: str, now_s: float) -> tuple[Transition, ...]:
-        raise NotImplementedError
+        is_inhibitor = alarm_id in self._causes.inhibitors
+        return self._respond(
+            alarm_id,
+            lambda alarm: response.shelve(alarm, occurrence, minutes, by, now_s, is_inhibitor=is_inhibitor),
+        )
 
     def unshelve(self, alarm_id: str, by: str, now_s: float) -> tuple[Transition, ...]:
-        raise NotImplementedError
+        return self._respond(alarm_id, lambda alarm: response.unshelve(alarm, by, now_s))
+
+    def _respond(
+        self, alarm_id: str, act: Callable[[Alarm], tuple[Alarm, tuple[Transition, ...]]]
+    ) -> tuple[Transition, ...]:
+        alarm = self.alarms.get(alarm_id)
+        if alarm is None:
+            raise Refused("There is no such alarm")
+        self.alarms[alarm_id], transitions = act(alarm)
+        return transitions
+
+    def _needing(self, changed: Collection[str]) -> tuple[AnyCheck, ...]:
+        if len(changed) == 1:
+            (signal,) = changed
+            return self._by_signal.get(signal, ())
+        wanted = {check.id for signal in changed for check in self._by_signal.get(signal, ())}
+        return tuple(check for check in self._checks if check.id in wanted) if wanted else ()
+
+    def _judge(self, check: AnyCheck, snapshot: Snapshot) -> tuple[Transition, ...]:
+        finding = self._find(check, snapshot)
+        by = self._causes.holding(check.id, snapshot.now_s)
+        if by and finding.verdict is Verdict.FAULT:
+            why = self.alarms[by[0]].spec.title
+            self.findings[check.id] = unknown(f"Not judged yet: {why}", short="waiting")
+        else:
+            self.findings[check.id] = finding
+        if snapshot.paused and check.scope is Scope.CAR:
+            by = ("paused", *by)
+        return self._advance(check.id, finding, snapshot.now_s, by)
+
+    def _advance(self, alarm_id: str, finding: Finding, now_s: float, by: tuple[str, ...]) -> tuple[Transition, ...]:
+        alarm, transitions = advance(self.alarms[alarm_id], finding, now_s, by)
+        self.alarms[alarm_id] = alarm
+        self._causes.note(alarm, now_s)
+        return transitions
+
+    def _find(self, check: AnyCheck, snapshot: Snapshot) -> Finding:
+        if check.scope is Scope.CAR:
+            if snapshot.link.phase != "monitoring":
+                return NO_LINK
+            if snapshot.paused:
+                return PAUSED
+        try:
+            finding = check.find(snapshot, self._limits_of[check.id], self.alarms[check.id].active)
+            if not isinstance(finding, Finding):
+                raise TypeError(f"{check.id} found {finding!r}, which is no finding")
+        except NotFresh as missing:
+            finding = unknown(missing.why, short=missing.short)
+        except Exception as error:  # the one net: a broken check must not silence the others
+            self._failed[check.id] = self._failed.get(check.id, 0) + 1
+            self.crashes[check.id] = Crash(
+                check_id=check.id,
+                error=f"{type(error).__name__}: {error}",
+                where="".join(format_exception(error)),
+                count=self._failed[check.id],
+            )
+            return unknown("This check fails", short="failed")
+        self.crashes.pop(check.id, None)
+        return finding
+
+    def _impaired(self) -> Finding:
+        if not self.crashes:
+            return OK
+        labels = tuple(check.label for check in self._declared if check.id in self.crashes)
+        return fault(f"Not watched: {', '.join(labels)}", causes=labels)

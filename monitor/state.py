@@ -209,7 +209,7 @@ class State:
             heard.meter.expect(self._expected_hz.get(name))
 
     def receive(self, signal: str, value: Value, received_s: float, stamp_s: float | None = None) -> tuple[str, ...]:
-        """Take one decoded value; returns every signal that changed by it, derived ones included, for `Monitor.step`."""
+        """Take one decoded value; returns the signals that changed by it, derived ones included, for `Monitor.step`."""
         heard = self._heard[signal]
         heard.count += 1
         heard.meter.receive(received_s)

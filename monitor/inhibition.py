@@ -1,0 +1,68 @@
+"""The cause table: which alarm explains which, so that one cause is one announcement."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from monitor.alarm import Alarm
+
+GRACE_S = 3.0  # after the cause has gone, its consequences get this long to go too
+
+
+class CauseTable:
+    """Knows every alarm's inhibitors, direct and through others, and which of them hold now.
+
+    The table is `AlarmSpec.inhibited_by`: lost link ⊃ silent car ⊃ stale signal ⊃ slow signal. What is judged *by* a
+    stale signal needs no row: its value cannot be read, its check is UNKNOWN, and UNKNOWN neither raises nor clears;
+    nor a grace: once the signal is back, what it says is true at once.
+
+    An inhibitor holds from its condition on, before its own delays have passed, until `GRACE_S` after its condition and
+    its alarm have gone.
+    """
+
+    def __init__(self, inhibited_by: Mapping[str, tuple[str, ...]]) -> None:
+        """`inhibited_by` has the direct inhibitors of each alarm; raises ValueError for an unknown name or a circle."""
+        self._closure: dict[str, tuple[str, ...]] = {}
+        self.order: list[str] = []  # every alarm after all that inhibit it
+        for alarm_id in inhibited_by:
+            self._visit(alarm_id, inhibited_by, ())
+        self.inhibitors = frozenset(name for names in self._closure.values() for name in names)
+        self._held_at_s: dict[str, float] = {}  # when each inhibitor was last seen to hold
+
+    def note(self, alarm: Alarm, now_s: float) -> None:
+        """Remember whether this alarm holds; to be told after each of its judgements."""
+        if alarm.id not in self.inhibitors:
+            return
+        if alarm.condition or alarm.active:
+            self._held_at_s[alarm.id] = now_s
+        elif self._held_at_s.get(alarm.id, now_s) > now_s:
+            self._held_at_s[alarm.id] = now_s  # the clock went back: the grace begins anew, it does not last for ever
+
+    def holding(self, alarm_id: str, now_s: float) -> tuple[str, ...]:
+        """The alarms that now explain this one away."""
+        return tuple(
+            name
+            for name in self._closure[alarm_id]
+            if name in self._held_at_s and now_s - self._held_at_s[name] < GRACE_S
+        )
+
+    def clear(self) -> None:
+        self._held_at_s.clear()
+
+    def _visit(self, alarm_id: str, table: Mapping[str, tuple[str, ...]], path: tuple[str, ...]) -> None:
+        if alarm_id in path:
+            raise ValueError(f"alarms inhibit each other in a circle: {' → '.join((*path, alarm_id))}")
+        if alarm_id in self._closure:
+            return
+        found: dict[str, None] = {}
+        for name in table[alarm_id]:
+            if name not in table:
+                raise ValueError(f"{alarm_id} is inhibited by {name}, which does not exist")
+            self._visit(name, table, (*path, alarm_id))
+            found |= dict.fromkeys((name, *self._closure[name]))
+        self._closure[alarm_id] = tuple(found)
+        self.order.append(alarm_id)
+
+
+def table_of(alarms: Iterable[Alarm]) -> CauseTable:
+    return CauseTable({alarm.id: alarm.spec.inhibited_by for alarm in alarms})

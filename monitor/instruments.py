@@ -1,0 +1,46 @@
+"""Settings of what the page draws and no check reads: the ends of the gauges, the braking behind the stopping bar."""
+
+from __future__ import annotations
+
+from monitor.check import Limits, threshold
+
+
+class GaugeLimits(Limits):
+    speed_max_mps: float = threshold(15.0, "Speed at 180°", unit="m/s", low=1.0, high=60.0, step=1.0)
+    acceleration_max_mps2: float = threshold(3.0, "Acceleration at 180°", unit="m/s²", low=0.5, high=15.0, step=0.5)
+
+
+class BrakingLimits(Limits):
+    reaction_s: float = threshold(
+        1.0, "Reaction time", unit="s", low=0.0, high=5.0, step=0.1, help="Until the car begins to brake."
+    )
+    deceleration_mps2: float = threshold(
+        3.0,
+        "Braking deceleration",
+        unit="m/s²",
+        low=0.5,
+        high=9.0,
+        step=0.1,
+        help="What the brakes are counted on for.",
+    )
+
+
+class ObstacleLimits(Limits):
+    standoff_m: float = threshold(
+        5.0, "Obstacle distance", unit="m", low=0.5, high=50.0, step=0.5, help="Nearer than this is too near."
+    )
+
+
+# By the name of the group; a check that comes to judge by one of them takes the class over and leaves this table.
+GROUPS: dict[str, type[Limits]] = {"gauge": GaugeLimits, "braking": BrakingLimits, "obstacle": ObstacleLimits}
+
+
+def stopping_m(speed_mps: float, limits: BrakingLimits) -> float:
+    """Distance to a stop [m]: reaction at full speed, then constant deceleration, v·t + v²/2a."""
+    speed_mps = abs(speed_mps)
+    return speed_mps * limits.reaction_s + speed_mps**2 / (2 * limits.deceleration_mps2)
+
+
+def time_gap_s(distance_m: float, speed_mps: float) -> float | None:
+    """Seconds until the car is where the object is now; None while standing, below 0.1 m/s: wheel speed is noisy."""
+    return distance_m / speed_mps if speed_mps > 0.1 else None

@@ -1,0 +1,70 @@
+"""What the operator does about an alarm: acknowledge it, shelve it for a while, take it off the shelf."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from monitor.alarm import Alarm, Change, Refused, Transition
+
+SHELVE_AT_MOST_MIN = 15.0  # longer is forgotten
+
+
+def acknowledge(alarm: Alarm, occurrence: int, by: str, now_s: float) -> tuple[Alarm, tuple[Transition, ...]]:
+    """The operator has seen this very occurrence. Refused for any other, so that a late tap cannot hide a newer one."""
+    title = alarm.spec.title
+    if alarm.acknowledged:
+        who = f" by {alarm.acknowledged_by}" if alarm.acknowledged_by and alarm.active else ""
+        raise Refused(f"{title}: already acknowledged{who}" if alarm.active else f"{title}: nothing to acknowledge")
+    if occurrence != alarm.occurrence:
+        raise Refused(f"{title} was announced anew meanwhile: look again")
+    after = replace(alarm, acknowledged=True, acknowledged_by=by)
+    transitions = [_transition(after, "acknowledged", by, now_s)]
+    if alarm.latched:
+        after = replace(after, active=False, latched=False, held_s=0.0, cleared_s=now_s, causes=())
+        transitions.append(_transition(after, "cleared", None, now_s))
+    return after, tuple(transitions)
+
+
+def shelve(
+    alarm: Alarm, occurrence: int, minutes: float, by: str, now_s: float, *, is_inhibitor: bool
+) -> tuple[Alarm, tuple[Transition, ...]]:
+    """Hide the alarm for some minutes, at most 15, in the operator's name; it goes on being judged meanwhile."""
+    title = alarm.spec.title
+    if not alarm.spec.shelvable:
+        raise Refused(f"{title} is critical and cannot be shelved")
+    if is_inhibitor:
+        raise Refused(f"{title} explains other alarms and cannot be shelved")
+    if not 0.0 < minutes <= SHELVE_AT_MOST_MIN:  # NaN is refused too
+        raise Refused(f"Shelving is for at most {SHELVE_AT_MOST_MIN:.0f} minutes")
+    if not by.strip():
+        raise Refused("Shelving needs the name of the operator")
+    if not alarm.is_standing:
+        raise Refused(f"{title}: nothing to shelve")
+    if occurrence != alarm.occurrence:
+        raise Refused(f"{title} was announced anew meanwhile: look again")
+    after = replace(alarm, shelved_until_s=now_s + 60.0 * minutes, shelved_by=by)
+    return after, (_transition(after, "shelved", by, now_s),)
+
+
+def unshelve(alarm: Alarm, by: str, now_s: float) -> tuple[Alarm, tuple[Transition, ...]]:
+    """Back from the shelf before its time; if it is still active that is an announcement, as at the end of the time."""
+    if alarm.shelved_until_s is None:
+        raise Refused(f"{alarm.spec.title} is not shelved")
+    after = replace(alarm, shelved_until_s=None, shelved_by=None)
+    if alarm.active:
+        after = replace(
+            after, occurrence=alarm.occurrence + 1, acknowledged=False, acknowledged_by=None, announced_s=now_s
+        )
+    return after, (_transition(after, "unshelved", by, now_s, announces=alarm.active and not alarm.suppressed_by),)
+
+
+def _transition(alarm: Alarm, change: Change, by: str | None, now_s: float, *, announces: bool = False) -> Transition:
+    return Transition(
+        alarm_id=alarm.id,
+        occurrence=alarm.occurrence,
+        change=change,
+        at_s=now_s,
+        text="" if alarm.finding is None else alarm.finding.text,
+        by=by,
+        announces=announces,
+    )
