@@ -139,7 +139,7 @@ def _behind_the_bridge(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Pr
         if facts.now_s - opened_s < NO_MESSAGE_S:
             return None, None, None
         return "bridge-car", problems.NOTHING_KNOWN if facts.offers_nothing else problems.NO_MESSAGE, None
-    if facts.now_s - last_s < CAR_SILENT_S or any(r.is_fresh(facts.now_s) for r in snapshot.readings.values()):
+    if facts.now_s - max(last_s, facts.since_s) < CAR_SILENT_S or any(r.is_fresh(facts.now_s) for r in snapshot.readings.values()):
         return None, None, None
     return "bridge-car", problems.ROS_GONE if ros_is_gone else problems.CAR_SILENT, last_s
 

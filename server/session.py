@@ -283,6 +283,8 @@ class Session:
             if self._phase == "connecting":
                 self._since_s = now_s
             self._phase = "failed"
+        elif problem.code == "not_rosbridge" and self._address is not None:
+            problem = problems.bridge_silent(self._address)  # it was a rosbridge before: it hangs
         self._problem = problem
         self._after_link_change(now_s)
 
