@@ -84,6 +84,11 @@ class Client:
         finally:
             self._leave()
 
+    @property
+    def is_drained(self) -> bool:
+        """All that was meant for this client has left us."""
+        return self._outbox.is_empty and self._connection.is_drained
+
     def handle(self, raw: bytes, *, whole: bool = False) -> None:
         """Does what one frame asks for, or says why not. Nothing a client sends can raise."""
         id: object = None

@@ -39,6 +39,11 @@ class Connection(ServerConnection):
             and not self.transport.is_closing()
         )
 
+    @property
+    def is_drained(self) -> bool:
+        """All that was written has gone to the system, or never will."""
+        return self.transport.is_closing() or self.transport.get_write_buffer_size() == 0
+
     def write(self, frame: bytes) -> None:
         """Writes one whole frame. Frames are never split here, so they cannot fall into the middle of another."""
         self.transport.write(frame)

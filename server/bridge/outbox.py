@@ -77,6 +77,11 @@ class Outbox:
         self._replies.append(frame)
         self.reply_bytes += len(frame)
 
+    @property
+    def is_empty(self) -> bool:
+        """Nothing waits here; the socket's own buffer is the wire's affair."""
+        return not self._backlog and not self._replies
+
     def forget(self, lane: Lane) -> None:
         """The subscription ended: what waits for it is not wanted any more."""
         self._backlog_bytes -= sum(len(frame) for _, frame in lane.frames)

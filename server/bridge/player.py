@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
-from collections.abc import AsyncIterator, Callable, Iterable, Iterator
+from collections.abc import AsyncGenerator, Callable, Iterable, Iterator
 from itertools import islice
 from typing import TypeVar
 
@@ -40,26 +41,27 @@ async def play(
     count = 0
     first_at_s = began_s = 0.0
     turn_ends = time.monotonic() + TURN_S
-    async for message in _fetched(iter(messages), ahead):
-        if count == 0:
-            first_at_s, began_s = message.at_s, tell()
-        wait_s = began_s + (message.at_s - first_at_s) / rate - tell()
-        if wait_s > SOON_S:
-            await asyncio.sleep(wait_s)
-            turn_ends = time.monotonic() + TURN_S
-        elif time.monotonic() > turn_ends:
-            await asyncio.sleep(0)
-            turn_ends = time.monotonic() + TURN_S
-        bridge.publish(message.topic, message.message)
-        count += 1
-        if on_message is not None:
-            on_message(message)
+    async with contextlib.aclosing(_fetched(iter(messages), ahead)) as fetched:
+        async for message in fetched:
+            if count == 0:
+                first_at_s, began_s = message.at_s, tell()
+            wait_s = began_s + (message.at_s - first_at_s) / rate - tell()
+            if wait_s > SOON_S:
+                await asyncio.sleep(wait_s)
+                turn_ends = time.monotonic() + TURN_S
+            elif time.monotonic() > turn_ends:
+                await asyncio.sleep(0)
+                turn_ends = time.monotonic() + TURN_S
+            bridge.publish(message.topic, message.message)
+            count += 1
+            if on_message is not None:
+                on_message(message)
     if on_end is not None:
         on_end()
     return count
 
 
-async def _fetched(source: Iterator[T], ahead: int) -> AsyncIterator[T]:
+async def _fetched(source: Iterator[T], ahead: int) -> AsyncGenerator[T, None]:
     if ahead <= 0:
         for item in source:
             yield item
@@ -70,8 +72,11 @@ async def _fetched(source: Iterator[T], ahead: int) -> AsyncIterator[T]:
             fetch = asyncio.create_task(asyncio.to_thread(_take, source, ahead))
             for item in batch:
                 yield item
-    finally:
-        fetch.cancel()
+    finally:  # whoever stops us may close the source next: let the thread come out of it first
+        if not fetch.done():
+            await asyncio.wait({fetch})
+        if not fetch.cancelled():
+            fetch.exception()  # seen, should there be one
 
 
 def _take(source: Iterator[T], count: int) -> list[T]:

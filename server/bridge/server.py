@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections.abc import Callable
 
@@ -44,6 +45,7 @@ class RosBridge:
         self.on_publish: list[Callable[[str, str, Json], None]] = []  # (topic, type, message) of what clients publish
         self.on_subscribe: list[Callable[[str], None]] = []  # (topic) each time a client subscribes
         self._listener = Listener(self._serve_client, max_clients=max_clients, max_message_bytes=max_message_bytes)
+        self._clients: set[Client] = set()
         self._address: tuple[str, int] | None = None
         add_rosapi(self)
 
@@ -138,5 +140,19 @@ class RosBridge:
         for callback in self.on_subscribe:
             callback(topic)
 
+    async def drain(self, within_s: float) -> bool:
+        """Waits until every client has been sent all that waits for it; False when that took too long."""
+        deadline = time.monotonic() + within_s
+        while not all(client.is_drained for client in self._clients):
+            if time.monotonic() > deadline:
+                return False
+            await asyncio.sleep(0.01)
+        return True
+
     async def _serve_client(self, connection: Connection) -> None:
-        await Client(self, connection).run()
+        client = Client(self, connection)
+        self._clients.add(client)
+        try:
+            await client.run()
+        finally:
+            self._clients.discard(client)

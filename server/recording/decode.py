@@ -48,8 +48,8 @@ def compile_decoder(type: str, definitions: dict[str, Any], version: RosVersion)
     """The function that reads messages of a type ("geometry_msgs/msg/Twist" in both versions, as rosbags spells it).
 
     The dicts have rosbridge's shape: stamps are secs/nsecs in ROS 1 and sec/nanosec in ROS 2, numeric arrays stay
-    numpy, uint8[] and char[] are bytes. Raises Undecodable here where the type is not known or not supported, and from the
-    function where a message's bytes do not fit it.
+    numpy, uint8[] and char[] are bytes. Raises Undecodable here where the type is not known or not supported, and from
+    the function where a message's bytes do not fit it.
     """
     if version == 1:
         return _compile(type, definitions, _Layout(ros1=True, order="<", start=0), None)
