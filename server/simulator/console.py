@@ -1,0 +1,113 @@
+"""Scenarios by typing: one line on the terminal starts, stops or lists them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import stat
+from collections.abc import Callable
+
+from server.simulator.scenarios import UnknownScenario
+from server.simulator.service import CarService
+
+HELP = "Type a scenario's name to start it (“speeding”, or “speeding 20” for 20 s), “stop”, “stop NAME” or “list”."
+LONGEST_LINE = 4096
+AGAIN_S = 1.0
+
+
+def obey(service: CarService, line: str) -> str:
+    """Does what one typed line asks and answers in words; empty for an empty line."""
+    words = line.split()
+    match [word.lower() for word in words]:
+        case []:
+            return ""
+        case ["list" | "help" | "?"]:
+            return listing(service)
+        case ["stop"]:
+            service.stop_scenario()
+            return "All scenarios stopped."
+        case ["stop", name]:
+            return _tried(lambda: service.stop_scenario(name), f"{name} stopped.")
+        case [name]:
+            return _tried(lambda: service.start_scenario(name), f"{name} started.")
+        case [name, seconds]:
+            try:
+                duration_s = float(seconds)
+            except ValueError:
+                return f"“{words[1][:40]}” is not a number of seconds. {HELP}"
+            return _tried(lambda: service.start_scenario(name, duration_s), f"{name} started for {duration_s:g} s.")
+        case _:
+            return HELP
+
+
+def listing(service: CarService) -> str:
+    """Every scenario with its sentence, and how long those under way still last."""
+    lines = []
+    for row in service.state()["scenarios"]:
+        match row["state"]:
+            case "running":
+                state = f"  [{row['left_s']:.0f} s left]"
+            case "ending":
+                state = "  [ending]"
+            case _:
+                state = ""
+        lines.append(f"  {row['name']:<18} {row['sentence']}{state}")
+    return "\n".join([*lines, HELP])
+
+
+def _tried(act: Callable[[], None], done: str) -> str:
+    try:
+        act()
+    except UnknownScenario as error:
+        return str(error)
+    return done
+
+
+class Console:
+    """Reads lines from a file descriptor as they come, without ever waiting for one."""
+
+    def __init__(self, service: CarService, file: int, say: Callable[[str], None]) -> None:
+        self._service, self._file, self._say = service, file, say
+        self._loop = asyncio.get_running_loop()
+        self._rest = b""
+        self._again: asyncio.TimerHandle | None = None
+
+    def open(self) -> None:
+        """Begins to listen; where there is nothing to listen to, nothing happens."""
+        with contextlib.suppress(OSError, ValueError):  # closed, or of a kind that cannot be waited for
+            if stat.S_ISREG(os.fstat(self._file).st_mode):
+                self._read()
+            else:
+                self._loop.add_reader(self._file, self._read)
+
+    def close(self) -> None:
+        if self._again is not None:
+            self._again.cancel()
+        with contextlib.suppress(OSError, ValueError):
+            self._loop.remove_reader(self._file)
+
+    def _read(self) -> None:
+        if self._is_in_background():  # reading would stop the whole process
+            self.close()
+            self._again = self._loop.call_later(AGAIN_S, self.open)
+            return
+        try:
+            data = os.read(self._file, LONGEST_LINE)
+        except OSError:
+            data = b""
+        if not data:
+            self.close()
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        if not data or len(self._rest) > LONGEST_LINE:
+            lines, self._rest = [*lines, self._rest], b""
+        for line in lines:
+            answer = obey(self._service, line.decode("utf-8", "replace")[:LONGEST_LINE])
+            if answer:
+                self._say(answer)
+
+    def _is_in_background(self) -> bool:
+        try:
+            return os.isatty(self._file) and os.getpgrp() != os.tcgetpgrp(self._file)
+        except OSError:
+            return False

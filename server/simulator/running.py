@@ -1,0 +1,112 @@
+"""The scenarios of one simulated car: which wait, which run, which are finding back to normal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from server.simulator.driver import Order
+from server.simulator.effects import Effect
+from server.simulator.scenarios import SCENARIOS, BridgeFault, Planned, Scenario, laid_over
+from server.source import Message
+
+
+@dataclass(slots=True, kw_only=True)
+class Running:
+    """A scenario under way."""
+
+    scenario: Scenario
+    began_s: float
+    ends_s: float
+    effect: Effect | None
+    is_ending: bool = False
+
+    def end(self) -> None:
+        self.is_ending = True
+        if self.effect is not None:
+            self.effect.end()
+
+    @property
+    def is_over(self) -> bool:
+        return self.is_ending and (self.effect is None or self.effect.is_over)
+
+
+class Scenarios:
+    """Starts and ends scenarios as time goes on. Several may run at once; each at most once."""
+
+    def __init__(self, plan: Iterable[Planned] = ()) -> None:
+        self._waiting = sorted(plan, key=lambda planned: planned.after_s)
+        self._running: dict[str, Running] = {}
+
+    def start(self, scenario: Scenario, now_s: float, duration_s: float | None = None) -> None:
+        """Begins a scenario; one that runs already begins anew, keeping what its effect has done so far."""
+        ends_s = now_s + (scenario.duration_s if duration_s is None else duration_s)
+        already = self._running.get(scenario.name)
+        if already is not None and not already.is_ending:
+            already.ends_s = ends_s
+            return
+        effect = None
+        if scenario.effect is not None and not scenario.order_suffices:
+            effect = scenario.effect()
+        self._running[scenario.name] = Running(scenario=scenario, began_s=now_s, ends_s=ends_s, effect=effect)
+
+    def stop(self, name: str | None = None) -> None:
+        """Ends one scenario, or all, now; what is planned for later stays planned."""
+        for running in self._running.values():
+            if name is None or running.scenario.name == name:
+                running.end()
+
+    def advance(self, now_s: float) -> None:
+        """Starts and ends what is due. `now_s` counts from the beginning of the drive."""
+        while self._waiting and self._waiting[0].after_s <= now_s:
+            due = self._waiting.pop(0)
+            self.start(due.scenario, now_s, due.duration_s)
+        for running in list(self._running.values()):
+            if now_s >= running.ends_s and not running.is_ending:
+                running.end()
+            if running.is_over:
+                del self._running[running.scenario.name]
+
+    @property
+    def orders(self) -> set[Order]:
+        """What the driver is to do."""
+        return {
+            running.scenario.order
+            for running in self._running.values()
+            if running.scenario.order is not None and not running.is_ending
+        }
+
+    @property
+    def bridge_faults(self) -> set[BridgeFault]:
+        """What the bridge is to suffer."""
+        return {
+            running.scenario.bridge
+            for running in self._running.values()
+            if running.scenario.bridge is not None and not running.is_ending
+        }
+
+    def lay_over(self, message: Message, signal: str) -> list[Message]:
+        """What becomes of a message."""
+        effects = [running.effect for running in self._running.values() if running.effect is not None]
+        return laid_over((message,), effects, signal) if effects else [message]
+
+    def state(self, now_s: float) -> list[dict[str, Any]]:
+        """Every scenario there is, for a person or a program to choose from, and how it stands."""
+        rows = []
+        for scenario in SCENARIOS.values():
+            running = self._running.get(scenario.name)
+            row: dict[str, Any] = {
+                "name": scenario.name,
+                "sentence": scenario.sentence,
+                "duration_s": scenario.duration_s,
+                "alarm": scenario.alarm,
+                "consequences": list(scenario.consequences),
+                "state": "off",
+                "left_s": 0.0,
+            }
+            if running is not None:
+                row["state"] = "ending" if running.is_ending else "running"
+                row["left_s"] = 0.0 if running.is_ending else round(max(0.0, running.ends_s - now_s), 1)
+            rows.append(row)
+        return rows

@@ -1,0 +1,246 @@
+"""Every fault that can be asked for by name: what it is, how long it lasts, and which alarm it should raise."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from server.simulator.driver import Order
+from server.simulator.effects import (
+    BlindLaser,
+    BothPedals,
+    ComponentError,
+    Effect,
+    FrozenSpeed,
+    GpsOffset,
+    ObstacleAhead,
+    Silence,
+    SlowRate,
+    Speeding,
+)
+from server.source import Message
+
+BridgeFault = Literal["freeze", "kill"]
+
+LONGEST_S = 3600.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """A fault on demand.
+
+    `effect` works on the messages of any source. `order` is what the simulated car's driver does meanwhile; where
+    `order_suffices` the simulated car shows the fault by its own motion and the effect is left to recordings.
+    """
+
+    name: str
+    sentence: str
+    duration_s: float
+    alarm: str  # as the table of alarms names it
+    consequences: tuple[str, ...] = ()  # what else may be raised, rightly
+    effect: Callable[[], Effect] | None = None
+    order: Order | None = None
+    order_suffices: bool = False
+    bridge: BridgeFault | None = None
+
+
+_SCENARIOS = (
+    Scenario(
+        name="speeding",
+        sentence="The car drives 12 m/s for some seconds, as soon as the lap allows it.",
+        duration_s=60.0,  # at most; it ends after HURRY_FOR_S above the limit
+        alarm="speed above limit",
+        effect=Speeding,
+        order=Order.HURRY,
+        order_suffices=True,
+    ),
+    Scenario(
+        name="obstacle",
+        sentence="Another car pulls across the way; the driver brakes and stops before it until it drives off.",
+        duration_s=10.0,  # short of the ten seconds of standing after which that is told too
+        alarm="obstacle in corridor",
+        consequences=("nearest object",),
+        effect=ObstacleAhead,
+        order=Order.YIELD,
+        order_suffices=True,
+    ),
+    Scenario(
+        name="pedal-conflict",
+        sentence="Brake and accelerator are down at the same time.",
+        duration_s=5.0,
+        alarm="brake and accelerator together",
+        effect=BothPedals,
+    ),
+    Scenario(
+        name="gps-drift",
+        sentence="The car stops, and while it stands its position wanders off by 16 m.",
+        # 5 s down to standstill, 3 s for the judge to take its anchor, 7 s of wandering, and time to notice
+        duration_s=24.0,
+        alarm="GPS drift at standstill",
+        consequences=("vehicle not moving", "phone and car disagree"),
+        # slower than the jump rule's 3 m/s; farther than 4.3 times the 2.5 m of a receiver that tells no quality
+        effect=lambda: GpsOffset(pace_mps=2.3, most_m=16.0, during="standing", after_s=3.0, back_mps=1.5),
+        order=Order.STAND,
+    ),
+    Scenario(
+        name="gps-jump",
+        sentence="The position runs away at 23 m/s, as a real receiver's did, and is right again at once.",
+        duration_s=6.0,
+        alarm="GPS jump",
+        consequences=("GPS drift at standstill", "phone and car disagree"),
+        effect=lambda: GpsOffset(pace_mps=23.0, most_m=1000.0, during="always", back_mps=None),
+    ),
+    Scenario(
+        name="phone-mismatch",
+        sentence="The position creeps 60 m aside while the car drives; a phone in the car knows better.",
+        duration_s=90.0,
+        alarm="phone and car disagree",
+        # 60 m lies beyond the gate of the worst phone fix that is used (50 m)
+        effect=lambda: GpsOffset(pace_mps=2.0, most_m=60.0, during="moving", back_mps=2.0),
+    ),
+    Scenario(
+        name="stale-gps",
+        sentence="No position comes any more; all else goes on.",
+        duration_s=10.0,
+        alarm="GPS stale",
+        consequences=("signal stale: position",),
+        effect=lambda: Silence("position"),
+    ),
+    Scenario(
+        name="silent-scan",
+        sentence="No laser scan comes any more; all else goes on.",
+        duration_s=10.0,
+        alarm="signal stale: scan",
+        effect=lambda: Silence("scan"),
+    ),
+    Scenario(
+        name="blind-laser",
+        sentence="Scans come, but no beam returns from anything.",
+        duration_s=10.0,
+        alarm="laser cannot see",
+        effect=BlindLaser,
+    ),
+    Scenario(
+        name="frozen-speed",
+        sentence="The car drives on, but its speed messages repeat one value.",
+        duration_s=8.0,
+        alarm="signal frozen: speed",
+        consequences=("command without response",),
+        effect=FrozenSpeed,
+        order=Order.STEADY,  # faster than the frozen speed, the true way would look like a GPS jump
+    ),
+    Scenario(
+        name="slow-rate",
+        sentence="Speed comes 10 times a second instead of 20.",
+        duration_s=15.0,
+        alarm="signal slower than expected: speed",
+        effect=lambda: SlowRate("speed"),
+    ),
+    Scenario(
+        name="diagnostics-error",
+        sentence="One component of the car reports an error.",
+        duration_s=10.0,
+        alarm="/diagnostics ERROR",
+        effect=ComponentError,
+    ),
+    Scenario(
+        name="all-silent",
+        sentence="Nothing comes from the car any more; the bridge answers as before.",
+        duration_s=10.0,
+        alarm="connection lost",
+        consequences=("signal stale",),
+        effect=Silence,
+    ),
+    Scenario(
+        name="bridge-frozen",
+        sentence="The bridge keeps its connections but neither sends nor answers, as a stopped process.",
+        duration_s=8.0,
+        alarm="connection lost",
+        bridge="freeze",
+    ),
+    Scenario(
+        name="bridge-killed",
+        sentence="The bridge drops every connection and refuses new ones, as a killed process.",
+        duration_s=8.0,
+        alarm="connection lost",
+        bridge="kill",
+    ),
+)
+
+SCENARIOS: dict[str, Scenario] = {scenario.name: scenario for scenario in _SCENARIOS}
+
+
+class UnknownScenario(ValueError):
+    """There is no scenario of that name, or its time is none; the text is one sentence for a person."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Planned:
+    """A scenario to come: `after_s` after the beginning, for `duration_s` (None: its own duration)."""
+
+    scenario: Scenario
+    after_s: float = 0.0
+    duration_s: float | None = None
+
+
+def find(name: str) -> Scenario:
+    """The scenario of that name, in any case of letters. Raises UnknownScenario."""
+    found = SCENARIOS.get(name.strip().lower())
+    if found is None:
+        raise UnknownScenario(f"There is no scenario “{name.strip()[:40]}”. There are: {', '.join(SCENARIOS)}.")
+    return found
+
+
+def check_duration(duration_s: float) -> float:
+    """The duration, if it is one. Raises UnknownScenario."""
+    if not 0 < duration_s <= LONGEST_S:
+        raise UnknownScenario(f"A scenario lasts more than 0 and at most {LONGEST_S:.0f} s, not {duration_s:g} s.")
+    return duration_s
+
+
+def planned(text: str) -> Planned:
+    """Reads NAME, NAME@T or NAME@T+D: from T seconds after the beginning, for D seconds. Raises UnknownScenario."""
+    name, at, when = text.partition("@")
+    scenario = find(name)
+    if not at:
+        return Planned(scenario=scenario)
+    match = re.fullmatch(r"(\d+(?:\.\d*)?)(?:\+(\d+(?:\.\d*)?))?", when.strip())
+    if match is None:
+        raise UnknownScenario(f"“{text[:60]}” is not NAME, NAME@SECONDS or NAME@SECONDS+DURATION.")
+    duration_s = None if match[2] is None else check_duration(float(match[2]))
+    return Planned(scenario=scenario, after_s=float(match[1]), duration_s=duration_s)
+
+
+def inject(
+    messages: Iterable[Message], faults: Iterable[Planned], signal_of: Callable[[Message], str | None]
+) -> Iterator[Message]:
+    """Lays faults over any messages, such as a recording; `after_s` counts from the first message.
+
+    `signal_of` tells which signal a message carries. Faults of the bridge cannot happen in a recording and do nothing.
+    """
+    waiting = sorted(faults, key=lambda fault: fault.after_s)
+    running: list[tuple[float, Effect]] = []
+    began_s: float | None = None
+    for message in messages:
+        if began_s is None:
+            began_s = message.at_s
+        while waiting and message.at_s - began_s >= waiting[0].after_s:
+            fault = waiting.pop(0)
+            if fault.scenario.effect is not None:
+                duration_s = fault.scenario.duration_s if fault.duration_s is None else fault.duration_s
+                running.append((began_s + fault.after_s + duration_s, fault.scenario.effect()))
+        for ends_s, effect in running:
+            if message.at_s >= ends_s:
+                effect.end()
+        running = [(ends_s, effect) for ends_s, effect in running if not effect.is_over]
+        yield from laid_over((message,), [effect for _, effect in running], signal_of(message))
+
+
+def laid_over(messages: Iterable[Message], effects: Iterable[Effect], signal: str | None) -> list[Message]:
+    """The messages, all of one signal, after every effect in turn."""
+    left = list(messages)
+    for effect in effects:
+        left = [made for message in left for made in effect.apply(message, signal)]
+    return left
