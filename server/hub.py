@@ -152,6 +152,8 @@ class Page:
     async def _write(self) -> None:
         try:
             await self._send(self._hello)
+            with contextlib.suppress(NotServed):
+                await self._bus.request(self._vehicle, {"kind": "refresh"})  # nobody may have looked for a while
             await self._send_newest("state", unasked=True)
             while True:
                 await self._wake.wait()

@@ -160,9 +160,12 @@ class Session:
     # -- commands ----------------------------------------------------------------------------------------------------
 
     async def handle(self, message: Mapping[str, Any]) -> dict[str, Any]:
-        """Answers a page's command, or the request `{"kind": "signals"}` for what there is beyond the state."""
+        """Answers a page's command, or what is asked of the session itself: state, refresh, signals, track."""
         if message.get("kind") == "state":
             return self.frame()
+        if message.get("kind") == "refresh":
+            self._put_state(self._now())
+            return {"ok": True}
         if message.get("kind") == "signals":
             return self._signals()
         if message.get("kind") == "track":

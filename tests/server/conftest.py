@@ -1,0 +1,54 @@
+"""A server and a bridge in the test's own loop, on free ports."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import AsyncIterator
+
+import pytest
+import uvicorn
+
+from server.app import create_app
+from server.bridge.server import RosBridge
+from server.config import Config, Vehicle
+
+
+@contextlib.asynccontextmanager
+async def serving(config: Config) -> AsyncIterator[str]:
+    """The app on a real socket; yields its http address."""
+    listening = socket.socket()
+    listening.bind(("127.0.0.1", 0))
+    server = uvicorn.Server(
+        uvicorn.Config(create_app(config), ws="websockets-sansio", log_level="warning", lifespan="on", access_log=False)
+    )
+    running = asyncio.create_task(server.serve(sockets=[listening]))
+    while not server.started:
+        await asyncio.sleep(0.01)
+    try:
+        yield f"http://127.0.0.1:{listening.getsockname()[1]}"
+    finally:
+        server.should_exit = True
+        await running
+        listening.close()
+
+
+@pytest.fixture
+async def bridge() -> AsyncIterator[RosBridge]:
+    """A bridge with a car's speed and scan advertised; `bridge.address` is its ws address."""
+    one = RosBridge(ros_version=1)
+    port = await one.start("127.0.0.1", 0)
+    one.address = f"ws://127.0.0.1:{port}"  # type: ignore[attr-defined]
+    one.advertise("/catvehicle/vel", "geometry_msgs/Twist")
+    one.advertise("/scan", "sensor_msgs/LaserScan")
+    yield one
+    await one.stop()
+
+
+@pytest.fixture
+async def server(bridge: RosBridge) -> AsyncIterator[str]:
+    """A server that watches the bridge; its http address."""
+    config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
+    async with serving(config) as base:
+        yield base

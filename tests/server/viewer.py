@@ -1,0 +1,99 @@
+"""A page without a browser: speaks docs/protocol.md over a real socket."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import json
+import time
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+import websockets
+
+
+class Viewer:
+    """Takes what it is offered and keeps it."""
+
+    def __init__(self, socket: websockets.ClientConnection, *, takes: bool = True) -> None:
+        self.socket = socket
+        self.takes = takes
+        self.states: list[dict[str, Any]] = []
+        self.scans: list[bytes] = []
+        self.events: list[dict[str, Any]] = []
+        self.offers: list[dict[str, Any]] = []
+        self.other: list[dict[str, Any]] = []
+        self.got_s: list[float] = []  # when each state came, wall clock
+        self._ids = itertools.count(1)
+        self._changed = asyncio.Condition()
+
+    async def read(self) -> None:
+        """Reads until the server ends it."""
+        with contextlib.suppress(websockets.ConnectionClosed):
+            async for message in self.socket:
+                await self.hear(message)
+
+    async def hear(self, message: str | bytes) -> None:
+        """One frame, answered as a page answers."""
+        if isinstance(message, bytes):
+            self.scans.append(message)
+        else:
+            frame = json.loads(message)
+            match frame["kind"]:
+                case "state":
+                    self.states.append(frame)
+                    self.got_s.append(time.time())
+                case "offer":
+                    self.offers.append(frame)
+                    if self.takes:
+                        await self.send({"kind": "take", "seq": frame["seq"]})
+                case "events":
+                    self.events.extend(frame["events"])
+                    await self.send({"kind": "have", "event": frame["events"][-1]["n"]})
+                case _:
+                    self.other.append(frame)
+        async with self._changed:
+            self._changed.notify_all()
+
+    async def send(self, message: dict[str, Any]) -> None:
+        await self.socket.send(json.dumps(message))
+
+    async def ask(self, **command: Any) -> dict[str, Any]:
+        """Sends a command and answers its reply."""
+        identity = f"test {next(self._ids)}"
+        await self.send(command | {"id": identity})
+        return await self.until(lambda: next((r for r in self.other if r.get("id") == identity), None))
+
+    async def until(self, found: Callable[[], Any], within_s: float = 5.0) -> Any:
+        """Waits for `found()` to be something and answers it."""
+        async with asyncio.timeout(within_s), self._changed:
+            while True:
+                answer = found()
+                if answer:
+                    return answer
+                await self._changed.wait()
+
+    async def state(self, fits: Callable[[dict[str, Any]], bool] = lambda _: True, within_s: float = 5.0) -> dict[str, Any]:
+        """The next state (from now on) that fits."""
+        start = len(self.states)
+        found: dict[str, Any] = await self.until(
+            lambda: next((state for state in self.states[start:] if fits(state)), None), within_s
+        )
+        return found
+
+
+@contextlib.asynccontextmanager
+async def viewer(base: str, *, vehicle: str | None = None, have_event: int | None = None) -> AsyncIterator[Viewer]:
+    """A viewer that reads in the background; `base` is the server's http address."""
+    url = base.replace("http://", "ws://") + "/ws" + (f"?vehicle={vehicle}" if vehicle else "")
+    async with websockets.connect(url, max_size=2**24) as socket:
+        one = Viewer(socket)
+        await one.send({"kind": "hello", "have_event": have_event})
+        reading = asyncio.create_task(one.read())
+        try:
+            yield one
+        finally:
+            reading.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await reading
