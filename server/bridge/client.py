@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+import logging
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from websockets.exceptions import ConnectionClosed
 
 from server.bridge import fields
+from server.bridge.completion import Misfit
 from server.bridge.connection import Connection
 from server.bridge.encoding import Encoding, Outgoing, Unencodable, json_frame
 from server.bridge.fields import Refused
@@ -22,6 +24,8 @@ from server.bridge.subscription import Subscription, Wish
 
 if TYPE_CHECKING:
     from server.bridge.server import RosBridge
+
+_log = logging.getLogger("catgraph.bridge")
 
 LEVELS = ("info", "warning", "error", "none")
 MOST_SUBSCRIPTIONS = 1_000
@@ -103,8 +107,11 @@ class Client:
             if handler is None:
                 raise Refused(_unknown(op, self._operations))
             handler(operation, id)
-        except (Refused, BadName, Unencodable) as error:
+        except (Refused, BadName, Misfit, Unencodable) as error:
             self.say("error", f"{op[:40]}: {error}" if op else str(error), id)
+        except Exception:  # our own mistake must not cost the client its connection
+            _log.exception("operation %r failed", op[:40])
+            self.say("error", f"{op[:40]}: this failed inside the bridge", id)
 
     def say(self, level: str, text: str, id: object = None) -> None:
         """Sends a status message, if the client wants those of this level."""
@@ -151,7 +158,8 @@ class Client:
         spelling = fields.text(operation, "topic")
         subscription = self._subscriptions.get(spelling)
         if subscription is None:
-            raise Refused(f"not subscribed to {spelling[:100]}")
+            self.say("warning", f"unsubscribe: not subscribed to {spelling[:100]}", id)
+            return
         if id is None:
             subscription.wishes.clear()
         else:
@@ -182,7 +190,8 @@ class Client:
         topic = self._bridge.graph.find(fields.text(operation, "topic"))
         ids = None if topic is None else self._advertised.get(topic.name)
         if topic is None or ids is None:
-            raise Refused("this topic was not advertised by this client")
+            self.say("warning", "unadvertise: this topic was not advertised by this client", id)
+            return
         ids.discard(id)
         if id is None or not ids:
             del self._advertised[topic.name]
@@ -201,6 +210,7 @@ class Client:
                 raise Refused(f"a client may publish to {MOST_ADVERTISED} topics")
             self._advertised[topic.name] = {None}  # publishing makes a publisher, as in rosbridge
             topic.publishers.add(self)
+        message = self._bridge.types.complete(topic.type, message, self._bridge.now())
         topic.distribute(Outgoing(message))
         for callback in self._bridge.on_publish:
             callback(topic.name, topic.type, message)
@@ -246,8 +256,6 @@ class Client:
         response: dict[str, Any] = {"op": "service_response", "service": service, "values": values, "result": result}
         if id is not None:
             response["id"] = id
-        if not result:
-            self.say("error", f"call_service: {values}", id)
         self._outbox.reply(json_frame(response))
 
     def type_became(self, topic: Topic, subscription: Subscription) -> None:

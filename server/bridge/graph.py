@@ -21,7 +21,6 @@ class Topic:
 
     name: str
     type: str | None  # canonical; None: only subscribed to, by clients that named no type
-    definition: str | None = None
     latches: bool = False
     latched: Outgoing | None = None  # the newest message, for those who come later
     publishers: set[Client | str] = field(default_factory=set)

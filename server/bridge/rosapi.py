@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from server.bridge.completion import stamp
 from server.bridge.graph import SOURCE, Topic
 from server.bridge.names import canonical_name
 from server.source import Json
@@ -18,12 +19,14 @@ ROSAPI_NODE = "/rosapi"
 def add_rosapi(bridge: RosBridge) -> None:
     """Adds the services of rosapi to a bridge, with the names of their fields as rosapi has them."""
     api = _Rosapi(bridge)
+    package = "rosapi" if bridge.ros_version == 1 else "rosapi_msgs"
     for name, type, handler, arguments in (
         ("topics", "Topics", api.topics, ()),
         ("topics_for_type", "TopicsForType", api.topics_for_type, ("type",)),
         ("topics_and_raw_types", "TopicsAndRawTypes", api.topics_and_raw_types, ()),
         ("topic_type", "TopicType", api.topic_type, ("topic",)),
         ("get_time", "GetTime", api.get_time, ()),
+        ("message_details", "MessageDetails", api.message_details, ("type",)),
         ("publishers", "Publishers", api.publishers, ("topic",)),
         ("subscribers", "Subscribers", api.subscribers, ("topic",)),
         ("nodes", "Nodes", api.nodes, ()),
@@ -33,11 +36,9 @@ def add_rosapi(bridge: RosBridge) -> None:
         ("service_type", "ServiceType", api.service_type, ("service",)),
         ("service_node", "ServiceNode", api.service_node, ("service",)),
     ):
-        bridge.add_service(f"/rosapi/{name}", f"rosapi/{type}", handler, arguments)
+        bridge.add_service(f"/rosapi/{name}", f"{package}/{type}", handler, arguments)
     if bridge.ros_version == 2:
-        bridge.add_service(
-            "/rosapi/get_ros_version", "rosapi/GetROSVersion", lambda _: {"version": 2, "distro": "humble"}
-        )
+        bridge.add_service("/rosapi/get_ros_version", f"{package}/GetROSVersion", api.ros_version)
 
 
 class _Rosapi:
@@ -53,7 +54,7 @@ class _Rosapi:
         return {"topics": [topic.name for topic in self._bridge.graph.topics() if topic.type == type]}
 
     def topics_and_raw_types(self, args: Json) -> Json:
-        texts = [topic.definition or "" for topic in self._bridge.graph.topics()]
+        texts = [self._bridge.types.text(topic.type or "") for topic in self._bridge.graph.topics()]
         return {**self.topics(args), "typedefs_full_texts": texts}
 
     def topic_type(self, args: Json) -> Json:
@@ -61,11 +62,13 @@ class _Rosapi:
         return {"type": (topic.type if topic else None) or ""}
 
     def get_time(self, args: Json) -> Json:
-        nanoseconds = round(self._bridge.now() * 1e9)
-        whole, rest = divmod(nanoseconds, 1_000_000_000)
-        return {
-            "time": {"secs": whole, "nsecs": rest} if self._bridge.ros_version == 1 else {"sec": whole, "nanosec": rest}
-        }
+        return {"time": stamp(self._bridge.now(), self._bridge.ros_version)}
+
+    def ros_version(self, args: Json) -> Json:
+        return {"version": 2, "distro": "humble"}
+
+    def message_details(self, args: Json) -> Json:
+        return {"typedefs": self._bridge.types.describe(self._bridge.message_type(_text(args, "type")))}
 
     def publishers(self, args: Json) -> Json:
         topic = self._topic(args)

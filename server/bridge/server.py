@@ -15,6 +15,7 @@ from server.bridge.names import canonical_name, canonical_type
 from server.bridge.outbox import Counters
 from server.bridge.rosapi import add_rosapi
 from server.bridge.services import Handler, Service, ServiceFailed, Services
+from server.bridge.types import MessageTypes
 from server.source import Json, RosVersion
 
 __all__ = ["CannotListen", "RosBridge", "ServiceFailed"]
@@ -42,6 +43,7 @@ class RosBridge:
         self.counters = Counters()
         self.graph = Graph()
         self.services = Services()
+        self.types = MessageTypes(ros_version)
         self.on_publish: list[Callable[[str, str, Json], None]] = []  # (topic, type, message) of what clients publish
         self.on_subscribe: list[Callable[[str], None]] = []  # (topic) each time a client subscribes
         self._listener = Listener(self._serve_client, max_clients=max_clients, max_message_bytes=max_message_bytes)
@@ -70,6 +72,7 @@ class RosBridge:
 
     async def start(self, host: str = "127.0.0.1", port: int = 0) -> int:
         """Listens and answers the port, a free one for 0. Raises CannotListen with one sentence for a person."""
+        self.types.load()
         port = await self._listener.open(host, port)
         self._address = (host, port)
         return port
@@ -102,10 +105,15 @@ class RosBridge:
         return canonical_type(name, self.ros_version)
 
     def advertise(self, topic: str, type: str, definition: str | None = None, *, latch: bool = False) -> None:
-        """Makes a topic exist. `latch`: newcomers get the last message at once. Raises BadName."""
+        """Makes a topic exist. `latch`: newcomers get the last message at once. Raises BadName.
+
+        `definition` is the type's .msg text with all it contains; standard types need none.
+        """
         type = self.message_type(type)
         found = self.graph.find_or_make(topic, type)
-        found.type, found.definition, found.latches = type, definition, latch
+        found.type, found.latches = type, latch
+        if definition:
+            self.types.learn(type, definition)
         found.publishers.add(SOURCE)
         for subscription, client in list(found.subscribers.items()):
             client.type_became(found, subscription)
