@@ -127,7 +127,7 @@ class Alarm:
 def advance(
     alarm: Alarm, finding: Finding, now_s: float, inhibited_by: Collection[str] = ()
 ) -> tuple[Alarm, tuple[Transition, ...]]:
-    """One judgement at `now_s`: the alarm after it and what happened; `inhibited_by` explains the alarm away for now."""
+    """One judgement at `now_s`: the alarm after it, and what happened. `inhibited_by` explains it away for now."""
     if alarm.out_of_service:
         return alarm, ()
     if finding.verdict is not Verdict.FAULT and not inhibited_by and alarm._is_at_rest:

@@ -23,3 +23,10 @@ class LinkFacts:
     connected_s: float | None = None  # when the open connection was made
     last_message_s: float | None = None  # when the car last said anything
     published: frozenset[str] = frozenset()  # the signals that discovery found on the car
+
+    @property
+    def opened_s(self) -> float | None:
+        """When the link that is open now was opened, the last time if it was lost meanwhile; None while closed."""
+        if self.phase != "monitoring":
+            return None
+        return self.since_s if self.connected_s is None else max(self.since_s, self.connected_s)

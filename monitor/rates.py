@@ -28,6 +28,7 @@ class Rate:
     measured_hz: float | None  # over the sliding window; None: not enough heard yet; 0.0: silent
     expected_hz: float | None  # None: neither declared, set nor learned
     settled: bool  # whether `expected_hz` may be held against the car
+    learning: bool = False  # whether it may still settle; a signal without a default that never keeps a rate does not
 
 
 class RateMeter:
@@ -120,7 +121,12 @@ class RateMeter:
         return max(STALE_PERIODS * (period_s or 0.0), floor_s)
 
     def rate(self, now_s: float) -> Rate:
-        return Rate(measured_hz=self.measured_hz(now_s), expected_hz=self.expected_hz, settled=self.is_settled)
+        return Rate(
+            measured_hz=self.measured_hz(now_s),
+            expected_hz=self.expected_hz,
+            settled=self.is_settled,
+            learning=self._blocks < DECIDED_BLOCKS,
+        )
 
     def measured_hz(self, now_s: float) -> float | None:
         """Intervals per second within the window; a pause still going on counts from its first missed message."""

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Generic, Literal, TypeVar, overload
 
+from monitor.headings import Headings
 from monitor.link import LinkFacts, Phase
+from monitor.motion import Slope, Standstill
 from monitor.rates import Rate, RateMeter
 from monitor.signals import SIGNALS
-from monitor.tracks import TrackPoint
+from monitor.tracks import Track, TrackPoint
 from monitor.values import (
     Acceleration,
     Bearing,
@@ -98,6 +100,7 @@ class Snapshot:
     extents: Mapping[str, Extent] = field(default_factory=dict)  # where a headline number was ever heard
     track: tuple[TrackPoint, ...] = ()  # where the car was, thinned and bounded, oldest first
     track_m: float | None = None  # distance driven since connecting; None: never had a position
+    standing_since_s: float | None = None  # when the car came to rest by its wheels; None: it moves, or cannot be told
 
     @overload
     def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...
@@ -199,6 +202,10 @@ class State:
         self._rates: Mapping[str, Rate] = MappingProxyType({})
         self._rates_at_s: float | None = None
         self._heard_s: float | None = None
+        self._slope = Slope()
+        self._standstill = Standstill()
+        self._track = Track()
+        self._headings = Headings()
         self._link = LinkFacts()
         self._paused = False
 
@@ -214,7 +221,7 @@ class State:
         heard.count += 1
         heard.meter.receive(received_s)
         self._heard_s = received_s
-        self._readings[signal] = Reading(
+        reading = Reading(
             value=value,
             received_s=received_s,
             stamp_s=stamp_s,
@@ -222,14 +229,15 @@ class State:
             period_s=heard.meter.period_s,
             count=heard.count,
         )
+        self._readings[signal] = reading
         self._extend(signal, value)
-        return (signal,)
+        derived = self._derive(signal, reading)
+        return (signal,) if derived is None else (signal, derived)
 
     def link(self, facts: LinkFacts) -> None:
         """What is now known of the link. A link that opens (again) starts the measuring of rates anew."""
         before, self._link = self._link, facts
-        opened = before.phase != "monitoring" or before.connected_s != facts.connected_s
-        if facts.phase == "monitoring" and opened:
+        if facts.opened_s is not None and facts.opened_s != before.opened_s:
             for heard in self._heard.values():
                 heard.meter.restart()
 
@@ -246,7 +254,59 @@ class State:
             paused=self._paused,
             heard_s=self._heard_s,
             extents=MappingProxyType(self._extents.copy()),
+            track=self._track.points,
+            track_m=self._track.distance_m,
+            standing_since_s=self._standstill.since_s if self._is_fresh("speed", now_s) else None,
         )
+
+    def _derive(self, signal: str, reading: Reading[Any]) -> str | None:
+        """Follow what this reading tells of other signals; the name of the derived signal that changed."""
+        value, at_s = reading.value, reading.received_s
+        match value:
+            case Twist():
+                return self._derive_acceleration(reading)
+            case GpsFix():
+                speed_mps = self._readings["speed"].value.speed_mps if self._is_fresh("speed", at_s) else None
+                is_standing = None if speed_mps is None else self._standstill.is_standing
+                self._track.receive(value, at_s, speed_mps, is_standing)
+                heading = self._headings.on_course(
+                    self._track.course_deg, speed_mps, yaw_is_fresh=self._is_fresh("odometry", at_s)
+                )
+                return self._derived("heading", heading, signal, reading)
+            case Odometry():
+                return self._derived("heading", self._headings.on_odometry(value), signal, reading)
+            case Heading():
+                self._headings.is_published = True
+        return None
+
+    def _derive_acceleration(self, reading: Reading[Twist]) -> str | None:
+        speed_mps = reading.value.speed_mps
+        self._standstill.add(reading.received_s, speed_mps)
+        # The car's own stamps are free of the jitter of the way here, where there are any.
+        at_s = reading.received_s if reading.stamp_s is None else reading.stamp_s
+        slope_mps2 = self._slope.add(at_s, speed_mps)
+        if slope_mps2 is None or self._heard["acceleration"].count:
+            return None
+        acceleration = Acceleration(acceleration_mps2=slope_mps2, source="speed")
+        return self._derived("acceleration", acceleration, "speed", reading)
+
+    def _derived(self, signal: str, value: Value | None, source: str, reading: Reading[Any]) -> str | None:
+        if value is None:
+            return None
+        self._readings[signal] = Reading(
+            value=value,
+            received_s=reading.received_s,
+            stamp_s=reading.stamp_s,
+            horizon_s=reading.horizon_s,
+            period_s=reading.period_s,
+            derived_from=source,
+        )
+        self._extend(signal, value)
+        return signal
+
+    def _is_fresh(self, signal: str, now_s: float) -> bool:
+        reading = self._readings.get(signal)
+        return reading is not None and reading.is_fresh(now_s)
 
     def _measure(self, now_s: float) -> Mapping[str, Rate]:
         at_s = self._rates_at_s

@@ -2,7 +2,26 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from dataclasses import dataclass
+from itertools import takewhile
+
+from monitor.geo import Plane, course_deg
+from monitor.values import GpsFix
+
+SMOOTH_S = 1.0  # the place of the car is the mean of this long: takes the noise of single fixes off the length
+LOOK_BACK_S = 2.5  # over this long the positions show whether and where the car moves
+ENDS_S = 0.5  # of that, what is averaged at either end
+MOVES_ABOVE_MPS = 0.5  # drift of a standing receiver stays below (19 m in a minute at the worst); a walk is above
+STANDS_BELOW_MPS = 0.3
+CHORD_M = 1.0  # the way is summed in chords of at least this, or of two sigma of a receiver that knows its own
+CHORD_AT_MOST_M = 10.0
+GAP_S = 5.0  # after a longer one the wheel speed of now says nothing of the way between
+FASTEST_MPS = 70.0
+JUMP_M = 10.0
+POINTS = 2000
+FAR_M = 20_000.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,7 +32,128 @@ class TrackPoint:
     lat_deg: float
     lon_deg: float
     distance_m: float  # driven until here
+    is_jump: bool = False  # the car did not drive from the point before to this one: draw no line
 
 
 class Track:
-    """To follow: bounded, decimated, noise-robust."""
+    """Follows the positions of a car.
+
+    Standing receivers drift and single fixes jump about, so their sum grows without a car moving. Here the way grows
+    only while the car moves: by its wheels where they are known, else by what the positions show over 2.5 s; and it is
+    the sum of chords between smoothed places. A leap which no car can make breaks the track and is no way driven.
+    """
+
+    def __init__(self) -> None:
+        self.points: tuple[TrackPoint, ...] = ()
+        self.course_deg: float | None = None  # of the motion over ground at the newest fix; None: standing or unknown
+        self._plane: Plane | None = None
+        self._fixes: deque[tuple[float, float, float]] = deque(maxlen=512)  # (s, east m, north m)
+        self._anchor: tuple[float, float] | None = None
+        self._driven_m = 0.0  # up to the anchor
+        self._shown_m: float | None = None
+        self._moves = False  # by the newest fix
+        self._moved = False  # by the one before
+
+    @property
+    def distance_m(self) -> float | None:
+        """Driven since the first position [m], never shrinking; None before there is one."""
+        return self._shown_m
+
+    def receive(self, fix: GpsFix, at_s: float, speed_mps: float | None, is_standing: bool | None) -> None:
+        """One position. `speed_mps` and `is_standing` are what the wheels say, None where they say nothing fresh."""
+        if fix.status < 0 or not (math.isfinite(fix.lat_deg) and math.isfinite(fix.lon_deg)):
+            return
+        plane = self._plane or Plane(fix.lat_deg, fix.lon_deg)
+        east_m, north_m = plane.enu(fix.lat_deg, fix.lon_deg)
+        is_jump = self._leaps(at_s, east_m, north_m, speed_mps)
+        if is_jump:
+            self._fixes.clear()
+            self._anchor = None
+        if is_jump or math.hypot(east_m, north_m) > FAR_M:
+            plane = Plane(fix.lat_deg, fix.lon_deg)
+            self._move_origin(east_m, north_m)
+            east_m = north_m = 0.0
+        self._plane = plane
+        self._fixes.append((at_s, east_m, north_m))
+        while self._fixes[0][0] < at_s - LOOK_BACK_S and len(self._fixes) > 2:
+            self._fixes.popleft()
+        self._look_back(is_standing)
+        self._drive(fix, at_s, is_jump)
+
+    def _leaps(self, at_s: float, east_m: float, north_m: float, speed_mps: float | None) -> bool:
+        if not self._fixes:
+            return False
+        last_s, last_east_m, last_north_m = self._fixes[-1]
+        gap_s = at_s - last_s
+        if gap_s < 0.0:
+            return True  # the clock went back: begin anew
+        step_m = math.hypot(east_m - last_east_m, north_m - last_north_m)
+        if speed_mps is None or gap_s > GAP_S:
+            return step_m > JUMP_M + FASTEST_MPS * max(gap_s, 1.0)  # fixes may come bunched: allow a second
+        return step_m > JUMP_M + (abs(speed_mps) + 5.0) * max(gap_s, 1.0)
+
+    def _look_back(self, is_standing: bool | None) -> None:
+        """Speed and course over ground between the mean places at either end of the look-back."""
+        first_s, last_s = self._fixes[0][0], self._fixes[-1][0]
+        self.course_deg = None
+        old = _mean(list(takewhile(lambda fix: fix[0] <= first_s + ENDS_S, self._fixes)))
+        new = _mean(list(takewhile(lambda fix: fix[0] >= last_s - ENDS_S, reversed(self._fixes))))
+        span_s = new[0] - old[0]
+        east_m, north_m = new[1] - old[1], new[2] - old[2]
+        over_ground_mps = math.hypot(east_m, north_m) / span_s if span_s > ENDS_S else None
+        self._moved = self._moves
+        if is_standing is not None:
+            self._moves = not is_standing
+        elif over_ground_mps is not None:
+            self._moves = over_ground_mps > (STANDS_BELOW_MPS if self._moves else MOVES_ABOVE_MPS)
+        if self._moves and over_ground_mps is not None and over_ground_mps > MOVES_ABOVE_MPS:
+            self.course_deg = course_deg(east_m, north_m)
+
+    def _drive(self, fix: GpsFix, at_s: float, is_jump: bool) -> None:
+        recent = list(takewhile(lambda one: one[0] >= at_s - SMOOTH_S, reversed(self._fixes)))
+        _, east_m, north_m = _mean(recent)
+        if self._anchor is None:
+            self._anchor = (east_m, north_m)
+            self._driven_m = self._shown_m = self._shown_m or 0.0
+            self._mark(fix, at_s, is_jump)
+            return
+        ahead_m = math.hypot(east_m - self._anchor[0], north_m - self._anchor[1])
+        if not self._moves:
+            if self._moved:
+                self._driven_m += ahead_m  # the rest of the way to the halt
+            self._show(self._driven_m)
+            self._anchor = (east_m, north_m)
+            return
+        self._show(self._driven_m + ahead_m)
+        chord_m = max(CHORD_M, min(2.0 * fix.sigma_m, CHORD_AT_MOST_M)) if fix.sigma_m else CHORD_M
+        if ahead_m >= chord_m:
+            self._driven_m += ahead_m
+            self._anchor = (east_m, north_m)
+            self._mark(fix, at_s, False)
+
+    def _show(self, distance_m: float) -> None:
+        self._shown_m = max(self._shown_m or 0.0, distance_m)
+
+    def _move_origin(self, east_m: float, north_m: float) -> None:
+        """The plane is good near its origin only; far from it, it follows the car."""
+        self._fixes = deque(((s, e - east_m, n - north_m) for s, e, n in self._fixes), maxlen=self._fixes.maxlen)
+        if self._anchor is not None:
+            self._anchor = (self._anchor[0] - east_m, self._anchor[1] - north_m)
+
+    def _mark(self, fix: GpsFix, at_s: float, is_jump: bool) -> None:
+        points = self.points
+        if len(points) >= POINTS:
+            points = tuple(
+                point
+                for index, point in enumerate(points)
+                if index % 2 == 0 or point.is_jump or index == len(points) - 1
+            )[-POINTS + 1 :]
+        point = TrackPoint(
+            at_s=at_s, lat_deg=fix.lat_deg, lon_deg=fix.lon_deg, distance_m=self._driven_m, is_jump=is_jump
+        )
+        self.points = (*points, point)
+
+
+def _mean(fixes: list[tuple[float, float, float]]) -> tuple[float, float, float]:
+    n = len(fixes)
+    return sum(fix[0] for fix in fixes) / n, sum(fix[1] for fix in fixes) / n, sum(fix[2] for fix in fixes) / n

@@ -1,0 +1,62 @@
+"""Has everything from the car stopped at once, while the link stands?"""
+
+from __future__ import annotations
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    fault,
+    ok,
+    unknown,
+)
+from monitor.silence import BRIDGE_WITHIN_S, silence
+from monitor.state import Snapshot
+
+
+def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
+    found = silence(snapshot)
+    if found is None:
+        return unknown("Nothing received since connecting", short="no data")
+    if not found.is_silent:
+        return ok(f"{found.fresh} of {found.heard} signals are fresh")
+    if not (found.is_bridge_proved or was_active or found.silent_s > BRIDGE_WITHIN_S):
+        # Car or link? Wait for the bridge's next sign of life: a lost link has its own words.
+        return unknown(f"No message for {found.silent_s:.1f} s, asking the bridge", short="silent")
+    proof = "the bridge answers, the car says nothing" if found.is_bridge_proved else "neither car nor bridge answers"
+    return fault(
+        f"No message for {found.silent_s:.1f} s: {proof}",
+        brief=f"{found.silent_s:.0f} s",
+        measured=Quantity(label="Silent for", value=found.silent_s, unit="s"),
+        causes=("car",),
+    )
+
+
+CHECKS = (
+    Check(
+        id="car_silent",
+        label="Car heard",
+        tile="Link",
+        order=120,
+        alarm=AlarmSpec(
+            title="The car fell silent",
+            priority=Priority.CRITICAL,
+            place=Place.DIALOG,
+            sound=Sound.HIGH,
+            needs_ack=True,
+            off_delay_s=1.0,
+            actions=(Action.ACKNOWLEDGE, Action.RECONNECT, Action.EXIT),
+            advice="The car may still be moving: watch the car.",
+            inhibited_by=("link_lost",),
+            place_after=Place.LIST,
+        ),
+        limits=Limits,
+        find=find,
+    ),
+)

@@ -1,0 +1,89 @@
+"""Does a signal come slower than it should? One alarm for each signal, made from the table of signals."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from monitor.check import (
+    BRIEF_LETTERS,
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+    unknown,
+)
+from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
+from monitor.signals import SIGNALS, Signal
+from monitor.state import Snapshot
+
+DEADBAND_PERCENT = 3.0  # a rate at the very limit neither comes nor goes
+
+
+def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
+    reading = snapshot.get(signal.name)
+    if reading is None or reading.derived_from is not None:
+        return absent(f"{signal.label}: no rate to measure")  # that it never came is the other family's to say
+    if signal.event_like and set_hz(limits, signal.name) == 0.0:
+        return absent(f"{signal.label} speaks when it has something to say", brief="no fixed rate")
+    snapshot.need(signal.name)  # while stale there is no rate to speak of
+    rate = snapshot.rates.get(signal.name)
+    if rate is None or rate.expected_hz is None or not rate.settled:
+        if rate is not None and not rate.learning:
+            return absent(f"{signal.label} keeps no steady rate", brief="no fixed rate")
+        return unknown(f"{signal.label}: measuring its rate", short="waiting")
+    if rate.measured_hz is None:
+        return unknown(f"{signal.label}: measuring its rate", short="waiting")
+    percent = min(100.0, limits.slow_below_percent + (DEADBAND_PERCENT if was_active else 0.0))
+    text = f"{signal.label}: {rate.measured_hz:.1f} Hz, expected {rate.expected_hz:.1f} Hz"
+    measured = Quantity(label="Rate", value=rate.measured_hz, unit="Hz")
+    limit = Quantity(label="Expected", value=rate.expected_hz, unit="Hz")
+    if rate.measured_hz >= rate.expected_hz * percent / 100.0:
+        return ok(text, measured=measured, limit=limit)
+    return fault(
+        text,
+        brief=_brief(signal, rate.measured_hz),
+        measured=measured,
+        limit=limit,
+        causes=(signal.name,),
+    )
+
+
+def _brief(signal: Signal, hz: float) -> str:
+    long = f"{signal.label} {hz:.0f} Hz"
+    return long if len(f"FAULT {long}") <= BRIEF_LETTERS else signal.label
+
+
+def check(signal: Signal) -> Check[Limits]:
+    return Check(
+        id=f"signal_slow.{signal.name}",
+        label=f"{signal.label} rate",
+        tile="Rates",
+        order=110,
+        group=GROUP,
+        alarm=AlarmSpec(
+            title=f"{signal.label} slower than expected",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.LOW,
+            needs_ack=True,
+            # As long as the window of the rate: no gap shorter than "silent" can hold it below the limit so long.
+            on_delay_s=5.0,
+            off_delay_s=2.0,
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="The car or the radio is busy; what depends on it comes late.",
+            inhibited_by=(f"signal_stale.{signal.name}",),
+        ),
+        limits=SignalLimits,
+        find=partial(find, signal),
+    )
+
+
+CHECKS = tuple(check(signal) for signal in SIGNALS.values())

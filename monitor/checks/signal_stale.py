@@ -1,0 +1,117 @@
+"""Has a signal of the car stopped coming? One alarm for each signal, made from the table of signals."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from monitor.check import (
+    BRIEF_LETTERS,
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+    unknown,
+)
+from monitor.inhibition import GRACE_S
+from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
+from monitor.signals import SIGNALS, Signal
+from monitor.silence import silence
+from monitor.state import Snapshot
+
+NEVER_AFTER_S = 5.0  # as long as the whole car is given for its first message
+
+
+def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
+    reading = snapshot.get(signal.name)
+    if reading is None or reading.derived_from is not None:
+        return _never_came(signal, snapshot, limits)
+    age_s = reading.age_s(snapshot.now_s)
+    text = f"{signal.label}: newest message {age_s:.1f} s old"
+    if _is_event_like(signal, limits):
+        return ok(text)
+    if reading.is_fresh(snapshot.now_s):
+        return ok(text)
+    opened_s = snapshot.link.opened_s
+    if opened_s is not None and reading.received_s < opened_s:
+        # Not heard since the link came back: it gets its time anew.
+        age_s = snapshot.now_s - opened_s
+        if age_s <= max(reading.horizon_s, GRACE_S):
+            return unknown(f"{signal.label}: waiting for its first message", short="waiting")
+    if _car_is_quiet(snapshot):
+        return unknown(f"{signal.label}: the whole car is silent", short="silent")
+    return fault(
+        f"{signal.label}: no message for {age_s:.1f} s",
+        brief=_brief(signal, age_s),
+        measured=Quantity(label="Silent for", value=age_s, unit="s"),
+        limit=Quantity(label="Allowed", value=reading.horizon_s, unit="s"),
+        causes=(signal.name,),
+    )
+
+
+def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Finding:
+    is_wanted = not signal.optional or set_hz(limits, signal.name) > 0.0
+    if signal.name not in snapshot.link.published:
+        if is_wanted:
+            return unknown(f"{signal.label} is not published", short="no data")
+        return absent(f"{signal.label} is not published")
+    if not is_wanted:
+        return absent(f"{signal.label}: nothing came yet", brief="nothing came")
+    opened_s = snapshot.link.opened_s
+    if opened_s is None or snapshot.now_s - opened_s < NEVER_AFTER_S:
+        return unknown(f"{signal.label}: waiting for its first message", short="waiting")
+    if _car_is_quiet(snapshot):
+        return unknown(f"{signal.label}: the whole car is silent", short="silent")
+    waited_s = snapshot.now_s - opened_s
+    return fault(
+        f"{signal.label}: nothing came in {waited_s:.0f} s since connecting",
+        brief=signal.label,
+        causes=(signal.name,),
+    )
+
+
+def _car_is_quiet(snapshot: Snapshot) -> bool:
+    found = silence(snapshot)
+    return found is None or found.is_quiet
+
+
+def _is_event_like(signal: Signal, limits: SlowLimits) -> bool:
+    return signal.event_like and set_hz(limits, signal.name) == 0.0
+
+
+def _brief(signal: Signal, age_s: float) -> str:
+    long = f"{signal.label} {age_s:.0f} s"
+    return long if len(f"FAULT {long}") <= BRIEF_LETTERS else signal.label
+
+
+def check(signal: Signal) -> Check[Limits]:
+    return Check(
+        id=f"signal_stale.{signal.name}",
+        label=f"{signal.label} heard",
+        tile="Signals",
+        order=100,
+        group=GROUP,
+        alarm=AlarmSpec(
+            title=f"{signal.label} silent",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.MEDIUM,
+            needs_ack=True,
+            off_delay_s=2.0,
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="What depends on it is not checked.",
+            inhibited_by=("car_silent", "no_message"),
+        ),
+        limits=SignalLimits,
+        find=partial(find, signal),
+    )
+
+
+CHECKS = tuple(check(signal) for signal in SIGNALS.values())
