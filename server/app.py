@@ -6,13 +6,14 @@ import asyncio
 import logging
 import secrets
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from fastapi import FastAPI
 
+from monitor.catalog import AnyCheck
 from server.bus import LocalBus
 from server.config import Config
 from server.hub import Hub
@@ -67,8 +68,9 @@ def create_app(
     *,
     now: Callable[[], float] = time.monotonic,
     wall_ms: Callable[[], int] = lambda: time.time_ns() // 1_000_000,
+    checks: Sequence[AnyCheck] | None = None,
 ) -> FastAPI:
-    """The ASGI application; its sessions run from its start-up to its shut-down.
+    """The ASGI application; its sessions run from its start-up to its shut-down. `checks` None: all there are.
 
     Raises OSError when the data folder cannot be used, AssetsMissing when the page's files are not there.
     """
@@ -89,7 +91,13 @@ def create_app(
     )
     for vehicle in config.vehicles:
         running.sessions[vehicle.name] = Session(
-            vehicle, bus, now=now, wall_ms=wall_ms, server=running.server_facts, allowed_hosts=config.allowed_hosts
+            vehicle,
+            bus,
+            now=now,
+            wall_ms=wall_ms,
+            server=running.server_facts,
+            allowed_hosts=config.allowed_hosts,
+            checks=checks,
         )
 
     @asynccontextmanager

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from monitor import catalog
+from monitor import catalog, values
 from monitor.runner import Monitor
 from monitor.signals import SIGNALS, Signal
 from monitor.state import Reading, Snapshot
@@ -139,7 +139,9 @@ def _behind_the_bridge(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Pr
         if facts.now_s - opened_s < NO_MESSAGE_S:
             return None, None, None
         return "bridge-car", problems.NOTHING_KNOWN if facts.offers_nothing else problems.NO_MESSAGE, None
-    if facts.now_s - max(last_s, facts.since_s) < CAR_SILENT_S or any(r.is_fresh(facts.now_s) for r in snapshot.readings.values()):
+    if facts.now_s - max(last_s, facts.since_s) < CAR_SILENT_S or any(
+        r.is_fresh(facts.now_s) for r in snapshot.readings.values()
+    ):
         return None, None, None
     return "bridge-car", problems.ROS_GONE if ros_is_gone else problems.CAR_SILENT, last_s
 
@@ -150,6 +152,7 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
     tally = facts.reception.by_signal.get(signal.name) or Tally()
     rate = snapshot.rates.get(signal.name)
     extent = snapshot.extents.get(signal.name)
+    freshness: str
     if reading is not None:
         freshness = reading.freshness(facts.now_s)
     elif source is not None and source.decode is not None:
@@ -167,7 +170,7 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
         "rate_hz": wire.plain(rate.measured_hz, 1) if rate else None,
         "topic": source.topic if source else None,
         "type": source.type if source else None,
-        "note": source.note if source else None,
+        "note": (source.note if source else None) or (_unknown_part(reading.value) if reading else None),
         "count": tally.received,
         "rejected": tally.rejected,
         "rejected_why": tally.last_reason,
@@ -177,6 +180,18 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
         "lowest": wire.plain(extent.lowest) if extent else None,
         "highest": wire.plain(extent.highest) if extent else None,
     }
+
+
+def _unknown_part(value: Any) -> str | None:
+    """What a proper message leaves open: the real car's cmd_vel has a NaN angle in every message."""
+    if isinstance(value, values.MotionCommand):
+        missing = [
+            name
+            for name, known in (("linear.x", value.speed_mps), ("angular.z", value.tyre_angle_rad))
+            if known is None
+        ]
+        return f"{' and '.join(missing)} is null: unknown" if missing else None
+    return None
 
 
 def _nearest(snapshot: Snapshot) -> dict[str, float | None]:

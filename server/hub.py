@@ -24,6 +24,7 @@ log = logging.getLogger("catgraph.hub")
 EVENTS_A_BATCH = 100
 MAX_PAGES = 500
 MAX_COMPLAINTS = 200  # a page that sends nothing sensible is let go
+MAX_REPLIES = 200  # and so is one that asks and never reads
 FRAME_KINDS = ("state", "scan")
 
 
@@ -81,7 +82,7 @@ class Page:
     # -- from the page -----------------------------------------------------------------------------------------------
 
     async def _read(self) -> None:
-        while self._complaints < MAX_COMPLAINTS:
+        while self._complaints < MAX_COMPLAINTS and len(self._replies) < MAX_REPLIES:
             received = await self._socket.receive()
             if received["type"] == "websocket.disconnect":
                 return

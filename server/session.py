@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import orjson
 
+from monitor.catalog import AnyCheck
 from monitor.runner import Monitor, Refused, Transition
 from monitor.signals import SIGNALS
 from monitor.state import LinkFacts, Phase, State
@@ -50,6 +51,7 @@ class Session:
         wall_ms: Callable[[], int],
         server: Callable[[], dict[str, Any]],
         allowed_hosts: Collection[str] = (),
+        checks: Sequence[AnyCheck] | None = None,
     ) -> None:
         self.vehicle = vehicle
         self._bus = bus
@@ -57,7 +59,8 @@ class Session:
         self._wall_ms = wall_ms
         self._server = server
         self._allowed_hosts = frozenset(allowed_hosts)
-        self._monitor = Monitor()
+        self._checks = checks  # None: all there are
+        self._monitor = Monitor(checks)
         self._tasks: set[asyncio.Task[None]] = set()
         self._lag_s = 0.0
         self._paused_since_s: float | None = None
@@ -224,7 +227,7 @@ class Session:
             )
         self._drop_link()
         self._clear()
-        self._monitor = Monitor(limits=self._monitor.limits)
+        self._monitor = Monitor(self._checks, self._monitor.limits)
         self._phase, self._address = "connecting", target
         self._link = RosLink(target, self, now=self._now)
         self._link.start()
@@ -234,7 +237,7 @@ class Session:
         self._drop_link()
         self._clear()
         self._paused_since_s = None
-        self._monitor = Monitor(limits=self._monitor.limits)
+        self._monitor = Monitor(self._checks, self._monitor.limits)
         if was != "idle":
             self._note("stopped", "Monitoring was stopped.")
 

@@ -61,9 +61,9 @@ def value(reading: Any) -> dict[str, Any] | None:
         case values.LaserScan():
             return _scan_summary(reading)
         case values.Diagnostics():
-            rows = [{"name": c.name, "level": c.level, "message": c.message} for c in reading.components]
-            worst = max((c.level for c in reading.components), default=0)
-            return {"worst": worst, "components": sorted(rows, key=lambda row: -row["level"])[:SHOWN_COMPONENTS]}
+            shown = sorted(reading.components, key=lambda c: -c.level)[:SHOWN_COMPONENTS]
+            rows = [{"name": c.name, "level": c.level, "message": c.message} for c in shown]
+            return {"worst": max((c.level for c in reading.components), default=0), "components": rows}
         case values.MotionCommand():
             return {"speed_mps": plain(reading.speed_mps), "tyre_angle_rad": plain(reading.tyre_angle_rad)}
         case values.Level():
