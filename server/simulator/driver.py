@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Set
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -17,17 +18,11 @@ from server.simulator.vehicle import LASER_AHEAD_M, WHEELBASE_M, Motion, MotionC
 
 Floats = npt.NDArray[np.float64]
 
-CRUISE_MPS = 8.0
-FAST_MPS = 12.0  # one above the operator's usual limit of 11
 SLOW_ZONES = ((140.0, 205.0, 5.5), (370.0, 440.0, 6.5))  # stations in m and the speed there, past the parked cars
-SIDEWAYS_MPS2 = 1.6
-PLAN_ACCELERATION_MPS2 = 1.0
-PLAN_BRAKING_MPS2 = 1.1
 STOP_FOR_S = 5.0  # short of the ten seconds after which a standing car is worth a word
-CALM_BRAKING_MPS2 = 1.5
+STANDING_BRAKING_MPS2 = 1.5
 HARD_BRAKING_MPS2 = 3.0
 KEPT_GAP_M = 4.2  # from the laser to whatever stands in the way
-REACTION_S = 0.5
 
 # The driver goes no faster than this allows, so that a healthy drive never comes near an obstacle alarm.
 ALARM_REACTION_S = 1.0
@@ -68,9 +63,25 @@ def _fastest_mps(sight_m: float) -> float:
     return min(stopping_mps, free_m / ALARM_COLLISION_S)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Temper:
+    """How somebody drives."""
+
+    cruise_mps: float
+    sideways_mps2: float
+    acceleration_mps2: float
+    braking_mps2: float
+    heeds_zones: bool
+
+
+CALM = _Temper(cruise_mps=8.0, sideways_mps2=1.6, acceleration_mps2=1.0, braking_mps2=1.1, heeds_zones=True)
+# one above the operator's usual limit of 11 m/s, and soon there
+HASTY = _Temper(cruise_mps=12.0, sideways_mps2=2.6, acceleration_mps2=1.4, braking_mps2=1.5, heeds_zones=False)
+
+
 @lru_cache(maxsize=1)
-def _limits_mps() -> Floats:
-    """At each station of the lap, the speed which sight and bend allow."""
+def _sight_mps() -> Floats:
+    """At each station of the lap, the speed which the sight ahead allows."""
     way, scenery = lap(), Scenery()
     beams = fan(math.radians(-30), math.radians(0.5), 121, 0.0, 0.0)
     angles = beams.angles_rad
@@ -87,16 +98,16 @@ def _limits_mps() -> Floats:
         sideways = np.minimum(distances, 200.0) * np.abs(beams.directions[1])
         in_way = (np.abs(angles) <= CONE_RAD) | (sideways <= CORRIDOR_M)
         limits[index] = _fastest_mps(float(distances[in_way].min()))
-        if pose.curvature:
-            limits[index] = min(limits[index], math.sqrt(SIDEWAYS_MPS2 / abs(pose.curvature)))
     return limits
 
 
-@lru_cache(maxsize=4)
-def _plan_mps(cap_mps: float) -> Floats:
+@lru_cache(maxsize=2)
+def _plan_mps(temper: _Temper) -> Floats:
     """At each station the speed to drive, slowing before what needs slowing. Twice round, as the lap is closed."""
-    plan = np.minimum(_limits_mps(), cap_mps)
-    if cap_mps <= CRUISE_MPS:
+    curvature = np.array([abs(lap().at(station).curvature) for station in lap().stations_m.tolist()])
+    plan = np.minimum(_sight_mps(), temper.cruise_mps)
+    plan = np.minimum(plan, np.sqrt(temper.sideways_mps2 / np.maximum(curvature, 1e-9)))
+    if temper.heeds_zones:
         for begin_m, end_m, zone_mps in SLOW_ZONES:
             inside = (lap().stations_m >= begin_m) & (lap().stations_m < end_m)
             plan[inside] = np.minimum(plan[inside], zone_mps)
@@ -107,11 +118,11 @@ def _plan_mps(cap_mps: float) -> Floats:
     for index in range(2 * count - 1, -1, -1):
         after = speeds[(index + 1) % count]
         here = index % count
-        speeds[here] = min(speeds[here], math.sqrt(after**2 + 2 * PLAN_BRAKING_MPS2 * STEP_M))
+        speeds[here] = min(speeds[here], math.sqrt(after**2 + 2 * temper.braking_mps2 * STEP_M))
     for index in range(2 * count):
         before = speeds[(index - 1) % count]
         here = index % count
-        speeds[here] = min(speeds[here], math.sqrt(before**2 + 2 * PLAN_ACCELERATION_MPS2 * STEP_M))
+        speeds[here] = min(speeds[here], math.sqrt(before**2 + 2 * temper.acceleration_mps2 * STEP_M))
     return np.array(speeds)
 
 
@@ -126,8 +137,8 @@ class Driver:
         self._waiting_since_s: float | None = None
         self._has_waited = False
         self._steady_mps: float | None = None
-        for cap_mps in (CRUISE_MPS, FAST_MPS):  # now, as it takes a moment
-            _plan_mps(cap_mps)
+        for temper in (CALM, HASTY):  # now, as it takes a moment
+            _plan_mps(temper)
 
     def resume(self, motion: Motion) -> None:
         """Takes the wheel again after somebody else has driven."""
@@ -140,10 +151,11 @@ class Driver:
         self.station_m = lap().nearest_m(motion.x_m, motion.y_m, guess_m=self.station_m)
         if self._is_lost(motion):
             self.station_m = lap().nearest_m(motion.x_m, motion.y_m)
-        wanted_mps = self._speed_mps(motion, now_s, orders, blocked_at_m)
-        braking = HARD_BRAKING_MPS2 if blocked_at_m is not None else CALM_BRAKING_MPS2
+        temper = HASTY if Order.HURRY in orders else CALM
+        braking = STANDING_BRAKING_MPS2 if blocked_at_m is None else HARD_BRAKING_MPS2
         lowest = self._target_mps - braking * 1.3 * step_s
-        highest = self._target_mps + PLAN_ACCELERATION_MPS2 * 1.2 * step_s
+        highest = self._target_mps + temper.acceleration_mps2 * 1.2 * step_s
+        wanted_mps = self._speed_mps(motion, now_s, temper, orders, blocked_at_m)
         self._target_mps = min(highest, max(lowest, wanted_mps))
         return MotionCommand(speed_mps=self._target_mps, tyre_rad=self._tyre_rad(motion, step_s))
 
@@ -151,12 +163,14 @@ class Driver:
         pose = lap().at(self.station_m)
         return math.hypot(motion.x_m - pose.x_m, motion.y_m - pose.y_m) > 8.0
 
-    def _speed_mps(self, motion: Motion, now_s: float, orders: Set[Order], blocked_at_m: float | None) -> float:
+    def _speed_mps(
+        self, motion: Motion, now_s: float, temper: _Temper, orders: Set[Order], blocked_at_m: float | None
+    ) -> float:
         if Order.STAND in orders:
             return 0.0
         # the car answers about 0.4 s late
         ahead = self.station_m + 0.4 * motion.speed_mps
-        plan = _plan_mps(FAST_MPS if Order.HURRY in orders else CRUISE_MPS)
+        plan = _plan_mps(temper)
         speed_mps = float(plan[int(ahead / STEP_M) % len(plan)])
         if Order.STEADY not in orders:
             self._steady_mps = None
@@ -184,7 +198,7 @@ class Driver:
             if now_s - self._waiting_since_s >= STOP_FOR_S:
                 self._has_waited = True
             return 0.0
-        return _approach_mps(left_m - 0.5, PLAN_BRAKING_MPS2)
+        return _approach_mps(left_m - 0.5, CALM.braking_mps2)
 
     def _tyre_rad(self, motion: Motion, step_s: float) -> float:
         reach_m = min(6.0, max(3.0, 1.5 + 0.5 * motion.speed_mps))

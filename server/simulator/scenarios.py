@@ -49,8 +49,8 @@ class Scenario:
 _SCENARIOS = (
     Scenario(
         name="speeding",
-        sentence="The car drives 12 m/s for some seconds, as soon as the lap allows it.",
-        duration_s=60.0,  # at most; it ends after HURRY_FOR_S above the limit
+        sentence="The car drives 12 m/s for some seconds, as soon as the lap allows it (at most half a minute).",
+        duration_s=60.0,  # at most; it ends by itself after some seconds above the limit
         alarm="speed above limit",
         effect=Speeding,
         order=Order.HURRY,
@@ -125,9 +125,10 @@ _SCENARIOS = (
     Scenario(
         name="frozen-speed",
         sentence="The car drives on, but its speed messages repeat one value.",
-        duration_s=8.0,
+        duration_s=10.0,
         alarm="signal frozen: speed",
-        consequences=("command without response",),
+        # braking does not show, and where the car slows for a bend its stopping distance is reckoned too long
+        consequences=("command without response", "obstacle in corridor"),
         effect=FrozenSpeed,
         order=Order.STEADY,  # faster than the frozen speed, the true way would look like a GPS jump
     ),

@@ -61,8 +61,8 @@ def _faces() -> list[tuple[Point, Point]]:
         *_parked_car(91, 210),
         *_parked_car(91, 214),
         *_parked_car(92, 268),
-        *box(71, -30, 0.4, 0.5, 0.4),  # a marshal left of the way to the stop line
-        *box(72, -30.6, 1.1, 0.5, 0.4),  # and someone beside
+        *box(59, -20, 0.4, 0.5, 0.4),  # a marshal left of the stop line
+        *box(59.8, -20.9, 1.1, 0.5, 0.4),  # and someone beside
     ]
 
 
