@@ -1,0 +1,132 @@
+// Which alarm shows where: one rule a place, none an alarm. Pure functions.
+
+import { fixed, timeOfDay } from './words.js';
+
+/**
+ * @typedef {import('./protocol.js').Alarm} Alarm
+ * @typedef {import('./protocol.js').State} State
+ * @typedef {import('./protocol.js').SoundName} SoundName
+ */
+
+const RANK = { critical: 3, warning: 2, advisory: 1 };
+const LOUD = /** @type {SoundName[]} */ (['high', 'medium', 'low']);
+
+/** @param {Alarm} alarm */
+const isAsking = (alarm) => alarm.state === 'UNACKED' || alarm.state === 'RTN_UNACKED';
+
+/**
+ * Alarms about the chain itself. Their dialogs show the chain, with what can be done about it.
+ * @param {Alarm} alarm
+ */
+export const isAboutLink = (alarm) => LINK_ACTIONS.some((action) => alarm.actions.includes(action));
+const LINK_ACTIONS = ['retry', 'reconnect', 'exit', 'change_address'];
+
+/**
+ * Most urgent first, then newest.
+ * @param {Alarm[]} alarms
+ */
+export function byUrgency(alarms) {
+  return [...alarms].sort((a, b) => RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
+}
+
+/**
+ * What stands where.
+ * @param {Alarm[]} alarms
+ */
+export function layOut(alarms) {
+  const sorted = byUrgency(alarms);
+  const asking = sorted.filter(isAsking);
+  const standing = sorted.filter((alarm) => alarm.state !== 'SHELVED');
+  return {
+    dialog: asking.find((alarm) => alarm.place === 'dialog') ?? null,
+    snackbars: asking.filter((alarm) => alarm.place === 'snackbar'),
+    standing,
+    shelved: sorted.length - standing.length,
+    worst: standing[0] ?? null,
+  };
+}
+
+/**
+ * The sound that must be heard now, or null. What is acknowledged, shelved or over is silent; a paused session is silent;
+ * a server that fell silent while it watched a car is the loudest alarm of all, for nothing else can be announced.
+ * @param {State | null} frame
+ * @param {{isServerLost: boolean, isLossAcknowledged: boolean}} page
+ * @returns {SoundName | null}
+ */
+export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
+  if (!frame || frame.session.paused) return null;
+  if (isServerLost) return isLossAcknowledged ? null : 'high';
+  const asking = frame.alarms.filter((alarm) => alarm.state === 'UNACKED').map((alarm) => alarm.sound);
+  return LOUD.find((sound) => asking.includes(sound)) ?? null;
+}
+
+/** @typedef {{kind: 'crit' | 'warn' | 'invert' | '', icon: string, text: string, end: string, opens: 'log' | 'signals'}} Strip */
+
+/**
+ * The one line under the tabs.
+ * @param {State | null} frame
+ * @param {{isSilent: boolean, chain: import('./link.js').ChainView, paused_s: number}} seen
+ * @returns {Strip}
+ */
+export function stripOf(frame, { isSilent, chain, paused_s }) {
+  if (!frame) return { kind: 'invert', icon: 'unknown', text: 'Nothing received yet', end: 'not checked', opens: 'signals' };
+  if (frame.session.paused && !isSilent) {
+    return { kind: 'invert', icon: 'pause', text: `Paused ${paused(paused_s)}: no alarm will come`, end: '', opens: 'log' };
+  }
+  if (chain.word === 'Lost') {
+    return { kind: 'crit', icon: 'link-off', text: 'Connection lost', end: chain.since_ms === null ? '' : `since ${timeOfDay(chain.since_ms)}`, opens: 'log' };
+  }
+  if (isSilent) return { kind: 'invert', icon: 'clock', text: 'Values are not live', end: 'not checked', opens: 'signals' };
+  const { standing, worst, shelved } = layOut(frame.alarms);
+  if (worst && worst.priority !== 'advisory') {
+    const isOne = standing.length === 1 && worst.priority === 'critical';
+    const among = isOne ? `${fixed(worst.for_s)} s` : `${1} of ${standing.length}`;
+    return {
+      kind: worst.priority === 'critical' ? 'crit' : 'warn', icon: worst.priority === 'critical' ? 'crit' : 'warn',
+      text: worst.title, end: shelved ? `${standing.length} standing, ${shelved} shelved` : among, opens: 'log',
+    };
+  }
+  if (chain.cut === 2) {
+    const isFirst = frame.link.topics_heard === 0;
+    return { kind: 'invert', icon: isFirst ? 'unknown' : 'clock', text: isFirst ? 'Nothing received yet' : 'Values are not live', end: 'not checked', opens: 'signals' };
+  }
+  const ok = tilesOf(frame.checks).filter((tile) => tile.verdict === 'ok').length;
+  const unknown = tilesOf(frame.checks).filter((tile) => tile.verdict === 'unknown' && tile.brief !== 'not published').length;
+  const counts = `${ok} OK · ${unknown} not checked`;
+  if (worst) return { kind: '', icon: 'info', text: worst.title, end: counts, opens: 'log' };
+  return { kind: '', icon: 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${unknown} not checked` : counts, opens: 'log' };
+}
+
+/**
+ * @typedef {import('./protocol.js').Check} Check
+ * @typedef {{label: string, verdict: import('./protocol.js').Verdict, brief: string, text: string, ids: string[]}} Tile
+ */
+
+const WORSE = { fault: 2, unknown: 1, ok: 0 };
+
+/**
+ * One tile for all checks that share it, in the order of their first; the worst of them speaks.
+ * @param {Check[]} checks
+ * @returns {Tile[]}
+ */
+export function tilesOf(checks) {
+  /** @type {Map<string, Tile>} */
+  const tiles = new Map();
+  for (const check of checks) {
+    const label = check.tile ?? check.label;
+    const tile = tiles.get(label);
+    if (!tile) {
+      tiles.set(label, { label, verdict: check.verdict, brief: check.brief, text: check.text, ids: [check.id] });
+      continue;
+    }
+    tile.ids.push(check.id);
+    if (WORSE[check.verdict] > WORSE[tile.verdict]) Object.assign(tile, { verdict: check.verdict, brief: check.brief, text: check.text });
+  }
+  return [...tiles.values()];
+}
+
+/** @param {number} seconds */
+function paused(seconds) {
+  const whole = Math.max(0, Math.floor(seconds));
+  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, '0')}`;
+}

@@ -1,0 +1,99 @@
+// The page's beginning: one store, one voice, every panel at its place.
+
+import { soundOf } from './alarm-layout.js';
+import { Arming } from './arming.js';
+import { field, html, listen, need, show, words } from './dom.js';
+import { gapWords } from './events.js';
+import { notices } from './notice.js';
+import { Page } from './page.js';
+import { Screens } from './screens.js';
+import { Store } from './store.js';
+import { Tabs } from './tabs.js';
+import { Voice } from './voice.js';
+import { fixed } from './words.js';
+import { lossKey, mount as mountDialogs } from './dialogs.js';
+import { mount as mountChecks } from './checks.js';
+import { mount as mountConnect } from './connect.js';
+import { mount as mountGauge } from './gauge.js';
+import { mount as mountNearest } from './nearest.js';
+import { mount as mountPedals } from './pedals.js';
+import { mount as mountPosition } from './position.js';
+import { mount as mountPreferences } from './preferences.js';
+import { mount as mountRail } from './rail.js';
+import { mount as mountScan } from './scan.js';
+import { mount as mountSnackbar } from './snackbar.js';
+import { mount as mountStart } from './start.js';
+import { mount as mountStrip } from './strip.js';
+import { mount as mountTopbar } from './topbar.js';
+import { mount as mountVeil } from './veil.js';
+
+const vehicle = document.documentElement.dataset['vehicle'];
+const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
+
+const store = new Store(() => new WebSocket(address));
+const voice = new Voice();
+const arming = new Arming(voice);
+const monitor = need(document, '#monitor');
+const say = notices(field(monitor, 'snacks'));
+const page = new Page(store, arming, say);
+
+const scan = mountScan(need(monitor, '[data-panel="scan"]'), store);
+const screens = new Screens(monitor, store, front);
+const tabs = new Tabs(monitor, front);
+page.onShown = () => {
+  tabs.place();
+  front();
+};
+
+mountStart(need(document, '#start'), store);
+mountConnect(need(document, '#connect'), store, page);
+mountTopbar(monitor, store);
+mountStrip(monitor, store);
+mountVeil(monitor, store);
+mountGauge(need(monitor, '[data-part="gauge"]'), store);
+mountNearest(need(monitor, '[data-part="nearest"]'), store);
+mountPedals(need(monitor, '[data-part="pedals"]'), store);
+mountPosition(need(monitor, '[data-part="position"]'), store);
+mountChecks(need(monitor, '[data-part="checks"]'), store);
+mountPreferences();
+mountRail(monitor, store, page);
+mountSnackbar(field(monitor, 'snacks'), store, say);
+mountDialogs(store, page);
+
+/** The scan is sent and drawn only while its tab is in front and nothing lies over it. */
+function front() {
+  queueMicrotask(() => scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null));
+}
+
+function draw() {
+  page.draw();
+  drawLimits();
+  show(field(monitor, 'sound-off'), voice.isPossible ? !voice.isRunning : false);
+}
+
+function speak() {
+  const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
+  voice.say(soundOf(store.frame, { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
+}
+
+store.on('draw', draw);
+store.on('draw', speak);
+store.on('beat', speak);
+store.on('move', () => page.draw());
+store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
+// Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
+for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
+listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
+
+/** The limits in force, until they can be set here. */
+function drawLimits() {
+  const list = field(monitor, 'limits');
+  const limits = Object.entries(store.frame?.limits ?? {});
+  const key = JSON.stringify(limits);
+  if (list.dataset['key'] === key) return;
+  list.dataset['key'] = key;
+  list.replaceChildren(...limits.flatMap(([name, value]) => [html('dt', {}, name), html('dd', {}, ...words(typeof value === 'number' ? fixed(value, 2) : String(value)))]));
+}
+
+store.start();
+draw();

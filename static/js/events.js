@@ -1,0 +1,88 @@
+// The numbered log of alarm events: each exactly once, in order, and what happened while the page was blind.
+
+/**
+ * @typedef {import('./protocol.js').AlarmEvent} AlarmEvent
+ * @typedef {{blind_s: number, raised: number, cleared: number, at_ms: number}} Gap
+ * @typedef {{event: AlarmEvent, gap: null} | {event: null, gap: Gap}} Row
+ */
+
+const KEPT = 500; // rows; the server has the whole log
+const PAST = 50; // events of before this page that its log begins with
+
+export class EventLog {
+  /** @type {Row[]} newest first */
+  rows = [];
+  /** @type {number | null} the last number this page has; null before the first greeting */
+  last = null;
+  /** @type {string | null} */
+  #boot = null;
+  /** @type {{until: number, gap: Gap} | null} what is being caught up with */
+  #blind = null;
+
+  /**
+   * The server greeted: it has events up to `last_event`. Answers the number from which this page wants them.
+   * @param {string} boot
+   * @param {number} last_event
+   * @param {number} blind_s how long nothing fresh had come before this greeting; 0 for the first
+   * @param {number} at_ms wall clock
+   * @returns {number}
+   */
+  greet(boot, last_event, blind_s, at_ms) {
+    const isRestarted = this.#boot !== null && this.#boot !== boot;
+    this.#boot = boot;
+    if (this.last === null) {
+      this.last = Math.max(0, last_event - PAST); // something to read in the log; it is past and not announced
+      return this.last;
+    }
+    // A server that lost its journal counts afresh: what it has is all new.
+    if (isRestarted && last_event < this.last) this.last = 0;
+    this.#blind = { until: last_event, gap: { blind_s, raised: 0, cleared: 0, at_ms } };
+    return this.last;
+  }
+
+  get boot() {
+    return this.#boot;
+  }
+
+  /**
+   * Take a batch; what is already here is dropped.
+   * @param {AlarmEvent[]} events
+   * @returns {AlarmEvent[]} those that are new, oldest first
+   */
+  take(events) {
+    const fresh = events.filter((event) => event.n > (this.last ?? 0)).sort((a, b) => a.n - b.n);
+    for (const event of fresh) {
+      this.last = event.n;
+      this.rows.unshift({ event, gap: null });
+      if (this.#blind && event.n <= this.#blind.until) {
+        if (event.change === 'raised' || event.change === 'recaused') this.#blind.gap.raised += 1;
+        if (event.change === 'cleared') this.#blind.gap.cleared += 1;
+      }
+    }
+    this.rows.length = Math.min(this.rows.length, KEPT);
+    return fresh;
+  }
+
+  /**
+   * The gap, once all that was missed is here; each gap once.
+   * @returns {Gap | null}
+   */
+  caughtUp() {
+    const blind = this.#blind;
+    if (!blind || (this.last ?? 0) < blind.until) return null;
+    this.#blind = null;
+    if (blind.gap.blind_s < 2) return null; // shorter than the veil: nothing was hidden from anyone
+    this.rows.unshift({ event: null, gap: blind.gap });
+    return blind.gap;
+  }
+}
+
+/**
+ * "Blind 14 s: 2 alarms raised, 1 cleared".
+ * @param {Gap} gap
+ */
+export function gapWords(gap) {
+  const blind = gap.blind_s < 120 ? `${Math.round(gap.blind_s)} s` : `${Math.round(gap.blind_s / 60)} min`;
+  if (!gap.raised && !gap.cleared) return `Blind ${blind}: no alarm was raised or cleared`;
+  return `Blind ${blind}: ${gap.raised} ${gap.raised === 1 ? 'alarm' : 'alarms'} raised, ${gap.cleared} cleared`;
+}

@@ -1,0 +1,26 @@
+// How much ink a value deserves: the server's verdict, degraded by the page's own silence.
+
+/** Frames come at least every 0.25 s; more than two of them missing is silence of our own, not the rhythm of frames. */
+export const LAG_GRACE_S = 0.6;
+
+/**
+ * @typedef {import('./protocol.js').Signal} Signal
+ * @typedef {import('./protocol.js').Freshness} Freshness
+ */
+
+/**
+ * The state of a signal at the glass.
+ * @param {Signal | undefined} signal as the newest frame has it; undefined where the server does not know it
+ * @param {number} lag_s age of that frame at the glass: its way here and the silence since [s]
+ * @returns {{ink: Freshness, age_s: number | null}}
+ */
+export function inkOf(signal, lag_s) {
+  if (!signal) return { ink: 'not_published', age_s: null };
+  const age_s = signal.age_s === null ? null : signal.age_s + lag_s;
+  if (signal.freshness === 'never' || signal.freshness === 'not_published' || age_s === null) {
+    return { ink: signal.freshness, age_s };
+  }
+  if (signal.freshness === 'stale') return { ink: 'stale', age_s };
+  if (lag_s <= LAG_GRACE_S) return { ink: signal.freshness, age_s };
+  return { ink: age_s > (signal.horizon_s ?? 1) ? 'stale' : 'ageing', age_s };
+}

@@ -1,0 +1,175 @@
+// The gauge: speed over 180°, acceleration within, the operator's limit at the edge.
+
+import { html, setAttribute, setText, svg } from './dom.js';
+import { accelerationAngle, band, digitsBox, faceOf, speedAngle } from './gauge-layout.js';
+import { ABSENT } from './ink.js';
+import { age, fixed, signed } from './words.js';
+
+const VIEW = '0 0 380 250';
+
+/**
+ * @param {HTMLElement} root
+ * @param {import('./store.js').Store} store
+ * @returns {() => void}
+ */
+export function mount(root, store) {
+  const face = svg('svg', { viewBox: VIEW, 'aria-hidden': 'true' });
+  // What moves lies in layers of its own and is turned by the compositor: no path is drawn anew while the car drives.
+  const white = sweep(172, 188, 180);
+  const red = sweep(172, 188, 180, 'over');
+  const turn = html('div', { class: 'turn' }, red);
+  const faster = sweep(115, 125, -90);
+  const slower = sweep(115, 125, 90);
+  const pointer = svg('svg', { viewBox: VIEW, class: 'moves', 'aria-hidden': 'true' }, svg('path', { class: 'ptr', d: 'M40 214L-2 214' }));
+  const bug = svg('g');
+  const acceleration = svg('tspan', { class: 'num' });
+  const accelerationUnit = svg('tspan', { class: 'unit', 'font-size': 15, dx: 5 }, 'm/s²');
+  const box = svg('rect', { class: 'box', y: 146, height: 98 });
+  const speed = svg('text', { class: 'speed', x: 190, y: 231, 'text-anchor': 'middle' });
+  const struck = svg('rect', { class: 'struck', y: 146, height: 90 });
+  const unit = svg('text', { class: 'unit', y: 240 });
+  const note = svg('text', { class: 'note', x: 190, y: 249, 'text-anchor': 'middle' });
+  const top = svg('svg', { viewBox: VIEW, 'aria-hidden': 'true' }, bug,
+    svg('text', { class: 'aval', x: 190, y: 124, 'text-anchor': 'middle' }, acceleration, accelerationUnit), box, speed, struck, unit, note);
+  const speedMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Speed', 'aria-valuemin': 0 });
+  const accelerationMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Acceleration' });
+  root.replaceChildren(
+    face, html('div', { class: 'clip' }, white), html('div', { class: 'clip' }, turn), html('div', { class: 'clip right' }, faster),
+    html('div', { class: 'clip left' }, slower), pointer, top, speedMeter, accelerationMeter,
+  );
+  let drawnFace = '';
+
+  function scaleOf() {
+    return {
+      speed_max_mps: store.limit('gauge.speed_max_mps') ?? 15,
+      acceleration_max_mps2: store.limit('gauge.acceleration_max_mps2') ?? 3,
+      limit_mps: store.limit('speed_limit.max_mps'),
+    };
+  }
+
+  function drawFace() {
+    const scale = scaleOf();
+    const key = JSON.stringify(scale);
+    if (key === drawnFace) return;
+    drawnFace = key;
+    const { tracks, rungs, ticks, labels, limit } = faceOf(scale);
+    face.replaceChildren(
+      ...tracks.map((d) => svg('path', { class: 'track', d })),
+      ...rungs.map((d) => svg('path', { class: 'rung', d })),
+      ...ticks.map(({ d, isBig }) => svg('path', { class: isBig ? 'tick big' : 'tick', d })),
+      ...labels.map(({ text, x, y }) => svg('text', { class: /[+−]/.test(text) ? 'num end' : 'num', x, y, 'text-anchor': 'middle' }, text)),
+    );
+    bug.replaceChildren(...(limit ? [
+      svg('path', { class: 'bugline', d: limit.line }), svg('path', { class: 'bug', d: limit.wedge }),
+      svg('text', { class: 'lim', x: limit.x, y: limit.y, 'text-anchor': limit.anchor }, 'limit ', svg('tspan', { class: 'num' }, limit.text)),
+    ] : []));
+  }
+
+  // Each frame: what moves.
+  function move() {
+    drawFace();
+    const scale = scaleOf();
+    const limit = scale.limit_mps === null ? 180 : speedAngle(scale.limit_mps, scale.speed_max_mps);
+    const angle = speedAngle(number(store.signal('speed')?.value?.speed_mps) ?? 0, scale.speed_max_mps);
+    rotate(pointer, angle);
+    rotate(white, Math.min(angle, limit));
+    rotate(turn, limit);
+    rotate(red, Math.max(0, angle - limit));
+    const push = accelerationAngle(number(store.signal('acceleration')?.value?.acceleration_mps2) ?? 0, scale.acceleration_max_mps2);
+    rotate(faster, Math.max(0, push));
+    rotate(slower, Math.min(0, push));
+  }
+
+  // Five times a second: what is read.
+  function draw() {
+    drawFace();
+    const scale = scaleOf();
+    const speedInk = store.ink('speed');
+    const speed_mps = number(store.signal('speed')?.value?.speed_mps);
+    const isSpeedKnown = speed_mps !== null && isValue(speedInk.ink);
+    setAttribute(root, 'data-speed', isSpeedKnown ? speedInk.ink : 'never');
+    const digits = isSpeedKnown ? fixed(speed_mps) : '–';
+    const block = digitsBox(digits);
+    const isOver = isSpeedKnown && speedInk.ink !== 'stale' && scale.limit_mps !== null && Math.abs(speed_mps) > scale.limit_mps;
+    setText(speed, digits);
+    setAttribute(speed, 'data-size', block.size);
+    setAttribute(root, 'data-over', isOver);
+    for (const part of [box, struck]) {
+      setAttribute(part, 'x', block.x);
+      setAttribute(part, 'width', block.width);
+    }
+    const isBack = isSpeedKnown && speed_mps < 0 && digits.startsWith('−');
+    setAttribute(unit, 'x', block.unitX);
+    setText(unit, isSpeedKnown ? (isBack ? 'm/s back' : 'm/s') : '');
+    setText(note, noteOf(speedInk, isSpeedKnown));
+    meter(speedMeter, isSpeedKnown && speedInk.ink !== 'stale' ? Math.abs(speed_mps) : null, scale.speed_max_mps, `${digits} metres a second`);
+
+    const pushInk = store.ink('acceleration');
+    const push = number(store.signal('acceleration')?.value?.acceleration_mps2);
+    const isPushKnown = push !== null && isValue(pushInk.ink);
+    setAttribute(root, 'data-push', isPushKnown ? pushInk.ink : 'never');
+    setText(acceleration, isPushKnown ? signed(push) : pushInk.ink === 'not_published' ? 'not published' : '–');
+    setText(accelerationUnit, isPushKnown || pushInk.ink !== 'not_published' ? 'm/s²' : '');
+    setAttribute(accelerationMeter, 'aria-valuemin', -scale.acceleration_max_mps2);
+    meter(accelerationMeter, isPushKnown && pushInk.ink !== 'stale' ? push : null, scale.acceleration_max_mps2, `${signed(push)} metres a second squared`);
+  }
+
+  move();
+  draw();
+  const stops = [store.on('move', move), store.on('draw', draw)];
+  return () => stops.forEach((stop) => stop());
+}
+
+/** @param {import('./protocol.js').Freshness} ink */
+const isValue = (ink) => ink !== 'never' && ink !== 'not_published';
+
+/**
+ * @param {{ink: import('./protocol.js').Freshness, age_s: number | null}} state
+ * @param {boolean} isKnown
+ */
+function noteOf({ ink, age_s }, isKnown) {
+  if (ink === 'never' || ink === 'not_published') return ABSENT[ink];
+  if (ink === 'stale') return `STALE ${age(age_s)} s`;
+  if (!isKnown) return 'unknown';
+  return ink === 'ageing' ? `${age(age_s)} s old` : '';
+}
+
+/**
+ * A half ring that is turned into sight from behind the edge of its clip.
+ * @param {number} inner
+ * @param {number} outer
+ * @param {number} from degrees where it begins when nothing of it is seen
+ * @param {string} [kind]
+ */
+function sweep(inner, outer, from, kind = '') {
+  return svg('svg', { viewBox: VIEW, class: `moves ${kind}`.trim(), 'aria-hidden': 'true' }, svg('path', { class: 'val', d: band(inner, outer, from, from + 180) }));
+}
+
+/**
+ * @param {HTMLElement | SVGElement} element
+ * @param {number} degrees
+ */
+function rotate(element, degrees) {
+  const transform = `rotate(${degrees.toFixed(1)}deg)`;
+  if (element.style.transform !== transform) element.style.transform = transform;
+}
+
+/**
+ * @param {HTMLElement} element
+ * @param {number | null} value null: unknown
+ * @param {number} max
+ * @param {string} text
+ */
+function meter(element, value, max, text) {
+  setAttribute(element, 'aria-valuemax', max);
+  setAttribute(element, 'aria-valuenow', (value ?? 0).toFixed(1));
+  setAttribute(element, 'aria-valuetext', value === null ? 'unknown' : text);
+}
+
+/**
+ * @param {unknown} value
+ * @returns {number | null}
+ */
+function number(value) {
+  return typeof value === 'number' && Number.isFinite(value) ? value : null;
+}

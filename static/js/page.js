@@ -1,0 +1,104 @@
+// Which screen is in front, and what the operator's wishes do to it.
+
+import { need, setAttribute, show } from './dom.js';
+
+/** @typedef {import('./store.js').Store} Store */
+
+export class Page {
+  /** The operator went back to the connect screen while the server may go on. */
+  isChoosing = false;
+  /** What link dialog was closed: see lossKey. @type {string | null} */
+  answered = null;
+  /** A better address, where the server knows one. @type {string | null} */
+  suggestion = null;
+  /** Called when another screen came in front. @type {() => void} */
+  onShown = () => {};
+
+  /**
+   * @param {Store} store
+   * @param {import('./arming.js').Arming} arming
+   * @param {(sentence: string, title?: string) => void} say
+   */
+  constructor(store, arming, say) {
+    this.store = store;
+    this.arming = arming;
+    this.say = say;
+    this.screens = ['start', 'connect', 'monitor'].map((name) => need(document, `#${name}`));
+  }
+
+  /** Put the right screen in front. */
+  draw() {
+    const name = screenOf(this.store, this.isChoosing);
+    if (document.body.dataset['screen'] === name && this.screens.some((screen) => screen.id === name && !screen.hidden)) return;
+    setAttribute(document.body, 'data-screen', name);
+    for (const screen of this.screens) show(screen, screen.id === name);
+    this.onShown();
+  }
+
+  get isMonitorShown() {
+    return document.body.dataset['screen'] === 'monitor';
+  }
+
+  /** To the connect screen, where a better address is taken over; the server goes on trying meanwhile. */
+  choose() {
+    this.isChoosing = true;
+    this.draw();
+    const input = /** @type {HTMLInputElement} */ (need(document, '#address'));
+    if (this.suggestion) {
+      input.value = this.suggestion;
+      input.dispatchEvent(new Event('input'));
+      this.suggestion = null;
+    }
+    input.focus();
+  }
+
+  /** An address was sent: what the session does is shown again. */
+  chosen() {
+    this.isChoosing = false;
+    this.answered = null;
+  }
+
+  async retry() {
+    if (this.store.isSilent) {
+      this.store.wire.hurry();
+      return;
+    }
+    await this.#ask('retry', 'Not tried again');
+  }
+
+  async reconnect() {
+    const address = this.store.frame?.session.address;
+    if (address) await this.#ask('connect', 'Not reconnected', { address });
+  }
+
+  /** Leave: monitoring ends, and with it every alarm. */
+  async stop() {
+    await this.#ask('disconnect', 'Monitoring was not stopped');
+  }
+
+  /** Leave a broken link. Where the server itself is gone, only this page leaves. */
+  async exit() {
+    if (this.store.isSilent) this.choose();
+    else await this.stop();
+  }
+
+  /**
+   * @param {string} kind
+   * @param {string} title
+   * @param {object} [fields]
+   */
+  async #ask(kind, title, fields) {
+    const answer = await this.store.ask(kind, fields);
+    if (!answer.ok) this.say(answer.reason ?? 'Refused.', title);
+  }
+}
+
+/**
+ * @param {Pick<Store, 'frame' | 'isMonitoring'>} store
+ * @param {boolean} isChoosing
+ * @returns {'start' | 'connect' | 'monitor'}
+ */
+export function screenOf(store, isChoosing) {
+  if (!store.frame) return 'start';
+  return store.isMonitoring && !isChoosing ? 'monitor' : 'connect';
+}

@@ -1,0 +1,159 @@
+// The shapes of docs/protocol.md as types, and the one place that looks at what came off the socket.
+
+/**
+ * @typedef {'fresh' | 'ageing' | 'stale' | 'never' | 'not_published'} Freshness
+ * @typedef {'ok' | 'fault' | 'unknown'} Verdict
+ * @typedef {'critical' | 'warning' | 'advisory'} Priority
+ * @typedef {'high' | 'medium' | 'low' | 'none'} SoundName
+ *
+ * @typedef {object} Signal
+ * @property {string} label
+ * @property {Freshness} freshness
+ * @property {number | null} age_s
+ * @property {number | null} horizon_s
+ * @property {number | null} period_s
+ * @property {number | null} expected_hz
+ * @property {number | null} rate_hz
+ * @property {string | null} topic
+ * @property {string | null} type
+ * @property {string | null} note
+ * @property {number} count
+ * @property {number} rejected
+ * @property {string | null} rejected_why
+ * @property {string} [unit]
+ * @property {number} [dropped]
+ * @property {number} [repaired]
+ * @property {string | null} [repaired_why]
+ * @property {Record<string, any> | null} value
+ * @property {number | null} lowest
+ * @property {number | null} highest
+ *
+ * @typedef {object} Check
+ * @property {string} id
+ * @property {string} label
+ * @property {string} [tile] the tile it shares with others; its own label where absent
+ * @property {Verdict} verdict
+ * @property {string} text
+ * @property {string} brief
+ *
+ * @typedef {{label: string, value: number | null, unit: string}} Quantity
+ *
+ * @typedef {object} Alarm
+ * @property {string} id
+ * @property {number} occurrence
+ * @property {string} title
+ * @property {Priority} priority
+ * @property {'dialog' | 'snackbar' | 'list'} place
+ * @property {SoundName} sound
+ * @property {'UNACKED' | 'ACKED' | 'RTN_UNACKED' | 'SHELVED'} state
+ * @property {boolean} active
+ * @property {boolean} needs_ack
+ * @property {number} raised_ms
+ * @property {number} for_s
+ * @property {string} text
+ * @property {string} trip_text
+ * @property {Quantity | null} measured
+ * @property {Quantity | null} limit
+ * @property {string[]} causes
+ * @property {string[]} actions
+ * @property {string | null} advice
+ * @property {number | null} shelved_until_ms
+ *
+ * @typedef {{code: string, title: string, hint: string, mark: string}} Problem
+ *
+ * @typedef {object} Session
+ * @property {'idle' | 'connecting' | 'failed' | 'monitoring' | 'lost'} phase
+ * @property {string | null} address
+ * @property {string | null} name
+ * @property {number | null} ros_version
+ * @property {number | null} connected_for_s
+ * @property {boolean} paused
+ * @property {number} paused_for_s
+ * @property {number | null} track_m
+ * @property {number} received
+ * @property {number} rejected
+ *
+ * @typedef {object} Link
+ * @property {null | 'server-bridge' | 'bridge-car'} cut
+ * @property {number | null} since_ms
+ * @property {number | null} bridge_age_s
+ * @property {number | null} car_age_s
+ * @property {Problem | null} problem
+ * @property {number} attempts
+ * @property {number} trying_for_s
+ * @property {number} topics_subscribed
+ * @property {number} topics_heard
+ * @property {number} [unreadable_frames]
+ * @property {string | null} [unreadable_why]
+ *
+ * @typedef {object} State
+ * @property {'state'} kind
+ * @property {number} seq
+ * @property {string | null} vehicle
+ * @property {{time_ms: number, boot: string, version: string, pages: number, frames_skipped: number, loop_lag_ms: number}} server
+ * @property {Session} session
+ * @property {Link} link
+ * @property {Record<string, Signal>} signals
+ * @property {{time_gap_s: number | null, stopping_m: number | null}} nearest
+ * @property {Check[]} checks
+ * @property {Alarm[]} alarms
+ * @property {Record<string, number>} limits
+ * @property {{state: string, for_s: number | null}} recording
+ * @property {{state: string, why: string | null}} decelerate
+ * @property {{holder: string | null}} control
+ *
+ * @typedef {object} AlarmEvent
+ * @property {number} n
+ * @property {number} at_ms
+ * @property {string | null} alarm
+ * @property {number | null} [occurrence]
+ * @property {string} change
+ * @property {string} [title] absent where the event is of no alarm
+ * @property {Priority} [priority]
+ * @property {string} text
+ * @property {string | null} by
+ *
+ * @typedef {{kind: 'hello', version: string, boot: string, vehicle: string | null, vehicles: string[], time_ms: number,
+ *   last_event: number, veil_after_s: number}} Hello
+ * @typedef {{kind: 'offer', seq: number, of: string[]}} Offer
+ * @typedef {{kind: 'events', events: AlarmEvent[], last: number}} Events
+ * @typedef {{kind: 'reply', id: string, ok: boolean, reason?: string, problem?: Problem & {suggestion: string | null}}} Reply
+ * @typedef {{kind: 'problem', reason: string}} Refusal
+ * @typedef {Hello | Offer | State | Events | Reply | Refusal} Message
+ */
+
+/** What a message of each kind must at least hold, and as what; anything else is not understood. */
+const SHAPES = /** @type {Record<string, Record<string, string>>} */ ({
+  hello: { boot: 'string', time_ms: 'number' },
+  offer: { seq: 'number' },
+  state: {
+    server: 'object', session: 'object', link: 'object', signals: 'object', nearest: 'object', checks: 'array',
+    alarms: 'array', limits: 'object', recording: 'object', decelerate: 'object', control: 'object',
+  },
+  events: { events: 'array' },
+  reply: { id: 'string', ok: 'boolean' },
+  problem: { reason: 'string' },
+});
+
+/**
+ * The message in a text frame, or null where it is none of ours: a frame that cannot be read must never stop the page.
+ * @param {string} text
+ * @returns {Message | null}
+ */
+export function readMessage(text) {
+  let message;
+  try {
+    message = JSON.parse(text);
+  } catch {
+    return null;
+  }
+  if (message === null || typeof message !== 'object') return null;
+  const shape = Object.hasOwn(SHAPES, message.kind) ? SHAPES[message.kind] : undefined;
+  if (!shape) return null;
+  for (const [name, kind] of Object.entries(shape)) {
+    const value = message[name];
+    const is = Array.isArray(value) ? 'array' : value === null ? 'null' : typeof value;
+    if (is !== kind) return null;
+  }
+  return message;
+}

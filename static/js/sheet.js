@@ -1,0 +1,38 @@
+// Opens and closes the sheets the operator asked for. Alarms take precedence: see dialogs.js.
+
+import { field, listen } from './dom.js';
+
+/** @param {HTMLDialogElement} sheet */
+export function openSheet(sheet) {
+  for (const other of /** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog[open]'))) {
+    if (other !== sheet && isAsked(other)) other.close();
+  }
+  if (!sheet.open) sheet.showModal();
+}
+
+/** @param {HTMLDialogElement} sheet */
+export function closeSheet(sheet) {
+  if (sheet.open) sheet.close();
+}
+
+/** Sheets opened by the operator, which give way to an alarm. */
+const ASKED = ['sheet-menu', 'sheet-history', 'sheet-shelve', 'sheet-stop', 'sheet-preferences'];
+
+/** @param {HTMLDialogElement} sheet */
+export function isAsked(sheet) {
+  return ASKED.includes(sheet.id);
+}
+
+/**
+ * A sheet closes by its own key, by Escape or back (the browser's doing), and by a press outside of it.
+ * @param {HTMLDialogElement} sheet
+ */
+export function mountSheet(sheet) {
+  const stops = [
+    listen(field(sheet, 'no'), 'click', () => sheet.close()),
+    listen(sheet, 'click', (event) => {
+      if (event.target === sheet && event.clientY < sheet.getBoundingClientRect().top) sheet.close();
+    }),
+  ];
+  return () => stops.forEach((stop) => stop());
+}

@@ -1,0 +1,44 @@
+// Warnings: one snackbar at a time over the rail, until it is acknowledged, shelved or over.
+
+import { layOut } from './alarm-layout.js';
+import { html, icon, setText, setWords, show } from './dom.js';
+import { openShelve } from './shelve.js';
+
+/**
+ * @param {HTMLElement} root
+ * @param {import('./store.js').Store} store
+ * @param {(sentence: string, title?: string) => void} say
+ */
+export function mount(root, store, say) {
+  const title = html('b');
+  const text = html('span');
+  const shelve = html('button', { type: 'button', class: 'key' }, 'Shelve');
+  const acknowledge = html('button', { type: 'button', class: 'key solid' }, 'Acknowledge');
+  const bar = html('div', { class: 'snack', role: 'status', hidden: true, 'data-f': 'warning' }, html('div', { class: 'side' }, icon('warn')),
+    html('div', { class: 'tx' }, title, text), html('div', { class: 'ac' }, shelve, acknowledge));
+  root.append(bar);
+  /** @type {import('./protocol.js').Alarm | null} */
+  let shown = null;
+
+  acknowledge.addEventListener('click', async () => {
+    if (!shown) return;
+    const answer = await store.ask('acknowledge', { alarm: shown.id, occurrence: shown.occurrence });
+    if (!answer.ok) say(answer.reason ?? 'Refused.', 'Not acknowledged');
+  });
+  shelve.addEventListener('click', () => shown && openShelve(store, shown, say));
+
+  function draw() {
+    const waiting = store.isSilent || !store.frame || store.frame.session.paused ? [] : layOut(store.frame.alarms).snackbars;
+    shown = waiting[0] ?? null;
+    show(bar, shown !== null);
+    if (!shown) return;
+    setWords(title, waiting.length > 1 ? `${shown.title} (1 of ${waiting.length})` : shown.title);
+    setWords(text, shown.text);
+    show(shelve, shown.priority !== 'critical' && shown.actions.includes('shelve'));
+    setText(acknowledge, 'Acknowledge');
+  }
+
+  draw();
+  const stops = [store.on('draw', draw), store.on('move', draw)];
+  return () => stops.forEach((stop) => stop());
+}

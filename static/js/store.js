@@ -1,0 +1,328 @@
+// What the page knows: the newest frame, how old it is, the log of events; and the way to ask the server for something.
+
+import { ServerClock } from './clock.js';
+import { DeadMan } from './dead-man.js';
+import { EventLog } from './events.js';
+import { inkOf } from './freshness.js';
+import { chainOf } from './link.js';
+import { readMessage } from './protocol.js';
+import { readScan } from './scan-frame.js';
+import { Wire } from './wire.js';
+
+/** Digits change at most five times a second. */
+const DRAW_EVERY_MS = 200;
+/** A command is for now: without an answer by then it counts as refused [ms]. */
+const REPLY_MS = 4000;
+
+/**
+ * @typedef {import('./protocol.js').State} State
+ * @typedef {import('./protocol.js').AlarmEvent} AlarmEvent
+ * @typedef {import('./events.js').Gap} Gap
+ * @typedef {'move' | 'draw' | 'scan' | 'beat' | 'log' | 'gap' | 'open'} Topic
+ *   move: a fresh frame is to be drawn · draw: five times a second, seen or not by a frame · scan: a new scan ·
+ *   beat: a fresh frame came (also while the page is hidden) · log: new events · gap: a blind time is over · open: connected
+ * @typedef {{ok: boolean, reason?: string, suggestion?: string}} Answer suggestion: an address that would do
+ */
+
+export class Store {
+  /** @type {State | null} */
+  frame = null;
+  /** @type {import('./scan-frame.js').Scan | null} */
+  scan = null;
+  /** When the newest scan came [ms, monotonic]. */
+  scanAt_ms = -Infinity;
+  /** Wall clock of the last fresh frame. @type {number | null} */
+  heard_ms = null;
+  /** Frames and scans that could not be read. */
+  unreadable = 0;
+  log = new EventLog();
+  deadMan = new DeadMan();
+  /** @type {Set<string>} names of what wants the scan */
+  #watchers = new Set();
+  #clock = new ServerClock();
+  /** How long the newest frame was under way [ms]. */
+  #delay_ms = 0;
+  #started_ms = 0;
+  #drew_ms = -Infinity;
+  #isMoved = false;
+  #asked = 0;
+  /** @type {Map<string, (answer: Answer) => void>} */
+  #waiting = new Map();
+  /** @type {Map<Topic, Set<(detail?: any) => void>>} */
+  #listeners = new Map();
+  /** @type {(() => void)[]} */
+  #stops = [];
+  #looked_ms = 0;
+  #lookedWall_ms = 0;
+
+  /** @param {() => WebSocket} dial */
+  constructor(dial) {
+    this.wire = new Wire(
+      { opened: () => this.#opened(), text: (text) => this.#heard(text), bytes: (bytes) => this.#heardScan(bytes), closed: () => this.#closed() },
+      dial,
+    );
+  }
+
+  /** Begin to dial and to draw. */
+  start() {
+    this.#started_ms = this.#looked_ms = this.now();
+    this.#lookedWall_ms = Date.now();
+    const timer = setInterval(() => this.#look(), DRAW_EVERY_MS);
+    this.#stops.push(() => clearInterval(timer));
+    for (const [target, type] of /** @type {[EventTarget, string][]} */ ([[document, 'visibilitychange'], [document, 'freeze'], [document, 'resume'], [window, 'pageshow']])) {
+      const listener = () => this.#slept(type);
+      target.addEventListener(type, listener);
+      this.#stops.push(() => target.removeEventListener(type, listener));
+    }
+    const online = () => this.wire.hurry();
+    window.addEventListener('online', online);
+    this.#stops.push(() => window.removeEventListener('online', online));
+    this.wire.look(this.now());
+  }
+
+  stop() {
+    for (const stop of this.#stops.splice(0)) stop();
+    this.wire.stop();
+  }
+
+  /** Monotonic time [ms]. */
+  now() {
+    return performance.now();
+  }
+
+  /**
+   * Listen; the result stops listening.
+   * @param {Topic} topic
+   * @param {(detail?: any) => void} listener
+   */
+  on(topic, listener) {
+    const all = this.#listeners.get(topic) ?? new Set();
+    this.#listeners.set(topic, all);
+    all.add(listener);
+    return () => void all.delete(listener);
+  }
+
+  /** Nothing fresh has come for so long that the values are covered, or nothing ever came. */
+  get isSilent() {
+    return this.deadMan.covered || (this.frame === null && this.silence_s > 2);
+  }
+
+  /** Seconds without a fresh frame; before the first, since the page began. */
+  get silence_s() {
+    return (this.now() - Math.max(this.deadMan.heard_ms, this.#started_ms)) / 1000;
+  }
+
+  /** Age of the newest frame at the glass [s]: its way here and the silence since. */
+  get lag_s() {
+    return Math.max(0, this.silence_s) + this.#delay_ms / 1000;
+  }
+
+  /** The chain as it stands now. */
+  get chain() {
+    return chainOf({ frame: this.frame, isSilent: this.isSilent, silence_s: this.silence_s, lag_s: this.lag_s, heard_ms: this.heard_ms });
+  }
+
+  /** Is the vehicle being monitored, as far as the page knows? */
+  get isMonitoring() {
+    return this.frame?.session.phase === 'monitoring' || this.frame?.session.phase === 'lost';
+  }
+
+  /** A signal of the newest frame. @param {string} name */
+  signal(name) {
+    return this.frame?.signals[name];
+  }
+
+  /** How much ink a signal deserves now. @param {string} name */
+  ink(name) {
+    return inkOf(this.signal(name), this.lag_s);
+  }
+
+  /**
+   * A limit of the newest frame, or null.
+   * @param {string} name
+   */
+  limit(name) {
+    const value = this.frame?.limits[name];
+    return typeof value === 'number' ? value : null;
+  }
+
+  /**
+   * Ask the server for something. It is refused at once where the server is not there: a command is never kept for later.
+   * @param {string} kind
+   * @param {object} [fields]
+   * @returns {Promise<Answer>}
+   */
+  ask(kind, fields = {}) {
+    this.#asked += 1;
+    const id = `p${this.#asked}`;
+    if (!this.wire.send({ kind, id, ...fields })) {
+      return Promise.resolve({ ok: false, reason: 'Not sent: the server does not answer.' });
+    }
+    return new Promise((resolve) => {
+      this.#waiting.set(id, resolve);
+      setTimeout(() => this.#answer(id, { ok: false, reason: 'The server gave no answer in time.' }), REPLY_MS);
+    });
+  }
+
+  /**
+   * Have scans sent while anyone wants them.
+   * @param {string} who
+   * @param {boolean} isWanted
+   */
+  watchScan(who, isWanted) {
+    const was = this.#watchers.size > 0;
+    if (isWanted) this.#watchers.add(who);
+    else this.#watchers.delete(who);
+    if (was !== this.#watchers.size > 0) this.wire.send({ kind: 'watch', scan: !was });
+  }
+
+  #opened() {
+    this.#clock.reset();
+    if (this.#watchers.size) this.wire.send({ kind: 'watch', scan: true });
+  }
+
+  #closed() {
+    for (const id of [...this.#waiting.keys()]) this.#answer(id, { ok: false, reason: 'The connection to the server broke.' });
+  }
+
+  /** @param {string} text */
+  #heard(text) {
+    const message = readMessage(text);
+    if (!message) {
+      this.unreadable += 1;
+      return;
+    }
+    switch (message.kind) {
+      case 'hello':
+        this.#clock.note(message.time_ms, this.now());
+        this.#greeted(message);
+        break;
+      case 'offer':
+        this.wire.send({ kind: 'take', seq: message.seq });
+        break;
+      case 'state':
+        this.#state(message);
+        break;
+      case 'events': {
+        const fresh = this.log.take(message.events);
+        this.wire.send({ kind: 'have', event: this.log.last ?? 0 });
+        if (fresh.length) this.#emit('log', fresh);
+        this.#caughtUp();
+        break;
+      }
+      case 'reply':
+        this.#answer(message.id, answerOf(message));
+        break;
+      case 'problem':
+        console.warn('The server did not understand:', message.reason);
+        break;
+    }
+  }
+
+  /** @param {import('./protocol.js').Hello} hello */
+  #greeted(hello) {
+    const blind_s = this.heard_ms === null ? 0 : this.silence_s;
+    const have_event = this.log.greet(hello.boot, hello.last_event, blind_s, Date.now());
+    this.wire.send({ kind: 'hello', have_event, boot: hello.boot });
+    this.#caughtUp();
+    this.#emit('open', hello);
+  }
+
+  /** @param {State} frame */
+  #state(frame) {
+    const now_ms = this.now();
+    const delay_ms = this.#clock.note(frame.server.time_ms, now_ms);
+    if (!this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service
+    this.frame = frame;
+    this.#delay_ms = delay_ms;
+    this.heard_ms = Date.now();
+    this.wire.proof(now_ms);
+    this.#emit('beat');
+    if (!this.#isMoved) {
+      this.#isMoved = true;
+      requestAnimationFrame(() => {
+        this.#isMoved = false;
+        this.#emit('move');
+        if (now_ms - this.#drew_ms >= DRAW_EVERY_MS) this.#draw();
+      });
+    }
+  }
+
+  /** @param {ArrayBuffer} bytes */
+  #heardScan(bytes) {
+    const scan = readScan(bytes);
+    if (!scan) {
+      this.unreadable += 1;
+      return;
+    }
+    this.scan = scan;
+    this.scanAt_ms = this.now();
+    this.#emit('scan');
+  }
+
+  #look() {
+    const now_ms = this.now();
+    // The monotonic clock of a phone stands still while the phone sleeps, its wall clock does not.
+    const slept_ms = Date.now() - this.#lookedWall_ms - (now_ms - this.#looked_ms);
+    this.#looked_ms = now_ms;
+    this.#lookedWall_ms = Date.now();
+    if (slept_ms > 2000 && this.frame) this.deadMan.cover();
+    this.deadMan.look(now_ms);
+    this.wire.look(now_ms);
+    if (!document.hidden && now_ms - this.#drew_ms >= DRAW_EVERY_MS - 20) requestAnimationFrame(() => this.#draw());
+    if (document.hidden) this.#emit('beat');
+  }
+
+  #draw() {
+    this.#drew_ms = this.now();
+    this.#emit('draw');
+  }
+
+  /**
+   * Hidden, frozen or back: the veil comes first, whatever the clocks say.
+   * @param {string} type
+   */
+  #slept(type) {
+    const isBack = type === 'resume' || type === 'pageshow' || !document.hidden;
+    if (this.frame && (type !== 'pageshow' || this.silence_s > 1)) this.deadMan.cover();
+    if (isBack) this.wire.hurry();
+    this.#emit('draw');
+  }
+
+  #caughtUp() {
+    const gap = this.log.caughtUp();
+    if (gap) this.#emit('gap', gap);
+  }
+
+  /**
+   * @param {string} id
+   * @param {Answer} answer
+   */
+  #answer(id, answer) {
+    this.#waiting.get(id)?.(answer);
+    this.#waiting.delete(id);
+  }
+
+  /**
+   * @param {Topic} topic
+   * @param {any} [detail]
+   */
+  #emit(topic, detail) {
+    for (const listener of this.#listeners.get(topic) ?? []) {
+      try {
+        listener(detail);
+      } catch (error) {
+        // One broken panel must not stop the veil, the sound or the other panels.
+        console.error(error);
+      }
+    }
+  }
+}
+
+/**
+ * @param {import('./protocol.js').Reply} reply
+ * @returns {Answer}
+ */
+function answerOf({ ok, reason, problem }) {
+  return { ok, ...(reason ? { reason } : {}), ...(problem?.suggestion ? { suggestion: problem.suggestion } : {}) };
+}

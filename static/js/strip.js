@@ -1,0 +1,47 @@
+// The one line under the tabs that never moves: the worst of what stands.
+
+import { stripOf } from './alarm-layout.js';
+import { field, need, setAttribute, setIcon, setWords } from './dom.js';
+
+/**
+ * @param {HTMLElement} root
+ * @param {import('./store.js').Store} store
+ */
+export function mount(root, store) {
+  const strip = field(root, 'strip');
+  const mark = need(strip, '.i');
+  const text = field(root, 'strip-text');
+  const end = field(root, 'strip-end');
+  const frame = need(document, '.frame');
+
+  function draw() {
+    const seen = stripOf(store.frame, {
+      isSilent: store.isSilent, chain: store.chain,
+      paused_s: (store.frame?.session.paused_for_s ?? 0) + store.lag_s,
+    });
+    setAttribute(strip, 'data-kind', seen.kind || null);
+    setAttribute(strip, 'data-opens', seen.opens);
+    setIcon(mark, seen.icon);
+    setWords(text, seen.text);
+    setWords(end, seen.end);
+    setAttribute(frame, 'data-mode', modeOf(store));
+  }
+
+  draw();
+  const stops = [store.on('draw', draw), store.on('move', draw)];
+  return () => stops.forEach((stop) => stop());
+}
+
+/**
+ * The edge of the screen tells the mode.
+ * @param {import('./store.js').Store} store
+ */
+function modeOf(store) {
+  const { frame } = store;
+  if (!frame || !store.isMonitoring) return 'none';
+  if (frame.session.paused && !store.isSilent) return 'paused';
+  if (store.chain.word === 'Lost' && store.silence_s > 2) return 'critical';
+  const critical = frame.alarms.filter((alarm) => alarm.priority === 'critical' && alarm.state !== 'SHELVED');
+  if (!critical.length || store.isSilent) return 'none';
+  return critical.some((alarm) => alarm.state === 'UNACKED') ? 'asking' : 'critical';
+}

@@ -1,0 +1,84 @@
+// The dead-man veil: covers the values when frames stop. The covering itself is a CSS animation (sheets of
+// instruments.css) that every fresh frame rewinds, so that it comes even when this script hangs.
+
+import { drawBigChain } from './chain.js';
+import { field, html, setAttribute, setText, setWords, show, words } from './dom.js';
+import { age, fixed, timeOfDay } from './words.js';
+
+/**
+ * The last values, told as what they are.
+ * @param {import('./protocol.js').State | null} frame
+ */
+export function thenWords(frame) {
+  const speed_mps = frame?.signals.speed?.value?.speed_mps;
+  const distance_m = frame?.signals.distance?.value?.distance_m;
+  const parts = [];
+  if (typeof speed_mps === 'number') parts.push(`${fixed(speed_mps)} m/s`);
+  if (typeof distance_m === 'number') parts.push(`object at ${fixed(distance_m)} m`);
+  return parts.join(', ') || 'nothing';
+}
+
+/**
+ * Does the veil stand? Where the server lives, it covers the values of a car that fell silent; before the first word of a
+ * car there is nothing to cover, but the empty instruments must not look like instruments.
+ * @param {import('./store.js').Store} store
+ */
+export function veilOf(store) {
+  if (store.isSilent) return 'all';
+  const { frame } = store;
+  if (!frame) return 'all';
+  if (frame.session.phase === 'lost' || store.chain.cut !== null) return 'values';
+  return null;
+}
+
+/**
+ * @param {HTMLElement} root
+ * @param {import('./store.js').Store} store
+ */
+export function mount(root, store) {
+  const veil = field(root, 'veil');
+  const [title, sentence, then, recName, rec] = ['veil-title', 'veil-words', 'veil-then', 'veil-rec-name', 'veil-rec'].map((name) => field(root, name));
+  const chain = field(veil, 'chain');
+  if (!title || !sentence || !then || !recName || !rec) throw new Error('The template lacks the veil');
+  let beat = 0;
+  let told = '';
+
+  function rewind() {
+    if (store.deadMan.covered) return;
+    beat = 1 - beat;
+    document.documentElement.dataset.beat = String(beat);
+  }
+
+  function draw() {
+    const kind = veilOf(store);
+    setAttribute(veil, 'data-on', kind);
+    const view = store.chain;
+    // While all is well the plate already says what it will have to say if this script hangs.
+    const shown = kind === null ? { ...view, cut: /** @type {const} */ (0), nodes: view.nodes.map((node, i) => ({ ...node, mark: i === 0 ? 'here' : i === 1 ? 'silent' : 'unknown', isBad: i === 1, isKnown: i === 0 })) } : view;
+    drawBigChain(chain, shown);
+    setWords(title, kind === null || view.age_s === null ? 'Stale' : `${view.word === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
+    const bold = kind === null ? 'The server fell silent.' : view.sentence;
+    const plain = kind === null ? 'Nothing fresh has come for 2 s and more.' : detailOf(view);
+    if (told !== `${bold}|${plain}`) {
+      told = `${bold}|${plain}`;
+      sentence.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
+    }
+    setWords(then, thenWords(store.frame));
+    const recording = store.frame?.recording.state ?? 'off';
+    setText(rec, recording === 'off' ? '' : 'saved up to the last message');
+    show(recName, recording !== 'off');
+    show(rec, recording !== 'off');
+  }
+
+  draw();
+  const stops = [store.on('beat', rewind), store.on('draw', draw), store.on('move', draw)];
+  return () => stops.forEach((stop) => stop());
+}
+
+/** @param {import('./link.js').ChainView} view */
+function detailOf(view) {
+  if (view.word === 'Silent' && view.since_ms !== null) {
+    return `${view.detail} Last word at ${timeOfDay(view.since_ms)}.`;
+  }
+  return view.detail;
+}

@@ -1,0 +1,87 @@
+// Makes the alarm sounds and the vibration; knows whether the phone lets it.
+
+import { burstOf, samplesOf } from './sound-layout.js';
+
+/** @typedef {'high' | 'medium' | 'low'} Loud */
+
+export class Voice {
+  /** @type {AudioContext | null} */
+  #context = null;
+  /** @type {AudioBufferSourceNode | null} */
+  #source = null;
+  /** @type {Loud | null} */
+  #sound = null;
+  /** @type {ReturnType<typeof setInterval> | undefined} */
+  #shake;
+
+  /** Can this browser sound at all? */
+  get isPossible() {
+    return typeof AudioContext === 'function';
+  }
+
+  /** Would an alarm be heard now? */
+  get isRunning() {
+    return this.#context?.state === 'running';
+  }
+
+  /** Called within a tap: browsers sound only after one. Never waits for the answer, which some never give. */
+  arm() {
+    if (!this.isPossible) return;
+    this.#context ??= new AudioContext({ latencyHint: 'interactive' });
+    if (this.#context.state !== 'running') this.#context.resume().catch(() => {});
+  }
+
+  /**
+   * Sound this from now on, or be still.
+   * @param {import('./protocol.js').SoundName | null} name
+   */
+  say(name) {
+    const sound = name === 'none' ? null : name;
+    if (sound === this.#sound && (sound === null || this.#source || !this.isRunning)) return;
+    const isNew = sound !== this.#sound;
+    this.#sound = sound;
+    this.#hush();
+    if (sound === null) return;
+    if (isNew || this.#shake === undefined) this.#vibrate(sound);
+    if (this.#context && this.isRunning) this.#play(this.#context, sound);
+  }
+
+  /** What sounds now, heard or not. */
+  get saying() {
+    return this.#sound;
+  }
+
+  /**
+   * @param {AudioContext} context
+   * @param {Loud} sound
+   */
+  #play(context, sound) {
+    const samples = samplesOf(sound, context.sampleRate);
+    const buffer = context.createBuffer(1, samples.length, context.sampleRate);
+    buffer.copyToChannel(samples, 0);
+    const source = context.createBufferSource();
+    source.buffer = buffer;
+    source.loop = sound !== 'low';
+    source.connect(context.destination);
+    source.start();
+    this.#source = source;
+  }
+
+  /** @param {Loud} sound */
+  #vibrate(sound) {
+    const { vibration, every_s } = burstOf(sound);
+    if (!vibration.length || typeof navigator.vibrate !== 'function') return;
+    navigator.vibrate(vibration);
+    this.#shake = setInterval(() => navigator.vibrate(vibration), every_s * 1000);
+  }
+
+  #hush() {
+    this.#source?.stop();
+    this.#source?.disconnect();
+    this.#source = null;
+    if (this.#shake === undefined) return;
+    clearInterval(this.#shake);
+    this.#shake = undefined;
+    navigator.vibrate(0);
+  }
+}

@@ -1,0 +1,116 @@
+// The page's end of the socket: dials for ever, and hangs up on a connection that has gone quiet.
+
+/** A browser may never report a dead connection: without a fresh frame for so long it is given up [ms]. */
+const QUIET_MS = 2500;
+/** A dial that has not opened by then is given up: the server may be stopped while its port still accepts [ms]. */
+const DIAL_MS = 5000;
+const FIRST_WAIT_MS = 300;
+const LAST_WAIT_MS = 2000;
+
+/**
+ * @typedef {object} Ear
+ * @property {() => void} opened
+ * @property {(text: string) => void} text
+ * @property {(bytes: ArrayBuffer) => void} bytes
+ * @property {() => void} closed
+ */
+
+/** One socket at a time. Time is an argument: whoever owns a Wire calls `look` a few times a second. */
+export class Wire {
+  /** @type {WebSocket | null} */
+  #socket = null;
+  #isOpen = false;
+  #proof_ms = 0;
+  #wait_ms = FIRST_WAIT_MS;
+  #next_ms = -Infinity;
+
+  /**
+   * @param {Ear} ear
+   * @param {() => WebSocket} dial makes a socket that is connecting
+   */
+  constructor(ear, dial) {
+    this.ear = ear;
+    this.dial = dial;
+  }
+
+  get isOpen() {
+    return this.#isOpen;
+  }
+
+  /**
+   * A fresh frame came: the connection is alive.
+   * @param {number} now_ms
+   */
+  proof(now_ms) {
+    this.#proof_ms = now_ms;
+    this.#wait_ms = FIRST_WAIT_MS;
+  }
+
+  /** Something changed for the better (the page is seen again, the phone is online): dial without waiting. */
+  hurry() {
+    this.#next_ms = -Infinity;
+    this.#wait_ms = FIRST_WAIT_MS;
+  }
+
+  /**
+   * Dial where there is no socket, hang up where it is quiet.
+   * @param {number} now_ms
+   */
+  look(now_ms) {
+    if (this.#socket && now_ms - this.#proof_ms > (this.#isOpen ? QUIET_MS : DIAL_MS)) this.#drop(now_ms);
+    if (!this.#socket && now_ms >= this.#next_ms) this.#open(now_ms);
+  }
+
+  /**
+   * Send now or not at all: nothing is kept for later.
+   * @param {object} message
+   * @returns {boolean} whether it went out
+   */
+  send(message) {
+    if (!this.#socket || !this.#isOpen) return false;
+    this.#socket.send(JSON.stringify(message));
+    return true;
+  }
+
+  /** Hang up for good; `look` must not be called again. */
+  stop() {
+    this.#hangUp();
+  }
+
+  /** @param {number} now_ms */
+  #open(now_ms) {
+    this.#proof_ms = now_ms;
+    const socket = this.dial();
+    socket.binaryType = 'arraybuffer';
+    this.#socket = socket;
+    socket.onopen = () => {
+      this.#isOpen = true;
+      this.ear.opened();
+    };
+    socket.onmessage = (event) => {
+      if (typeof event.data === 'string') this.ear.text(event.data);
+      else this.ear.bytes(event.data);
+    };
+    socket.onclose = () => this.#drop(performance.now());
+    socket.onerror = () => {}; // a close always follows
+  }
+
+  /** @param {number} now_ms */
+  #drop(now_ms) {
+    const wasOpen = this.#isOpen;
+    this.#hangUp();
+    this.#next_ms = now_ms + this.#wait_ms;
+    this.#wait_ms = Math.min(LAST_WAIT_MS, this.#wait_ms * 1.7);
+    if (wasOpen) this.ear.closed();
+  }
+
+  #hangUp() {
+    const socket = this.#socket;
+    this.#socket = null;
+    this.#isOpen = false;
+    if (!socket) return;
+    // Forgotten before it is closed: a frame still under way on the old socket is never heard again.
+    socket.onopen = socket.onmessage = socket.onclose = socket.onerror = null;
+    socket.close();
+  }
+}
