@@ -74,7 +74,9 @@ class Viewer:
                     return answer
                 await self._changed.wait()
 
-    async def state(self, fits: Callable[[dict[str, Any]], bool] = lambda _: True, within_s: float = 5.0) -> dict[str, Any]:
+    async def state(
+        self, fits: Callable[[dict[str, Any]], bool] = lambda _: True, within_s: float = 5.0
+    ) -> dict[str, Any]:
         """The next state (from now on) that fits."""
         start = len(self.states)
         found: dict[str, Any] = await self.until(

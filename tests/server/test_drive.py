@@ -1,0 +1,128 @@
+"""A real drive, replayed through a rosbridge at true speed, and what the server then knows of it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import re
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from server.config import Config, Vehicle
+from tests.server.conftest import serving
+from tests.server.viewer import Viewer, viewer
+
+MESSAGES = {
+    "speed": 1120,
+    "brake": 1117,
+    "accelerator": 1118,
+    "steering": 1117,
+    "distance": 4190,
+    "bearing": 4183,
+    "position": 560,
+    "odometry": 560,
+    "command": 263,
+}
+
+
+@contextlib.asynccontextmanager
+async def replaying(path: Path, *options: str) -> AsyncIterator[str]:
+    """`catgraph replay` as a process; its ws address."""
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "server", "replay", str(path), "--port", "0", "--wait", "--stay", *options),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+    assert process.stdout is not None
+    try:
+        async with asyncio.timeout(30):
+            while True:
+                line = (await process.stdout.readline()).decode()
+                assert line, "replay ended before it said its address"
+                found = re.search(r"ws://[\d.]+:\d+", line)
+                if found:
+                    break
+        yield found.group()
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        await process.wait()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(180)
+async def test_the_real_drive_of_2016_06_01_both_ways(recordings: Path) -> None:
+    """The ROS 1 bag and the ROS 2 MCAP at once, two vehicles of one server: every message, and the drive's own figures."""
+    async with (
+        replaying(recordings / "catvehicle_2016-06-01.bag") as bag,
+        replaying(recordings / "catvehicle_2016-06-01_mcap") as mcap,
+        serving(Config(vehicles=(Vehicle(name="bag", address=bag), Vehicle(name="mcap", address=mcap)))) as server,
+        viewer(server, vehicle="bag") as of_bag,
+        viewer(server, vehicle="mcap") as of_mcap,
+        httpx.AsyncClient() as client,
+    ):
+        for one in (of_bag, of_mcap):
+            await one.until(lambda one=one: one.states and one.states[-1]["session"]["received"] >= 14228, within_s=100)
+        await asyncio.sleep(0.5)  # no message more than there are
+        for one, version in ((of_bag, 1), (of_mcap, 2)):
+            state = (await client.get(f"{server}/api/state", params={"vehicle": one.states[-1]["vehicle"]})).json()
+            assert state["session"]["ros_version"] == version
+            assert state["session"]["received"] == 14228
+            assert state["session"]["rejected"] == 0
+            signals = state["signals"]
+            assert {name: signals[name]["count"] for name in MESSAGES} == MESSAGES
+            assert all(signal["rejected"] == 0 for signal in signals.values())
+            assert signals["speed"]["highest"] == pytest.approx(4.23, abs=0.005)
+            assert signals["brake"]["highest"] == pytest.approx(22.35, abs=0.005)
+            assert (signals["accelerator"]["lowest"], signals["accelerator"]["highest"]) == (0, 0)
+            assert signals["steering"]["lowest"] == pytest.approx(-4.33, abs=0.005)
+            assert signals["steering"]["highest"] == pytest.approx(1.70, abs=0.005)
+            assert signals["distance"]["lowest"] == pytest.approx(4.10, abs=0.005)
+            assert signals["distance"]["highest"] == pytest.approx(14.55, abs=0.005)
+            assert state["session"]["track_m"] == pytest.approx(76, abs=1.0)
+            assert signals["command"]["value"]["tyre_angle_rad"] is None
+            assert "angular.z is null" in signals["command"]["note"]
+            _assert_seen_on_the_socket(one)
+
+
+def _assert_seen_on_the_socket(one: Viewer) -> None:
+    """The page's own frames show the drive as it went, at true speed."""
+    last = one.states[-1]
+    assert last["signals"]["speed"]["highest"] == pytest.approx(4.23, abs=0.005)
+    speeds = [
+        state["signals"]["speed"]["value"]["speed_mps"] for state in one.states if state["signals"]["speed"]["value"]
+    ]
+    assert max(speeds) > 4.1
+    heard = [index for index, state in enumerate(one.states) if state["session"]["received"] > 0]
+    done = next(index for index, state in enumerate(one.states) if state["session"]["received"] >= 14228)
+    assert one.got_s[done] - one.got_s[heard[0]] == pytest.approx(55.9, abs=1.0)
+    assert done - heard[0] > 400  # some ten a second
+
+
+async def test_the_real_laser(recordings: Path) -> None:
+    """681 beams; what is nearer than range_min is no return, on the wire as in the state."""
+    path = recordings / "lidar" / "scan_tools_hokuyo_demo.bag"
+    async with (
+        replaying(path, "--loop") as bag,
+        serving(Config(vehicles=(Vehicle(name="car", address=bag),))) as server,
+        viewer(server) as one,
+    ):
+        await one.send({"kind": "watch", "scan": True})
+        await one.until(lambda: len(one.scans) >= 30, within_s=30)
+        state = await one.state(lambda s: s["signals"]["scan"]["value"])
+        scan = state["signals"]["scan"]
+        assert scan["rejected"] == 0
+        assert scan["value"]["beams"] == 681
+        assert scan["value"]["nearest_m"] >= scan["value"]["range_min_m"]
+        for frame in one.scans:
+            assert len(frame) == 28 + 2 * 681
+            codes = np.frombuffer(frame[28:], dtype="<u2")
+            scale = float(np.frombuffer(frame[24:28], dtype="<f4")[0])
+            drawn = codes[(codes > 0) & (codes < 65533)] * scale
+            assert drawn.min() >= scan["value"]["range_min_m"] - scale
+        assert sum((np.frombuffer(frame[28:], dtype="<u2") == 65535).sum() for frame in one.scans) > 0
