@@ -57,7 +57,7 @@ async def replaying(path: Path, *options: str) -> AsyncIterator[str]:
 @pytest.mark.slow
 @pytest.mark.timeout(180)
 async def test_the_real_drive_of_2016_06_01_both_ways(recordings: Path) -> None:
-    """The ROS 1 bag and the ROS 2 MCAP at once, two vehicles of one server: every message, and the drive's own figures."""
+    """The ROS 1 bag and the ROS 2 MCAP at once, two vehicles of one server: every message, the drive's figures."""
     async with (
         replaying(recordings / "catvehicle_2016-06-01.bag") as bag,
         replaying(recordings / "catvehicle_2016-06-01_mcap") as mcap,

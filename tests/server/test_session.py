@@ -186,7 +186,7 @@ async def test_two_vehicles_in_one_process_do_not_mix(bridge: RosBridge) -> None
 
 @pytest.mark.parametrize("flaps", [8, pytest.param(200, marks=[pytest.mark.soak, pytest.mark.timeout(1800)])])
 async def test_flaps_leak_nothing_and_keep_the_subscriptions_whole(bridge: RosBridge, server: str, flaps: int) -> None:
-    """Killed and frozen in turn: afterwards as many tasks, threads and descriptors as before, and one subscription a topic."""
+    """Killed and frozen in turn: then as many tasks, threads and descriptors as before, one subscription a topic."""
     process = psutil.Process()
     async with driving(bridge), viewer(server) as one:
         await one.state(is_live)
