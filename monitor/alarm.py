@@ -21,6 +21,10 @@ from monitor.check import Finding, Verdict
 Change = Literal["raised", "cleared", "acknowledged", "recaused", "shelved", "unshelved", "suppressed", "unsuppressed"]
 
 
+CLOCK_BACK_S = 0.5  # less is a message that waited a moment, not a clock that went back
+ROUNDING_S = 1e-6  # delays are summed in steps
+
+
 class AlarmState(StrEnum):
     NORMAL = "NORMAL"
     UNACKED = "UNACKED"  # the condition stands, nobody has said that they saw it
@@ -132,7 +136,8 @@ def advance(
         return alarm, ()
     if finding.verdict is not Verdict.FAULT and not inhibited_by and alarm._is_at_rest:
         return alarm, ()  # by far the most frequent case, and nothing of it needs remembering
-    step = _Step(_rebased(alarm, now_s), finding, now_s)
+    alarm = rebased(alarm, now_s)
+    step = _Step(alarm, finding, now_s if alarm.at_s is None else max(now_s, alarm.at_s))
     step.unshelve_when_due()
     step.suppress(tuple(inhibited_by))
     step.judge()
@@ -148,9 +153,9 @@ def end(alarm: Alarm, now_s: float, why: str) -> tuple[Alarm, tuple[Transition, 
     return fresh, (told,)
 
 
-def _rebased(alarm: Alarm, now_s: float) -> Alarm:
+def rebased(alarm: Alarm, now_s: float) -> Alarm:
     """The alarm with its times moved along when the clock went back, so that every duration stays what it was."""
-    if alarm.at_s is None or now_s >= alarm.at_s:
+    if alarm.at_s is None or now_s >= alarm.at_s - CLOCK_BACK_S:
         return alarm
     shift_s = now_s - alarm.at_s
 
@@ -247,9 +252,11 @@ class _Step:
         if self._suppressed:
             self._set["held_s"] = 0.0
             return
-        held_s = self._alarm.held_s + (self._dt_s if self._verdict_before is Verdict.FAULT else 0.0)
+        # What was explained away is no fault seen: the delay counts from the end of the suppression.
+        seen_before = self._verdict_before is Verdict.FAULT and not self._alarm.suppressed_by
+        held_s = self._alarm.held_s + (self._dt_s if seen_before else 0.0)
         self._set["held_s"] = held_s
-        if held_s >= self._alarm.spec.on_delay_s:
+        if held_s + ROUNDING_S >= self._alarm.spec.on_delay_s:
             self._active = True
             self._set |= {
                 "held_s": 0.0,
@@ -268,7 +275,7 @@ class _Step:
         causes: dict[str, float | None] = {}
         for cause in self._alarm.causes:
             absent_s = None if cause.absent_s is None else cause.absent_s + self._dt_s
-            if absent_s is None or absent_s <= self._alarm.spec.off_delay_s:
+            if absent_s is None or absent_s <= self._alarm.spec.off_delay_s + ROUNDING_S:
                 causes[cause.name] = 0.0 if absent_s is None else absent_s
         is_new = any(name not in causes for name in names)
         causes |= dict.fromkeys(names)
@@ -283,7 +290,7 @@ class _Step:
             return
         held_s = self._alarm.held_s + (self._dt_s if self._verdict_before is Verdict.OK else 0.0)
         self._set["held_s"] = held_s
-        if self._suppressed or held_s < self._alarm.spec.off_delay_s:
+        if self._suppressed or held_s + ROUNDING_S < self._alarm.spec.off_delay_s:
             return
         if self._alarm.spec.latches and not self._acknowledged:
             self._set["latched"] = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from monitor.alarm import Alarm, Change, Refused, Transition
+from monitor.alarm import Alarm, Change, Refused, Transition, rebased
 
 SHELVE_AT_MOST_MIN = 15.0  # longer is forgotten
 
@@ -42,7 +42,7 @@ def shelve(
         raise Refused(f"{title}: nothing to shelve")
     if occurrence != alarm.occurrence:
         raise Refused(f"{title} was announced anew meanwhile: look again")
-    after = replace(alarm, shelved_until_s=now_s + 60.0 * minutes, shelved_by=by)
+    after = replace(rebased(alarm, now_s), shelved_until_s=now_s + 60.0 * minutes, shelved_by=by)
     return after, (_transition(after, "shelved", by, now_s),)
 
 

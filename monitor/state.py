@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Generic, Literal, TypeVar, overload
 
@@ -35,6 +35,7 @@ __all__ = ["Extent", "Freshness", "LinkFacts", "NotFresh", "Phase", "Reading", "
 
 AGEING_PERIODS = 3
 AGEING_FLOOR_S = 0.25  # three periods of a 75 Hz signal are one hiccup of Wi-Fi
+CLOCK_BACK_S = 0.5
 RATES_EVERY_S = 0.1  # a rate over 5 s does not change faster
 
 Freshness = Literal["fresh", "ageing", "stale"]
@@ -202,6 +203,7 @@ class State:
         self._rates: Mapping[str, Rate] = MappingProxyType({})
         self._rates_at_s: float | None = None
         self._heard_s: float | None = None
+        self._latest_s = -math.inf
         self._slope = Slope()
         self._standstill = Standstill()
         self._track = Track()
@@ -217,6 +219,7 @@ class State:
 
     def receive(self, signal: str, value: Value, received_s: float, stamp_s: float | None = None) -> tuple[str, ...]:
         """Take one decoded value; returns the signals that changed by it, derived ones included, for `Monitor.step`."""
+        self._follow_clock(received_s)
         heard = self._heard[signal]
         heard.count += 1
         heard.meter.receive(received_s)
@@ -246,6 +249,7 @@ class State:
 
     def snapshot(self, now_s: float) -> Snapshot:
         """What is known at `now_s`, which later messages do not change."""
+        self._follow_clock(now_s)
         return Snapshot(
             now_s=now_s,
             readings=MappingProxyType(self._readings.copy()),
@@ -258,6 +262,23 @@ class State:
             track_m=self._track.distance_m,
             standing_since_s=self._standstill.since_s if self._is_fresh("speed", now_s) else None,
         )
+
+    def _follow_clock(self, at_s: float) -> None:
+        """When the clock goes back, what is known keeps its age; else old values would look new for a long time."""
+        if at_s >= self._latest_s:
+            self._latest_s = at_s
+            return
+        shift_s = at_s - self._latest_s
+        if shift_s > -CLOCK_BACK_S:
+            return  # a message waited a moment between its arrival and here
+        self._latest_s = at_s
+        self._readings = {
+            name: replace(reading, received_s=reading.received_s + shift_s) for name, reading in self._readings.items()
+        }
+        if self._heard_s is not None:
+            self._heard_s += shift_s
+        for heard in self._heard.values():
+            heard.meter.restart()
 
     def _derive(self, signal: str, reading: Reading[Any]) -> str | None:
         """Follow what this reading tells of other signals; the name of the derived signal that changed."""

@@ -58,6 +58,6 @@ def _words(verdict: Verdict, those: Sequence[tuple[Check[Any], Finding]], of: in
     text = "; ".join(texts)
     if len(briefs) == 1 and verdict is Verdict.UNKNOWN:
         return text, briefs[0]
-    word = "FAULT" if verdict is Verdict.FAULT else "not checked:"
-    brief = f"{word} {len(those)} of {of}"
-    return text, brief if len(brief) <= BRIEF_LETTERS else word
+    plain, counted = ("FAULT", "FAULT") if verdict is Verdict.FAULT else ("not checked", "not checked:")
+    brief = f"{counted} {len(those)} of {of}"
+    return text, brief if len(brief) <= BRIEF_LETTERS else plain
