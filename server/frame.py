@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from monitor import catalog, values
+from monitor.instruments import stopping_m, time_gap_s
 from monitor.runner import Monitor
 from monitor.signals import SIGNALS, Signal
 from monitor.state import Reading, Snapshot
@@ -20,12 +21,6 @@ from server.topics import Source
 CAR_SILENT_S = 1.4  # said before 2 s are over; the slowest of the fast signals comes ten times a second
 NO_MESSAGE_S = 5.0
 ROS_GONE_S = 2.5  # one unanswered question may be lost; three are a sign
-STANDING_MPS = 0.3  # below, a time gap says nothing
-REACTION_S = 1.0  # the safety driver's, with the foot ready
-BRAKING_MPS2 = 3.0  # what the driver brakes with, dry road, no emergency
-GAUGE_MAX_MPS = 15.0
-GAUGE_MAX_MPS2 = 3.0
-STANDOFF_M = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,15 +59,10 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str,
         "session": _session(facts, snapshot),
         "link": _link(facts, snapshot),
         "signals": {name: _signal(signal, facts, snapshot) for name, signal in SIGNALS.items()},
-        "nearest": _nearest(snapshot),
+        "nearest": _nearest(snapshot, monitor),
         "checks": [wire.tile(tile) for tile in monitor.tiles()],
         "alarms": [wire.alarm(alarm, facts.now_s, facts.wall_ms) for alarm in monitor.standing()],
-        "limits": {
-            **catalog.flat(monitor.limits),
-            "gauge.speed_max_mps": GAUGE_MAX_MPS,
-            "gauge.acceleration_max_mps2": GAUGE_MAX_MPS2,
-            "obstacle.standoff_m": STANDOFF_M,
-        },
+        "limits": catalog.flat(monitor.limits),
         "recording": {"state": "off", "for_s": None},
         "decelerate": {"state": "not_available", "why": "not configured"},
         "control": {"holder": None},
@@ -194,23 +184,18 @@ def _unknown_part(value: Any) -> str | None:
     return None
 
 
-def _nearest(snapshot: Snapshot) -> dict[str, float | None]:
-    """Time gap and stopping distance, from speed and nearest object while both are fresh.
-
-    Stopping distance = v·t + v²/2a (DOMAIN: reaction time t, deceleration a); time gap = gap / own speed (SAE J2944).
-    """
-    speed = _fresh(snapshot, "speed")
-    distance = _fresh(snapshot, "distance")
+def _nearest(snapshot: Snapshot, monitor: Monitor) -> dict[str, float | None]:
+    """Time gap and stopping distance, from speed and nearest object while both are fresh."""
+    speed: values.Twist | None = _fresh(snapshot, "speed")
+    distance: values.Distance | None = _fresh(snapshot, "distance")
     if speed is None:
         return {"time_gap_s": None, "stopping_m": None}
-    v = abs(speed.speed_mps)
-    gap = (
-        distance.distance_m / v
-        if distance is not None and distance.distance_m is not None and v > STANDING_MPS
-        else None
-    )
-    stopping = v * REACTION_S + v * v / (2 * BRAKING_MPS2) if v > STANDING_MPS else 0.0
-    return {"time_gap_s": wire.plain(gap, 2), "stopping_m": wire.plain(stopping, 2)}
+    metres = distance.distance_m if distance is not None else None
+    gap_s = time_gap_s(metres, speed.speed_mps) if metres is not None else None
+    return {
+        "time_gap_s": wire.plain(gap_s, 2),
+        "stopping_m": wire.plain(stopping_m(speed.speed_mps, monitor.limits.braking), 2),
+    }
 
 
 def _fresh(snapshot: Snapshot, name: str) -> Any:

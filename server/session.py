@@ -59,8 +59,8 @@ class Session:
         self._wall_ms = wall_ms
         self._server = server
         self._allowed_hosts = frozenset(allowed_hosts)
-        self._checks = checks  # None: all there are
         self._monitor = Monitor(checks)
+        self._crashes_told: set[str] = set()
         self._tasks: set[asyncio.Task[None]] = set()
         self._lag_s = 0.0
         self._paused_since_s: float | None = None
@@ -225,21 +225,23 @@ class Session:
                 "Ask whoever started the server.",
                 code="not_allowed",
             )
-        self._drop_link()
-        self._clear()
-        self._monitor = Monitor(self._checks, self._monitor.limits)
+        self._end()
         self._phase, self._address = "connecting", target
         self._link = RosLink(target, self, now=self._now)
         self._link.start()
 
     def _disconnect(self) -> None:
         was = self._phase
-        self._drop_link()
-        self._clear()
-        self._paused_since_s = None
-        self._monitor = Monitor(self._checks, self._monitor.limits)
+        self._end()
         if was != "idle":
             self._note("stopped", "Monitoring was stopped.")
+
+    def _end(self) -> None:
+        """One car's monitoring is over: its alarms end in the log, and all that is known of it is forgotten."""
+        self._tell(self._monitor.end(self._now()))
+        self._drop_link()
+        self._paused_since_s = None
+        self._clear()
 
     def _drop_link(self) -> None:
         if self._link is not None:
@@ -474,9 +476,18 @@ class Session:
 
     def _judge(self, now_s: float, changed: Collection[str] | None) -> None:
         transitions = self._monitor.step(self._state.snapshot(now_s), changed)
+        if self._monitor.crashes:
+            self._log_crashes()
         if transitions:
             self._tell(transitions)
             self._put_state(now_s)
+
+    def _log_crashes(self) -> None:
+        """Each failing check once; the page says "monitoring impaired" as long as it fails."""
+        for crash in self._monitor.crashes.values():
+            if crash.check_id not in self._crashes_told:
+                self._crashes_told.add(crash.check_id)
+                log.error("check %s failed: %s\n%s", crash.check_id, crash.error, crash.where)
 
     def _tell(self, transitions: Collection[Transition]) -> None:
         at_ms = self._wall_ms()
