@@ -5,13 +5,27 @@ from __future__ import annotations
 import ipaddress
 import re
 from dataclasses import dataclass
-from urllib.parse import urlsplit
+from urllib.parse import SplitResult, quote, urlsplit
 
 DEFAULT_PORT = 9090  # rosbridge's own
 MASTER_PORT = 11311  # a ROS master, which speaks XML-RPC and not rosbridge
+LONGEST = 300  # letters; a host name has at most 253
 
-_HOST = re.compile(r"^(?=.{1,253}$)[A-Za-z0-9_]([A-Za-z0-9_-]{0,62})?(\.[A-Za-z0-9_]([A-Za-z0-9_-]{0,62})?)*\.?$")
-_METADATA = (ipaddress.ip_address("169.254.169.254"), ipaddress.ip_address("fd00:ec2::254"))
+_LABEL = r"[A-Za-z0-9_]([A-Za-z0-9_-]{0,61}[A-Za-z0-9_])?"
+_HOST = re.compile(rf"(?=.{{1,253}}\Z){_LABEL}(\.{_LABEL})*\.?\Z")
+# The services that tell a cloud's machines their keys; those of the large clouds are link-local besides.
+_METADATA = frozenset(
+    map(ipaddress.ip_address, ("169.254.169.254", "100.100.100.200", "192.0.0.192", "fd00:ec2::254", "fd20:ce::254"))
+)
+_THIS_NETWORK = ipaddress.ip_network("0.0.0.0/8")
+_EVERYONE = ipaddress.ip_address("255.255.255.255")
+_NAT64 = (ipaddress.ip_network("64:ff9b::/96"), ipaddress.ip_network("64:ff9b:1::/48"))  # RFC 6052, RFC 8215
+_COMPATIBLE = ipaddress.ip_network("::/96")  # IPv4 in IPv6 as of old, RFC 4291 2.5.5.1
+
+_NETLOC = re.compile(r"(\[[^\[\]]*\]|[^\[\]:]*)(:[^:]*)?\Z")
+_FEW_SLASHES = re.compile(r"(?i)(wss?):/?(?=[^/\d]|\d+\.)")
+_EXAMPLE = "Type a host and a port, such as 192.168.4.1:9090."
+_IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 class BadAddress(ValueError):
@@ -31,20 +45,16 @@ class Address:
     host: str  # name or IP address, IPv6 without brackets
     port: int
     secure: bool = False
-    path: str = ""
+    path: str = ""  # with its query, as it goes over the wire
 
     @property
     def shown(self) -> str:
         """`host:port`, as the operator knows it."""
-        return f"{self._bracketed}:{self.port}"
+        return f"{_bracketed(self.host)}:{self.port}"
 
     @property
     def url(self) -> str:
-        return f"{'wss' if self.secure else 'ws'}://{self._bracketed}:{self.port}{self.path}"
-
-    @property
-    def _bracketed(self) -> str:
-        return f"[{self.host}]" if ":" in self.host else self.host
+        return f"{'wss' if self.secure else 'ws'}://{_bracketed(self.host)}:{self.port}{self.path}"
 
 
 def parse(text: str) -> Address:
@@ -55,16 +65,24 @@ def parse(text: str) -> Address:
     typed = text.strip()
     if not typed:
         raise BadAddress("No address is given.", "Type the address of the car's rosbridge, such as 192.168.4.1:9090.")
-    if len(typed) > 300 or any(ord(letter) < 33 or ord(letter) == 127 for letter in typed):
-        raise BadAddress("This is not an address.", "Type a host and a port, such as 192.168.4.1:9090.")
-    scheme, separator, _ = typed.partition("://")
+    if len(typed) > LONGEST or any(not letter.isprintable() or letter.isspace() for letter in typed):
+        raise BadAddress("This is not an address.", _EXAMPLE)
+    scheme, separator, rest = typed.partition("://")
     if not separator:
         if _is_bare_ipv6(typed):
-            return Address(host=typed, port=DEFAULT_PORT)
-        typed = f"ws://{typed}"
-    elif scheme.lower() in ("http", "https", "rosrpc"):
-        raise _wrong_scheme(typed, scheme.lower())
-    elif scheme.lower() not in ("ws", "wss"):
+            return Address(host=_host_of(typed), port=DEFAULT_PORT)
+        if slip := _FEW_SLASHES.match(typed):
+            better = f"{slip[1].lower()}://{typed[slip.end() :]}"
+            raise BadAddress(
+                f"After {slip[1].lower()}: stand two slashes.",
+                f"Most likely {better}.",
+                code="scheme",
+                suggestion=better,
+            )
+        return _split(f"ws://{typed}")
+    if scheme.lower() in ("http", "https", "rosrpc"):
+        raise _wrong_scheme(scheme.lower(), rest)
+    if scheme.lower() not in ("ws", "wss"):
         raise BadAddress(
             f"“{scheme[:20]}” is not a way to reach a car.",
             "Use ws:// or wss://, or only host and port.",
@@ -74,50 +92,74 @@ def parse(text: str) -> Address:
 
 
 def _split(typed: str) -> Address:
-    try:
-        parts = urlsplit(typed)
-        port = parts.port
-        host = parts.hostname or ""
-    except ValueError:
-        raise BadAddress("The port is not a number from 1 to 65535.", "rosbridge usually listens on 9090.") from None
+    parts = _url_parts(typed)
     if parts.username is not None or parts.password is not None:
         raise BadAddress("An address with a user name is not dialled.", "Leave out what stands before the @.")
-    if not host:
-        raise BadAddress("The address names no host.", "Type a host and a port, such as 192.168.4.1:9090.")
-    if not _is_ip(host) and not _HOST.match(host):
-        raise BadAddress(f"“{host[:60]}” is not a host name.", "Type a name or an IP address, such as 192.168.4.1.")
+    port = _port(parts)
+    host = _host_of(parts.hostname or "")
     if port == 0:
         raise BadAddress("Port 0 cannot be dialled.", "rosbridge usually listens on 9090.")
     if port == MASTER_PORT:
-        raise BadAddress(
-            f"Port {MASTER_PORT} is the ROS master; catgraph speaks to rosbridge.",
-            f"Most likely ws://{host}:{DEFAULT_PORT}.",
-            code="ros_master",
-            suggestion=f"ws://{host}:{DEFAULT_PORT}",
-        )
-    secure = parts.scheme.lower() == "wss"
-    path = parts.path if parts.path not in ("", "/") else ""
+        raise _master(host, f"Port {MASTER_PORT} is the ROS master; catgraph speaks to rosbridge.")
+    path = quote(parts.path, safe="/%:@!$&'()*+,;=~") if parts.path not in ("", "/") else ""
     if parts.query:
-        path = f"{path or '/'}?{parts.query}"
-    return Address(host=host, port=port or DEFAULT_PORT, secure=secure, path=path)
+        path = f"{path or '/'}?{quote(parts.query, safe='/%:@!$&()*+,;=~?')}"
+    return Address(host=host, port=port or DEFAULT_PORT, secure=parts.scheme.lower() == "wss", path=path)
 
 
-def _wrong_scheme(typed: str, scheme: str) -> BadAddress:
+def _url_parts(typed: str) -> SplitResult:
     try:
-        parts = urlsplit(typed)
-        host, port = parts.hostname or "", parts.port
+        return urlsplit(typed)
+    except ValueError:  # brackets that hold no IPv6 address, letters that turn into / or @ when made plain
+        raise _no_host(typed.partition("://")[2]) from None
+
+
+def _port(parts: SplitResult) -> int | None:
+    if not _NETLOC.match(parts.netloc):
+        raise BadAddress(
+            "Host and port cannot be told apart.", "Type host:port; an IPv6 address in brackets, [fd00::1]:9090."
+        )
+    try:
+        return parts.port
     except ValueError:
+        raise BadAddress("The port is not a number from 1 to 65535.", "rosbridge usually listens on 9090.") from None
+
+
+def _host_of(host: str) -> str:
+    """The host as it is dialled. Raises BadAddress."""
+    if not host:
+        raise BadAddress("The address names no host.", _EXAMPLE)
+    if "%" in host and _is_ip(host):  # an interface's name: only link-local addresses have use for one
+        raise BadAddress(
+            f"{host[:60]} is never dialled.", "Use the car's address on its own network.", code="forbidden"
+        )
+    if not _is_ip(host) and not _HOST.match(host):
+        raise _no_host(host)
+    return host
+
+
+def _no_host(text: str) -> BadAddress:
+    return BadAddress(f"“{text[:60]}” is not a host name.", "Type a name or an IP address, such as 192.168.4.1.")
+
+
+def _master(host: str, sentence: str) -> BadAddress:
+    better = f"ws://{_bracketed(host)}:{DEFAULT_PORT}"
+    return BadAddress(sentence, f"Most likely {better}.", code="ros_master", suggestion=better)
+
+
+def _wrong_scheme(scheme: str, rest: str) -> BadAddress:
+    try:
+        parts = _url_parts(f"ws://{rest}")
+        host, port = _host_of(parts.hostname or ""), _port(parts)
+    except BadAddress:
         host, port = "", None
     if port == MASTER_PORT and host:
-        return BadAddress(
-            "This is a ROS master address; catgraph speaks to rosbridge.",
-            f"Most likely ws://{host}:{DEFAULT_PORT}.",
-            code="ros_master",
-            suggestion=f"ws://{host}:{DEFAULT_PORT}",
-        )
-    better = f"{'wss' if scheme == 'https' else 'ws'}://{host or 'host'}:{port or DEFAULT_PORT}"
+        return _master(host, "This is a ROS master address; catgraph speaks to rosbridge.")
+    better = f"{'wss' if scheme == 'https' else 'ws'}://{_bracketed(host or 'host')}:{port or DEFAULT_PORT}"
     return BadAddress(
-        f"{scheme}:// is for web pages; a rosbridge is reached with ws://.",
+        f"{scheme}:// is for web pages; a rosbridge is reached with ws://."
+        if scheme != "rosrpc"
+        else "rosrpc:// is how ROS nodes call each other; a rosbridge is reached with ws://.",
         f"Most likely {better}.",
         code="scheme",
         suggestion=better if host else None,
@@ -125,26 +167,42 @@ def _wrong_scheme(typed: str, scheme: str) -> BadAddress:
 
 
 def refuse_forbidden(ip: str) -> None:
-    """Raises BadAddress for an IP address that is never dialled: link-local, metadata services, multicast,
-    unspecified."""
-    address = ipaddress.ip_address(ip.split("%")[0])
-    mapped = getattr(address, "ipv4_mapped", None)
-    if mapped is not None:
-        address = mapped
-    if address.is_link_local or address in _METADATA or address.is_multicast or address.is_unspecified:
-        raise BadAddress(f"{ip} is never dialled.", "Use the car's address on its own network.", code="forbidden")
+    """Raises BadAddress for an IP address that is never dialled: link-local, metadata services, multicast, broadcast,
+    unspecified; and for an IPv6 address that a router or the system turns into one of these."""
+    address = ipaddress.ip_address(ip.partition("%")[0])
+    for one in (address, *_within(address)):
+        if (
+            one.is_link_local
+            or one in _METADATA
+            or one.is_multicast
+            or one.is_unspecified
+            or one == _EVERYONE
+            or (one.version == 4 and one in _THIS_NETWORK)
+        ):
+            raise BadAddress(f"{ip} is never dialled.", "Use the car's address on its own network.", code="forbidden")
+
+
+def _within(address: _IpAddress) -> list[ipaddress.IPv4Address]:
+    """The IPv4 addresses that an IPv6 address carries."""
+    if not isinstance(address, ipaddress.IPv6Address) or address.is_loopback:
+        return []
+    found = [address.ipv4_mapped, address.sixtofour]
+    if address in _COMPATIBLE or any(address in network for network in _NAT64):
+        found.append(ipaddress.IPv4Address(int(address) & 0xFFFFFFFF))
+    return [one for one in found if one is not None]
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
 
 
 def _is_ip(host: str) -> bool:
     try:
-        ipaddress.ip_address(host.split("%")[0])
+        ipaddress.ip_address(host)
     except ValueError:
         return False
     return True
 
 
 def _is_bare_ipv6(text: str) -> bool:
-    try:
-        return ipaddress.ip_address(text).version == 6
-    except ValueError:
-        return False
+    return _is_ip(text) and ":" in text

@@ -3,8 +3,8 @@ chain."""
 
 from __future__ import annotations
 
-import asyncio
 import errno
+import re
 import socket
 import ssl
 from dataclasses import dataclass
@@ -34,6 +34,13 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
     host, port = address.host, address.port
     if isinstance(error, BadAddress):
         return of_bad_address(error)
+    if isinstance(error, socket.gaierror) and error.errno == socket.EAI_AGAIN:
+        return Problem(
+            code="no_lookup",
+            title=f"The name {host} cannot be looked up.",
+            hint="No name server answers here: use the car's IP address, or join its network.",
+            mark="no name server",
+        )
     if isinstance(error, socket.gaierror):
         return Problem(
             code="no_such_host",
@@ -41,12 +48,12 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
             hint="Check the spelling, or use the car's IP address. Is this server on the car's network?",
             mark="no such host",
         )
-    if isinstance(error, ssl.SSLError):
+    if isinstance(error, ssl.SSLCertVerificationError):
         return Problem(
-            code="tls",
-            title=f"{host} does not speak TLS that this server trusts.",
-            hint=f"Try ws://{address.shown} instead of wss://, or install the bridge's certificate here.",
-            mark="no TLS",
+            code="tls_untrusted",
+            title=f"The certificate of {host} is not trusted here.",
+            hint=f"{_sentence(error.verify_message)} Install the bridge's certificate here, or try ws://{address.shown}.",
+            mark="not trusted",
         )
     if isinstance(error, ConnectionRefusedError):
         return Problem(
@@ -55,12 +62,26 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
             hint="Start rosbridge on the car, or check the port.",
             mark="refused",
         )
-    if isinstance(error, (TimeoutError, asyncio.TimeoutError)):
+    if isinstance(error, ssl.SSLError) or (address.secure and isinstance(error, ConnectionError)):
+        return Problem(
+            code="tls",
+            title=f"{address.shown} does not speak TLS.",
+            hint=f"Try ws://{address.shown} instead of wss://.",
+            mark="no TLS",
+        )
+    if isinstance(error, TimeoutError):
         return Problem(
             code="timeout",
             title=f"{host} does not answer.",
             hint="Is the car switched on, and this server on its network?",
             mark="no answer",
+        )
+    if isinstance(error, OSError) and error.errno in (errno.EACCES, errno.EPERM):
+        return Problem(
+            code="forbidden_here",
+            title=f"This server is not allowed to dial {address.shown}.",
+            hint="A firewall on this machine forbids it.",
+            mark="forbidden",
         )
     if isinstance(error, OSError) and error.errno in (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.EHOSTDOWN):
         return Problem(
@@ -72,7 +93,7 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
     return Problem(
         code="failed",
         title=f"{address.shown} cannot be reached.",
-        hint=f"The system says: {str(error)[:120] or type(error).__name__}.",
+        hint=f"The system says: {_sentence(str(error)[:120] or type(error).__name__)}",
         mark="failed",
     )
 
@@ -87,7 +108,37 @@ def not_rosbridge(address: Address, what: str) -> Problem:
     )
 
 
+def of_handshake(address: Address, reason: str, answer: bytes) -> Problem:
+    """The problem of something that took the connection and is no WebSocket: why its handshake failed, and how its
+    answer began."""
+    if answer.startswith(b"\x15\x03") or (not address.secure and b"HTTPS" in answer):  # a TLS alert; nginx in words
+        return Problem(
+            code="wants_tls",
+            title=f"{address.shown} wants a secure connection.",
+            hint=f"Try wss://{address.shown}.",
+            mark="wants TLS",
+        )
+    status = re.search(r"upgrade failed \[(\d+)\]", reason)
+    if status is not None and status[1] in ("401", "403", "407"):
+        return not_rosbridge(address, f"It asks for a login (HTTP {status[1]}).")
+    if status is not None and status[1] == "503":
+        return Problem(
+            code="busy",
+            title=f"{address.shown} takes no more connections.",
+            hint="Too many look at this car, or its bridge is still starting. It is tried again by itself.",
+            mark="busy",
+        )
+    if status is not None:
+        return not_rosbridge(address, f"It answers as a web server does (HTTP {status[1]}).")
+    if answer:
+        return not_rosbridge(address, "It answers, but not as a WebSocket does.")
+    if "timeout" in reason:
+        return not_rosbridge(address, "It accepts the connection and then says nothing.")
+    return not_rosbridge(address, "It closes the connection at once; a secure one wants wss://.")
+
+
 def closed_by_bridge(address: Address, why: str) -> Problem:
+    """`why`: what the bridge gave as its reason, or what it did wrong; empty where it just went."""
     detail = f" ({why[:100]})" if why else ""
     return Problem(
         code="closed",
@@ -104,6 +155,10 @@ def bridge_silent(address: Address) -> Problem:
         hint=f"Nothing comes from {address.shown}: the car is out of radio range, switched off, or rosbridge hangs.",
         mark="silent",
     )
+
+
+def _sentence(text: str) -> str:
+    return text.strip().rstrip(".") + "."
 
 
 CAR_SILENT = Problem(
