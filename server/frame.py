@@ -18,7 +18,8 @@ from server.problems import Problem
 from server.reception import Reception, Tally
 from server.topics import Source
 
-CAR_SILENT_S = 1.4  # said before 2 s are over; the slowest of the fast signals comes ten times a second
+CAR_SILENT_S = 1.4  # said before 2 s are over
+OVERDUE_PERIODS = 3
 NO_MESSAGE_S = 5.0
 ROS_GONE_S = 2.5  # one unanswered question may be lost; three are a sign
 
@@ -129,11 +130,14 @@ def _behind_the_bridge(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Pr
         if facts.now_s - opened_s < NO_MESSAGE_S:
             return None, None, None
         return "bridge-car", problems.NOTHING_KNOWN if facts.offers_nothing else problems.NO_MESSAGE, None
-    if facts.now_s - max(last_s, facts.since_s) < CAR_SILENT_S or any(
-        r.is_fresh(facts.now_s) for r in snapshot.readings.values()
-    ):
+    if facts.now_s - max(last_s, facts.since_s) < max(CAR_SILENT_S, OVERDUE_PERIODS * _shortest_period_s(snapshot)):
         return None, None, None
     return "bridge-car", problems.ROS_GONE if ros_is_gone else problems.CAR_SILENT, last_s
+
+
+def _shortest_period_s(snapshot: Snapshot) -> float:
+    """Of the signals heard; 0 where none has a known period. A car whose fastest signal comes each second gets 3 s."""
+    return min((r.period_s for r in snapshot.readings.values() if r.period_s and r.count), default=0.0)
 
 
 def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
