@@ -68,6 +68,7 @@ class Client:
             "fragment": self._fragment,
         }
         connection.on_ready = self._outbox.flush
+        connection.on_lost = self._outbox.close  # also ends our waiting for a client that does not read
         self._outbox.on_replies_gone = self._may_listen.set
 
     async def run(self) -> None:
@@ -143,8 +144,8 @@ class Client:
         elif id not in subscription.wishes and len(subscription.wishes) >= MOST_WISHES:
             raise Refused(f"a client may subscribe {MOST_WISHES} times to one topic")
         subscription.wishes[id] = wish
-        subscription.settle()
         topic = self._bridge.graph.find_or_make(spelling, wish.type)
+        subscription.settle(topic.type)
         if subscription not in topic.subscribers:
             topic.subscribers[subscription] = self
             if topic.latched is not None:
@@ -165,7 +166,8 @@ class Client:
         else:
             subscription.wishes.pop(id, None)
         if subscription.wishes:
-            subscription.settle()
+            topic = self._bridge.graph.find(spelling)
+            subscription.settle(topic.type if topic else None)
         else:
             self._end(spelling)
         self.say("info", f"unsubscribed from {spelling[:100]}", id)
@@ -260,10 +262,10 @@ class Client:
 
     def type_became(self, topic: Topic, subscription: Subscription) -> None:
         """The topic exists now: those who asked for another type get an error and no data."""
-        others = [(id, wish.type) for id, wish in subscription.wishes.items() if wish.type not in (None, topic.type)]
-        subscription.is_muted = len(others) == len(subscription.wishes)
-        for id, type in others:
-            self.say("error", f"subscribe: {topic.name} has the type {topic.type}, not {type}", id)
+        subscription.settle(topic.type)
+        for id, wish in subscription.wishes.items():
+            if wish.type not in (None, topic.type):
+                self.say("error", f"subscribe: {topic.name} has the type {topic.type}, not {wish.type}", id)
 
     def _end(self, spelling: str) -> None:
         subscription = self._subscriptions.pop(spelling)
@@ -274,7 +276,7 @@ class Client:
             self._bridge.graph.tidy(topic)
 
     def _leave(self) -> None:
-        self._connection.on_ready = None
+        self._connection.on_ready = self._connection.on_lost = None
         for task in self._calls:
             task.cancel()
         self._outbox.close()

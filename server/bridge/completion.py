@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import math
 from typing import Any, cast
 
 import numpy as np
@@ -143,7 +144,9 @@ class _Completion:
 
 def stamp(at_s: float, version: RosVersion) -> Json:
     """A time as messages carry it: secs/nsecs in ROS 1, sec/nanosec in ROS 2."""
-    seconds, rest = divmod(round(at_s * 1e9), 1_000_000_000)
+    whole = math.floor(at_s)
+    carry, rest = divmod(round((at_s - whole) * 1e9), 1_000_000_000)  # at_s * 1e9 would not be exact
+    seconds = whole + carry
     return {"secs": seconds, "nsecs": rest} if version == 1 else {"sec": seconds, "nanosec": rest}
 
 

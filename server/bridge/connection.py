@@ -27,7 +27,9 @@ class Connection(ServerConnection):
         self._listener = listener
         self._frozen = False
         self._unread = bytearray()
+        self._deadline: asyncio.TimerHandle | None = None  # of the handshake
         self.on_ready: Callable[[], None] | None = None
+        self.on_lost: Callable[[], None] | None = None
 
     @property
     def is_ready(self) -> bool:
@@ -70,11 +72,15 @@ class Connection(ServerConnection):
             return
         if self._listener.is_frozen:
             self.freeze()
-        self.loop.call_later(HANDSHAKE_S, self._end_handshake)
+        self._deadline = self.loop.call_later(HANDSHAKE_S, self._end_handshake)
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._listener.forget(self)
+        if self._deadline is not None:
+            self._deadline.cancel()
         super().connection_lost(exc)
+        if self.on_lost is not None:
+            self.on_lost()
 
     def data_received(self, data: bytes) -> None:
         if self._frozen:  # websockets may have resumed reading by itself
@@ -97,7 +103,7 @@ class Connection(ServerConnection):
         if self.protocol.state is not State.CONNECTING:
             return
         if self._frozen:
-            self.loop.call_later(HANDSHAKE_S, self._end_handshake)
+            self._deadline = self.loop.call_later(HANDSHAKE_S, self._end_handshake)
         else:
             self.transport.abort()
 

@@ -52,11 +52,14 @@ class Outbox:
         self._backlog: set[Lane] = set()  # lanes with frames in them
         self._backlog_bytes = 0
         self._replies: deque[bytes] = deque()
+        self._is_closed = False
         self.reply_bytes = 0
         self.on_replies_gone: Callable[[], None] | None = None
 
     def send(self, lane: Lane, frame: bytes) -> None:
         """Sends a message at once where it can, else queues it and drops the oldest that has no room."""
+        if self._is_closed:
+            return
         if not self._backlog and not self._replies and self._wire.is_ready:
             self._write_message(frame)
             return
@@ -71,6 +74,8 @@ class Outbox:
 
     def reply(self, frame: bytes) -> None:
         """Sends an answer ahead of waiting messages. Answers are never dropped: see `reply_bytes`."""
+        if self._is_closed:
+            return
         if not self._replies and self._wire.is_ready:
             self._write(frame)
             return
@@ -112,7 +117,8 @@ class Outbox:
             self._write_message(frame)
 
     def close(self) -> None:
-        """The client is gone: what still waited is lost, and counted."""
+        """The client is gone: messages that still waited are lost, and counted; nothing more is taken."""
+        self._is_closed = True
         self._counters.dropped += sum(len(lane.frames) for lane in self._backlog)
         for lane in list(self._backlog):
             self.forget(lane)

@@ -27,7 +27,7 @@ class Subscription:
     def __init__(self, spelling: str, outbox: Outbox, counters: Counters, loop: asyncio.AbstractEventLoop) -> None:
         self.spelling = spelling  # the topic's name as this client writes it
         self.wishes: dict[object, Wish] = {}
-        self.is_muted = False  # the topic turned out to have another type than the one asked for
+        self._is_muted = False  # the topic turned out to have another type than the one asked for
         self._outbox = outbox
         self._counters = counters
         self._loop = loop
@@ -38,9 +38,10 @@ class Subscription:
         self._held: deque[bytes] = deque()  # waiting for the throttle, not for the socket
         self._timer: asyncio.TimerHandle | None = None
 
-    def settle(self) -> None:
-        """Takes the wishes into account after they changed."""
+    def settle(self, type: str | None) -> None:
+        """Takes the wishes into account after they, or the topic's type, changed."""
         wishes = self.wishes.values()
+        self._is_muted = type is not None and all(wish.type not in (None, type) for wish in wishes)
         self._throttle_s = min((wish.throttle_s for wish in wishes), default=0.0)
         self._lane.limit = min((wish.queue_length for wish in wishes), default=0)
         self._encoding = "cbor" if any(wish.encoding == "cbor" for wish in wishes) else "json"
@@ -49,7 +50,7 @@ class Subscription:
 
     def offer(self, message: Outgoing) -> None:
         """Sends, holds or leaves out one message."""
-        if self.is_muted:
+        if self._is_muted:
             return
         if not self._throttle_s:
             self._outbox.send(self._lane, message.frame(self.spelling, self._encoding))
