@@ -27,6 +27,9 @@ import { mount as mountStrip } from './strip.js';
 import { mount as mountTopbar } from './topbar.js';
 import { mount as mountVeil } from './veil.js';
 
+/** The limits shown until Settings is built: name in the frame, label, unit. */
+const LIMITS = /** @type {const} */ ([['speed_limit.max_mps', 'Speed', 'm/s'], ['obstacle.standoff_m', 'Nearest object', 'm']]);
+
 const vehicle = document.documentElement.dataset['vehicle'];
 const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
 
@@ -83,16 +86,18 @@ store.on('move', () => page.draw());
 store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
 // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
 for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
+listen(document, 'keydown', () => { document.documentElement.dataset['keys'] = ''; }, { capture: true });
+listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
 listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
 
 /** The limits in force, until they can be set here. */
 function drawLimits() {
   const list = field(monitor, 'limits');
-  const limits = Object.entries(store.frame?.limits ?? {});
+  const limits = LIMITS.flatMap(([name, label, unit]) => (store.limit(name) === null ? [] : [[label, `${fixed(store.limit(name))} ${unit}`]]));
   const key = JSON.stringify(limits);
   if (list.dataset['key'] === key) return;
   list.dataset['key'] = key;
-  list.replaceChildren(...limits.flatMap(([name, value]) => [html('dt', {}, name), html('dd', {}, ...words(typeof value === 'number' ? fixed(value, 2) : String(value)))]));
+  list.replaceChildren(...limits.flatMap(([label = '', value = '']) => [html('dt', {}, label), html('dd', {}, ...words(value))]));
 }
 
 store.start();

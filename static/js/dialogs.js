@@ -4,7 +4,7 @@ import { isAboutLink, layOut } from './alarm-layout.js';
 import { drawBigChain } from './chain.js';
 import { field, html, listen, need, setIcon, setText, setWords, show, words } from './dom.js';
 import { isAsked } from './sheet.js';
-import { age, fixed, timeOfDay } from './words.js';
+import { age, counted, fixed, timeOfDay } from './words.js';
 
 /** A silent server is covered by the veil at once; the dialog waits for what a change of radio cell takes [s]. */
 const LOST_AFTER_S = 4;
@@ -153,8 +153,8 @@ function fillAlarm(sheet, alarm) {
   const lasting = alarm.active
     ? `Stands for ${age(alarm.for_s)} s, since ${timeOfDay(alarm.raised_ms)}.`
     : `It is over; it began at ${timeOfDay(alarm.raised_ms)}.`;
-  setWords(field(sheet, 'text'), measured && limit ? lasting : `${alarm.text}. ${lasting}`);
-  setWords(field(sheet, 'advice'), alarm.advice ?? '');
+  const cause = measured && limit ? '' : `${alarm.text.replace(/[.!?]$/, '')}.`;
+  setWords(field(sheet, 'text'), [cause, lasting, alarm.advice].filter(Boolean).join(' '));
 }
 
 /**
@@ -191,8 +191,8 @@ export function linkWords(kind, view, frame) {
     return [view.sentence, heard, view.detail];
   }
   const isServer = view.cut === 0;
-  const again = isServer ? view.detail : `The server is there and dials again by itself. ${tried}`.trim();
-  const until = frame && frame.recording.state !== 'off' && view.since_ms !== null ? ` Recording saved up to ${timeOfDay(view.since_ms)}.` : '';
+  const again = isServer ? view.detail : `The server is there and dials again${link?.attempts ? `; ${counted(link.attempts, 'try', 'tries')} so far` : ''}.`;
+  const until = !isServer && frame && frame.recording.state !== 'off' && view.since_ms !== null ? ` Recording saved up to ${timeOfDay(view.since_ms)}.` : '';
   return [view.sentence, again, `The car may still be moving: watch the car.${until}`];
 }
 

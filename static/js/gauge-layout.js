@@ -107,7 +107,7 @@ export function band(inner, outer, from, to) {
 function limitMark(degrees, limit_mps) {
   const [x, y] = polar(226, degrees);
   const isLeft = degrees < 90;
-  const isTop = Math.abs(degrees - 90) < 30; // above the band there is no room: the words stand beside the wedge
+  const isTop = Math.abs(degrees - 90) < 26; // above the band there is no room: the words stand beside the wedge
   return {
     line: ray(degrees, 170, 191),
     wedge: `M${at(191, degrees)}L${at(205, degrees - 4)}L${at(205, degrees + 4)}Z`,
@@ -137,9 +137,9 @@ function numberAt(degrees, value) {
   return { degrees, text, x, y: y + 6 };
 }
 
-/** Ticks each 1 m/s up to 20; above, so that there are at most 20. @param {number} max */
+/** Ticks each 1 m/s about 15; elsewhere so that there are at most 20. @param {number} max */
 function tickStep(max) {
-  return [0.2, 0.5, 1, 2, 5, 10, 20].find((step) => max / step <= 20 && (step >= 1 || max / step > 10)) ?? max / 10;
+  return [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20].find((step) => max / step <= 20) ?? max / 10;
 }
 
 /** @param {number} value */

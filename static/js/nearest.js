@@ -57,7 +57,7 @@ export function mount(root, store) {
     const near = store.frame?.nearest;
     const gap_s = isLive && distance_m !== null ? (near?.time_gap_s ?? null) : null;
     show(parts.gap, gap_s !== null);
-    if (gap_s !== null) write(gap, state.ink, fixed(gap_s));
+    if (gap_s !== null) write(gap, state.ink, fixed(gap_s, gap_s < 100 ? 1 : 0));
     const speedState = store.ink('speed');
     const isSpeedLive = speedState.ink === 'fresh' || speedState.ink === 'ageing';
     const stopping_m = isSpeedLive ? (near?.stopping_m ?? null) : null;

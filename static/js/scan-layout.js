@@ -108,11 +108,11 @@ export function beamWords(scan) {
     counts.set(kind, (counts.get(kind) ?? 0) + 1);
   }
   const usable = counts.get(-1) ?? 0;
-  const parts = [`${usable} of ${scan.codes.length} beams usable`];
+  const beyond = counts.get(NOTHING_IN_RANGE);
+  const parts = beyond ? [`${usable} of ${scan.codes.length} usable`, `${beyond} beyond range`] : [`${usable} of ${scan.codes.length} beams usable`];
   const blind = [NO_RETURN, TOO_CLOSE, INVALID].filter((code) => counts.get(code));
   if (blind.length === 1) parts.push(`${counts.get(blind[0])} hatched: ${codeWords(blind[0] ?? 0)}`);
   else if (blind.length > 1) parts.push(`hatched: ${blind.map((code) => `${counts.get(code)} ${codeWords(code)}`).join(', ')}`);
-  if (counts.get(NOTHING_IN_RANGE)) parts.push(`${counts.get(NOTHING_IN_RANGE)} nothing in range`);
   return parts.join(' · ');
 }
 

@@ -19,7 +19,7 @@ const HEADLINES = /** @type {Record<string, (value: any) => [string, string]>} *
   bearing: (value) => [fixed(value.bearing_rad, 3), ''],
   position: (value) => (value.status < 0 ? ['no', 'fix'] : [value.alt_m === null ? '2D' : '3D', 'fix']),
   odometry: (value) => [fixed(value.speed_mps, 2), 'm/s'],
-  heading: (value) => [fixed(value.heading_deg, 0), '°'],
+  heading: (value) => [value.heading_deg === null ? NOTHING : `${fixed(value.heading_deg, 0)}°`, ''],
   scan: (value) => [fixed(value.beams, 0), ''],
   diagnostics: (value) => [LEVELS[value.worst] ?? NOTHING, ''],
   command: (value) => [fixed(value.speed_mps), 'm/s'],
@@ -45,7 +45,7 @@ export function headline(name, value) {
  */
 export function details(signal, name) {
   const rows = /** @type {[string, string | null | undefined][]} */ ([
-    ['Topic', signal.topic ?? 'none that catgraph knows'],
+    ['Topic', signal.topic ?? (signal.value ? 'none of its own' : 'none that catgraph knows')],
     ['Type', signal.type],
     ['Note', signal.note],
     ['Messages', signal.topic ? `${signal.count}${signal.dropped ? `, ${signal.dropped} dropped` : ''}` : null],
@@ -60,6 +60,13 @@ export function details(signal, name) {
     ['Components', name === 'diagnostics' ? componentWords(signal.value?.['components']) : null],
   ]);
   return rows.flatMap(([key, text]) => (text === null || text === undefined || text === '' ? [] : [[key, text]]));
+}
+
+/** Where a signal comes from, in a word. @param {Signal} signal */
+export function kindWords({ type, topic, value }) {
+  if (type) return type.split('/').at(-1) ?? type;
+  if (topic) return 'type unknown';
+  return typeof value?.['source'] === 'string' ? `from ${value['source']}` : 'no such topic';
 }
 
 /** @param {any} components */
@@ -137,7 +144,7 @@ function fill(at, name, signal, { ink, age_s }) {
   const isAbsent = ink === 'never' || ink === 'not_published';
   const [text, unit] = headline(name, signal.value);
   setText(at.name, signal.label);
-  setText(at.kind, signal.type ? (signal.type.split('/').at(-1) ?? '') : signal.topic ? 'type unknown' : 'no such topic');
+  setText(at.kind, kindWords(signal));
   setAttribute(at.element, 'data-faulty', signal.rejected > 0);
   write(at.value, ink, isAbsent ? ABSENT[ink] : text, at.unit, unit);
   setText(at.rate, isAbsent ? NOTHING : fixed(signal.rate_hz));

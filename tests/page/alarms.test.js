@@ -1,0 +1,119 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { layOut, soundOf, stripOf, tilesOf } from '../../static/js/alarm-layout.js';
+import { showTiles } from '../../static/js/checks.js';
+import { dialogOf, linkWords, lossKey } from '../../static/js/dialogs.js';
+import { chainOf } from '../../static/js/link.js';
+import { eventWords } from '../../static/js/log.js';
+import { alarm, state } from './frames.js';
+
+const link = (more = {}) => alarm({ id: 'link_lost', title: 'Connection lost', actions: ['reconnect', 'change_address', 'exit'], ...more });
+const warning = (more = {}) => alarm({ id: 'gps', title: 'GPS drift', priority: 'warning', place: 'snackbar', sound: 'medium', ...more });
+
+test('one dialog: the most severe, then the newest', () => {
+  const all = [alarm({ id: 'a', raised_ms: 1 }), alarm({ id: 'b', raised_ms: 2 }), alarm({ id: 'c', priority: 'warning', raised_ms: 9 }), warning()];
+  assert.equal(layOut(all).dialog?.id, 'b');
+  assert.deepEqual(layOut(all).snackbars.map(({ id }) => id), ['gps']);
+  assert.equal(layOut([alarm({ state: 'ACKED' })]).dialog, null);
+  assert.equal(layOut([alarm({ state: 'RTN_UNACKED', active: false })]).dialog?.id, 'speed_limit');
+  assert.equal(layOut([warning({ state: 'SHELVED' })]).shelved, 1);
+});
+
+test('the loudest unacknowledged alarm is heard', () => {
+  const page = { isServerLost: false, isLossAcknowledged: false };
+  assert.equal(soundOf(state({ alarms: [warning(), alarm()] }), page), 'high');
+  assert.equal(soundOf(state({ alarms: [warning(), alarm({ state: 'ACKED' })] }), page), 'medium');
+  assert.equal(soundOf(state({ alarms: [alarm({ state: 'RTN_UNACKED' })] }), page), null);
+  assert.equal(soundOf(state({ alarms: [alarm()], session: { paused: true } }), page), null);
+  assert.equal(soundOf(state({ alarms: [alarm({ sound: 'none' })] }), page), null);
+});
+
+test('a server that fell silent is the loudest of all, until it is acknowledged', () => {
+  assert.equal(soundOf(state(), { isServerLost: true, isLossAcknowledged: false }), 'high');
+  assert.equal(soundOf(state(), { isServerLost: true, isLossAcknowledged: true }), null);
+});
+
+const seen = { isSilent: false, silence_s: 0.1, isChoosing: false, isAnswered: false };
+
+test('which dialog stands', () => {
+  const kind = (/** @type {any} */ frame, more = {}) => dialogOf({ frame, ...seen, ...more })?.kind ?? null;
+  assert.equal(kind(state({ alarms: [alarm()] })), 'alarm');
+  assert.equal(kind(state({ alarms: [alarm()], session: { paused: true } })), null);
+  assert.equal(kind(state({ session: { phase: 'lost' }, alarms: [link()] })), 'lost');
+  assert.equal(kind(state({ session: { phase: 'lost' } })), 'lost');
+  assert.equal(kind(state({ session: { phase: 'lost' } }), { isAnswered: true }), null);
+  assert.equal(kind(state({ session: { phase: 'lost' } }), { isChoosing: true }), null);
+  assert.equal(kind(state({ link: { cut: 'bridge-car', topics_heard: 0, car_age_s: null } })), 'mute');
+  assert.equal(kind(state({ link: { cut: 'bridge-car', topics_heard: 4 } })), null); // the veil says it
+  assert.equal(kind(state({ session: { phase: 'failed' } })), 'failed');
+  assert.equal(kind(state({ session: { phase: 'failed' } }), { isChoosing: true }), null);
+  assert.equal(kind(state({ session: { phase: 'idle' } })), null);
+  assert.equal(kind(null), null);
+});
+
+test('an alarm of the car stands above one of the link, and reaches an operator who is choosing', () => {
+  const both = state({ alarms: [alarm({ raised_ms: 1 }), link({ priority: 'warning' })] });
+  assert.equal(dialogOf({ frame: both, ...seen })?.alarm?.id, 'speed_limit');
+  assert.equal(dialogOf({ frame: both, ...seen, isChoosing: true })?.alarm?.id, 'speed_limit');
+});
+
+test('a silent server shows no old alarm as live; its own dialog comes after the veil', () => {
+  const frame = state({ alarms: [alarm()] });
+  assert.equal(dialogOf({ frame, ...seen, isSilent: true, silence_s: 3 }), null);
+  assert.deepEqual(dialogOf({ frame, ...seen, isSilent: true, silence_s: 4.1 }), { kind: 'lost', alarm: null });
+  assert.equal(dialogOf({ frame: state({ session: { phase: 'idle' } }), ...seen, isSilent: true, silence_s: 9 }), null);
+});
+
+test('a dialog that was answered stays closed until something else is lost', () => {
+  const lost = state({ session: { phase: 'lost' }, link: { since_ms: 20_000 } });
+  assert.equal(lossKey(lost, false), lossKey(lost, false));
+  assert.notEqual(lossKey(lost, false), lossKey(lost, true));
+  assert.notEqual(lossKey(lost, false), lossKey(state({ session: { phase: 'lost' }, link: { since_ms: 90_000 } }), false));
+  assert.equal(lossKey(state(), false), 'none');
+});
+
+test('the words of a lost link warn of a moving car', () => {
+  const frame = state({ session: { phase: 'lost' }, link: { cut: 'server-bridge', attempts: 3, trying_for_s: 6 } });
+  const [bold, plain, more] = linkWords('lost', chainOf({ frame, isSilent: false, silence_s: 0, lag_s: 0, heard_ms: 0 }), frame);
+  assert.equal(bold, 'The bridge stopped answering.');
+  assert.match(plain, /dials again; 3 tries so far\.$/);
+  assert.match(more, /may still be moving/);
+});
+
+/** @param {any} frame */
+const strip = (frame, more = {}) => stripOf(frame, { isSilent: false, paused_s: 42.7, chain: chainOf({ frame, isSilent: false, silence_s: 0, lag_s: 0, heard_ms: 0 }), ...more });
+
+test('the strip says the worst that stands', () => {
+  const checks = /** @type {any} */ ([{ id: 'a', label: 'A', verdict: 'ok' }, { id: 'b', label: 'B', verdict: 'unknown' }]);
+  assert.deepEqual([strip(state({ checks })).text, strip(state({ checks })).end], ['No alarms', '1 OK · 1 not checked']);
+  assert.deepEqual(strip(state({ alarms: [alarm()] })), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: '2.3 s', opens: 'log' });
+  assert.deepEqual([strip(state({ alarms: [warning(), warning({ id: 'b' })] })).kind, strip(state({ alarms: [warning(), warning({ id: 'b' })] })).end], ['warn', '1 of 2']);
+  assert.equal(strip(state({ session: { paused: true } })).text, 'Paused 0:42: no alarm will come');
+  assert.equal(strip(state({ session: { phase: 'lost' } })).kind, 'crit');
+  assert.equal(strip(state({ link: { cut: 'bridge-car' } })).text, 'Values are not live');
+  assert.equal(strip(null).text, 'Nothing received yet');
+  assert.equal(strip(state({ alarms: [alarm({ state: 'SHELVED', priority: 'warning' })] })).text, 'No alarms');
+});
+
+test('one tile for the checks that share it; the worst speaks', () => {
+  const check = (/** @type {string} */ id, /** @type {string} */ verdict, tile = 'Signals') => /** @type {any} */ ({ id, label: id, tile, verdict, brief: id, text: '' });
+  assert.deepEqual(tilesOf([check('a', 'ok'), check('b', 'fault'), check('c', 'unknown'), check('d', 'ok', 'Speed')]).map(({ label, verdict, brief }) => [label, verdict, brief]),
+    [['Signals', 'fault', 'b'], ['Speed', 'ok', 'd']]);
+});
+
+test('tiles: paused means not checked, whatever the frame says; fuel is never 0', () => {
+  const checks = /** @type {any} */ ([{ id: 'speed_limit', label: 'Speed', verdict: 'ok', brief: 'OK' }]);
+  const rows = (/** @type {string | null} */ why, frame = state({ checks })) => showTiles(frame, why, false).map(({ label, kind, lines }) => [label, kind, ...lines]);
+  assert.deepEqual(rows(null), [['Speed', 'ok', 'OK'], ['Fuel', 'unk', 'not published']]);
+  assert.deepEqual(rows('paused')[0], ['Speed', 'unk', 'not checked', 'paused']);
+  const fault = state({ checks: [{ ...checks[0], verdict: 'fault', brief: 'FAULT 12.6 m/s' }], alarms: [alarm()] });
+  assert.deepEqual(rows(null, fault)[0], ['Speed', 'crit', 'FAULT 12.6 m/s']);
+});
+
+test('the log tells what happened', () => {
+  const event = /** @type {any} */ ({ n: 1, at_ms: 0, alarm: 'speed_limit', change: 'cleared', title: 'Speed above limit', priority: 'critical', text: 'back under', by: null });
+  assert.deepEqual(eventWords(event), { icon: 'ok', kind: '', title: 'Speed above limit cleared', text: 'back under' });
+  assert.equal(eventWords({ ...event, change: 'raised' }).icon, 'crit');
+  assert.equal(eventWords({ ...event, alarm: null, change: 'lost', text: 'The bridge closed the connection.' }).title, 'The bridge closed the connection.');
+  assert.equal(eventWords({ ...event, change: 'something_new' }).title, 'Speed above limit something_new');
+});

@@ -1,0 +1,231 @@
+"""A server of pictures: serves the real page and speaks docs/protocol.md with frames that are set by hand.
+
+For screenshots only, so that every state of the page can be looked at; the tests drive the real server.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import copy
+import math
+import struct
+import time
+from typing import Any
+
+import uvicorn
+from fastapi import FastAPI, Request, WebSocket, WebSocketDisconnect
+from fastapi.responses import HTMLResponse
+from fastapi.staticfiles import StaticFiles
+from fastapi.templating import Jinja2Templates
+
+from server.web.assets import static_dir, templates_dir
+
+Json = dict[str, Any]
+TILES = (
+    "Speed", "Obstacle", "Pedals", "GPS fix", "GPS drift", "Phone–car", "Tracks", "Laser", "Scan shape", "Signals",
+    "Moving", "Diagnostics", "Command", "Recorder",
+)  # fmt: skip
+UNKNOWN = {"GPS drift": "not checked: moving", "Command": "not checked: not armed"}
+
+
+def signal(label: str, kind: str | None, value: Json | None, **more: Any) -> Json:
+    """One signal of a state, fresh unless told otherwise."""
+    hz = more.pop("hz", 20.0)
+    known = value is not None
+    return {
+        "label": label, "freshness": "fresh" if known else "not_published", "age_s": 0.02 if known else None,
+        "horizon_s": max(1.0, 10 / hz), "period_s": 1 / hz, "expected_hz": hz, "rate_hz": hz,
+        "topic": f"/catvehicle/{label.lower()}" if known else None, "type": kind, "note": None,
+        "count": 1118 if known else 0, "rejected": 0, "rejected_why": None, "dropped": 0, "value": value,
+        "lowest": None, "highest": None, **more,
+    }  # fmt: skip
+
+
+def live() -> Json:
+    """The state the pictures of the design show: driving at 4.2 m/s with an object 12.4 m ahead."""
+    twist, wrench, number = "geometry_msgs/Twist", "geometry_msgs/Wrench", "std_msgs/Float64"
+    return {
+        "kind": "state", "seq": 1, "vehicle": "car",
+        "server": {"boot": "9f00", "version": "0.1.0", "pages": 1, "frames_skipped": 0, "loop_lag_ms": 0.4},
+        "session": {
+            "phase": "monitoring", "address": "ws://192.168.4.1:9090", "name": "192.168.4.1:9090", "ros_version": 1,
+            "connected_for_s": 252.3, "paused": False, "paused_for_s": 0.0, "track_m": 76.1, "received": 14228,
+            "rejected": 0,
+        },
+        "link": {
+            "cut": None, "since_ms": None, "bridge_age_s": 0.05, "car_age_s": 0.05, "problem": None, "attempts": 0,
+            "trying_for_s": 0.0, "topics_subscribed": 14, "topics_heard": 12,
+        },
+        "signals": {
+            "speed": signal("Speed", twist, {"speed_mps": 4.2}, age_s=0.04),
+            "acceleration": signal("Acceleration", twist, {"acceleration_mps2": 0.3, "source": "speed"}),
+            "brake": signal("Brake", wrench, {"percent": 0.0}, age_s=0.04),
+            "accelerator": signal("Accelerator", wrench, {"percent": 14.1}, age_s=0.05),
+            "steering": signal("Steering", wrench, {"percent": -4.0}, age_s=0.04),
+            "distance": signal("Nearest distance", number, {"distance_m": 12.4, "none_in_range": False}, hz=74.8, age_s=0),
+            "bearing": signal("Nearest angle", number, {"bearing_rad": -0.052}, hz=74.8, age_s=0.01),
+            "odometry": signal("Odometry", "nav_msgs/Odometry", {"speed_mps": 4.19}),
+            "position": signal(
+                "Position", "sensor_msgs/NavSatFix",
+                {"lat_deg": 32.231904, "lon_deg": -110.950116, "alt_m": 748.3, "status": 0, "sigma_m": 5.0}, hz=10.0,
+            ),
+            "heading": signal("Heading", "nav_msgs/Odometry", {"heading_deg": 87.0, "source": "odometry"}),
+            "scan": signal(
+                "Laser", "sensor_msgs/LaserScan",
+                {"beams": 181, "usable": 164, "nearest_m": 3.2, "nearest_bearing_rad": 1.5, "frame_id": "laser"},
+                hz=75.0,
+            ),
+            "diagnostics": signal("Diagnostics", "diagnostic_msgs/DiagnosticArray", {"worst": 0, "components": []}, hz=1.0),
+            "command": signal("Command", None, None),
+            "fuel": signal("Fuel", None, None),
+        },
+        "nearest": {"time_gap_s": 3.0, "stopping_m": 7.1},
+        "checks": [
+            {"id": tile, "label": tile, "verdict": "unknown" if tile in UNKNOWN else "ok", "text": "",
+             "brief": UNKNOWN.get(tile, "OK")}
+            for tile in TILES
+        ],
+        "alarms": [],
+        "limits": {
+            "speed_limit.max_mps": 11.0, "gauge.speed_max_mps": 15.0, "gauge.acceleration_max_mps2": 3.0,
+            "obstacle.standoff_m": 5.0,
+        },
+        "recording": {"state": "on", "for_s": 252.0},
+        "decelerate": {"state": "not_available", "why": "not configured"},
+        "control": {"holder": "You"},
+    }  # fmt: skip
+
+
+def idle(phase: str = "idle") -> Json:
+    """Before a car is connected."""
+    state = live()
+    state["session"] |= {"phase": phase, "address": None, "name": None, "connected_for_s": None}
+    state["signals"] = {
+        name: one | {"freshness": "not_published", "value": None, "age_s": None}
+        for name, one in state["signals"].items()
+    }
+    state["checks"] = []
+    return state
+
+
+def alarm(name: str, title: str, **more: Any) -> Json:
+    """A standing alarm."""
+    return {
+        "id": name, "occurrence": 1, "title": title, "priority": "warning", "place": "snackbar", "sound": "medium",
+        "state": "UNACKED", "active": True, "needs_ack": False, "raised_ms": 0, "for_s": 2.3, "text": "",
+        "trip_text": "", "measured": None, "limit": None, "causes": [], "actions": ["shelve", "acknowledge"],
+        "advice": "", "shelved_until_ms": None, **more,
+    }  # fmt: skip
+
+
+def scan(number: int) -> bytes:
+    """A wall on the left, a parked car on the right, a person ahead and one blind sector; 181 beams."""
+    beams = [_cast(math.radians(i - 90), i) for i in range(181)]
+    scale = 81.0 / 65000
+    codes = [0 if r is None else 65534 if r > 79 else round(r / scale) for r in beams]
+    header = struct.pack("<BBHIfffff", 0x53, 1, 181, number, 0.01, -math.pi / 2, math.radians(1), 81.0, scale)
+    return header + struct.pack(f"<{len(codes)}H", *codes)
+
+
+def _cast(angle: float, index: int) -> float | None:
+    if -72 < math.degrees(angle) < -54.5:
+        return None
+    x, y = math.cos(angle), math.sin(angle)
+    best = 81.0
+    for ax, ay, bx, by in _walls():
+        dx, dy = bx - ax, by - ay
+        det = x * dy - y * dx
+        if abs(det) < 1e-9:
+            continue
+        t, u = (ax * dy - ay * dx) / det, (ax * y - ay * x) / det
+        if t > 0 and 0 <= u <= 1:
+            best = min(best, t)
+    noise = math.sin(index * 12.9898) * 43758.5453
+    return best + ((noise - math.floor(noise)) - 0.5) * 0.06 if best <= 79 else best
+
+
+def _walls() -> list[tuple[float, float, float, float]]:
+    def box(x0: float, y0: float, x1: float, y1: float) -> list[tuple[float, float, float, float]]:
+        return [(x0, y0, x1, y0), (x1, y0, x1, y1), (x1, y1, x0, y1), (x0, y1, x0, y0)]
+
+    return [
+        (-2, 5.6, 40, 6.2), *box(6.9, -5.0, 11.3, -3.1), *box(12.38, -0.98, 12.9, -0.42), (19.2, -14, 18.4, -6),
+        (17.4, 6, 17.4, 2.1), (60, 40, 60, -60), (60, -30, -2, -30),
+    ]  # fmt: skip
+
+
+class Canned:
+    """The server: `state` is what every page gets from now on, `silent` makes it hold its tongue."""
+
+    def __init__(self) -> None:
+        self.state = live()
+        self.silent = False
+        self.heard: list[Json] = []
+        self.found: list[Json] = [
+            {"name": "CATVehicle", "address": "ws://192.168.4.1:9090"},
+            {"name": "Simulated car", "address": "ws://127.0.0.1:9091"},
+        ]
+        self.app = FastAPI()
+        self._watching = False
+        templates = Jinja2Templates(directory=templates_dir())
+        templates.env.globals["asset"] = lambda name: f"/static/{name}"
+        self.app.mount("/static", StaticFiles(directory=static_dir()))
+
+        @self.app.get("/", response_class=HTMLResponse)
+        async def page(request: Request) -> HTMLResponse:
+            return templates.TemplateResponse(request, "page.html", {"version": "0.1.0", "vehicle": "car"})
+
+        @self.app.get("/api/vehicles")
+        async def vehicles() -> Json:
+            return {"vehicles": [], "found": self.found}
+
+        @self.app.websocket("/ws")
+        async def socket(socket: WebSocket) -> None:
+            await socket.accept()
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+                await self._serve(socket)
+
+    async def _serve(self, socket: WebSocket) -> None:
+        hello = {"kind": "hello", "version": "0.1.0", "boot": "9f00", "vehicle": "car", "vehicles": ["car"]}
+        await socket.send_json(hello | {"time_ms": _now_ms(), "last_event": 117, "veil_after_s": 2.0})
+        beat = asyncio.create_task(self._beat(socket))
+        try:
+            while True:
+                message = await socket.receive_json()
+                self.heard.append(message)
+                if message.get("kind") == "watch":
+                    self._watching = message["scan"]
+                if "id" in message:
+                    await socket.send_json({"kind": "reply", "id": message["id"], "ok": True})
+        finally:
+            beat.cancel()
+
+    async def _beat(self, socket: WebSocket) -> None:
+        number = 0
+        while True:
+            if not self.silent:
+                number += 1
+                state = copy.deepcopy(self.state)
+                state["server"]["time_ms"] = _now_ms()
+                await socket.send_json(state)
+                if self._watching:
+                    await socket.send_bytes(scan(number))
+            await asyncio.sleep(0.1)
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> Any:
+        """Serves while the block runs; gives the address."""
+        server = uvicorn.Server(uvicorn.Config(self.app, port=0, log_level="warning", ws="websockets-sansio"))
+        task = asyncio.create_task(server.serve())
+        while not server.started:
+            await asyncio.sleep(0.02)
+        try:
+            yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+        finally:
+            server.should_exit = True
+            await task
+
+
+def _now_ms() -> int:
+    return time.time_ns() // 1_000_000

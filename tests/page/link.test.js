@@ -1,0 +1,41 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { chainOf } from '../../static/js/link.js';
+import { state } from './frames.js';
+
+const now = { isSilent: false, silence_s: 0.1, lag_s: 0.1, heard_ms: 0 };
+
+test('live: every node answers, and the age is the car’s at the glass', () => {
+  const chain = chainOf({ ...now, frame: state() });
+  assert.deepEqual([chain.word, chain.cut, chain.age_s?.toFixed(2)], ['Live', null, '0.15']);
+  assert.ok(chain.nodes.every((node) => node.isKnown && !node.isBad));
+});
+
+test('each silence is said of the part that fell silent', () => {
+  const server = chainOf({ ...now, frame: state(), isSilent: true, silence_s: 3.4 });
+  assert.deepEqual([server.word, server.cut, server.sentence, server.nodes[1]?.mark], ['Lost', 0, 'The server fell silent.', 'silent 3.4 s']);
+  assert.deepEqual(server.nodes.map((node) => node.isKnown), [true, false, false, false]);
+
+  const bridge = chainOf({ ...now, frame: state({ session: { phase: 'lost' }, link: { cut: 'server-bridge', bridge_age_s: 6.1 } }) });
+  assert.deepEqual([bridge.word, bridge.cut, bridge.sentence, bridge.nodes[2]?.mark], ['Lost', 1, 'The bridge stopped answering.', 'silent 6.2 s']);
+
+  const car = chainOf({ ...now, frame: state({ link: { cut: 'bridge-car', car_age_s: 3.3, since_ms: 5 } }) });
+  assert.deepEqual([car.word, car.cut, car.sentence, car.nodes[3]?.mark, car.since_ms], ['Silent', 2, 'The car fell silent.', 'silent 3.4 s', 5]);
+});
+
+test('the words of the server’s problem are used where it has any', () => {
+  const problem = { code: 'refused', title: 'Nothing listens.', hint: 'Start it.', mark: 'refused' };
+  const chain = chainOf({ ...now, frame: state({ session: { phase: 'failed' }, link: { cut: 'server-bridge', problem } }) });
+  assert.deepEqual([chain.cut, chain.sentence, chain.detail, chain.nodes[2]?.mark], [1, 'Nothing listens.', 'Start it.', 'refused']);
+});
+
+test('a car that never spoke is awaited for a while, then silent', () => {
+  const fresh = (/** @type {number} */ connected_for_s) => chainOf({ ...now, frame: state({ session: { connected_for_s }, link: { car_age_s: null, topics_heard: 0 } }) });
+  assert.equal(fresh(1).word, 'Waiting');
+  assert.deepEqual([fresh(5).word, fresh(5).cut, fresh(5).nodes[3]?.mark], ['Silent', 2, 'silent 5.1 s']);
+});
+
+test('before the first frame the server does not answer; after a sleep nobody is accused', () => {
+  assert.equal(chainOf({ ...now, frame: null, isSilent: true, heard_ms: null }).sentence, 'The server does not answer.');
+  assert.deepEqual([chainOf({ ...now, frame: state(), isSilent: true, silence_s: 0.3 })].map(({ word, cut }) => [word, cut]), [['Waking', null]]);
+});

@@ -1,0 +1,74 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { armWords, bare, foundIn, remembered } from '../../static/js/connect.js';
+import { screenOf } from '../../static/js/page.js';
+import { slowWords } from '../../static/js/rail.js';
+import { details, headline, kindWords } from '../../static/js/signals.js';
+import { tabByHash, tabByKey } from '../../static/js/tabs.js';
+import { recordingWords } from '../../static/js/topbar.js';
+import { thenWords } from '../../static/js/veil.js';
+import { state } from './frames.js';
+
+test('tabs by key and by link', () => {
+  assert.deepEqual(['ArrowRight', 'ArrowLeft', 'Home', 'End', 'x'].map((key) => tabByKey(key, 0)), [1, 0, 0, 4, null]);
+  assert.equal(tabByKey('ArrowRight', 4), 4);
+  assert.deepEqual(['#map', '#SCAN', '', '#nothing'].map(tabByHash), [1, 2, -1, -1]);
+});
+
+test('which screen is in front', () => {
+  assert.equal(screenOf({ frame: null, isMonitoring: false }, false), 'start');
+  assert.equal(screenOf({ frame: state({ session: { phase: 'idle' } }), isMonitoring: false }, false), 'connect');
+  assert.equal(screenOf({ frame: state(), isMonitoring: true }, false), 'monitor');
+  assert.equal(screenOf({ frame: state(), isMonitoring: true }, true), 'connect');
+});
+
+test('what the phone refused is said, with what it costs', () => {
+  assert.deepEqual(armWords('position', 'refused'), { tag: 'Refused', kind: 'warn', cost: 'Refused: phone–car will not be checked' });
+  assert.equal(armWords('screen', 'missing').cost, 'Needs HTTPS: the phone may go dark and hide alarms');
+  assert.equal(armWords('sound', 'ready').tag, 'Ready');
+  assert.equal(armWords('sound', 'asks').kind, 'unk');
+});
+
+test('addresses: each once, newest first, and not too many', () => {
+  assert.deepEqual(remembered(['a', 'b'], 'b'), ['b', 'a']);
+  assert.equal(remembered(Array.from({ length: 20 }, (_, i) => String(i)), 'x').length, 8);
+  assert.equal(bare('ws://car:9090/'), 'car:9090');
+  assert.equal(bare('wss://car:9090'), 'wss://car:9090');
+});
+
+test('found vehicles are listed once, and an answer of another shape is none', () => {
+  assert.deepEqual(foundIn({ found: [{ name: 'Sim', address: 'ws://127.0.0.1:9091' }], vehicles: [{ name: 'car', address: '127.0.0.1:9091', phase: 'idle' }, { name: 'b', address: null }] }),
+    [{ name: 'Sim', address: 'ws://127.0.0.1:9091', phase: undefined }]);
+  for (const answer of [null, 7, {}, { found: 'x' }, { found: [null, 7, {}] }]) assert.deepEqual(foundIn(answer), []);
+});
+
+test('the headline of each signal; unknown is a dash and never 0', () => {
+  assert.deepEqual(headline('speed', { speed_mps: 4.2 }), ['4.2', 'm/s']);
+  assert.deepEqual(headline('distance', { distance_m: null, none_in_range: true }), ['none', '']);
+  assert.deepEqual(headline('position', { status: -1, alt_m: 1 }), ['no', 'fix']);
+  assert.deepEqual(headline('diagnostics', { worst: 2 }), ['ERROR', '']);
+  assert.deepEqual(headline('fuel', { value: 62.5, unit: '%' }), ['62.5', '%']);
+  assert.deepEqual(headline('command', { speed_mps: null }), ['–', 'm/s']);
+  assert.deepEqual(headline('speed', null), ['–', '']);
+  assert.deepEqual(headline('something_new', { percent: 7 }), ['7.0', '%']);
+});
+
+test('the details of a signal tell what was rejected and why', () => {
+  const signal = /** @type {any} */ ({ label: 'Speed', topic: '/v', type: 'geometry_msgs/Twist', note: 'Float64, expected Float32', count: 9, rejected: 2, rejected_why: 'linear.x is text', lowest: 0, highest: 4.23, value: {}, horizon_s: 1, expected_hz: 20 });
+  const rows = Object.fromEntries(details(signal, 'speed'));
+  assert.equal(rows['Rejected'], '2: linear.x is text');
+  assert.equal(rows['Note'], 'Float64, expected Float32');
+  assert.equal(rows['Range so far'], '0.00 to 4.23');
+  assert.equal(kindWords(signal), 'Twist');
+  assert.equal(kindWords({ ...signal, type: null, topic: null, value: { source: 'speed' } }), 'from speed');
+  assert.equal(kindWords({ ...signal, type: null, topic: null, value: null }), 'no such topic');
+});
+
+test('recording, slow-down and last values', () => {
+  assert.deepEqual(recordingWords({ state: 'off', for_s: null }, true), { isOn: false, text: 'off' });
+  assert.deepEqual(recordingWords({ state: 'on', for_s: 252 }, true), { isOn: true, text: '04:12' });
+  assert.deepEqual(recordingWords({ state: 'on', for_s: 252 }, false), { isOn: false, text: 'held' });
+  assert.deepEqual(slowWords({ state: 'not_available', why: 'not configured' }), { title: 'Slow-down off', why: 'not configured' });
+  assert.equal(thenWords(state({ signals: { speed: { value: { speed_mps: 4.2 } }, distance: { value: { distance_m: 12.4 } } } })), '4.2 m/s, object at 12.4 m');
+  assert.equal(thenWords(null), 'nothing');
+});

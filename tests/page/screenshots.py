@@ -1,0 +1,269 @@
+"""`make screenshots`: the page in each of its states, both themes, at the size of a phone, into out/screenshots."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+import tempfile
+from collections.abc import Awaitable, Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from playwright.async_api import Browser, Page, async_playwright
+
+from tests.chromium import FLAGS, find_chromium
+from tests.page.canned import Canned, alarm, idle, live
+
+OUT = Path(__file__).resolve().parents[2] / "out" / "screenshots"
+PHONE: dict[str, Any] = {
+    "viewport": {"width": 412, "height": 915},
+    "device_scale_factor": 2,
+    "has_touch": True,
+    "is_mobile": True,
+    "reduced_motion": "reduce",  # so that nothing stands half-way
+}
+Scene = Callable[[Canned, Page], Awaitable[None]]
+SCENES: dict[str, Scene] = {}
+# Roboto as on a phone: words take the room they take there.
+FONTS = """<?xml version="1.0"?><!DOCTYPE fontconfig SYSTEM "fonts.dtd"><fontconfig><dir>/usr/share/fonts</dir>
+<match target="pattern"><edit name="family" mode="prepend" binding="strong"><string>Roboto</string></edit></match>
+<cachedir>{cache}</cachedir></fontconfig>"""
+
+
+def scene(name: str) -> Callable[[Scene], Scene]:
+    """Declares how a state is reached; the page is loaded afterwards, then `act` of it is done."""
+
+    def keep(how: Scene) -> Scene:
+        SCENES[name] = how
+        return how
+
+    return keep
+
+
+def at(clock: str) -> int:
+    """A time of day as milliseconds since 1970."""
+    hour, minute, second = (int(part) for part in clock.split(":"))
+    return int(
+        datetime.now().astimezone().replace(hour=hour, minute=minute, second=second, microsecond=0).timestamp() * 1000
+    )
+
+
+@scene("home")
+async def home(server: Canned, page: Page) -> None:
+    server.state = live()
+
+
+@scene("home-lower")
+async def home_lower(server: Canned, page: Page) -> None:
+    server.state = live()
+    await page.wait_for_selector(".checks li")
+    await page.evaluate("document.querySelector('[data-panel=home]').scrollTo(0, 9999)")
+
+
+@scene("home-fault")
+async def home_fault(server: Canned, page: Page) -> None:
+    state = live()
+    state["signals"]["speed"]["value"]["speed_mps"] = 12.6
+    state["signals"]["acceleration"]["value"]["acceleration_mps2"] = 1.1
+    state["signals"]["accelerator"]["value"]["percent"] = 38
+    state["signals"]["steering"]["value"]["percent"] = 2
+    state["signals"]["distance"]["value"]["distance_m"] = 18.7
+    state["signals"]["bearing"]["value"]["bearing_rad"] = 0.0175
+    state["nearest"] = {"time_gap_s": 1.5, "stopping_m": 18.2}
+    state["checks"][0] |= {"verdict": "fault", "brief": "FAULT 12.6 m/s"}
+    state["alarms"] = [
+        alarm(
+            "Speed", "Speed above limit", priority="critical", place="dialog", sound="high", needs_ack=True,
+            text="12.6 m/s, limit 11.0 m/s", measured={"label": "Speed", "value": 12.6, "unit": "m/s"},
+            limit={"label": "Limit", "value": 11.0, "unit": "m/s"}, actions=["acknowledge", "decelerate"],
+            advice="The safety driver must slow the car.", raised_ms=at("14:07:31"),
+        )
+    ]  # fmt: skip
+    server.state = state
+
+
+@scene("home-warning")
+async def home_warning(server: Canned, page: Page) -> None:
+    state = live()
+    state["signals"]["speed"]["value"]["speed_mps"] = 0.0
+    state["signals"]["acceleration"]["value"]["acceleration_mps2"] = 0.0
+    state["signals"]["brake"]["value"]["percent"] = 42
+    state["signals"]["accelerator"]["value"]["percent"] = 0
+    state["signals"]["steering"]["value"]["percent"] = 0
+    state["nearest"] = {"time_gap_s": None, "stopping_m": 0.0}
+    state["recording"]["for_s"] = 698.0
+    state["checks"][4] |= {"verdict": "fault", "brief": "FAULT 6.3 m"}
+    state["alarms"] = [alarm("GPS drift", "GPS drift", text="6.3 m from where it stopped 41 s ago; 2.0 m are allowed")]
+    server.state = state
+
+
+def _cut(state: dict[str, Any], cut: str, **link: Any) -> dict[str, Any]:
+    state["link"] |= {"cut": cut, "since_ms": at("14:07:31")} | link
+    state["recording"]["state"] = "held"
+    for one in state["checks"]:
+        one |= {"verdict": "unknown", "brief": "not checked: stale"}
+    return state
+
+
+@scene("home-stale")
+async def home_stale(server: Canned, page: Page) -> None:
+    problem = {
+        "code": "car_silent", "title": "The car fell silent.", "mark": "silent",
+        "hint": "Server and bridge answer; no message comes from the car.",
+    }  # fmt: skip
+    server.state = _cut(live(), "bridge-car", car_age_s=3.35, problem=problem)
+
+
+@scene("server-silent")
+async def server_silent(server: Canned, page: Page) -> None:
+    server.state = live()
+    await page.wait_for_selector(".checks li")
+    server.silent = True
+    await page.wait_for_timeout(3300)
+
+
+@scene("link-lost")
+async def link_lost(server: Canned, page: Page) -> None:
+    state = _cut(live(), "server-bridge", bridge_age_s=6.15, attempts=3, trying_for_s=6.2)
+    state["session"]["phase"] = "lost"
+    state["alarms"] = [
+        alarm(
+            "link_lost", "Connection lost", priority="critical", place="dialog", sound="high", raised_ms=at("14:07:31"),
+            actions=["acknowledge", "reconnect", "change_address", "exit"],
+        )
+    ]  # fmt: skip
+    server.state = state
+
+
+@scene("no-messages")
+async def no_messages(server: Canned, page: Page) -> None:
+    state = idle("monitoring")
+    state["session"] |= {"address": "ws://192.168.4.1:9090", "connected_for_s": 4.95}
+    problem = {
+        "code": "no_message", "title": "The bridge answers, the car publishes nothing.", "mark": "silent",
+        "hint": "Seen after a restart of roscore: restart rosbridge too.",
+    }  # fmt: skip
+    state["link"] |= {"cut": "bridge-car", "car_age_s": None, "topics_heard": 0, "problem": problem}
+    state["recording"]["state"] = "off"
+    server.state = state
+
+
+@scene("paused")
+async def paused(server: Canned, page: Page) -> None:
+    state = live()
+    state["session"] |= {"paused": True, "paused_for_s": 42.1}
+    server.state = state
+
+
+@scene("scan")
+async def scan(server: Canned, page: Page) -> None:
+    server.state = live()
+    await page.wait_for_selector("[data-tab=scan]:visible")
+    await page.tap("[data-tab=scan]")
+
+
+@scene("signals")
+async def signals(server: Canned, page: Page) -> None:
+    state = live()
+    state["signals"]["odometry"] |= {"freshness": "ageing", "age_s": 0.33}
+    state["signals"]["diagnostics"] |= {"freshness": "stale", "age_s": 7.35, "rate_hz": 0.0}
+    state["alarms"] = [alarm("signal_stale", "Diagnostics stale", state="ACKED")]
+    server.state = state
+    await page.tap("#monitor [data-f=menu]")
+    await page.tap("[data-screen=signals]")
+
+
+@scene("connect")
+async def connect(server: Canned, page: Page) -> None:
+    server.state = idle()
+    await page.wait_for_selector("#connect:not([hidden])")
+    await page.fill("#address", "192.168.4.1:9090")
+    await page.tap("[data-f=go]")
+    await page.wait_for_timeout(300)
+    await page.evaluate("document.activeElement.blur()")
+
+
+@scene("connect-failed")
+async def connect_failed(server: Canned, page: Page) -> None:
+    await connect(server, page)
+    state = idle("failed")
+    state["session"]["address"] = "ws://192.168.4.1:9090"
+    state["link"] |= {
+        "cut": "server-bridge", "attempts": 3, "trying_for_s": 4.0,
+        "problem": {
+            "code": "refused", "title": "192.168.4.1 is there, but nothing listens on port 9090.", "mark": "refused",
+            "hint": "Start rosbridge on the car, or check the port.",
+        },
+    }  # fmt: skip
+    server.state = state
+
+
+@scene("menu")
+async def menu(server: Canned, page: Page) -> None:
+    server.state = live()
+    await page.tap("#monitor [data-f=menu]")
+
+
+@scene("stop")
+async def stop(server: Canned, page: Page) -> None:
+    server.state = live()
+    await page.tap("[data-f=stop]")
+
+
+@scene("map")
+async def map_(server: Canned, page: Page) -> None:
+    server.state = live()
+    await page.tap("[data-tab=map]")
+
+
+@scene("settings")
+async def settings(server: Canned, page: Page) -> None:
+    server.state = live()
+    await page.tap("[data-tab=settings]")
+
+
+async def take(browser: Browser, name: str, theme: str, size: dict[str, int] | None = None) -> Path:
+    """One picture."""
+    server = Canned()
+    options = PHONE | ({"viewport": size} if size else {})
+    async with server.running() as address:
+        context = await browser.new_context(
+            **options, color_scheme="dark" if theme == "dark" else "light", permissions=[]
+        )
+        page = await context.new_page()
+        page.on("console", lambda message: print(name, "console:", message.text) if message.type != "log" else None)
+        page.on("pageerror", lambda error: print(name, "error:", error))
+        await page.goto(address)
+        await page.wait_for_selector("#monitor:not([hidden])")
+        if "connect" not in name:
+            await page.tap("#monitor .top .rec")  # any touch lets the page sound
+        await SCENES[name](server, page)
+        await page.wait_for_timeout(700)
+        path = OUT / (f"{name}-{theme}.png" if size is None else f"{name}-{theme}-{size['width']}.png")
+        await page.screenshot(path=path)
+        await context.close()
+    return path
+
+
+async def main(names: list[str]) -> None:
+    """All pictures, or those whose names are given."""
+    OUT.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="catgraph-fonts-") as folder:
+        fonts = Path(folder, "fonts.conf")
+        fonts.write_text(FONTS.format(cache=Path(folder, "cache")), encoding="utf-8")
+        async with async_playwright() as playwright:
+            browser = await playwright.chromium.launch(
+                executable_path=find_chromium(),
+                args=[*FLAGS, "--autoplay-policy=user-gesture-required"],
+                env={**os.environ, "FONTCONFIG_FILE": str(fonts)},
+            )
+            for name in names or SCENES:
+                for theme in ("dark", "light"):
+                    print(await take(browser, name, theme))
+            await browser.close()
+
+
+if __name__ == "__main__":
+    asyncio.run(main(sys.argv[1:]))
