@@ -90,25 +90,29 @@ def _is_debian() -> bool:
 
 
 def main() -> int:
-    """Print the path of the Chromium to use, after installing one where needed."""
+    """Print the path of the Chromium to use, after installing one where needed; 1 with a sentence where none can be."""
     try:
-        path = find_chromium()
+        print(f"Chromium: {_found_or_installed()}")
+    except NoChromium as why:
+        print(why, file=sys.stderr)
+        return 1
+    return 0
+
+
+def _found_or_installed() -> str:
+    try:
+        return find_chromium()
     except NoChromium:
         if os.environ.get("CATGRAPH_CHROMIUM"):
             raise
-        install_chromium()
-        try:
-            path = find_chromium()
-        except NoChromium:
-            print(
-                "No Chromium could be installed for the page's tests: install one with the system's packages "
-                "(or `playwright install-deps chromium` as root for the libraries it lacks), "
-                "or name one in CATGRAPH_CHROMIUM.",
-                file=sys.stderr,
-            )
-            return 1
-    print(f"Chromium: {path}")
-    return 0
+    install_chromium()
+    try:
+        return find_chromium()
+    except NoChromium:
+        raise NoChromium(
+            "No Chromium could be installed for the page's tests: install one with the system's packages (or as root "
+            "`playwright install-deps chromium`, for the libraries it lacks), or name one in CATGRAPH_CHROMIUM."
+        ) from None
 
 
 if __name__ == "__main__":
