@@ -19,8 +19,10 @@ from server.config import Config
 from server.hub import Hub
 from server.journal import Journal
 from server.session import Session
+from server.settings import SettingsFile
 from server.version import catgraph_version
 from server.web import api, docs, errors, metrics, pages
+from server.web import log as alarm_log
 from server.web.headers import SecurityHeaders
 
 log = logging.getLogger("catgraph.app")
@@ -98,6 +100,7 @@ def create_app(
             server=running.server_facts,
             allowed_hosts=config.allowed_hosts,
             checks=checks,
+            settings=SettingsFile(config.data / "settings" / f"{vehicle.name}.toml" if config.data else None),
         )
 
     @asynccontextmanager
@@ -122,6 +125,7 @@ def create_app(
     app.add_middleware(SecurityHeaders)
     errors.install(app)
     app.include_router(api.router)
+    app.include_router(alarm_log.router)
     app.include_router(metrics.router)
     app.include_router(docs.router)
     pages.install(app)

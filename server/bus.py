@@ -64,6 +64,10 @@ class LocalBus:
     def events_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
         return self._journal.after(vehicle, n, limit)
 
+    def find_events(self, vehicle: str, **filters: Any) -> list[dict[str, Any]]:
+        """As `Journal.find`."""
+        return self._journal.find(vehicle, **filters)
+
     def last_event(self, vehicle: str) -> int:
         return self._journal.last(vehicle)
 

@@ -50,7 +50,29 @@ class Shelve(_Command):
     minutes: Annotated[float, Field(gt=0, le=15)] = 5.0
 
 
-Command = Connect | Retry | Disconnect | Pause | Resume | Acknowledge | Shelve
+class Unshelve(_Command):
+    kind: Literal["unshelve"]
+    alarm: Name
+
+
+class Set(_Command):
+    """Settings to change; null takes one back to its default. `version`: refused when they changed since."""
+
+    kind: Literal["set"]
+    values: dict[Name, float | None] = Field(default_factory=dict, max_length=500)
+    topics: dict[Name, str | None] = Field(default_factory=dict, max_length=50)
+    profile: Name | None = None
+    version: Number | None = None
+
+
+class Import(_Command):
+    """All settings at once, from a TOML file."""
+
+    kind: Literal["import"]
+    toml: Annotated[str, Field(max_length=64 * 1024)]
+
+
+Command = Connect | Retry | Disconnect | Pause | Resume | Acknowledge | Shelve | Unshelve | Set | Import
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
 
 

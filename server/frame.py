@@ -37,6 +37,8 @@ class Facts:
     ros_version: int | None
     connected_s: float | None
     paused_since_s: float | None
+    profile: str  # the kind of car it is taken for
+    settings_version: int
     since_s: float
     dialled_s: float
     problem: Problem | None
@@ -77,6 +79,8 @@ def _session(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
         "address": facts.address.url if facts.address else None,
         "name": facts.address.shown if facts.address else None,
         "ros_version": facts.ros_version,
+        "profile": facts.profile,
+        "settings_version": facts.settings_version,
         "connected_for_s": wire.plain(connected_for, 1),
         "paused": facts.paused_since_s is not None,
         "paused_for_s": round(facts.now_s - facts.paused_since_s, 1) if facts.paused_since_s is not None else 0.0,

@@ -63,5 +63,35 @@ class Journal:
         )
         return [orjson.loads(body) for (body,) in rows]
 
+    def find(
+        self,
+        vehicle: str,
+        *,
+        before: int | None = None,
+        limit: int = 100,
+        alarm: str | None = None,
+        change: str | None = None,
+        since_ms: int | None = None,
+        until_ms: int | None = None,
+    ) -> list[dict[str, Any]]:
+        """Events newest first, numbered below `before`, of one alarm, one kind of change, one span of time."""
+        conditions: list[str] = ["vehicle = ?"]
+        values: list[str | int] = [vehicle]
+        for condition, value in (
+            ("n < ?", before),
+            ("alarm = ?", alarm),
+            ("change = ?", change),
+            ("at_ms >= ?", since_ms),
+            ("at_ms < ?", until_ms),
+        ):
+            if value is not None:
+                conditions.append(condition)
+                values.append(value)
+        rows = self._database.execute(
+            f"SELECT body FROM event WHERE {' AND '.join(conditions)} ORDER BY n DESC LIMIT ?",  # conditions are ours
+            (*values, limit),
+        )
+        return [orjson.loads(body) for (body,) in rows]
+
     def close(self) -> None:
         self._database.close()

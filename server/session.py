@@ -11,9 +11,10 @@ import orjson
 
 from monitor.catalog import AnyCheck
 from monitor.runner import Monitor, Refused, Transition
+from monitor.signal_limits import expected_rates
 from monitor.signals import SIGNALS
 from monitor.state import LinkFacts, Phase, State
-from monitor.values import LaserScan
+from monitor.values import LaserScan, Steering
 from server import address, commands, decode, discovery, problems, wire
 from server.address import BadAddress
 from server.bus import LocalBus
@@ -22,7 +23,9 @@ from server.frame import Facts, state_frame
 from server.link import LinkDown, RosLink, Subscription
 from server.problems import Problem
 from server.reception import Reception, Tally
+from server.settings import BadSetting, Conflict, SettingsFile
 from server.topics import BY_SIGNAL, TOPICS, Source, map_signals
+from server.tuning import PERCENT_A_RAD, Tuning
 
 log = logging.getLogger("catgraph.session")
 
@@ -52,6 +55,7 @@ class Session:
         server: Callable[[], dict[str, Any]],
         allowed_hosts: Collection[str] = (),
         checks: Sequence[AnyCheck] | None = None,
+        settings: SettingsFile | None = None,
     ) -> None:
         self.vehicle = vehicle
         self._bus = bus
@@ -59,7 +63,8 @@ class Session:
         self._wall_ms = wall_ms
         self._server = server
         self._allowed_hosts = frozenset(allowed_hosts)
-        self._monitor = Monitor(checks)
+        self._tuning = Tuning(settings or SettingsFile(None))
+        self._monitor = Monitor(checks, self._tuning.limits)
         self._crashes_told: set[str] = set()
         self._tasks: set[asyncio.Task[None]] = set()
         self._lag_s = 0.0
@@ -87,7 +92,8 @@ class Session:
         self._looked = False
         self._offers_nothing = False
         self._reception = Reception()
-        self._state = State()
+        self._state = State(expected_rates(self._tuning.limits))
+        self._offer: discovery.Offer | None = None
         self._scan_number = 0
         self._scan_kept = False
         self._scan_put_s = -1.0
@@ -100,6 +106,8 @@ class Session:
         """Begins to tick, and dials where the vehicle's address is known."""
         self._bus.serve(self.vehicle.name, self.handle)
         self._spawn(self._run(), "tick")
+        if self._tuning.complaint:
+            self._note("settings", self._tuning.complaint)
         if self.vehicle.address:
             self._connect(self.vehicle.address)
 
@@ -171,6 +179,8 @@ class Session:
             return {"ok": True}
         if message.get("kind") == "signals":
             return self._signals()
+        if message.get("kind") == "settings":
+            return self._tuning.as_json() | {"toml": self._tuning.as_toml()}
         if message.get("kind") == "track":
             return self._track()
         try:
@@ -190,6 +200,12 @@ class Session:
             }
         except Refused as why:
             return {"ok": False, "reason": why.reason}
+        except BadSetting as why:
+            return {"ok": False, "reason": str(why), "field": why.field}
+        except Conflict as why:
+            return {"ok": False, "reason": str(why), "conflict": True}
+        except OSError as why:
+            return {"ok": False, "reason": f"The settings cannot be kept: {why.strerror or why}."}
         return {"ok": True}
 
     def _obey(self, command: commands.Command) -> None:
@@ -215,7 +231,26 @@ class Session:
                         command.alarm, command.occurrence, minutes=command.minutes, by="operator", now_s=now_s
                     )
                 )
+            case commands.Unshelve():
+                self._tell(self._monitor.unshelve(command.alarm, by="operator", now_s=now_s))
+            case commands.Set():
+                lines = self._tuning.change(
+                    values=command.values, topics=command.topics, profile=command.profile, version=command.version
+                )
+                self._tuned(lines, by="operator")
+            case commands.Import():
+                self._tuned(self._tuning.replace(command.toml), by="operator")
         self._put_state(now_s)
+
+    def _tuned(self, lines: Sequence[str], *, by: str | None) -> None:
+        """New settings count from this moment on."""
+        if lines:
+            self._note("settings", "; ".join(lines), by=by)
+        self._monitor.limits = self._tuning.limits
+        self._state.expect(expected_rates(self._tuning.limits))
+        if self._offer is not None:
+            self._map(self._offer)
+        self._judge(self._now(), None)
 
     def _connect(self, typed: str) -> None:
         target = address.parse(typed)
@@ -326,6 +361,8 @@ class Session:
         proper = True
         for source in sources:
             value = self._reception.read(source, message, note)
+            if isinstance(value, Steering) and self._tuning.profile.steering == "tyre_angle":
+                value = Steering(percent=value.percent * PERCENT_A_RAD)
             if value is None:
                 proper = False
                 continue
@@ -395,8 +432,17 @@ class Session:
         self._looked = True
         self._prove()
         self._ros_version = offer.ros or self._ros_version
-        sources = map_signals(offer.topics)
-        gone = {signal: source for signal, source in self._sources.items() if signal not in sources}
+        self._offer = offer
+        if self._tuning.recognise(offer.topics, offer.ros):
+            self._tuned([f"Taken for: {self._tuning.profile.title}"], by=None)
+        self._map(offer)
+
+    def _map(self, offer: discovery.Offer) -> None:
+        """Chooses the topic of each signal and subscribes to them."""
+        sources = map_signals(offer.topics, self._tuning.settings.topics)
+        gone = {
+            s: source for s, source in self._sources.items() if s not in sources and source.topic not in offer.topics
+        }
         self._sources = gone | sources  # a topic that vanished stays subscribed: it may come back
         mapped = {source.topic for source in self._sources.values()}
         self._unmapped = {name: kind for name, kind in offer.topics.items() if name not in mapped}
@@ -492,12 +538,16 @@ class Session:
     def _tell(self, transitions: Collection[Transition]) -> None:
         at_ms = self._wall_ms()
         self._bus.append(
-            self.vehicle.name, [wire.event(t, self._monitor.alarms[t.alarm_id], at_ms) for t in transitions]
+            self.vehicle.name,
+            [
+                wire.event(t, self._monitor.alarms[t.alarm_id], at_ms, self._tuning.settings.version)
+                for t in transitions
+            ],
         )
 
-    def _note(self, change: str, text: str) -> None:
+    def _note(self, change: str, text: str, *, by: str | None = None) -> None:
         self._bus.append(
-            self.vehicle.name, [{"at_ms": self._wall_ms(), "alarm": None, "change": change, "text": text, "by": None}]
+            self.vehicle.name, [{"at_ms": self._wall_ms(), "alarm": None, "change": change, "text": text, "by": by}]
         )
 
     # -- frames ------------------------------------------------------------------------------------------------------
@@ -516,6 +566,8 @@ class Session:
             ros_version=self._ros_version,
             connected_s=self._connected_s,
             paused_since_s=self._paused_since_s,
+            profile=self._tuning.profile.title,
+            settings_version=self._tuning.settings.version,
             since_s=self._since_s,
             dialled_s=self._dialled_s,
             problem=self._problem,

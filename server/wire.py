@@ -175,7 +175,7 @@ def _quantity(quantity: Quantity | None) -> dict[str, Any] | None:
     return {"label": quantity.label, "value": plain(quantity.value), "unit": quantity.unit}
 
 
-def event(transition: Transition, alarm: Alarm, at_ms: int) -> dict[str, Any]:
+def event(transition: Transition, alarm: Alarm, at_ms: int, settings_version: int) -> dict[str, Any]:
     """A transition as the log keeps it and the pages get it; the log adds its number."""
     spec = alarm.spec
     return {
@@ -190,4 +190,7 @@ def event(transition: Transition, alarm: Alarm, at_ms: int) -> dict[str, Any]:
         "text": transition.text,
         "by": transition.by,
         "announces": transition.announces,
+        "settings_version": settings_version,
+        "measured": _quantity(alarm.finding.measured if alarm.finding else None),
+        "limit": _quantity(alarm.finding.limit if alarm.finding else None),
     }

@@ -14,6 +14,14 @@ from starlette.exceptions import HTTPException
 log = logging.getLogger("catgraph.web")
 
 
+class Problem(HTTPException):
+    """An error that says more than its sentence; `more` becomes members of the problem document."""
+
+    def __init__(self, status: int, detail: str, **more: Any) -> None:
+        super().__init__(status, detail)
+        self.more = more
+
+
 def problem(status: int, detail: str, **more: Any) -> JSONResponse:
     """A problem document; `type` is about:blank, so `title` is the status in words."""
     body = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail, **more}
@@ -25,7 +33,7 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     async def of_http(_: Request, error: HTTPException) -> JSONResponse:
-        answer = problem(error.status_code, str(error.detail))
+        answer = problem(error.status_code, str(error.detail), **getattr(error, "more", {}))
         answer.headers.update(error.headers or {})
         return answer
 

@@ -1,0 +1,73 @@
+"""What is known beforehand of a kind of car: its defaults, and how it is recognised by the topics it offers."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.resources import files
+from typing import Any, Literal
+
+from monitor import catalog
+
+SteeringUnit = Literal["percent", "tyre_angle"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Profile:
+    """One kind of car."""
+
+    name: str
+    title: str
+    steering: SteeringUnit = "percent"  # what torque.z of the steering topic means
+    limits: Mapping[str, float] = field(default_factory=dict)  # thresholds that differ from the checks' own defaults
+    has: tuple[str, ...] = ()  # topics that a car of this kind has, whatever the case of their letters
+    lacks: tuple[str, ...] = ()
+    ros: int | None = None
+
+    def fits(self, topics: frozenset[str], ros: int | None) -> bool:
+        """Whether a car with these topics (lower case) may be of this kind."""
+        return (
+            all(name.lower() in topics for name in self.has)
+            and not any(name.lower() in topics for name in self.lacks)
+            and (self.ros is None or self.ros == ros)
+        )
+
+
+GENERIC = Profile(name="generic", title="Any car")
+
+
+def load() -> dict[str, Profile]:
+    """The profiles that are shipped, by name. Raises ValueError where one of them is wrong (a test loads them all)."""
+    found = {GENERIC.name: GENERIC}
+    for entry in sorted(files(__name__).iterdir(), key=lambda entry: entry.name):
+        if entry.name.endswith(".toml"):
+            profile = _read(entry.name.removesuffix(".toml"), tomllib.loads(entry.read_text(encoding="utf-8")))
+            found[profile.name] = profile
+    return found
+
+
+def _read(name: str, body: Mapping[str, Any]) -> Profile:
+    match = body.get("match", {})
+    limits = {
+        f"{group}.{threshold}": value
+        for group, values in body.get("limits", {}).items()
+        for threshold, value in values.items()
+    }
+    catalog.changed(catalog.AllLimits(), limits)  # raises ValueError for a threshold that is not there or out of range
+    return Profile(
+        name=name,
+        title=body["title"],
+        steering=body.get("steering", "percent"),
+        limits=limits,
+        has=tuple(match.get("has", ())),
+        lacks=tuple(match.get("lacks", ())),
+        ros=match.get("ros"),
+    )
+
+
+def choose(profiles: Mapping[str, Profile], topics: Mapping[str, str], ros: int | None) -> Profile:
+    """The profile that says most of a car with these topics; the generic one where none fits."""
+    names = frozenset(name.lower() for name in topics)
+    fitting = [profile for profile in profiles.values() if profile is not GENERIC and profile.fits(names, ros)]
+    return max(fitting, key=lambda profile: len(profile.has) + len(profile.lacks), default=GENERIC)

@@ -1,0 +1,222 @@
+"""What an operator set for one vehicle: thresholds, topics, kind of car; a TOML file, changed as a whole.
+
+Only what differs from the profile's defaults is kept, so that a better default reaches a car nobody changed.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import ValidationError
+
+from monitor import catalog
+from monitor.catalog import AllLimits
+from monitor.signals import SIGNALS
+from server import profiles
+from server.profiles import GENERIC, Profile
+
+AUTO = "auto"  # the profile follows from what the car offers
+MAX_TOML_BYTES = 64 * 1024
+
+
+class BadSetting(ValueError):
+    """A value that cannot be set; `str()` is one sentence, `field` its full name."""
+
+    def __init__(self, field: str, sentence: str) -> None:
+        super().__init__(sentence)
+        self.field = field
+
+
+class Conflict(Exception):
+    """Somebody else changed the settings in between."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """One version of a vehicle's settings; immutable."""
+
+    version: int = 0
+    profile: str = AUTO
+    values: Mapping[str, float] = field(default_factory=dict)  # "speed_limit.max_mps": 9.0; only what was changed
+    topics: Mapping[str, str] = field(default_factory=dict)  # signal → topic the operator picked
+
+    def limits(self, profile: Profile) -> AllLimits:
+        """The thresholds in force for a car of that kind."""
+        return catalog.changed(catalog.AllLimits(), {**profile.limits, **self.values})
+
+
+def change(
+    settings: Settings,
+    profile: Profile,
+    *,
+    values: Mapping[str, float | None] | None = None,
+    topics: Mapping[str, str | None] | None = None,
+    profile_name: str | None = None,
+    known_profiles: Mapping[str, Profile] | None = None,
+) -> Settings:
+    """The next version. A value or topic of None goes back to its default. Raises BadSetting, naming the field."""
+    new_values = {**settings.values}
+    for name, value in (values or {}).items():
+        if value is None:
+            new_values.pop(name, None)
+        else:
+            new_values[name] = value
+    _validate({**profile.limits, **new_values}, named=values or {})
+    defaults = catalog.flat(catalog.changed(catalog.AllLimits(), profile.limits))
+    kept = {name: float(value) for name, value in new_values.items() if defaults.get(name) != value}
+    new_topics = {**settings.topics}
+    for signal, topic in (topics or {}).items():
+        if signal not in SIGNALS:
+            raise BadSetting(f"topics.{signal}", f"There is no signal named {signal[:40]}.")
+        if topic is None:
+            new_topics.pop(signal, None)
+        elif not topic or len(topic) > 300:
+            raise BadSetting(f"topics.{signal}", "A topic's name has 1 to 300 letters.")
+        else:
+            new_topics[signal] = topic
+    chosen = settings.profile if profile_name is None else profile_name
+    if chosen != AUTO and known_profiles is not None and chosen not in known_profiles:
+        raise BadSetting("profile", f"There is no profile named {chosen[:40]}.")
+    return Settings(version=settings.version + 1, profile=chosen, values=kept, topics=new_topics)
+
+
+def _validate(flat: Mapping[str, Any], *, named: Mapping[str, Any]) -> None:
+    schema = catalog.schema()
+    for name in named:
+        if name not in schema:
+            raise BadSetting(name, f"There is no setting named {name[:60]}.")
+    for name, value in flat.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise BadSetting(name, f"{_label(name)}: a number is needed.")
+    try:
+        catalog.changed(catalog.AllLimits(), flat)
+    except ValidationError as error:
+        fault = error.errors(include_url=False, include_context=False, include_input=False)[0]
+        name = ".".join(str(part) for part in fault["loc"])
+        raise BadSetting(name, _sentence(name, fault["msg"])) from None
+
+
+def _label(name: str) -> str:
+    return str(catalog.schema().get(name, {}).get("title", name))
+
+
+def _sentence(name: str, message: str) -> str:
+    row = catalog.schema().get(name)
+    if row is None:
+        return f"{name[:60]}: {message}."
+    return f"{row['title']}: {row['minimum']:g} to {row['maximum']:g} {row['unit']} is possible."
+
+
+def differences(old: Settings, new: Settings, profile: Profile) -> list[str]:
+    """What changed between two versions, a line each, as the log tells it."""
+    before, after = catalog.flat(old.limits(profile)), catalog.flat(new.limits(profile))
+    lines = [
+        f"{_label(name)}: {before[name]:g} → {after[name]:g} {catalog.schema()[name]['unit']}".rstrip()
+        for name in after
+        if before.get(name) != after[name]
+    ]
+    for signal in sorted({*old.topics, *new.topics}):
+        if old.topics.get(signal) != new.topics.get(signal):
+            lines.append(f"Topic of {SIGNALS[signal].label}: {new.topics.get(signal, 'as found')}")
+    if old.profile != new.profile:
+        lines.append(f"Profile: {new.profile}")
+    return lines
+
+
+def to_toml(settings: Settings) -> str:
+    """The settings as a file for people: thresholds by group, in SI."""
+    limits: dict[str, dict[str, float]] = {}
+    for name, value in sorted(settings.values.items()):
+        group, _, threshold = name.partition(".")
+        limits.setdefault(group, {})[threshold] = value
+    return tomli_w.dumps(
+        {
+            "version": settings.version,
+            "profile": settings.profile,
+            "topics": dict(sorted(settings.topics.items())),
+            "limits": limits,
+        }
+    )
+
+
+def from_toml(text: str, profile: Profile = GENERIC, known_profiles: Mapping[str, Profile] | None = None) -> Settings:
+    """The settings in a file. Raises BadSetting with one sentence for whatever is wrong with it."""
+    if len(text.encode()) > MAX_TOML_BYTES:
+        raise BadSetting("", "A file of settings has at most 64 kB.")
+    try:
+        body = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise BadSetting("", f"This is not TOML: {str(error)[:120]}.") from None
+    version = body.get("version", 0)
+    if type(version) is not int or version < 0:
+        raise BadSetting("version", "The version is a whole number.")
+    values: dict[str, Any] = {}
+    for group, rows in _table(body, "limits").items():
+        for threshold, value in _table(body["limits"], group).items() if isinstance(rows, dict) else ():
+            values[f"{group}.{threshold}"] = value
+        if not isinstance(rows, dict):
+            raise BadSetting(f"limits.{group}", f"[limits.{group[:40]}] is not a table.")
+    topics = _table(body, "topics")
+    if not all(isinstance(topic, str) for topic in topics.values()):
+        raise BadSetting("topics", "A topic is given as text.")
+    name = body.get("profile", AUTO)
+    if not isinstance(name, str):
+        raise BadSetting("profile", "The profile is given by its name.")
+    unknown = set(body) - {"version", "profile", "topics", "limits"}
+    if unknown:
+        raise BadSetting(sorted(unknown)[0], f"There is no section named {sorted(unknown)[0][:40]}.")
+    fresh = change(Settings(), profile, values=values, topics=topics, profile_name=name, known_profiles=known_profiles)
+    return replace(fresh, version=version)
+
+
+def _table(body: Mapping[str, Any], name: str) -> dict[str, Any]:
+    table = body.get(name, {})
+    if not isinstance(table, dict):
+        raise BadSetting(name, f"[{name[:40]}] is not a table.")
+    return table
+
+
+class SettingsFile:
+    """Where one vehicle's settings are kept; without a path, in memory."""
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self.complaint: str | None = None  # why what was found could not be used
+
+    def read(self) -> Settings:
+        """What was kept, or the defaults; a file that cannot be used is set aside beside itself, never overwritten."""
+        if self._path is None or not self._path.exists():
+            return Settings()
+        try:
+            return from_toml(self._path.read_text(encoding="utf-8"), known_profiles=profiles.load())
+        except (OSError, UnicodeDecodeError, BadSetting) as why:
+            aside = self._path.with_suffix(".unusable.toml")
+            try:
+                os.replace(self._path, aside)
+            except OSError:
+                aside = self._path
+            self.complaint = f"The settings kept in {aside.name} cannot be used ({why}); the defaults are in force."
+            return Settings()
+
+    def write(self, settings: Settings) -> None:
+        """Keeps a version: whole or not at all, through a loss of power too. Raises OSError."""
+        if self._path is None:
+            return
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        new = self._path.with_suffix(".new")
+        with open(new, "w", encoding="utf-8") as file:
+            file.write(to_toml(settings))
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(new, self._path)
+        folder = os.open(self._path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)

@@ -1,0 +1,94 @@
+"""How one vehicle is judged: its settings, the kind of car it was recognised as, and the thresholds that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from monitor import catalog
+from monitor.catalog import AllLimits
+from server import profiles
+from server.profiles import GENERIC, Profile
+from server.settings import AUTO, Conflict, Settings, SettingsFile, change, differences, from_toml, to_toml
+
+PERCENT_A_RAD = -1 / 0.00536  # the CATVehicle's steering: measured on its recordings, negative percent = left
+
+
+class Tuning:
+    """The one owner of a vehicle's settings."""
+
+    def __init__(self, file: SettingsFile) -> None:
+        self._file = file
+        self._profiles = profiles.load()
+        self._recognised = GENERIC
+        self.settings: Settings = file.read()
+        self.complaint = file.complaint
+
+    @property
+    def profile(self) -> Profile:
+        """The kind of car: what the operator chose, else what was recognised."""
+        return self._recognised if self.settings.profile == AUTO else self._profiles[self.settings.profile]
+
+    @property
+    def limits(self) -> AllLimits:
+        return self.settings.limits(self.profile)
+
+    def recognise(self, topics: Mapping[str, str], ros: int | None) -> bool:
+        """Looks at what the car offers; True when it is now taken for another kind of car."""
+        before = self.profile
+        self._recognised = profiles.choose(self._profiles, topics, ros)
+        return self.profile is not before
+
+    def change(
+        self,
+        *,
+        values: Mapping[str, float | None],
+        topics: Mapping[str, str | None],
+        profile: str | None,
+        version: int | None,
+    ) -> list[str]:
+        """Puts changes in force and keeps them; what changed, a line each. Raises BadSetting, Conflict, OSError."""
+        self._demand(version)
+        new = change(
+            self.settings,
+            self.profile,
+            values=values,
+            topics=topics,
+            profile_name=profile,
+            known_profiles=self._profiles,
+        )
+        return self._adopt(new)
+
+    def replace(self, toml: str) -> list[str]:
+        """As `change`, with all settings from a file."""
+        read = from_toml(toml, self.profile, self._profiles)
+        return self._adopt(
+            Settings(version=self.settings.version + 1, profile=read.profile, values=read.values, topics=read.topics)
+        )
+
+    def as_toml(self) -> str:
+        return to_toml(self.settings)
+
+    def as_json(self) -> dict[str, Any]:
+        """What `GET /api/settings` answers; `schema` says what may be set, `defaults` what the profile gives."""
+        return {
+            "version": self.settings.version,
+            "profile": {"name": self.profile.name, "title": self.profile.title, "chosen": self.settings.profile},
+            "profiles": [{"name": p.name, "title": p.title} for p in self._profiles.values()],
+            "values": catalog.flat(self.limits),
+            "defaults": catalog.flat(catalog.changed(catalog.AllLimits(), self.profile.limits)),
+            "changed": sorted(self.settings.values),
+            "topics": dict(self.settings.topics),
+            "schema": catalog.schema(),
+        }
+
+    def _adopt(self, new: Settings) -> list[str]:
+        lines = differences(self.settings, new, self.profile)
+        if lines:
+            self._file.write(new)  # first kept, then in force: what is in force is what a restart finds
+            self.settings = new
+        return lines
+
+    def _demand(self, version: int | None) -> None:
+        if version is not None and version != self.settings.version:
+            raise Conflict("Somebody else has changed the settings meanwhile. Look at them again.")
