@@ -12,7 +12,8 @@ from monitor.values import GpsFix
 
 SMOOTH_S = 1.0  # the place of the car is the mean of this long: takes the noise of single fixes off the length
 LOOK_BACK_S = 2.5  # over this long the positions show whether and where the car moves
-ENDS_S = 0.5  # of that, what is averaged at either end
+ENDS_S = 0.5  # of that, what is averaged at either end …
+SPAN_S = 1.0  # … and how far apart the ends must lie at least
 MOVES_ABOVE_MPS = 0.5  # drift of a standing receiver stays below (19 m in a minute at the worst); a walk is above
 STANDS_BELOW_MPS = 0.3
 CHORD_M = 1.0  # the way is summed in chords of at least this, or of two sigma of a receiver that knows its own
@@ -51,8 +52,8 @@ class Track:
         self._anchor: tuple[float, float] | None = None
         self._driven_m = 0.0  # up to the anchor
         self._shown_m: float | None = None
-        self._moves = False  # by the newest fix
-        self._moved = False  # by the one before
+        self._moves: bool | None = None  # by the newest fix; None: too little seen to tell
+        self._moved: bool | None = None  # by the one before
 
     @property
     def distance_m(self) -> float | None:
@@ -100,7 +101,7 @@ class Track:
         new = _mean(list(takewhile(lambda fix: fix[0] >= last_s - ENDS_S, reversed(self._fixes))))
         span_s = new[0] - old[0]
         east_m, north_m = new[1] - old[1], new[2] - old[2]
-        over_ground_mps = math.hypot(east_m, north_m) / span_s if span_s > ENDS_S else None
+        over_ground_mps = math.hypot(east_m, north_m) / span_s if span_s >= SPAN_S else None
         self._moved = self._moves
         if is_standing is not None:
             self._moves = not is_standing
@@ -118,6 +119,8 @@ class Track:
             self._mark(fix, at_s, is_jump)
             return
         ahead_m = math.hypot(east_m - self._anchor[0], north_m - self._anchor[1])
+        if self._moves is None:
+            return
         if not self._moves:
             if self._moved:
                 self._driven_m += ahead_m  # the rest of the way to the halt

@@ -1,0 +1,85 @@
+"""What the car's own diagnostics say: errors and stale components warn, warnings advise, each by its component.
+
+One alarm of each kind, with the components as its causes: a component that joins re-alarms an acknowledged one. Components
+no other check knows of are among them, so that nothing the car says of itself goes unsaid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from functools import partial
+
+from monitor.check import (
+    BRIEF_LETTERS,
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Sound,
+    absent,
+    fault,
+    ok,
+)
+from monitor.state import Snapshot
+from monitor.values import Component
+
+OK_LEVEL, WARN, ERROR, STALE = 0, 1, 2, 3  # diagnostic_msgs/DiagnosticStatus
+WORDS = {WARN: "warns", ERROR: "error", STALE: "stale"}
+NAMED = 3  # components in the text; the rest are counted
+
+
+def find(levels: Collection[int], snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
+    if snapshot.get("diagnostics") is None and "diagnostics" not in snapshot.link.published:
+        return absent("Diagnostics are not published")
+    components = snapshot.need("diagnostics").components
+    bad = [component for component in components if component.level in levels]
+    if not bad:
+        return ok(f"{len(components)} components report")
+    bad.sort(key=lambda component: (component.level != ERROR, component.name))
+    brief = bad[0].name if len(bad) == 1 else f"{len(bad)} parts"
+    return fault(
+        _text(bad),
+        brief=brief if len(f"FAULT {brief}") <= BRIEF_LETTERS else f"{len(bad)} part",
+        causes=tuple(sorted({component.name for component in bad})),
+    )
+
+
+def _text(bad: list[Component]) -> str:
+    told = [
+        f"{component.name[:60]} {WORDS[component.level]}{f': {component.message[:80]}' if component.message else ''}"
+        for component in bad[:NAMED]
+    ]
+    more = f"; and {len(bad) - NAMED} more" if len(bad) > NAMED else ""
+    return "; ".join(told) + more
+
+
+def _check(id: str, label: str, title: str, levels: Collection[int], priority: Priority) -> Check[Limits]:
+    is_warning = priority is Priority.WARNING
+    return Check(
+        id=id,
+        label=label,
+        tile="Diagnostics",
+        order=130,
+        alarm=AlarmSpec(
+            title=title,
+            priority=priority,
+            place=Place.SNACKBAR if is_warning else Place.LIST,
+            sound=Sound.MEDIUM if is_warning else Sound.LOW,
+            needs_ack=is_warning,
+            off_delay_s=3.0,  # three reports of a 1 Hz publisher
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="The car says so of itself: look at the component named.",
+        ),
+        limits=Limits,
+        find=partial(find, frozenset(levels)),
+        needs=frozenset({"diagnostics"}),
+    )
+
+
+CHECKS = (
+    _check("diagnostics_error", "Diagnostics", "Component in error or stale", (ERROR, STALE), Priority.WARNING),
+    _check("diagnostics_warn", "Diagnostics warnings", "Component warns", (WARN,), Priority.ADVISORY),
+)

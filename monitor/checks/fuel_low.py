@@ -1,0 +1,67 @@
+"""Is the fuel, or the charge, of the car running low?"""
+
+from __future__ import annotations
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+    threshold,
+    unknown,
+)
+from monitor.state import Snapshot
+
+
+class FuelLimits(Limits):
+    low_percent: float = threshold(10.0, "Fuel low below", unit="%", low=1.0, high=60.0, step=1.0)
+    deadband_percent: float = threshold(
+        2.0, "Fuel deadband", unit="%", low=0.0, high=10.0, step=0.5, help="Fuel sloshes: it clears this far above."
+    )
+
+
+def find(snapshot: Snapshot, limits: FuelLimits, was_active: bool) -> Finding:
+    reading = snapshot.get("fuel")
+    if reading is None and "fuel" not in snapshot.link.published:
+        return absent("Fuel is not published")
+    level = snapshot.need("fuel")
+    if level.unit != "%":
+        return unknown(f"Fuel is given in {level.unit or 'an unknown unit'}, not in percent of the tank", short="unit")
+    below = limits.low_percent + (limits.deadband_percent if was_active else 0.0)
+    text = f"{level.value:.0f} % left, low below {limits.low_percent:.0f} %"
+    measured = Quantity(label="Fuel", value=level.value, unit="%")
+    limit = Quantity(label="Low below", value=limits.low_percent, unit="%")
+    if level.value >= below:
+        return ok(text, measured=measured, limit=limit)
+    return fault(text, brief=f"{level.value:.0f} %", measured=measured, limit=limit, causes=("fuel",))
+
+
+CHECKS = (
+    Check(
+        id="fuel_low",
+        label="Fuel",
+        order=150,
+        alarm=AlarmSpec(
+            title="Fuel low",
+            priority=Priority.ADVISORY,
+            place=Place.LIST,
+            sound=Sound.LOW,
+            needs_ack=False,
+            on_delay_s=5.0,  # a full turn of a bend, while the fuel stands aslant
+            off_delay_s=10.0,
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="Plan the way back.",
+        ),
+        limits=FuelLimits,
+        find=find,
+        needs=frozenset({"fuel"}),
+    ),
+)

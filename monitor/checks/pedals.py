@@ -1,0 +1,74 @@
+"""Are brake and accelerator pressed at the same time?"""
+
+from __future__ import annotations
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    fault,
+    ok,
+    threshold,
+)
+from monitor.state import Snapshot
+
+DEADBAND_PERCENT = 0.4  # one quantum of the car's own figures, 100/255
+
+
+class PedalLimits(Limits):
+    pressed_percent: float = threshold(
+        2.0,
+        "Pedal counts as pressed",
+        unit="%",
+        low=0.5,
+        high=50.0,
+        step=0.5,
+        help="The pedals come in steps of 0.39 %: a limit of one step would chatter.",
+    )
+
+
+def find(snapshot: Snapshot, limits: PedalLimits, was_active: bool) -> Finding:
+    brake = snapshot.need("brake").percent
+    accelerator = snapshot.need("accelerator").percent
+    pressed = max(0.0, limits.pressed_percent - (DEADBAND_PERCENT if was_active else 0.0))
+    text = f"Brake {brake:.0f} %, accelerator {accelerator:.0f} %"
+    measured = Quantity(label="Both at least", value=min(brake, accelerator), unit="%")
+    limit = Quantity(label="Pressed above", value=limits.pressed_percent, unit="%")
+    if brake > pressed and accelerator > pressed:
+        return fault(
+            text,
+            brief=f"{brake:.0f}/{accelerator:.0f} %",
+            measured=measured,
+            limit=limit,
+            causes=("brake", "accelerator"),
+        )
+    return ok(text, measured=measured, limit=limit)
+
+
+CHECKS = (
+    Check(
+        id="pedals",
+        label="Pedals",
+        order=30,
+        alarm=AlarmSpec(
+            title="Brake and accelerator together",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.MEDIUM,
+            needs_ack=True,
+            on_delay_s=0.3,
+            off_delay_s=1.0,
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="Two controllers may be fighting over the car: be ready to take over.",
+        ),
+        limits=PedalLimits,
+        find=find,
+        needs=frozenset({"brake", "accelerator"}),
+    ),
+)
