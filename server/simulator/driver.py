@@ -19,6 +19,7 @@ from server.simulator.vehicle import LASER_AHEAD_M, WHEELBASE_M, Motion, MotionC
 Floats = npt.NDArray[np.float64]
 
 SLOW_ZONES = ((140.0, 205.0, 5.5), (370.0, 440.0, 6.5))  # stations in m and the speed there, past the parked cars
+ANSWER_S = 0.4  # the car answers to a command about so late
 STOP_FOR_S = 5.0  # short of the ten seconds after which a standing car is worth a word
 STANDING_BRAKING_MPS2 = 1.5
 HARD_BRAKING_MPS2 = 3.0
@@ -168,8 +169,7 @@ class Driver:
     ) -> float:
         if Order.STAND in orders:
             return 0.0
-        # the car answers about 0.4 s late
-        ahead = self.station_m + 0.4 * motion.speed_mps
+        ahead = self.station_m + ANSWER_S * motion.speed_mps
         plan = _plan_mps(temper)
         speed_mps = float(plan[int(ahead / STEP_M) % len(plan)])
         if Order.STEADY not in orders:
@@ -181,7 +181,9 @@ class Driver:
         if blocked_at_m is not None:
             gap_m = (blocked_at_m - self.station_m) % LENGTH_M - LASER_AHEAD_M
             if gap_m < LENGTH_M / 2:
-                speed_mps = min(speed_mps, _approach_mps(gap_m - KEPT_GAP_M, HARD_BRAKING_MPS2))
+                speed_mps = min(
+                    speed_mps, _approach_mps(gap_m - KEPT_GAP_M - ANSWER_S * motion.speed_mps, HARD_BRAKING_MPS2)
+                )
         if Order.HURRY not in orders:
             speed_mps = min(speed_mps, self._stop_line_mps(motion, now_s))
         return speed_mps

@@ -79,6 +79,11 @@ class Scenery:
         self._near: Floats = faces
         self._extra: Floats | None = None
 
+    @property
+    def faces(self) -> Floats:
+        """Every face there is: (faces, 2 ends, 2 coordinates) in the lap's metres."""
+        return self._all if self._extra is None else np.concatenate((self._all, self._extra))
+
     def put(self, faces: list[tuple[Point, Point]] | None) -> None:
         """Places one thing that was not there before, or takes it away again with None."""
         self._extra = np.array(faces) if faces else None
@@ -100,9 +105,9 @@ class Scenery:
         area = ahead[:, 0] * left[:, 1] - left[:, 0] * ahead[:, 1]
         side = beams.directions[0][beam] * (left[:, 1] - left[:, 0])[face]
         side -= beams.directions[1][beam] * (ahead[:, 1] - ahead[:, 0])[face]
-        with np.errstate(divide="ignore", invalid="ignore"):  # a face seen exactly edge-on
-            distance = area[face] / side
-        np.fmin.at(nearest, beam, distance)
+        is_edge_on = np.abs(side) < 1e-9  # such a face cannot be hit, and 0/0 is no distance
+        distance = np.where(is_edge_on, np.inf, area[face] / np.where(is_edge_on, 1.0, side))
+        np.minimum.at(nearest, beam, distance)
         nearest[nearest > farthest_m] = np.inf
         return nearest
 
