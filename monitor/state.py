@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Generic, Literal, TypeVar, overload
 
+from monitor.components import Components
 from monitor.headings import Headings
 from monitor.link import LinkFacts, Phase
 from monitor.motion import Slope, Standstill
@@ -208,6 +209,7 @@ class State:
         self._standstill = Standstill()
         self._track = Track()
         self._headings = Headings()
+        self._components = Components()
         self._link = LinkFacts()
         self._paused = False
 
@@ -224,6 +226,8 @@ class State:
         heard.count += 1
         heard.meter.receive(received_s)
         self._heard_s = received_s
+        if isinstance(value, Diagnostics):
+            value = self._components.merge(value, received_s)
         reading = Reading(
             value=value,
             received_s=received_s,

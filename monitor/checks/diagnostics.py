@@ -1,7 +1,7 @@
 """What the car's own diagnostics say: errors and stale components warn, warnings advise, each by its component.
 
-One alarm of each kind, with the components as its causes: a component that joins re-alarms an acknowledged one. Components
-no other check knows of are among them, so that nothing the car says of itself goes unsaid.
+One alarm of each kind, with the components as its causes: a component that joins re-alarms an acknowledged one.
+Components no other check knows of are among them, so that nothing the car says of itself goes unsaid.
 """
 
 from __future__ import annotations

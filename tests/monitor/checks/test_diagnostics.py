@@ -1,0 +1,59 @@
+"""Diagnostics: each level at its own alarm, each component a cause, texts that stay short."""
+
+from __future__ import annotations
+
+import pytest
+
+from monitor.values import Component, Diagnostics
+from tests.monitor.checks.known import ask, check_of, known
+
+
+def said(*rows: tuple[str, int]) -> Diagnostics:
+    return Diagnostics(components=tuple(Component(name=name, level=level, message="why") for name, level in rows))
+
+
+@pytest.mark.parametrize(
+    ("levels", "error", "warn"),
+    [
+        ((), "ok", "ok"),
+        ((0, 0), "ok", "ok"),
+        ((0, 1), "ok", "fault"),
+        ((0, 2), "fault", "ok"),
+        ((3,), "fault", "ok"),
+        ((1, 2, 3), "fault", "fault"),
+    ],
+    ids=str,
+)
+def test_verdict(levels: tuple[int, ...], error: str, warn: str) -> None:
+    snapshot = known(diagnostics=said(*((f"part {i}", level) for i, level in enumerate(levels))))
+    assert ask("diagnostics_error", snapshot).verdict == error
+    assert ask("diagnostics_warn", snapshot).verdict == warn
+
+
+def test_components_are_the_causes_and_the_worst_is_named_first() -> None:
+    finding = ask("diagnostics_error", known(diagnostics=said(("laser", 3), ("gps", 2), ("wheel", 0))))
+    assert finding.causes == ("gps", "laser")
+    assert finding.text == "gps error: why; laser stale: why"
+
+
+def test_many_components_are_counted() -> None:
+    finding = ask("diagnostics_error", known(diagnostics=said(*((f"part {i}", 2) for i in range(200)))))
+    assert finding.text.endswith("and 197 more")
+    assert len(finding.text) < 500
+    assert len(finding.brief) <= 20
+
+
+def test_a_long_name_does_not_break_the_tile() -> None:
+    finding = ask("diagnostics_error", known(diagnostics=said(("x" * 5000, 2))))
+    assert len(finding.brief) <= 20
+    assert len(finding.text) < 200
+
+
+def test_not_published_and_silent() -> None:
+    assert not ask("diagnostics_error", known()).applies
+    assert ask("diagnostics_error", known(age_s=2.0, diagnostics=said(("gps", 2)))).verdict == "unknown"
+
+
+def test_errors_interrupt_and_warnings_only_stand_in_the_list() -> None:
+    assert check_of("diagnostics_error").alarm.place == "snackbar"
+    assert check_of("diagnostics_warn").alarm.place == "list"
