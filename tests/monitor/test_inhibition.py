@@ -1,0 +1,78 @@
+"""The cause table: which alarm explains which, and for how long."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from monitor.alarm import Alarm
+from monitor.inhibition import GRACE_S, CauseTable
+from tests.monitor.test_alarm import SPEC
+
+TABLE = {"slow": ("stale",), "stale": ("silent",), "silent": ("lost",), "lost": (), "speed": ()}
+LOST = Alarm(id="lost", spec=SPEC, condition=True)
+GONE = replace(LOST, condition=False)
+
+
+def test_causes_of_causes_count_and_come_first() -> None:
+    table = CauseTable(TABLE)
+    assert table.order.index("lost") < table.order.index("silent") < table.order.index("stale")
+    assert table.inhibitors == {"stale", "silent", "lost"}
+    table.note(LOST, 0.0)
+    assert [table.holding(name, 0.0) for name in ("slow", "stale", "silent", "lost", "speed")] == [
+        ("lost",),
+        ("lost",),
+        ("lost",),
+        (),
+        (),
+    ]
+
+
+@pytest.mark.parametrize(("after_s", "holds"), [(0.0, True), (GRACE_S - 0.01, True), (GRACE_S, False)])
+def test_the_consequences_get_a_grace_to_go_too(after_s: float, holds: bool) -> None:
+    table = CauseTable(TABLE)
+    table.note(LOST, 10.0)
+    table.note(GONE, 10.0 + after_s)
+    assert bool(table.holding("stale", 10.0 + after_s)) == holds
+
+
+def test_it_holds_while_the_alarm_waits_out_its_own_delay() -> None:
+    table = CauseTable(TABLE)
+    table.note(replace(GONE, active=True), 10.0)
+    assert table.holding("stale", 10.0) == ("lost",)
+
+
+def test_what_never_happened_explains_nothing() -> None:
+    table = CauseTable(TABLE)
+    table.note(GONE, 10.0)
+    assert table.holding("stale", 10.0) == ()
+
+
+def test_a_clock_that_goes_back_does_not_make_the_grace_last_for_ever() -> None:
+    table = CauseTable(TABLE)
+    table.note(LOST, 1e6)
+    table.note(GONE, 5.0)
+    assert table.holding("stale", 5.0) == ("lost",)
+    table.note(GONE, 5.0 + GRACE_S)
+    assert table.holding("stale", 5.0 + GRACE_S) == ()
+
+
+def test_cleared_it_knows_nothing() -> None:
+    table = CauseTable(TABLE)
+    table.note(LOST, 10.0)
+    table.clear()
+    assert table.holding("stale", 10.0) == ()
+
+
+@pytest.mark.parametrize(
+    ("table", "reason"),
+    [
+        ({"a": ("b",), "b": ("a",)}, "circle: a → b → a"),
+        ({"a": ("a",)}, "circle"),
+        ({"a": ("b",)}, "b, which does not exist"),
+    ],
+)
+def test_a_table_that_makes_no_sense_is_refused(table: dict[str, tuple[str, ...]], reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        CauseTable(table)
