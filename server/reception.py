@@ -43,7 +43,10 @@ class Reception:
     unasked: int = 0  # messages on topics nobody subscribed to
 
     def tally(self, signal: str) -> Tally:
-        return self.by_signal.setdefault(signal, Tally())
+        found = self.by_signal.get(signal)
+        if found is None:
+            found = self.by_signal[signal] = Tally()
+        return found
 
     def read(self, source: Source, message: Any, note: str | None) -> Any | None:
         """The decoded value, or None where it was rejected; either way it is counted."""
