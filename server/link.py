@@ -1,24 +1,31 @@
 """The connection to one rosbridge: roslibpy on our own event loop, watched, and without its queues.
 
-The only file that imports roslibpy, or knows its inside. Written against roslibpy 2.1.0; each thing assumed of it
-is named
-in `ASSUMPTIONS` and held by a test of its own. What is replaced, and why:
+The only file that imports roslibpy, or knows its inside and that of autobahn below it. Written against the versions in
+`ASSUMPTIONS`; each thing assumed of them is named there and held by a test of its own. What is replaced, and why:
 
 - its transport runs a loop in a thread: `_OwnLoop` adopts the running one;
 - its client queues what is sent while down and delivers it on reconnecting: `send_now` refuses instead;
 - its topics register anew with every failed attempt: the table of subscriptions here is sent once an opening;
-- its back-off grows to an hour, its dialling has no time-out and cannot be abandoned: `_Dialler` does both;
-- a half-open link goes unseen: pings, and a watch on the time since the bridge was last heard.
+- its back-off grows to an hour, its dialling has no time-out, takes the first address that accepts and cannot be
+  abandoned: `_Dialler` is one task that does all of it;
+- a half-open link goes unseen, and autobahn's own pings come by the thousand or give up after 0.1 s, because its timers
+  round to whole seconds: `_BridgeProtocol` pings and watches by itself;
+- a message beyond the limit ends the connection, to come again with the next: it is skipped here.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import ipaddress
 import itertools
 import logging
 import os
+import socket as sockets
+import ssl
+import struct
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 os.environ.setdefault("ROSLIBPY_TRANSPORT", "asyncio")  # before anything lets txaio choose Twisted for the process
@@ -27,27 +34,42 @@ import roslibpy
 from roslibpy.comm.comm_asyncio import AsyncioRosBridgeClientFactory, AsyncioRosBridgeProtocol
 
 from server import frames, problems
-from server.address import Address, refuse_forbidden
+from server.address import Address, BadAddress, refuse_forbidden
 from server.problems import Problem
 
 log = logging.getLogger("catgraph.link")
+for _name in ("autobahn", "txaio", "roslibpy"):  # they tell each dropped connection; the operator hears it from us
+    logging.getLogger(_name).addHandler(logging.NullHandler())
+    logging.getLogger(_name).propagate = False
 
 ASSUMPTIONS = {
     "roslibpy": "2.1.0",
-    "factory": "AsyncioRosBridgeClientFactory dials in _connect_async; _schedule_reconnect and _open_connection repeat it",
-    "manager": "the factory takes its loop from `manager.loop` and asks a manager only for run()",
-    "protocol": "onOpen calls factory.ready(self), onClose factory.connection_lost(self), frames arrive in onMessage",
+    "manager": "the factory takes its loop from its manager; autobahn below it takes it from the argument `loop`",
+    "factory": "it calls _schedule_reconnect when a connection is lost, and dials nowhere but in _connect_async",
+    "protocol": "onOpen tells factory.ready, onClose factory.connection_lost; onClose comes once, opened or not",
+    "frames": "a message is onMessageBegin, of each frame onMessageFrameBegin, Data and End, then onMessageEnd",
+    "state": "state is STATE_OPEN from the handshake to the first close frame; sendMessage raises in any other",
+    "unread": "while shaking hands, what was received stands in `data`",
     "ros": "Ros.__init__ sets _id_counter, factory and is_connecting and then calls connect()",
 }
 
-PING_EVERY_S = 0.5
-PING_ANSWER_WITHIN_S = 1.1  # with the interval and autobahn's 0.2 s timer buckets: a dead link is dropped in ≤ 2.0 s
-DIAL_TIMEOUT_S = 4.0
+PING_EVERY_S = 0.25  # while nothing else comes
+SILENT_AFTER_S = 1.6  # the answer to a ping may take 1.3 s; a dead link is dropped, and said, within 2 s
+LATE_S = 0.1  # a look later than this says that we were held up ourselves
+LOOKUP_TIMEOUT_S = 4.0
+DIAL_TIMEOUT_S = 4.0  # over all addresses of a host, but at least a second for each
 HANDSHAKE_TIMEOUT_S = 3.0
+GOODBYE_S = 0.5
 FIRST_RETRY_S = 0.2
 LAST_RETRY_S = 2.0
 RETRY_GROWTH = 1.7
-MAX_MESSAGE_BYTES = 16 * 1024 * 1024  # a 100 000-beam cloud fits; a 40 MB message would stop the loop for a second
+STEADY_S = 2.0  # a connection that held this long was one; the next is tried for at once
+MAX_ADDRESSES = 4
+MAX_HANDSHAKE_BYTES = 64 * 1024
+MAX_MESSAGE_BYTES = (
+    16 * 1024 * 1024
+)  # a 100 000-beam cloud fits; reading a 40 MB message would stop the loop for a second
+MAX_SKIPPED_BYTES = 256 * 1024 * 1024  # a frame that claims more is no message, and would swallow all that follows
 MAX_PENDING_CALLS = 64
 
 
@@ -57,6 +79,14 @@ class LinkDown(ConnectionError):
 
 class CallFailed(RuntimeError):
     """The bridge answered a service call with a failure, or not in time."""
+
+
+class NoWebSocket(ConnectionError):
+    """The connection was taken, and the handshake failed; `answer` is how the other side's words began."""
+
+    def __init__(self, reason: str, answer: bytes) -> None:
+        super().__init__(reason)
+        self.answer = answer
 
 
 class LinkListener(Protocol):
@@ -81,12 +111,6 @@ class Subscription:
     queue_length: int = 0
 
 
-@dataclass(slots=True)
-class _Call:
-    future: asyncio.Future[Any]
-    timer: asyncio.TimerHandle | None = field(default=None)
-
-
 class _OwnLoop:
     """What roslibpy calls an event loop manager, around the loop that already runs."""
 
@@ -98,105 +122,165 @@ class _OwnLoop:
 
 
 class _BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
-    """One WebSocket to the bridge; hands whole frames to the link that owns it."""
+    """One WebSocket to the bridge: watched for silence, and handing whole messages to the link that owns it."""
 
-    def onOpen(self) -> None:
-        self._manual_disconnect = False
-        self.factory.ready(self)
-        self.factory.link._opened(self)
+    def connection_made(self, transport: asyncio.Transport) -> None:
+        self.settled = asyncio.Event()  # opened, or closed without
+        self.gone = asyncio.Event()
+        self.was_accepted = False  # by the link, when it opened
+        self.was_silent = False
+        self.message_data: list[bytes] = []
+        self.heard_s = self.factory.loop.time()
+        self._timer: asyncio.TimerHandle | None = None
+        super().connection_made(transport)
 
-    def onMessage(self, payload: bytes, isBinary: bool) -> None:
-        self.factory.link._frame(payload, isBinary)
+    def data_received(self, data: bytes) -> None:
+        self.heard_s = self.factory.loop.time()
+        self.factory.link._heard(self)
+        super().data_received(data)
 
     def _dataReceived(self, data: bytes) -> None:
-        self.factory.link._heard()
         super()._dataReceived(data)
+        if self.state == self.STATE_CONNECTING and len(self.data) > MAX_HANDSHAKE_BYTES:
+            self.failHandshake("it talks without end")
+
+    def onOpen(self) -> None:
+        super().onOpen()
+        self._look(self.factory.loop.time())
+        self.factory.link._opened(self)
+        self.settled.set()
 
     def onClose(self, wasClean: bool, code: int | None, reason: str | None) -> None:
-        self.factory.link._closed(self, code, reason or "")
+        if self._timer is not None:
+            self._timer.cancel()
         super().onClose(wasClean, code, reason)
+        self.factory.link._closed(self)
+        self.settled.set()
+        self.gone.set()
+
+    def onCloseFrame(self, code: int | None, reasonRaw: bytes | None) -> bool | None:
+        """The bridge says goodbye: it is answered, and not waited for."""
+        done: bool | None = super().onCloseFrame(code, reasonRaw)
+        if self._timer is not None and self.transport is not None:
+            self._timer.cancel()
+            self._timer = self.factory.loop.call_later(GOODBYE_S, self._closeConnection, True)
+            self.transport.close()
+        return done
+
+    def _closeConnection(self, abort: bool = False) -> None:
+        if self.transport is None:
+            return
+        if abort:  # else the system would go on delivering what it holds, long after it was true
+            with contextlib.suppress(OSError, TypeError, AttributeError):
+                self.transport.get_extra_info("socket").setsockopt(
+                    sockets.SOL_SOCKET, sockets.SO_LINGER, struct.pack("ii", 1, 0)
+                )
+        super()._closeConnection(abort)
+
+    def _look(self, due_s: float) -> None:
+        """Is the other side still there? Pings where it says nothing by itself, drops it where it does not answer."""
+        loop = self.factory.loop
+        now_s = loop.time()
+        quiet_s = now_s - self.heard_s
+        is_late = now_s - due_s > LATE_S  # what was heard meanwhile may still wait to be read
+        if quiet_s >= SILENT_AFTER_S and not is_late:
+            self.was_silent = True
+            self.dropConnection(abort=True)
+            return
+        if quiet_s >= PING_EVERY_S / 2:
+            self.sendPing()
+        next_s = max(min(now_s + PING_EVERY_S, self.heard_s + SILENT_AFTER_S + 0.001), now_s + 0.05)
+        self._timer = loop.call_at(next_s, self._look, next_s)
+
+    # A message is gathered here, so that one beyond the limit can be skipped where autobahn would hang up.
+
+    def onMessageFrameBegin(self, length: int) -> None:
+        super().onMessageFrameBegin(length)
+        if self.message_data_total_length > MAX_SKIPPED_BYTES:
+            self._fail_connection(1009, f"a message of {self.message_data_total_length // 2**20} MB")
+        elif self._is_too_large:
+            self.message_data.clear()
+
+    def onMessageFrameData(self, payload: bytes) -> None:
+        if not self._is_too_large:
+            super().onMessageFrameData(payload)
+
+    def onMessageEnd(self) -> None:
+        data, self.message_data = self.message_data, []
+        if self.failedByMe:
+            return
+        if self._is_too_large:
+            self.factory.link._junk(self, f"a message of more than {MAX_MESSAGE_BYTES // 2**20} MB")
+        else:
+            self.factory.link._frame(self, b"".join(data), self.message_is_binary)
+
+    @property
+    def _is_too_large(self) -> bool:
+        return bool(self.message_data_total_length > MAX_MESSAGE_BYTES)
 
 
 class _Dialler(AsyncioRosBridgeClientFactory):  # type: ignore[misc]
-    """Dials one address for ever, on our loop, with a time-out, until it is stopped."""
+    """Dials one address for ever, on our loop, until it is stopped: one task, so that there is never a second one."""
 
     protocol = _BridgeProtocol
-    initialDelay = FIRST_RETRY_S
-    maxDelay = LAST_RETRY_S
-    factor = RETRY_GROWTH
 
     def __init__(self, url: str, *, link: RosLink) -> None:
         self._manager = _OwnLoop()
         super(AsyncioRosBridgeClientFactory, self).__init__(url, loop=self._manager.loop)
         self._proto = None
-        self._proto_lock = _NoLock()  # one loop, one thread: nothing to lock
+        self._proto_lock = contextlib.nullcontext()  # one loop, one thread: nothing to lock
         self._stop = False
         self._retry_count = 0
-        self._reconnect_delay = self.initialDelay
+        self._reconnect_delay = FIRST_RETRY_S
         self.link = link
-        self._dialling: asyncio.Task[None] | None = None
-        self._waiting: asyncio.TimerHandle | None = None
-        # no permessage-deflate is offered: it would cost the car's computer more than the network
+        self._running: asyncio.Task[None] | None = None
+        self._hurry = asyncio.Event()
+        # No permessage-deflate is offered: it would cost the car's computer more than it saves the network.
         self.setProtocolOptions(
-            autoPingInterval=PING_EVERY_S,
-            autoPingTimeout=PING_ANSWER_WITHIN_S,
-            maxMessagePayloadSize=MAX_MESSAGE_BYTES,
-            maxFramePayloadSize=MAX_MESSAGE_BYTES,
-            openHandshakeTimeout=HANDSHAKE_TIMEOUT_S,
-            closeHandshakeTimeout=1,
+            openHandshakeTimeout=0,  # 0: not by autobahn's timers
+            closeHandshakeTimeout=0,
+            serverConnectionDropTimeout=0,
             tcpNoDelay=True,
             utf8validateIncoming=False,  # orjson refuses what is not UTF-8
             failByDrop=True,
         )
 
     def connect(self) -> None:
-        self._stop = False
-        self._open_connection()
-
-    def _open_connection(self) -> None:
-        self._waiting = None
-        if not self._stop and (self._dialling is None or self._dialling.done()):
-            self._dialling = self._manager.loop.create_task(self._connect_async(), name=f"dial {self.url}")
+        if self._running is None and not self._stop:
+            self._running = self._manager.loop.create_task(self._connect_async(), name=f"dial {self.url}")
 
     async def _connect_async(self) -> None:
-        try:
-            async with asyncio.timeout(DIAL_TIMEOUT_S):
-                await self.link._dial(self)
-        except (OSError, TimeoutError, ValueError) as error:
-            self.link._dial_failed(error)
-            self._schedule_reconnect()
+        delay_s = FIRST_RETRY_S
+        while True:
+            try:
+                connection = await self.link._dial(self)
+            except Exception as error:  # whatever it was, the next try must come
+                if not isinstance(error, (OSError, ValueError)):
+                    log.exception("dialling %s failed in an unforeseen way", self.url)
+                self.link._dial_failed(error)
+            else:
+                opened_s = self._manager.loop.time()
+                await connection.gone.wait()
+                if self._manager.loop.time() - opened_s >= STEADY_S:
+                    delay_s = FIRST_RETRY_S
+            self._hurry.clear()
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(delay_s):
+                    await self._hurry.wait()
+            delay_s = FIRST_RETRY_S if self._hurry.is_set() else min(delay_s * RETRY_GROWTH, LAST_RETRY_S)
 
     def _schedule_reconnect(self) -> None:
-        if self._stop:
-            return
-        delay = self._reconnect_delay
-        self._reconnect_delay = min(delay * self.factor, self.maxDelay)
-        self._waiting = self._manager.loop.call_later(delay, self._open_connection)
+        """Not by a timer: `_connect_async` goes round."""
 
     def retry_now(self) -> None:
         """Dials at once if it is waiting for its next try."""
-        self._reconnect_delay = self.initialDelay
-        if self._waiting is not None:
-            self._waiting.cancel()
-            self._open_connection()
+        self._hurry.set()
 
     def stop(self) -> None:
         """No further try, nothing left behind."""
         self._stop = True
-        if self._waiting is not None:
-            self._waiting.cancel()
-            self._waiting = None
-        if self._dialling is not None:
-            self._dialling.cancel()
-            self._dialling = None
-
-
-class _NoLock:
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, *_: object) -> None:
-        pass
+        if self._running is not None:
+            self._running.cancel()
 
 
 class _Ros(roslibpy.Ros):  # type: ignore[misc]
@@ -221,17 +305,20 @@ class RosLink:
         self._listener = listener
         self._now = now
         self._ros = _Ros(address.url, link=self)
-        self._socket: _BridgeProtocol | None = None
+        self._socket: _BridgeProtocol | None = None  # the open one
         self._table: dict[str, Subscription] = {}
-        self._calls: dict[str, _Call] = {}
+        self._calls: dict[str, asyncio.Future[Any]] = {}
         self._ids = itertools.count(1)
         self._stopped = False
+        self._faults: set[str] = set()  # told already
+        self._lookup: asyncio.Task[Any] | None = None
+        self._tls: ssl.SSLContext | None = None
 
     # -- for the session ---------------------------------------------------------------------------------------------
 
     @property
     def is_open(self) -> bool:
-        return self._socket is not None
+        return self._socket is not None and self._socket.state == self._socket.STATE_OPEN
 
     def start(self) -> None:
         self._ros.factory.connect()
@@ -240,28 +327,28 @@ class RosLink:
         self._ros.factory.retry_now()
 
     def stop(self) -> None:
-        """Ends the link for good. What was not yet sent is not sent."""
+        """Ends the link for good, and tells the listener nothing more. What was not yet sent is not sent."""
         self._stopped = True
         self._ros.factory.stop()
+        if self._lookup is not None:
+            self._lookup.cancel()
         self._fail_calls("the link was ended")
-        if self._socket is not None:
-            self._socket._manual_disconnect = True
-            self.abort()
+        self.abort()
 
     def abort(self) -> None:
         """Drops the connection without a closing handshake, so that nothing buffered is delivered."""
-        if self._socket is not None and self._socket.transport is not None:
-            self._socket.transport.abort()
+        if self._socket is not None:
+            self._socket.dropConnection(abort=True)
 
     def subscribe(self, wanted: Subscription) -> None:
         """Puts a row into the table; sent now if the link is open, and once at every opening."""
         previous = self._table.get(wanted.topic)
         if previous == wanted:
             return
-        if previous is not None and self.is_open:
-            self._send_row("unsubscribe", previous)
         self._table[wanted.topic] = wanted
         if self.is_open:
+            if previous is not None:
+                self._send_row("unsubscribe", previous)
             self._send_row("subscribe", wanted)
 
     def unsubscribe(self, topic: str) -> None:
@@ -279,125 +366,182 @@ class RosLink:
 
     def send_now(self, operation: dict[str, Any]) -> None:
         """Writes one rosbridge operation to the open connection. Raises LinkDown when there is none."""
-        if self._socket is None:
+        if self._socket is None or not self.is_open:
             raise LinkDown("not sent: no connection to the car")
         self._socket.sendMessage(frames.encode(operation), isBinary=False)
 
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
-        """The values a service answers. Raises LinkDown, or CallFailed with the bridge's words."""
+        """The values a service answers. Raises LinkDown, also where the link breaks before the answer, or CallFailed
+        with the bridge's words."""
         if len(self._calls) >= MAX_PENDING_CALLS:
             raise CallFailed("too many calls are unanswered")
         identity = f"call:{service}:{next(self._ids)}"
-        loop = asyncio.get_running_loop()
-        call = _Call(loop.create_future())
+        answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         self.send_now({"op": "call_service", "id": identity, "service": service, "args": arguments or {}})
-        self._calls[identity] = call
+        self._calls[identity] = answer
         try:
             async with asyncio.timeout(timeout_s):
-                return await call.future
+                return await answer
         except TimeoutError:
             raise CallFailed(f"{service} did not answer within {timeout_s:g} s") from None
         finally:
             self._calls.pop(identity, None)
 
+    # -- dialling ----------------------------------------------------------------------------------------------------
+
+    async def _dial(self, factory: _Dialler) -> _BridgeProtocol:
+        """Resolves, refuses what is never dialled, and dials exactly the addresses that were looked at, in turn, until
+        one of them shakes hands. Raises what tells most of why none did."""
+        self.attempts += 1
+        found = await self._addresses()
+        failures: list[Exception] = []
+        for ip in found:
+            try:
+                refuse_forbidden(ip)
+                return await self._dial_one(factory, ip, max(DIAL_TIMEOUT_S / len(found), 1.0))
+            except (OSError, ValueError) as error:
+                failures.append(error)
+        raise min(failures, key=_says_little, default=OSError("the host has no address"))
+
+    async def _addresses(self) -> list[str]:
+        host = self.address.host
+        with contextlib.suppress(ValueError):
+            return [str(ipaddress.ip_address(host))]
+        if self._lookup is None or self._lookup.done():  # one that hangs is waited for again, not started again
+            self._lookup = asyncio.ensure_future(_look_up(host, self.address.port))
+            self._lookup.add_done_callback(lambda task: task.cancelled() or task.exception())
+        try:
+            async with asyncio.timeout(LOOKUP_TIMEOUT_S):
+                found = await asyncio.shield(self._lookup)
+        except TimeoutError:
+            raise sockets.gaierror(sockets.EAI_AGAIN, "no name server answers") from None
+        return list(dict.fromkeys(str(sockaddr[0]) for *_, sockaddr in found))[:MAX_ADDRESSES]
+
+    async def _dial_one(self, factory: _Dialler, ip: str, within_s: float) -> _BridgeProtocol:
+        loop = asyncio.get_running_loop()
+        secure: dict[str, Any] = {}
+        if self.address.secure:
+            self._tls = self._tls or ssl.create_default_context()
+            secure = {"ssl": self._tls, "server_hostname": self.address.host}
+        async with asyncio.timeout(within_s):
+            _, connection = await loop.create_connection(factory, ip, self.address.port, **secure)
+        assert isinstance(connection, _BridgeProtocol)
+        reason = "timeout"
+        try:
+            async with asyncio.timeout(HANDSHAKE_TIMEOUT_S):
+                await connection.settled.wait()
+            reason = str(connection.wasNotCleanReason)
+        except TimeoutError:
+            pass
+        finally:
+            if connection is not self._socket:
+                connection.dropConnection(abort=True)
+        if not connection.was_accepted:
+            raise NoWebSocket(reason, bytes(connection.data[:2000]))
+        return connection
+
+    def _dial_failed(self, error: Exception) -> None:
+        if isinstance(error, NoWebSocket):
+            problem = problems.of_handshake(self.address, str(error), error.answer)
+        else:
+            problem = problems.of_dial_error(error, self.address)
+        self._tell(self._listener.dial_failed, problem)
+
     # -- from the protocol -------------------------------------------------------------------------------------------
 
-    async def _dial(self, factory: _Dialler) -> None:
-        """Resolves, refuses what is never dialled, and dials exactly the addresses that were looked at."""
-        self.attempts += 1
-        loop = asyncio.get_running_loop()
-        found = await loop.getaddrinfo(self.address.host, self.address.port, type=1)
-        last: Exception = OSError("no address")
-        for _, _, _, _, sockaddr in dict.fromkeys(found):
-            try:
-                refuse_forbidden(str(sockaddr[0]))
-                tls: dict[str, Any] = {}
-                if self.address.secure:
-                    import ssl
-
-                    tls = {"ssl": ssl.create_default_context(), "server_hostname": self.address.host}
-                await loop.create_connection(factory, str(sockaddr[0]), self.address.port, **tls)
-                return
-            except (OSError, ValueError) as error:
-                last = error
-        raise last
-
-    def _dial_failed(self, error: BaseException) -> None:
-        if not self._stopped:
-            self._listener.dial_failed(problems.of_dial_error(error, self.address))
-
-    def _heard(self) -> None:
-        self.heard_s = self._now()
+    def _heard(self, socket: _BridgeProtocol) -> None:
+        if socket is self._socket:
+            self.heard_s = self._now()
 
     def _opened(self, socket: _BridgeProtocol) -> None:
-        if self._stopped:
-            socket.transport.abort()
+        if self._stopped or self._socket is not None:
+            socket.dropConnection(abort=True)
             return
         self._socket = socket
+        socket.was_accepted = True
+        self.heard_s = self._now()
         for row in self._table.values():
             self._send_row("subscribe", row)
-        self._listener.link_opened()
+        self._tell(self._listener.link_opened)
 
-    def _closed(self, socket: _BridgeProtocol, code: int | None, reason: str) -> None:
-        was_open = self._socket is socket
-        if was_open:
-            self._socket = None
+    def _closed(self, socket: _BridgeProtocol) -> None:
+        if socket is not self._socket:
+            return  # it never opened: whoever dialled it says so
+        self._socket = None
         self._fail_calls("the connection to the bridge was lost")
-        if self._stopped:
-            return
-        if not was_open:
-            self._listener.dial_failed(self._handshake_problem(reason))
-        elif "ping timeout" in reason:
-            self._listener.link_closed(problems.bridge_silent(self.address))
+        if socket.was_silent:
+            problem = problems.bridge_silent(self.address)
+        elif socket.failedByMe:
+            problem = problems.closed_by_bridge(self.address, str(socket.wasNotCleanReason))
         else:
-            self._listener.link_closed(problems.closed_by_bridge(self.address, reason))
+            problem = problems.closed_by_bridge(self.address, socket.remoteCloseReason or "")
+        self._tell(self._listener.link_closed, problem)
 
-    def _handshake_problem(self, reason: str) -> Problem:
-        if "upgrade failed" in reason or "invalid" in reason.lower() or "HTTP" in reason:
-            return problems.not_rosbridge(self.address, "It answers, but not as a WebSocket.")
-        if "timeout" in reason:
-            return problems.not_rosbridge(self.address, "It accepts the connection and then says nothing.")
-        return problems.not_rosbridge(self.address, "It closes the connection at once; a secure one wants wss://.")
+    def _junk(self, socket: _BridgeProtocol, why: str) -> None:
+        if socket is self._socket:
+            self._tell(self._listener.junk_received, why)
 
-    def _frame(self, payload: bytes, is_binary: bool) -> None:
+    def _frame(self, socket: _BridgeProtocol, payload: bytes, is_binary: bool) -> None:
+        if socket is not self._socket:
+            return  # stopped, or dropped: what is still in the pipe is no news
         try:
             operation, note = frames.decode(payload, is_binary)
         except frames.Unreadable as error:
-            self._listener.junk_received(str(error))
+            self._junk(socket, str(error))
             return
         match operation.get("op"):
             case "publish":
                 topic = operation.get("topic")
-                if isinstance(topic, str) and "msg" in operation:
-                    self._listener.message_received(topic, operation["msg"], note)
-                else:
-                    self._listener.junk_received("a publish without topic or msg")
+                if not isinstance(topic, str) or "msg" not in operation:
+                    self._junk(socket, "a publish without topic or msg")
+                elif not self._tell(self._listener.message_received, topic, operation["msg"], note):
+                    self._junk(socket, "a message on which catgraph itself stumbled")
             case "service_response":
                 self._answered(operation)
             case "status":
-                self._listener.status_received(str(operation.get("level"))[:20], str(operation.get("msg"))[:500])
+                level, text = _words(operation.get("level"), 20), _words(operation.get("msg"), 500)
+                self._tell(self._listener.status_received, level, text)
             case "fragment":
-                self._listener.junk_received("a fragment, which was not asked for")
+                self._junk(socket, "a fragment, which was not asked for")
             case _:
-                self._listener.junk_received("an operation that rosbridge does not have")
+                self._junk(socket, "an operation that rosbridge does not have")
 
     def _answered(self, operation: dict[str, Any]) -> None:
-        call = self._calls.get(str(operation.get("id")))
-        if call is None or call.future.done():
+        identity = operation.get("id")
+        answer = self._calls.get(identity) if isinstance(identity, str) else None
+        if answer is None or answer.done():
             return  # late: the caller has given up
         if operation.get("result") is False:
-            call.future.set_exception(CallFailed(str(operation.get("values"))[:300]))
+            answer.set_exception(CallFailed(_words(operation.get("values"), 300)))
         else:
-            call.future.set_result(operation.get("values"))
+            answer.set_result(operation.get("values"))
+
+    def _tell(self, listener: Callable[..., None], *what: Any) -> bool:
+        """Tells the listener, unless stopped; False where it stumbled.
+
+        A fault of its own costs this one message and not the link: the next message of the kind would find the same
+        fault, and the operator would be blind to all the others.
+        """
+        if self._stopped:
+            return True
+        try:
+            listener(*what)
+        except Exception as error:
+            fault = f"{listener.__name__}: {type(error).__name__}"
+            if fault not in self._faults:
+                self._faults.add(fault)
+                log.exception("%s, told once, on what came from %s", fault, self.address.shown)
+            return False
+        return True
 
     def _fail_calls(self, why: str) -> None:
-        for call in list(self._calls.values()):
-            if not call.future.done():
-                call.future.set_exception(CallFailed(why))
+        for answer in list(self._calls.values()):
+            if not answer.done():
+                answer.set_exception(LinkDown(why))
 
     def _send_row(self, operation: str, row: Subscription) -> None:
-        message: dict[str, Any] = {"op": operation, "id": f"{operation}:{row.topic}", "topic": row.topic}
-        message["id"] = f"subscribe:{row.topic}"  # the same at both ends: unsubscribing names the subscription
+        # The same id at both ends: unsubscribing names the subscription.
+        message: dict[str, Any] = {"op": operation, "id": f"subscribe:{row.topic}", "topic": row.topic}
         if operation == "subscribe":
             if row.type is not None:
                 message["type"] = row.type
@@ -407,3 +551,17 @@ class RosLink:
                 "queue_length": row.queue_length,
             }
         self.send_now(message)
+
+
+async def _look_up(host: str, port: int) -> Any:
+    return await asyncio.get_running_loop().getaddrinfo(host, port, type=sockets.SOCK_STREAM)
+
+
+def _says_little(error: Exception) -> int:
+    """Of several failures the most telling is told: the farther a dial came, the more it tells."""
+    kinds = (NoWebSocket, ssl.SSLError, ConnectionRefusedError, ConnectionError, TimeoutError, OSError, BadAddress)
+    return next((rank for rank, kind in enumerate(kinds) if isinstance(error, kind)), len(kinds))
+
+
+def _words(value: Any, limit: int) -> str:
+    return value[:limit] if isinstance(value, str) else "" if value is None else f"({type(value).__name__})"
