@@ -1,7 +1,7 @@
 // The first screen: where the car is, and what this phone must allow before its alarms can be heard.
 
 import { openPreferences } from './preferences.js';
-import { closeSheet, mountSheet, openSheet } from './sheet.js';
+import { closeSheet, openSheet } from './sheet.js';
 import { field, html, icon, listen, need, setAttribute, setText, setWords, show } from './dom.js';
 import { age } from './words.js';
 
@@ -74,11 +74,11 @@ export function mount(root, store, page) {
   let asked_ms = -Infinity;
   let isTyped = false;
   let isBusy = false;
+  let wasSilent = false;
   let shownFound = '';
   input.value = addresses()[0] ?? '';
 
   const stops = [
-    mountSheet(historySheet),
     listen(at('form'), 'submit', (event) => {
       event.preventDefault();
       connect();
@@ -192,8 +192,8 @@ export function mount(root, store, page) {
     const isSame = session?.address ? bare(session.address) === bare(input.value.trim()) : false;
     setAttribute(go, 'data-busy', isDialling && (isSame || isBusy));
     setWords(go, isDialling && (isSame || isBusy) ? `Connecting ${age(frame?.link.trying_for_s ?? 0)} s` : isBack() ? 'Back to monitoring' : 'Connect and arm alarms');
-    if (store.isSilent && !says.textContent) complain('The server does not answer; this page keeps trying.');
-    else if (!store.isSilent && says.textContent?.startsWith('The server does not answer')) complain('');
+    if (store.isSilent !== wasSilent) complain(store.isSilent ? 'The server does not answer; this page keeps trying.' : '');
+    wasSilent = store.isSilent;
     const { arms } = page.arming;
     for (const what of /** @type {const} */ (['sound', 'screen', 'position'])) {
       const words = armWords(what, arms[what]);

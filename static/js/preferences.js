@@ -1,7 +1,7 @@
 // Preferences of this phone: so far the theme. They change nothing on the server.
 
 import { listen, need } from './dom.js';
-import { mountSheet, openSheet } from './sheet.js';
+import { openSheet } from './sheet.js';
 
 const sheet = () => /** @type {HTMLDialogElement} */ (need(document, '#sheet-preferences'));
 
@@ -17,10 +17,10 @@ export function mount() {
     for (const key of keys) key.setAttribute('aria-pressed', String(key.dataset['themeKey'] === now));
   };
   draw();
-  const stops = [mountSheet(sheet()), ...keys.map((key) => listen(key, 'click', () => {
+  const stops = keys.map((key) => listen(key, 'click', () => {
     choose(key.dataset['themeKey'] ?? 'phone');
     draw();
-  }))];
+  }));
   return () => stops.forEach((stop) => stop());
 }
 

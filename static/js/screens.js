@@ -3,7 +3,7 @@
 import { mount as mountLog } from './log.js';
 import { mount as mountSignals } from './signals.js';
 import { openPreferences } from './preferences.js';
-import { mountSheet, openSheet, closeSheet } from './sheet.js';
+import { closeSheet, openSheet } from './sheet.js';
 import { field, html, listen, need, setText, show, words } from './dom.js';
 import { fixed } from './words.js';
 
@@ -37,7 +37,6 @@ export class Screens {
     this.onChange = onChange;
     this.menu = /** @type {HTMLDialogElement} */ (need(document, '#sheet-menu'));
     this.stops = [
-      mountSheet(this.menu),
       listen(field(root, 'menu'), 'click', () => openSheet(this.menu)),
       listen(field(root, 'back'), 'click', () => this.show(null)),
       listen(field(root, 'link'), 'click', () => this.show('signals')),

@@ -1,6 +1,6 @@
 // Opens and closes the sheets the operator asked for. Alarms take precedence: see dialogs.js.
 
-import { field, listen } from './dom.js';
+import { field, listen, need } from './dom.js';
 
 /** @param {HTMLDialogElement} sheet */
 export function openSheet(sheet) {
@@ -23,16 +23,14 @@ export function isAsked(sheet) {
   return ASKED.includes(sheet.id);
 }
 
-/**
- * A sheet closes by its own key, by Escape or back (the browser's doing), and by a press outside of it.
- * @param {HTMLDialogElement} sheet
- */
-export function mountSheet(sheet) {
-  const stops = [
+/** Each closes by its own key, by Escape or back (the browser's doing), and by a press outside of it. */
+export function mountSheets() {
+  const sheets = ASKED.map((id) => /** @type {HTMLDialogElement} */ (need(document, `#${id}`)));
+  const stops = sheets.flatMap((sheet) => [
     listen(field(sheet, 'no'), 'click', () => sheet.close()),
     listen(sheet, 'click', (event) => {
       if (event.target === sheet && event.clientY < sheet.getBoundingClientRect().top) sheet.close();
     }),
-  ];
+  ]);
   return () => stops.forEach((stop) => stop());
 }

@@ -44,6 +44,7 @@ def signal(label: str, kind: str | None, value: Json | None, **more: Any) -> Jso
 
 def live() -> Json:
     """The state the pictures of the design show: driving at 4.2 m/s with an object 12.4 m ahead."""
+    diagnostics = "diagnostic_msgs/DiagnosticArray"
     twist, wrench, number = "geometry_msgs/Twist", "geometry_msgs/Wrench", "std_msgs/Float64"
     return {
         "kind": "state", "seq": 1, "vehicle": "car",
@@ -63,7 +64,7 @@ def live() -> Json:
             "brake": signal("Brake", wrench, {"percent": 0.0}, age_s=0.04),
             "accelerator": signal("Accelerator", wrench, {"percent": 14.1}, age_s=0.05),
             "steering": signal("Steering", wrench, {"percent": -4.0}, age_s=0.04),
-            "distance": signal("Nearest distance", number, {"distance_m": 12.4, "none_in_range": False}, hz=74.8, age_s=0),
+            "distance": signal("Nearest distance", number, {"distance_m": 12.4, "none_in_range": False}, hz=74.8),
             "bearing": signal("Nearest angle", number, {"bearing_rad": -0.052}, hz=74.8, age_s=0.01),
             "odometry": signal("Odometry", "nav_msgs/Odometry", {"speed_mps": 4.19}),
             "position": signal(
@@ -76,7 +77,7 @@ def live() -> Json:
                 {"beams": 181, "usable": 164, "nearest_m": 3.2, "nearest_bearing_rad": 1.5, "frame_id": "laser"},
                 hz=75.0,
             ),
-            "diagnostics": signal("Diagnostics", "diagnostic_msgs/DiagnosticArray", {"worst": 0, "components": []}, hz=1.0),
+            "diagnostics": signal("Diagnostics", diagnostics, {"worst": 0, "components": []}, hz=1.0),
             "command": signal("Command", None, None),
             "fuel": signal("Fuel", None, None),
         },
@@ -218,7 +219,7 @@ class Canned:
         """Serves while the block runs; gives the address."""
         server = uvicorn.Server(uvicorn.Config(self.app, port=0, log_level="warning", ws="websockets-sansio"))
         task = asyncio.create_task(server.serve())
-        while not server.started:
+        while not server.started:  # noqa: ASYNC110  # uvicorn has no event for it
             await asyncio.sleep(0.02)
         try:
             yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"

@@ -247,23 +247,26 @@ async def take(browser: Browser, name: str, theme: str, size: dict[str, int] | N
     return path
 
 
-async def main(names: list[str]) -> None:
+async def take_all(names: list[str], fonts: Path) -> None:
     """All pictures, or those whose names are given."""
+    async with async_playwright() as playwright:
+        browser = await playwright.chromium.launch(
+            executable_path=find_chromium(), args=[*FLAGS], env={**os.environ, "FONTCONFIG_FILE": str(fonts)}
+        )
+        for name in names or SCENES:
+            for theme in ("dark", "light"):
+                print(await take(browser, name, theme))
+        await browser.close()
+
+
+def main(names: list[str]) -> None:
+    """Set up the fonts, then take the pictures."""
     OUT.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="catgraph-fonts-") as folder:
         fonts = Path(folder, "fonts.conf")
         fonts.write_text(FONTS.format(cache=Path(folder, "cache")), encoding="utf-8")
-        async with async_playwright() as playwright:
-            browser = await playwright.chromium.launch(
-                executable_path=find_chromium(),
-                args=[*FLAGS, "--autoplay-policy=user-gesture-required"],
-                env={**os.environ, "FONTCONFIG_FILE": str(fonts)},
-            )
-            for name in names or SCENES:
-                for theme in ("dark", "light"):
-                    print(await take(browser, name, theme))
-            await browser.close()
+        asyncio.run(take_all(names, fonts))
 
 
 if __name__ == "__main__":
-    asyncio.run(main(sys.argv[1:]))
+    main(sys.argv[1:])

@@ -1,0 +1,77 @@
+"""A real Chromium at the size of a phone, with touch, for the tests of the page."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Page, async_playwright, expect
+
+from tests.chromium import FLAGS
+
+PHONE: dict[str, Any] = {
+    "viewport": {"width": 412, "height": 915},
+    "device_scale_factor": 1,  # a quarter of the pixels for a machine without a graphics card
+    "has_touch": True,
+    "is_mobile": True,
+    "permissions": ["geolocation"],
+    "geolocation": {"latitude": 32.2319, "longitude": -110.9501},
+}
+expect.set_options(timeout=8000)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Every test here but those of the plain functions drives a browser, on one event loop a module."""
+    here = Path(__file__).parent
+    for item in items:
+        if here in item.path.parents:
+            item.add_marker(pytest.mark.browser)
+            item.add_marker(pytest.mark.asyncio(loop_scope="module"), append=False)
+
+
+@pytest_asyncio.fixture(loop_scope="module", scope="module")
+async def browser(chromium: str) -> AsyncIterator[Browser]:
+    async with async_playwright() as playwright:
+        browser = await playwright.chromium.launch(executable_path=chromium, args=list(FLAGS))
+        yield browser
+        await browser.close()
+
+
+class Phone:
+    """A phone with the page open, and what its console said."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.complaints: list[str] = []
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("console", lambda said: self.complaints.append(said.text) if said.type in ("error", "warning") else None)
+
+    async def open(self, address: str) -> None:
+        await self.page.goto(address)
+
+    def f(self, name: str, root: str = "#monitor") -> Any:
+        """A field of the page by its name in the templates."""
+        return self.page.locator(f'{root} [data-f="{name}"]').first
+
+    async def live(self, timeout: float = 10_000) -> None:
+        """Waits until Home shows live values."""
+        await expect(self.f("word")).to_have_text("Live", timeout=timeout)
+        await expect(self.f("veil")).not_to_have_attribute("data-on", re.compile("."), timeout=timeout)
+
+    async def speed(self) -> str:
+        return str(await self.page.locator(".gauge .speed").text_content())
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def phone(browser: Browser) -> AsyncIterator[Phone]:
+    """A fresh phone; at the end its console must be clean but for the lost connections a test made."""
+    context = await browser.new_context(**PHONE)
+    phone = Phone(await context.new_page())
+    yield phone
+    await context.close()
+    lost = re.compile(r"WebSocket connection to|Failed to load resource: net::ERR_(CONNECTION|EMPTY)|ERR_CONNECTION")
+    assert [said for said in phone.complaints if not lost.search(said)] == []

@@ -1,0 +1,114 @@
+"""Servers, bridges and cars as the processes they are in the field: started, frozen, killed, started again."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import re
+import signal
+import socket
+import sys
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+
+class Process:
+    """One `python -m server …`; `address` is what it printed."""
+
+    def __init__(self, *arguments: str) -> None:
+        self._arguments = arguments
+        self._process: asyncio.subprocess.Process | None = None
+        self._reader: asyncio.Task[None] | None = None
+        self.address = ""
+
+    async def start(self) -> Process:
+        """Starts it and waits until it says its address."""
+        self._process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "server", *self._arguments),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.DEVNULL,
+            env={key: value for key, value in os.environ.items() if key != "PYTHONASYNCIODEBUG"},
+        )
+        out = self._process.stdout
+        assert out is not None
+        async with asyncio.timeout(30):
+            while True:
+                line = (await out.readline()).decode()
+                assert line, f"{self._arguments} ended before it said its address"
+                found = re.search(r"(?:ws|http)://[\d.]+:\d+", line)
+                if found:
+                    self.address = found.group()
+                    break
+        self._reader = asyncio.create_task(self._drain(out))
+        return self
+
+    @property
+    def shown(self) -> str:
+        """`host:port`."""
+        return self.address.split("//")[1]
+
+    async def type(self, line: str) -> None:
+        """Types a line on its terminal."""
+        assert self._process is not None
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{line}\n".encode())
+        await self._process.stdin.drain()
+
+    def freeze(self) -> None:
+        """As a process that is stopped: its port still accepts, nothing answers."""
+        self._send(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        self._send(signal.SIGCONT)
+
+    async def kill(self) -> None:
+        """At once, without a farewell."""
+        assert self._process is not None
+        with contextlib.suppress(ProcessLookupError):
+            self._process.kill()
+        await self._process.wait()
+        if self._reader is not None:
+            self._reader.cancel()
+
+    def _send(self, what: signal.Signals) -> None:
+        assert self._process is not None
+        self._process.send_signal(what)
+
+    @staticmethod
+    async def _drain(out: asyncio.StreamReader) -> None:
+        while await out.readline():
+            pass
+
+
+@contextlib.asynccontextmanager
+async def running(*arguments: str) -> AsyncIterator[Process]:
+    """A process for the length of the block."""
+    process = await Process(*arguments).start()
+    try:
+        yield process
+    finally:
+        await process.kill()
+
+
+def server(data: Path, vehicle: str | None = None, port: int = 0) -> tuple[str, ...]:
+    """Arguments of a server; with a `vehicle` it dials from the start."""
+    dial = ("--vehicle", f"car={vehicle}") if vehicle else ()
+    return ("serve", "--port", str(port), "--data", str(data), *dial)
+
+
+def simulate(*options: str, port: int = 0) -> tuple[str, ...]:
+    return ("simulate", "--port", str(port), *options)
+
+
+def replay(path: Path, *options: str, port: int = 0) -> tuple[str, ...]:
+    return ("replay", str(path), "--port", str(port), "--loop", *options)
+
+
+def free_port() -> int:
+    """A port that nothing listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        found: int = probe.getsockname()[1]
+        return found
