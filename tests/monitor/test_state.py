@@ -101,7 +101,8 @@ def test_a_snapshot_never_changes() -> None:
 def test_every_signal_can_be_received_and_read_back(signal: str) -> None:
     state = State()
     assert signal in state.receive(signal, VALUES[signal], 1.0)
-    assert state.snapshot(1.0).need(signal) is VALUES[signal]
+    found = state.snapshot(1.0).need(signal)
+    assert found is VALUES[signal] or found == VALUES[signal]  # diagnostics are merged anew
 
 
 @pytest.mark.parametrize(
