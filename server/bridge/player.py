@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncGenerator, Callable, Iterable, Iterator
+from collections.abc import AsyncGenerator, Awaitable, Callable, Iterable, Iterator
 from itertools import islice
 from typing import TypeVar
 
@@ -24,6 +24,7 @@ async def play(
     *,
     rate: float = 1.0,
     clock: Callable[[], float] | None = None,
+    sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
     on_end: Callable[[], None] | None = None,
     on_message: Callable[[Message], None] | None = None,
     ahead: int = 0,
@@ -31,9 +32,10 @@ async def play(
     """Publishes every message when it is due, `rate` times as fast as it happened, and answers how many.
 
     All dues are reckoned from the one instant of the first message, so lateness never adds up: what is late is sent at
-    once, in order, until time is caught up with. The topics must have been advertised. `clock` tells seconds, monotonic
-    where none is given. `ahead`: so many messages are fetched in a thread before they are due, for sources that read
-    files; 0 fetches each only when the one before it is out, for sources that react to what happens.
+    once, in order, until time is caught up with. The topics must have been advertised. `clock` tells seconds (monotonic
+    where none is given) and `sleep` waits on it. `ahead`: so many messages are fetched in a thread before they are due,
+    for sources that read files; 0 fetches each only when the one before it is out, for sources that react to what
+    happens.
     """
     if not rate > 0:
         raise ValueError("the rate must be above 0")
@@ -47,7 +49,7 @@ async def play(
                 first_at_s, began_s = message.at_s, tell()
             wait_s = began_s + (message.at_s - first_at_s) / rate - tell()
             if wait_s > SOON_S:
-                await asyncio.sleep(wait_s)
+                await sleep(wait_s)
                 turn_ends = time.monotonic() + TURN_S
             elif time.monotonic() > turn_ends:
                 await asyncio.sleep(0)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from server.bridge.player import play
+from server.bridge.player import SOON_S, play
 from server.bridge.server import RosBridge
 from server.source import Message
 from tests.server.bridge.probe import Probe
@@ -26,46 +26,55 @@ def numbers(bridge: RosBridge) -> RosBridge:
     return bridge
 
 
+class Watch:
+    """A clock of the test's own, on which every sleep lasts a little too long."""
+
+    def __init__(self, late_s: float) -> None:
+        self.now_s = 1000.0
+        self.late_s = late_s
+
+    def __call__(self) -> float:
+        return self.now_s
+
+    async def sleep(self, wait_s: float) -> None:
+        self.now_s += wait_s + self.late_s
+        await asyncio.sleep(0)
+
+
 @pytest.mark.parametrize("ahead", [0, 16])
-async def test_messages_come_in_order_at_their_spacing(numbers: RosBridge, probe: Probe, ahead: int) -> None:
+@pytest.mark.parametrize("rate", [1.0, 10.0])
+async def test_messages_come_when_they_are_due_and_lateness_never_adds_up(
+    numbers: RosBridge, probe: Probe, ahead: int, rate: float
+) -> None:
     await probe.subscribe("/n")
-    lateness: list[float] = []
-    began = time.monotonic()
-    played = asyncio.ensure_future(
-        play(
-            drive(100),
-            numbers,
-            ahead=ahead,
-            on_message=lambda m: lateness.append(time.monotonic() - began - m.message["data"] * 0.01),
-        )
-    )
-    heard = [(await probe.hear())["msg"]["data"] for _ in range(100)]
-    assert await played == 100
-    assert heard == list(range(100))
-    late = sorted(lateness)
-    assert late[0] > -0.001  # never early
-    assert late[50] < 0.008
-    assert lateness[-1] < 0.05  # and lateness does not add up
+    watch, came_s = Watch(late_s=0.0009), []
 
+    def note(message: Message) -> None:
+        came_s.append(watch.now_s - 1000.0)
 
-async def test_the_rate_shortens_the_spacing(numbers: RosBridge) -> None:
-    began = time.monotonic()
-    await play(drive(100), numbers, rate=10.0)
-    assert 0.095 <= time.monotonic() - began < 0.3
+    await play(drive(200), numbers, rate=rate, clock=watch, sleep=watch.sleep, ahead=ahead, on_message=note)
+    due_s = [n * 0.01 / rate for n in range(200)]
+    assert all(-SOON_S <= came - due <= 0.0015 for came, due in zip(came_s, due_s, strict=True))
+    assert [(await probe.hear())["msg"]["data"] for _ in range(200)] == list(range(200))
 
 
 async def test_what_is_late_catches_up_without_a_gap(numbers: RosBridge) -> None:
-    times: list[float] = []
+    watch, came_s = Watch(late_s=0.0), []
 
     def stall(message: Message) -> None:
-        times.append(time.monotonic())
+        came_s.append(round(watch.now_s - 1000.0, 6))
         if message.message["data"] == 10:
-            time.sleep(0.2)
+            watch.now_s += 0.2
 
+    await play(drive(60), numbers, clock=watch, sleep=watch.sleep, on_message=stall)
+    assert came_s[11:31] == pytest.approx([0.3] * 20, abs=0.001)  # at once after the stall
+    assert came_s[31:] == pytest.approx([n * 0.01 for n in range(31, 60)], abs=0.001)  # and in step again
+
+
+async def test_on_the_real_clock_it_takes_its_time(numbers: RosBridge) -> None:
     began = time.monotonic()
-    await play(drive(60), numbers, on_message=stall)
-    assert times[29] - times[11] < 0.1  # sent at once after the stall
-    assert times[59] - began < 0.7  # back in step: 0.59 s is its due
+    await play(drive(101), numbers, rate=2.0)
+    assert 0.499 <= time.monotonic() - began < 0.9
 
 
 async def test_others_get_their_turn_while_it_hurries(numbers: RosBridge, probe: Probe) -> None:
@@ -76,19 +85,6 @@ async def test_others_get_their_turn_while_it_hurries(numbers: RosBridge, probe:
     assert not playing.done()
     playing.cancel()
     await asyncio.wait({playing})
-
-
-async def test_a_given_clock_decides(numbers: RosBridge) -> None:
-    clock_s = 0.0
-
-    def fast() -> float:
-        nonlocal clock_s
-        clock_s += 100.0
-        return clock_s
-
-    began = time.monotonic()
-    assert await play(drive(50, period_s=10.0), numbers, clock=fast) == 50
-    assert time.monotonic() - began < 0.5
 
 
 async def test_a_live_source_is_asked_for_one_message_at_a_time(numbers: RosBridge) -> None:
