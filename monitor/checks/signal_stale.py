@@ -105,7 +105,7 @@ def check(signal: Signal) -> Check[Limits]:
             sound=Sound.MEDIUM,
             needs_ack=True,
             off_delay_s=2.0,
-            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            actions=(Action.ACKNOWLEDGE,),  # not to be shelved: it is why other checks do not judge
             advice="What depends on it is not checked.",
             inhibited_by=("car_silent", "no_message"),
         ),
