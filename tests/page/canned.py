@@ -219,7 +219,7 @@ class Canned:
         """Serves while the block runs; gives the address."""
         server = uvicorn.Server(uvicorn.Config(self.app, port=0, log_level="warning", ws="websockets-sansio"))
         task = asyncio.create_task(server.serve())
-        while not server.started:  # noqa: ASYNC110  # uvicorn has no event for it
+        while not server.started:  # uvicorn has no event for it
             await asyncio.sleep(0.02)
         try:
             yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"

@@ -24,7 +24,7 @@ async def serving(config: Config) -> AsyncIterator[str]:
         uvicorn.Config(create_app(config), ws="websockets-sansio", log_level="warning", lifespan="on", access_log=False)
     )
     running = asyncio.create_task(server.serve(sockets=[listening]))
-    while not server.started:  # noqa: ASYNC110 (uvicorn tells nobody)
+    while not server.started:
         await asyncio.sleep(0.01)
     try:
         yield f"http://127.0.0.1:{listening.getsockname()[1]}"

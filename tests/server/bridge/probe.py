@@ -79,5 +79,5 @@ async def probing(port: int, **options: Any) -> AsyncIterator[Probe]:
 async def until(condition: Callable[[], bool], within_s: float = 5.0) -> None:
     """Waits for something that another task does."""
     async with asyncio.timeout(within_s):
-        while not condition():  # noqa: ASYNC110 (it has no event to offer)
+        while not condition():
             await asyncio.sleep(0.005)

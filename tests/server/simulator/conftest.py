@@ -70,7 +70,7 @@ async def bridge_client(port: int) -> AsyncIterator[BridgeClient]:
 async def until(is_so: Callable[[], bool]) -> None:
     """Waits for something that nobody announces."""
     async with asyncio.timeout(PATIENCE_S):
-        while not is_so():  # noqa: ASYNC110
+        while not is_so():
             await asyncio.sleep(0.01)
 
 
