@@ -1,4 +1,4 @@
-"""Settings of what the page draws and no check reads: the ends of the gauges, the braking behind the stopping bar."""
+"""Settings that the page draws by: the ends of the gauges, and of the obstacle checks the stopping distance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ class GaugeLimits(Limits):
     acceleration_max_mps2: float = threshold(3.0, "Acceleration at 180°", unit="m/s²", low=0.5, high=15.0, step=0.5)
 
 
-class BrakingLimits(Limits):
+class ObstacleLimits(Limits):
+    """Shared by the two checks that look for obstacles, and by the bars that the page draws."""
+
+    standoff_m: float = threshold(
+        5.0, "Obstacle distance", unit="m", low=0.5, high=50.0, step=0.5, help="Nearer than this is too near."
+    )
     reaction_s: float = threshold(
         1.0, "Reaction time", unit="s", low=0.0, high=5.0, step=0.1, help="Until the car begins to brake."
     )
@@ -23,19 +28,24 @@ class BrakingLimits(Limits):
         step=0.1,
         help="What the brakes are counted on for.",
     )
-
-
-class ObstacleLimits(Limits):
-    standoff_m: float = threshold(
-        5.0, "Obstacle distance", unit="m", low=0.5, high=50.0, step=0.5, help="Nearer than this is too near."
+    time_to_collision_s: float = threshold(
+        2.0, "Time to collision", unit="s", low=0.5, high=10.0, step=0.1, help="Sooner than this is too soon."
     )
+    deadband_m: float = threshold(
+        0.5, "Obstacle deadband", unit="m", low=0.0, high=5.0, step=0.1, help="It clears this much farther away."
+    )
+    half_width_m: float = threshold(
+        1.2, "Corridor half-width", unit="m", low=0.5, high=3.0, step=0.1, help="What is farther aside is passed by."
+    )
+    wheelbase_m: float = threshold(2.62, "Wheelbase", unit="m", low=0.5, high=8.0, step=0.01)
+    laser_ahead_m: float = threshold(2.5, "Laser ahead of the rear axle", unit="m", low=-2.0, high=8.0, step=0.1)
 
 
-# By the name of the group; a check that comes to judge by one of them takes the class over and leaves this table.
-GROUPS: dict[str, type[Limits]] = {"gauge": GaugeLimits, "braking": BrakingLimits, "obstacle": ObstacleLimits}
+# By the name of the group; a check that judges by one of them names the same class.
+GROUPS: dict[str, type[Limits]] = {"gauge": GaugeLimits, "obstacle": ObstacleLimits}
 
 
-def stopping_m(speed_mps: float, limits: BrakingLimits) -> float:
+def stopping_m(speed_mps: float, limits: ObstacleLimits) -> float:
     """Distance to a stop [m]: reaction at full speed, then constant deceleration, v·t + v²/2a."""
     speed_mps = abs(speed_mps)
     return speed_mps * limits.reaction_s + speed_mps**2 / (2 * limits.deceleration_mps2)

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, Generic, Literal, TypeVar, overload
 
 from monitor.components import Components
+from monitor.earlier import Earlier
 from monitor.headings import Headings
 from monitor.link import LinkFacts, Phase
 from monitor.motion import Slope, Standstill
@@ -102,6 +103,8 @@ class Snapshot:
     extents: Mapping[str, Extent] = field(default_factory=dict)  # where a headline number was ever heard
     track: tuple[TrackPoint, ...] = ()  # where the car was, thinned and bounded, oldest first
     track_m: float | None = None  # distance driven since connecting; None: never had a position
+    scan_before: Reading[LaserScan] | None = None  # some 0.4 s before the newest
+    distance_before: Reading[Distance] | None = None
     standing_since_s: float | None = None  # when the car came to rest by its wheels; None: it moves, or cannot be told
 
     @overload
@@ -210,6 +213,7 @@ class State:
         self._track = Track()
         self._headings = Headings()
         self._components = Components()
+        self._earlier = {"scan": Earlier(), "distance": Earlier()}
         self._link = LinkFacts()
         self._paused = False
 
@@ -237,6 +241,9 @@ class State:
             count=heard.count,
         )
         self._readings[signal] = reading
+        earlier = self._earlier.get(signal)
+        if earlier is not None:
+            earlier.add(reading)
         self._extend(signal, value)
         derived = self._derive(signal, reading)
         return (signal,) if derived is None else (signal, derived)
@@ -264,6 +271,8 @@ class State:
             extents=MappingProxyType(self._extents.copy()),
             track=self._track.points,
             track_m=self._track.distance_m,
+            scan_before=self._earlier["scan"].before,
+            distance_before=self._earlier["distance"].before,
             standing_since_s=self._standstill.since_s if self._is_fresh("speed", now_s) else None,
         )
 

@@ -202,7 +202,7 @@ def _nearest(snapshot: Snapshot, monitor: Monitor) -> dict[str, float | None]:
     gap_s = time_gap_s(metres, speed.speed_mps) if metres is not None else None
     return {
         "time_gap_s": wire.plain(gap_s, 2),
-        "stopping_m": wire.plain(stopping_m(speed.speed_mps, monitor.limits.braking), 2),
+        "stopping_m": wire.plain(stopping_m(speed.speed_mps, monitor.limits.obstacle), 2),
     }
 
 

@@ -1,0 +1,136 @@
+"""Can the laser see, and does its scan agree with itself?
+
+A beam without a return is never free (28 to 69 % of a healthy laser's beams are such): only a corridor almost all of
+whose beams are unusable is blindness. The expected count is computed for each message: a real SICK is interlaced.
+"""
+
+from __future__ import annotations
+
+import math
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+    threshold,
+    unknown,
+)
+from monitor.corridor import Corridor, look
+from monitor.state import Snapshot
+
+CORRIDOR = Corridor(half_width_m=1.2, wheelbase_m=2.62, laser_ahead_m=2.5)
+LOOK_AHEAD_M = 5.0  # where the beams of the corridor are counted
+SWEEP_SLACK = 1.1  # a sweep may take so much longer than the time between two scans
+
+
+class BlindLimits(Limits):
+    blind_percent: float = threshold(
+        90.0,
+        "Laser is blind above",
+        unit="%",
+        low=50.0,
+        high=100.0,
+        step=1.0,
+        help="Of the beams in the corridor, those without a usable return.",
+    )
+
+
+def _laser_is_absent(snapshot: Snapshot) -> bool:
+    return snapshot.get("scan") is None and "scan" not in snapshot.link.published
+
+
+def sees(snapshot: Snapshot, limits: BlindLimits, was_active: bool) -> Finding:
+    if _laser_is_absent(snapshot):
+        return absent("The laser is not published")
+    sight = look(snapshot.need("scan"), CORRIDOR, LOOK_AHEAD_M)
+    limit = Quantity(label="At most", value=limits.blind_percent, unit="%")
+    if sight.beams == 0:
+        return fault("The scan has no beam ahead of the car", brief="no beam", limit=limit, causes=("scan",))
+    percent = 100.0 * sight.blind / sight.beams
+    measured = Quantity(label="Without a return", value=percent, unit="%")
+    text = f"{percent:.0f} % of {sight.beams} beams ahead without a usable return"
+    if percent > limits.blind_percent:
+        return fault(text, brief=f"{percent:.0f} % blind", measured=measured, limit=limit, causes=("scan",))
+    return ok(text, measured=measured, limit=limit)
+
+
+def agrees(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
+    """Beams = round((angle_max − angle_min) / angle_increment) + 1; time per beam within the time of a scan."""
+    if _laser_is_absent(snapshot):
+        return absent("The laser is not published")
+    scan = snapshot.need("scan")
+    span_rad = scan.angle_max_rad - scan.angle_min_rad
+    if not math.isfinite(span_rad) or scan.angle_increment_rad == 0.0 or span_rad * scan.angle_increment_rad < 0.0:
+        if scan.beams > 1:
+            return fault("The scan's angles contradict each other", brief="angles", causes=("angles",), level=2)
+        return unknown("One beam or none: nothing to compare", short="1 beam")
+    expected = round(span_rad / scan.angle_increment_rad) + 1
+    measured = Quantity(label="Beams", value=scan.beams, unit="")
+    limit = Quantity(label="Expected", value=expected, unit="")
+    text = f"{scan.beams} beams, {expected} expected"
+    if abs(scan.beams - expected) > 1:
+        return fault(text, brief=f"{scan.beams} beams", measured=measured, limit=limit, causes=("beams",), level=2)
+    sweep_s = (scan.beams - 1) * scan.time_increment_s
+    if scan.scan_time_s > 0.0 and sweep_s > SWEEP_SLACK * scan.scan_time_s:
+        took = f"{sweep_s * 1000:.0f} ms a sweep, {scan.scan_time_s * 1000:.0f} ms a scan"
+        return fault(f"The scan's times contradict each other: {took}", brief="times", causes=("times",), level=1)
+    if scan.beams != expected:
+        return fault(f"{text}: off by one", brief=f"{scan.beams} beams", causes=("off by one",), level=1)
+    return ok(text, measured=measured, limit=limit)
+
+
+def _alarm(title: str, advice: str, priority: Priority, *, on_delay_s: float, place: Place) -> AlarmSpec:
+    return AlarmSpec(
+        title=title,
+        priority=priority,
+        place=place,
+        sound=Sound.MEDIUM,
+        needs_ack=True,
+        on_delay_s=on_delay_s,
+        off_delay_s=2.0,
+        actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+        advice=advice,
+    )
+
+
+CHECKS = (
+    Check(
+        id="laser_blind",
+        label="Laser",
+        order=80,
+        alarm=_alarm(
+            "The laser cannot see",
+            "Obstacles are not checked: look ahead yourself, and for sun, dirt or a cover on the laser.",
+            Priority.WARNING,
+            on_delay_s=1.0,
+            place=Place.SNACKBAR,
+        ),
+        limits=BlindLimits,
+        find=sees,
+        needs=frozenset({"scan"}),
+    ),
+    Check(
+        id="scan_shape",
+        label="Scan shape",
+        order=90,
+        alarm=_alarm(
+            "The scan contradicts itself",
+            "Returns may be drawn and judged in the wrong place: check the laser's driver.",
+            Priority.WARNING,
+            on_delay_s=0.5,
+            place=Place.SNACKBAR,
+        ),
+        limits=Limits,
+        find=agrees,
+        needs=frozenset({"scan"}),
+    ),
+)

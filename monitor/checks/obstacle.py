@@ -1,0 +1,172 @@
+"""Does something stand in the way? Asked of the laser, along the corridor, and of the car's own distance estimator.
+
+Too near is: nearer than the distance the operator allows or than the car needs to stop, or met within the time to
+collision at the speed at which the gap closes (SAE J2944: undefined while it does not close).
+"""
+
+from __future__ import annotations
+
+import math
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+    unknown,
+)
+from monitor.corridor import TYRE_RAD_A_PERCENT, Corridor, look
+from monitor.instruments import ObstacleLimits, stopping_m
+from monitor.state import NotFresh, Snapshot
+
+CLOSING_AT_LEAST_MPS = 0.3  # slower is noise of two distances
+STEADY_WITHIN_M = 3.0  # a gap that shrank more than the car can drive in between is another object's
+
+
+def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Finding:
+    if snapshot.get("scan") is None and "scan" not in snapshot.link.published:
+        return absent("The laser is not published")
+    scan = snapshot.need("scan")
+    speed_mps = _speed(snapshot)
+    corridor = _corridor(snapshot, limits)
+    needed_m = max(limits.standoff_m, stopping_m(speed_mps or 0.0, limits))
+    sight = look(scan, corridor, needed_m)
+    if sight.beams and sight.blind > 0.9 * sight.beams:
+        return unknown("The laser sees nothing in the corridor", short="blind")
+    before = snapshot.scan_before
+    closing_mps = None
+    if sight.gap_m is not None:
+        gap_before_m = look(before.value, corridor, needed_m).gap_m if before is not None else None
+        span_s = snapshot.readings["scan"].received_s - before.received_s if before is not None else 0.0
+        closing_mps = _closing(sight.gap_m, gap_before_m, span_s, speed_mps)
+    return _judge(sight.gap_m, sight.bearing_rad, speed_mps, closing_mps, limits, was_active, cause="scan")
+
+
+def by_estimator(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Finding:
+    if snapshot.get("distance") is None and "distance" not in snapshot.link.published:
+        return absent("The nearest object is not published")
+    distance = snapshot.need("distance")
+    speed_mps = _speed(snapshot)
+    if distance.distance_m is None:
+        return _judge(None, None, speed_mps, None, limits, was_active, cause="distance")
+    bearing = snapshot.get("bearing")
+    bearing_rad = bearing.value.bearing_rad if bearing is not None and bearing.is_fresh(snapshot.now_s) else None
+    before = snapshot.distance_before
+    closing_mps = None
+    span_s = snapshot.readings["distance"].received_s - before.received_s if before is not None else 0.0
+    gap_before_m = before.value.distance_m if before is not None else None
+    closing_mps = _closing(distance.distance_m, gap_before_m, span_s, speed_mps)
+    return _judge(distance.distance_m, bearing_rad, speed_mps, closing_mps, limits, was_active, cause="distance")
+
+
+def _corridor(snapshot: Snapshot, limits: ObstacleLimits) -> Corridor:
+    steering = snapshot.get("steering")
+    angle_rad = 0.0
+    if steering is not None and steering.is_fresh(snapshot.now_s) and math.isfinite(steering.value.percent):
+        angle_rad = max(-0.6, min(0.6, steering.value.percent * TYRE_RAD_A_PERCENT))
+    return Corridor(
+        half_width_m=limits.half_width_m,
+        wheelbase_m=limits.wheelbase_m,
+        laser_ahead_m=limits.laser_ahead_m,
+        tyre_angle_rad=angle_rad,
+    )
+
+
+def _speed(snapshot: Snapshot) -> float | None:
+    """Own speed; None where it is not known, and then only the distance is judged."""
+    try:
+        speed_mps = snapshot.need("speed").speed_mps
+    except NotFresh:
+        return None
+    return abs(speed_mps) if math.isfinite(speed_mps) else None
+
+
+def _closing(gap_m: float, before_m: float | None, span_s: float, speed_mps: float | None) -> float | None:
+    """Speed [m/s] at which the gap shrinks, from two sights; own speed where the earlier one is of something else."""
+    if before_m is None or span_s <= 0.0 or before_m - gap_m > (speed_mps or 0.0) * span_s + STEADY_WITHIN_M:
+        return speed_mps
+    return (before_m - gap_m) / span_s
+
+
+def _judge(
+    gap_m: float | None,
+    bearing_rad: float | None,
+    speed_mps: float | None,
+    closing_mps: float | None,
+    limits: ObstacleLimits,
+    was_active: bool,
+    *,
+    cause: str,
+) -> Finding:
+    needed_m = max(limits.standoff_m, stopping_m(speed_mps or 0.0, limits))
+    limit = Quantity(label="Needed", value=needed_m, unit="m")
+    if gap_m is None:
+        return ok("Nothing in the way", limit=limit)
+    measured = Quantity(label="Gap", value=gap_m, unit="m")
+    where = "" if bearing_rad is None or abs(bearing_rad) < math.radians(2) else _side(bearing_rad)
+    text = f"Obstacle {gap_m:.1f} m ahead{where}, {needed_m:.1f} m needed"
+    if gap_m < needed_m + (limits.deadband_m if was_active else 0.0):
+        return fault(text, brief=f"{gap_m:.1f} m", measured=measured, limit=limit, causes=(cause,))
+    if closing_mps is not None and closing_mps > CLOSING_AT_LEAST_MPS:
+        collision_s = gap_m / closing_mps
+        if collision_s < limits.time_to_collision_s * (1.25 if was_active else 1.0):
+            return fault(
+                f"{text}; met in {collision_s:.1f} s, {limits.time_to_collision_s:.1f} s needed",
+                brief=f"in {collision_s:.1f} s",
+                measured=measured,
+                limit=limit,
+                causes=(cause,),
+            )
+    return ok(text, measured=measured, limit=limit)
+
+
+def _side(bearing_rad: float) -> str:
+    return f", {abs(math.degrees(bearing_rad)):.0f}° {'left' if bearing_rad > 0 else 'right'}"
+
+
+def _alarm(title: str, inhibited_by: tuple[str, ...]) -> AlarmSpec:
+    return AlarmSpec(
+        title=title,
+        priority=Priority.CRITICAL,
+        place=Place.DIALOG,
+        sound=Sound.HIGH,
+        needs_ack=True,
+        off_delay_s=1.0,
+        actions=(Action.ACKNOWLEDGE, Action.DECELERATE),
+        advice="The safety driver must brake or steer clear.",
+        inhibited_by=inhibited_by,
+    )
+
+
+CHECKS = (
+    Check(
+        id="obstacle",
+        label="Obstacle (laser)",
+        tile="Obstacle",
+        order=20,
+        group="obstacle",
+        alarm=_alarm("Obstacle ahead", ("laser_blind",)),
+        limits=ObstacleLimits,
+        find=by_laser,
+        needs=frozenset({"scan"}),
+    ),
+    Check(
+        id="obstacle_nearest",
+        label="Obstacle (nearest object)",
+        tile="Obstacle",
+        order=21,
+        group="obstacle",
+        # Both say the same of the same thing: what the laser announced is not announced again.
+        alarm=_alarm("Object too near", ("obstacle",)),
+        limits=ObstacleLimits,
+        find=by_estimator,
+        needs=frozenset({"distance"}),
+    ),
+)
