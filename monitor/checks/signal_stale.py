@@ -39,6 +39,8 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
         return ok(text)
     if reading.is_fresh(snapshot.now_s):
         return ok(text)
+    if reading.received_s > snapshot.now_s:
+        return unknown(f"{signal.label}: the clock went back", short="waiting")
     opened_s = snapshot.link.opened_s
     if opened_s is not None and reading.received_s < opened_s:
         # Not heard since the link came back: it gets its time anew.
