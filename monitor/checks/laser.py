@@ -88,16 +88,16 @@ def agrees(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     return ok(text, measured=measured, limit=limit)
 
 
-def _alarm(title: str, advice: str, priority: Priority, *, on_delay_s: float, place: Place) -> AlarmSpec:
+def _alarm(title: str, advice: str, *, on_delay_s: float, actions: tuple[Action, ...]) -> AlarmSpec:
     return AlarmSpec(
         title=title,
-        priority=priority,
-        place=place,
+        priority=Priority.WARNING,
+        place=Place.SNACKBAR,
         sound=Sound.MEDIUM,
         needs_ack=True,
         on_delay_s=on_delay_s,
         off_delay_s=2.0,
-        actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+        actions=actions,
         advice=advice,
     )
 
@@ -110,9 +110,8 @@ CHECKS = (
         alarm=_alarm(
             "The laser cannot see",
             "Obstacles are not checked: look ahead yourself, and for sun, dirt or a cover on the laser.",
-            Priority.WARNING,
             on_delay_s=1.0,
-            place=Place.SNACKBAR,
+            actions=(Action.ACKNOWLEDGE,),  # it explains why obstacles are not checked: never hidden
         ),
         limits=BlindLimits,
         find=sees,
@@ -125,9 +124,8 @@ CHECKS = (
         alarm=_alarm(
             "The scan contradicts itself",
             "Returns may be drawn and judged in the wrong place: check the laser's driver.",
-            Priority.WARNING,
             on_delay_s=0.5,
-            place=Place.SNACKBAR,
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
         ),
         limits=Limits,
         find=agrees,
