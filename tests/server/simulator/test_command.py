@@ -156,7 +156,7 @@ async def test_after_being_stopped_it_goes_on_from_now_without_a_flood() -> None
             await client.subscribe("/gps_fix")
             await client.next("/gps_fix")
             os.kill(running.process.pid, signal.SIGSTOP)
-            time.sleep(2.0)
+            time.sleep(2.0)  # noqa: ASYNC251  nothing else has to run meanwhile
             os.kill(running.process.pid, signal.SIGCONT)
             await client.next("/gps_fix", lambda message: age_s(message) < 0.5)
             began_s = time.monotonic()
