@@ -48,7 +48,7 @@ class McapFile:
         self.ros_version: RosVersion = 2 if is_ros2 else 1
 
     def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-        for _, channel, message in self._reader.iter_messages(start_time=start_ns):
+        for _, channel, message in self._reader.iter_messages(starting_at=start_ns):
             if channel.id in numbers:
                 yield message.log_time, channel.id, message.data
 

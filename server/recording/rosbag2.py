@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
+from pathlib import Path, PosixPath
 from typing import Any, Literal
+from urllib.parse import quote
 
 from rosbags.interfaces import MessageDefinitionFormat, QosDurability
 from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
+from server.recording.errors import RecordingUnreadable
 from server.recording.source import Channel, DefinitionFormat
 from server.source import RosVersion
 
@@ -22,6 +24,17 @@ _FORMATS: dict[Any, DefinitionFormat] = {
 }
 
 
+class _UriPath(PosixPath):
+    """A path that reads as part of a URI when it is written as text: so rosbags hands it to SQLite, unquoted, and a
+    folder called "drive #3" could not be opened."""
+
+    def __str__(self) -> str:
+        return quote(super().__str__())
+
+    def __fspath__(self) -> str:
+        return super().__str__()
+
+
 class Bag2:
     """A ROS 2 bag."""
 
@@ -29,7 +42,9 @@ class Bag2:
 
     def __init__(self, path: Path, kind: Literal["directory", "mcap", "db3"]) -> None:
         self.path = path
-        self._reader = _READERS[kind](path)
+        if kind == "db3":
+            _assert_whole(path)
+        self._reader = _READERS[kind](_UriPath(path))
         self._reader.open()
         self._connections = dict(enumerate(self._reader.connections))
         self.channels: Sequence[Channel] = [
@@ -47,6 +62,16 @@ class Bag2:
 
     def close(self) -> None:
         self._reader.close()
+
+
+def _assert_whole(path: Path) -> None:
+    """SQLite reads what is missing at the end of a database as zeros. Its header says how long it should be."""
+    with path.open("rb") as file:
+        header = file.read(100)
+    page_bytes = int.from_bytes(header[16:18], "big")
+    whole = (65_536 if page_bytes == 1 else page_bytes) * int.from_bytes(header[28:32], "big")
+    if path.stat().st_size < whole:
+        raise RecordingUnreadable(f"{path} is not complete: {path.stat().st_size} of {whole} bytes are there")
 
 
 def _channel(number: int, connection: Any) -> Channel:

@@ -57,8 +57,9 @@ class Replay:
 @contextlib.asynccontextmanager
 async def replaying(*arguments: str | Path) -> AsyncIterator[Replay]:
     command = [sys.executable, "-m", "server", "replay", *map(str, arguments)]
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONASYNCIODEBUG"}
     process = await asyncio.create_subprocess_exec(
-        *command, cwd=PROJECT, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+        *command, cwd=PROJECT, env=environment, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
     )
     try:
         yield Replay(process)
@@ -91,7 +92,9 @@ REAL_DRIVES = {CATVEHICLE: 14_228, "catvehicle_2016-06-01_mcap": 14_228, "lidar/
 
 
 async def test_real_drives_arrive_whole_and_equal(recordings: Path) -> None:
-    await asyncio.gather(*(replay_whole(recordings / file, count) for file, count in REAL_DRIVES.items()))
+    async with asyncio.TaskGroup() as together:
+        for file, count in REAL_DRIVES.items():
+            together.create_task(replay_whole(recordings / file, count))
 
 
 async def replay_whole(file: Path, count: int) -> None:
