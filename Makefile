@@ -63,7 +63,8 @@ clean: ## back to a fresh clone; recordings in data/ stay
 # --- set-up, done again only when one of the files that decide it changes ---
 
 GROUND := pyproject.toml constraints.txt hatch_build.py package.json package-lock.json
-LOST := $(if $(wildcard static/vendor/stamp),,vendor-missing)
+LOST := $(shell cd static/vendor 2> /dev/null && tail -n +2 stamp 2> /dev/null | xargs -r ls > /dev/null 2>&1 \
+  && [ -s stamp ] || echo vendor-missing)
 
 $(VENV)/pyvenv.cfg:
 	@for python in $${PYTHON:-} python3 python3.14 python3.13 python3.12 python3.11; do \
