@@ -52,6 +52,7 @@ class RateMeter:
         "_last_s",
         "_learned_hz",
         "_set_hz",
+        "_settled",
     )
 
     def __init__(self, declared_hz: float | None, set_hz: float | None = None) -> None:
@@ -60,6 +61,8 @@ class RateMeter:
         self._learned_hz: float | None = None
         self._blocks = 0
         self._arrivals: deque[float] = deque(maxlen=20_000)
+        self._settled: tuple[float, float] | None = None  # period and horizon [s] once settled: asked at every message
+        self._settle()
         self.restart()
 
     def restart(self) -> None:
@@ -75,6 +78,7 @@ class RateMeter:
     def expect(self, set_hz: float | None) -> None:
         """The operator's own figure; None or 0 hands back to learning."""
         self._set_hz = set_hz or None
+        self._settle()
 
     def receive(self, at_s: float) -> None:
         last_s = self._last_s
@@ -103,8 +107,10 @@ class RateMeter:
     @property
     def period_s(self) -> float | None:
         """Seconds between two messages as far as known; until settled the longer of the declared and the observed."""
+        if self._settled is not None:
+            return self._settled[0]
         expected_hz = self.expected_hz
-        if self.is_settled or self._heard < 2 or self._last_s is None:
+        if self._heard < 2 or self._last_s is None:
             return None if expected_hz is None else 1.0 / expected_hz
         observed_s = (self._last_s - self._first_s) / (self._heard - 1)
         period_s = observed_s if expected_hz is None else max(observed_s, 1.0 / expected_hz)
@@ -113,12 +119,10 @@ class RateMeter:
     @property
     def horizon_s(self) -> float:
         """Age from which a reading is stale: max(10 periods, 1 s), more patient until the rate is settled."""
-        period_s = self.period_s
-        if self.is_settled:
-            floor_s = STALE_FLOOR_S
-        else:
-            floor_s = STARTING_S if self._declared_hz is not None else UNDECLARED_S
-        return max(STALE_PERIODS * (period_s or 0.0), floor_s)
+        if self._settled is not None:
+            return self._settled[1]
+        floor_s = STARTING_S if self._declared_hz is not None else UNDECLARED_S
+        return max(STALE_PERIODS * (self.period_s or 0.0), floor_s)
 
     def rate(self, now_s: float) -> Rate:
         return Rate(
@@ -143,6 +147,8 @@ class RateMeter:
         return (len(arrivals) - 1) / span_s if span_s > 0.0 else None
 
     def _forget(self, now_s: float) -> None:
+        if now_s - self._arrivals[0] <= WINDOW_S:
+            return
         window_s = max(WINDOW_S, WINDOW_PERIODS * (self.period_s or 0.0))
         arrivals = self._arrivals
         while len(arrivals) > 2 and now_s - arrivals[0] > window_s:
@@ -160,9 +166,22 @@ class RateMeter:
         block_hz, before_hz = self._block_n / span_s, self._last_block_hz
         self._block_start_s, self._block_n, self._last_block_hz = at_s, 0, block_hz
         self._blocks += 1
+        self._agree(block_hz, before_hz)
+        self._settle()
+
+    def _agree(self, block_hz: float, before_hz: float | None) -> None:
         if before_hz is None or abs(block_hz - before_hz) > STEADY_WITHIN * max(block_hz, before_hz):
             return
         steady_hz = (block_hz + before_hz) / 2
         # Only a clear step up is a new rate: following every wobble upward would ratchet the demand.
         if self._learned_hz is None or min(block_hz, before_hz) > (1 + STEADY_WITHIN) * self._learned_hz:
             self._learned_hz = steady_hz
+
+    def _settle(self) -> None:
+        """To be called whenever what is expected may have changed."""
+        expected_hz = self.expected_hz
+        if self.is_settled and expected_hz is not None:
+            period_s = 1.0 / expected_hz
+            self._settled = period_s, max(STALE_PERIODS * period_s, STALE_FLOOR_S)
+        else:
+            self._settled = None
