@@ -68,6 +68,7 @@ class Session:
         self._crashes_told: set[str] = set()
         self._tasks: set[asyncio.Task[None]] = set()
         self._lag_s = 0.0
+        self._state_is_due = False
         self._paused_since_s: float | None = None
         self._clear()
 
@@ -526,7 +527,7 @@ class Session:
             self._log_crashes()
         if transitions:
             self._tell(transitions)
-            self._put_state(now_s)
+            self._put_state_soon()
 
     def _log_crashes(self) -> None:
         """Each failing check once; the page says "monitoring impaired" as long as it fails."""
@@ -583,7 +584,18 @@ class Session:
         )
         return state_frame(facts, self._state.snapshot(now_s), self._monitor)
 
+    def _put_state_soon(self) -> None:
+        """Once the events have gone out: they must not wait until a state is made. Several changes make one state."""
+        if not self._state_is_due:
+            self._state_is_due = True
+            asyncio.get_running_loop().call_soon(self._put_due_state)
+
+    def _put_due_state(self) -> None:
+        if self._state_is_due:  # else one was put meanwhile
+            self._put_state(self._now())
+
     def _put_state(self, now_s: float) -> None:
+        self._state_is_due = False
         if self._bus.watched(self.vehicle.name):
             self._bus.put(self.vehicle.name, "state", orjson.dumps(self.frame()).decode())
 
