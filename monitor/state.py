@@ -10,6 +10,7 @@ from typing import Any, Generic, Literal, TypeVar, overload
 
 from monitor.components import Components
 from monitor.earlier import Earlier
+from monitor.gps_watch import GpsFollower, GpsWatch
 from monitor.headings import Headings
 from monitor.link import LinkFacts, Phase
 from monitor.motion import Slope, Standstill
@@ -103,6 +104,7 @@ class Snapshot:
     extents: Mapping[str, Extent] = field(default_factory=dict)  # where a headline number was ever heard
     track: tuple[TrackPoint, ...] = ()  # where the car was, thinned and bounded, oldest first
     track_m: float | None = None  # distance driven since connecting; None: never had a position
+    gps: GpsWatch = field(default_factory=GpsWatch)  # what the newest fixes tell of the receiver
     scan_before: Reading[LaserScan] | None = None  # some 0.4 s before the newest
     distance_before: Reading[Distance] | None = None
     standing_since_s: float | None = None  # when the car came to rest by its wheels; None: it moves, or cannot be told
@@ -213,6 +215,8 @@ class State:
         self._track = Track()
         self._headings = Headings()
         self._components = Components()
+        self._gps_follower = GpsFollower()
+        self._gps = GpsWatch()
         self._earlier = {"scan": Earlier(), "distance": Earlier()}
         self._link = LinkFacts()
         self._paused = False
@@ -271,6 +275,7 @@ class State:
             extents=MappingProxyType(self._extents.copy()),
             track=self._track.points,
             track_m=self._track.distance_m,
+            gps=self._gps,
             scan_before=self._earlier["scan"].before,
             distance_before=self._earlier["distance"].before,
             standing_since_s=self._standstill.since_s if self._is_fresh("speed", now_s) else None,
@@ -303,6 +308,8 @@ class State:
                 speed_mps = self._readings["speed"].value.speed_mps if self._is_fresh("speed", at_s) else None
                 is_standing = None if speed_mps is None else self._standstill.is_standing
                 self._track.receive(value, at_s, speed_mps, is_standing)
+                standing_since_s = None if speed_mps is None else self._standstill.since_s
+                self._gps = self._gps_follower.receive(value, at_s, reading.stamp_s, standing_since_s)
                 heading = self._headings.on_course(
                     self._track.course_deg, speed_mps, yaw_is_fresh=self._is_fresh("odometry", at_s)
                 )

@@ -1,0 +1,118 @@
+"""Has the receiver a fix, and does it say how good it is?
+
+Covariance is trusted only if its type is at least APPROXIMATED and its values are finite and above zero
+(sensor_msgs/NavSatFix); the real car marks zeros as known. The report's wish to reject unknown quality outright is a
+setting, off by default, because the real car would be rejected for ever.
+"""
+
+from __future__ import annotations
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+    threshold,
+    unknown,
+)
+from monitor.state import Snapshot
+
+
+class FixLimits(Limits):
+    worst_sigma_m: float = threshold(
+        10.0, "GPS error at most", unit="m", low=0.5, high=100.0, step=0.5, help="One sigma, as the receiver states it."
+    )
+    strict: float = threshold(
+        0.0,
+        "Reject unknown GPS quality",
+        unit="0/1",
+        low=0.0,
+        high=1.0,
+        step=1.0,
+        help="1: a position whose quality is unknown counts as no position.",
+    )
+
+
+def has_fix(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
+    if snapshot.get("position") is None and "position" not in snapshot.link.published:
+        return absent("Position is not published")
+    fix = snapshot.need("position")
+    if fix.status < 0:
+        return fault("The receiver has no fix; its coordinates mean nothing", brief="no fix", causes=("position",))
+    if fix.sigma_m is None:
+        return ok("A fix of unknown quality")
+    text = f"A fix with an error of {fix.sigma_m:.1f} m"
+    measured = Quantity(label="Error", value=fix.sigma_m, unit="m")
+    limit = Quantity(label="At most", value=limits.worst_sigma_m, unit="m")
+    if fix.sigma_m > limits.worst_sigma_m * (0.9 if was_active else 1.0):
+        return fault(text, brief=f"{fix.sigma_m:.0f} m", measured=measured, limit=limit, causes=("quality",))
+    return ok(text, measured=measured, limit=limit)
+
+
+def knows_its_quality(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
+    if snapshot.get("position") is None and "position" not in snapshot.link.published:
+        return absent("Position is not published")
+    fix = snapshot.need("position")
+    if fix.status >= 0 and fix.sigma_m is None:
+        kind = (
+            "no covariance"
+            if fix.covariance_type == 0
+            else f"a covariance of type {fix.covariance_type} without values"
+        )
+        why = f"The receiver does not say how good its position is: {kind}"
+        if limits.strict >= 1.0:
+            return fault(f"{why}; rejected by the strict setting", brief="quality", causes=("position",))
+        return unknown(why, short="quality")  # a healthy car of this kind would alarm for ever
+    return ok("The receiver says how good its position is")
+
+
+CHECKS = (
+    Check(
+        id="gps_fix",
+        label="GPS fix",
+        order=40,
+        alarm=AlarmSpec(
+            title="GPS: no usable fix",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.MEDIUM,
+            needs_ack=True,
+            on_delay_s=3.0,
+            off_delay_s=5.0,
+            actions=(Action.ACKNOWLEDGE,),
+            advice="Where the car is and goes must be judged by eye.",
+        ),
+        limits=FixLimits,
+        find=has_fix,
+        needs=frozenset({"position"}),
+    ),
+    Check(
+        id="gps_quality",
+        label="GPS quality",
+        order=41,
+        group="gps_fix",
+        alarm=AlarmSpec(
+            title="GPS quality unknown",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.LOW,
+            needs_ack=True,
+            on_delay_s=3.0,
+            off_delay_s=5.0,
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="The strict setting rejects such a position: do not rely on it.",
+            inhibited_by=("gps_fix",),
+        ),
+        limits=FixLimits,
+        find=knows_its_quality,
+        needs=frozenset({"position"}),
+    ),
+)

@@ -1,0 +1,98 @@
+"""What the newest positions tell of the receiver itself: how far they drift while the car stands, how fast they run."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from statistics import median
+
+from monitor.geo import Plane, offset_m
+from monitor.values import GpsFix
+
+ANCHOR_S = 2.0  # the anchor is the median of the first fixes at rest, this long
+FIXES = 3  # in a row: one stray fix is not a fault
+STEP_AT_LEAST_S = 0.04  # fixes closer than that are two words for one
+STEP_AT_MOST_S = 2.0  # after a longer gap the car may be anywhere
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GpsWatch:
+    """At one moment; empty tuples where there is nothing to judge."""
+
+    drift_m: tuple[float, ...] = ()  # of the last fixes at rest, newest last: distance from the anchor
+    anchored_s: float | None = None  # since when the car rests where the anchor is
+    over_ground_mps: tuple[float, ...] = ()  # speed between the last fixes, newest last
+    net_mps: float | None = None  # the same from the first to the last of them: noise goes back and forth
+    sigma_m: float | None = None  # the receiver's own; None: it does not say
+
+
+class GpsFollower:
+    """Follows the fixes of one receiver."""
+
+    def __init__(self) -> None:
+        self._resting: list[tuple[float, GpsFix]] = []  # fixes since the car came to rest, until there is an anchor
+        self._since_s: float | None = None
+        self._anchor: tuple[float, float] | None = None
+        self._drift: deque[float] = deque(maxlen=FIXES)
+        self._steps: deque[tuple[float, float, float]] = deque(maxlen=FIXES)  # east m, north m, s
+        self._last: tuple[float, GpsFix] | None = None
+
+    def receive(self, fix: GpsFix, at_s: float, stamp_s: float | None, standing_since_s: float | None) -> GpsWatch:
+        """One fix. Steps are timed by the receiver's own stamps, since Wi-Fi bunches arrivals."""
+        if fix.status < 0 or not (math.isfinite(fix.lat_deg) and math.isfinite(fix.lon_deg)):
+            self.__init__()  # type: ignore[misc]  # without a fix the coordinates mean nothing
+            return GpsWatch()
+        self._step(fix, at_s if stamp_s is None else stamp_s)
+        self._rest(fix, at_s, standing_since_s)
+        return GpsWatch(
+            drift_m=tuple(self._drift),
+            anchored_s=self._since_s if self._anchor is not None else None,
+            over_ground_mps=tuple(math.hypot(east, north) / span for east, north, span in self._steps),
+            net_mps=self._net_mps(),
+            sigma_m=fix.sigma_m,
+        )
+
+    def _step(self, fix: GpsFix, time_s: float) -> None:
+        if self._last is not None:
+            span_s = time_s - self._last[0]
+            if 0.0 <= span_s < STEP_AT_LEAST_S:
+                return
+            if 0.0 < span_s <= STEP_AT_MOST_S:
+                before = self._last[1]
+                self._steps.append((*offset_m(before.lat_deg, before.lon_deg, fix.lat_deg, fix.lon_deg), span_s))
+            else:
+                self._steps.clear()
+        self._last = (time_s, fix)
+
+    def _net_mps(self) -> float | None:
+        if len(self._steps) < FIXES:
+            return None
+        east_m = sum(east for east, _, _ in self._steps)
+        north_m = sum(north for _, north, _ in self._steps)
+        return math.hypot(east_m, north_m) / sum(span_s for _, _, span_s in self._steps)
+
+    def _rest(self, fix: GpsFix, at_s: float, standing_since_s: float | None) -> None:
+        if standing_since_s is None or standing_since_s != self._since_s:
+            self._resting.clear()
+            self._drift.clear()
+            self._anchor = None
+            self._since_s = standing_since_s
+        if standing_since_s is None:
+            return
+        if self._anchor is None:
+            self._resting.append((at_s, fix))
+            if at_s - self._resting[0][0] >= ANCHOR_S:
+                self._anchor = (
+                    median(f.lat_deg for _, f in self._resting),
+                    _median_lon(tuple(f.lon_deg for _, f in self._resting)),
+                )
+                self._resting.clear()
+            return
+        self._drift.append(math.hypot(*Plane(*self._anchor).enu(fix.lat_deg, fix.lon_deg)))
+
+
+def _median_lon(longitudes: tuple[float, ...]) -> float:
+    """Median of longitudes that may lie on both sides of the 180° meridian."""
+    first = longitudes[0]
+    return math.remainder(first + median(math.remainder(lon - first, 360.0) for lon in longitudes), 360.0)
