@@ -54,7 +54,7 @@ def clear_distance_m(speed_mps: float) -> float:
     return max(ALARM_STANDOFF_M, stopping_m, speed_mps * ALARM_COLLISION_S)
 
 
-def _fastest_mps(sight_m: float) -> float:
+def fastest_mps(sight_m: float) -> float:
     """The inverse of clear_distance_m, with some distance to spare."""
     free_m = sight_m - SPARE_M
     if free_m <= ALARM_STANDOFF_M:
@@ -98,7 +98,7 @@ def _sight_mps() -> Floats:
         )
         sideways = np.minimum(distances, 200.0) * np.abs(beams.directions[1])
         in_way = (np.abs(angles) <= CONE_RAD) | (sideways <= CORRIDOR_M)
-        limits[index] = _fastest_mps(float(distances[in_way].min()))
+        limits[index] = fastest_mps(float(distances[in_way].min()))
     return limits
 
 

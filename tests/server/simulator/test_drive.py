@@ -9,7 +9,7 @@ from itertools import takewhile
 import pytest
 
 from server.simulator.car import START_S, SimulatedCar
-from server.simulator.driver import clear_distance_m
+from server.simulator.driver import SPARE_M, clear_distance_m, fastest_mps
 from tests.server.simulator.rules import Rules
 
 
@@ -60,6 +60,13 @@ def test_the_free_distance_kept_is_the_largest_of_the_rules() -> None:
     assert clear_distance_m(0.0) == 5.0
     assert clear_distance_m(3.0) == 6.0  # both 2 s of way and the stopping distance
     assert clear_distance_m(8.0) == pytest.approx(8.0 + 64 / 3)
+
+
+@pytest.mark.parametrize("sight_m", [7.0, 12.0, 30.0, 63.0])
+def test_the_driver_goes_as_fast_as_the_sight_allows_and_no_faster(sight_m: float) -> None:
+    speed_mps = fastest_mps(sight_m)
+    assert clear_distance_m(speed_mps) == pytest.approx(sight_m - SPARE_M)
+    assert clear_distance_m(speed_mps + 0.1) > sight_m - SPARE_M
 
 
 def test_it_is_much_faster_than_real_time() -> None:

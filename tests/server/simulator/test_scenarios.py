@@ -124,15 +124,18 @@ def test_a_phone_mismatch_moves_the_car_far_enough_and_breaks_nothing_else() -> 
 def test_the_obstacle_is_met_by_braking_and_the_drive_goes_on() -> None:
     car = SimulatedCar(plan=(planned("obstacle@11"),))
     steps = car.steps()
-    nearest_m, slowest_mps = 99.0, 99.0
+    nearest_m, slowest_mps, last_m = 99.0, 99.0, 0.0
     while car.elapsed_s < 35:
         for message in next(steps).messages:
-            if 11.1 < car.elapsed_s < 20.9 and message.topic == "/DistanceEstimator/dist":
-                nearest_m = min(nearest_m, message.message["data"])
+            if message.topic == "/DistanceEstimator/dist" and car.elapsed_s < 21.5:
+                last_m = message.message["data"]
+                if 11.1 < car.elapsed_s < 20.9:
+                    nearest_m = min(nearest_m, last_m)
         if 11.1 < car.elapsed_s < 20.9:
             slowest_mps = min(slowest_mps, car.motion.speed_mps)
     assert slowest_mps == 0.0
     assert 3.5 < nearest_m < 4.9
+    assert last_m > 40.0  # it is gone as suddenly
     assert car.motion.speed_mps > 5.0
 
 
