@@ -138,8 +138,8 @@ def advance(
         return alarm, ()  # by far the most frequent case, and nothing of it needs remembering
     alarm = rebased(alarm, now_s)
     step = _Step(alarm, finding, now_s if alarm.at_s is None else max(now_s, alarm.at_s))
-    step.unshelve_when_due()
     step.suppress(tuple(inhibited_by))
+    step.unshelve_when_due()
     step.judge()
     return step.result()
 
@@ -210,6 +210,14 @@ class _Step:
         )
         return alarm, tuple(self._transitions)
 
+    def suppress(self, by: tuple[str, ...]) -> None:
+        before = self._suppressed
+        self._suppressed = bool(by)
+        if by != self._alarm.suppressed_by:
+            self._set["suppressed_by"] = by
+        if before != self._suppressed and (self._active or not self._acknowledged):
+            self._tell("suppressed" if self._suppressed else "unsuppressed")
+
     def unshelve_when_due(self) -> None:
         until_s = self._alarm.shelved_until_s
         if until_s is None or self._now_s < until_s:
@@ -220,14 +228,6 @@ class _Step:
             self._announce("unshelved")
         else:
             self._tell("unshelved")
-
-    def suppress(self, by: tuple[str, ...]) -> None:
-        before = self._suppressed
-        self._suppressed = bool(by)
-        if by != self._alarm.suppressed_by:
-            self._set["suppressed_by"] = by
-        if before != self._suppressed and (self._active or not self._acknowledged):
-            self._tell("suppressed" if self._suppressed else "unsuppressed")
 
     def judge(self) -> None:
         match self._finding.verdict:

@@ -60,6 +60,7 @@ class AlarmSpec:
     actions: tuple[Action, ...] = (Action.ACKNOWLEDGE,)
     advice: str = ""  # one sentence: what the operator should do
     inhibited_by: tuple[str, ...] = ()  # alarms which explain this one: while they stand it is not announced
+    grace_s: float = 0.0  # once this alarm's condition has gone, what it explains gets this long to go too
     latches: bool = False  # stays active until acknowledged although its condition has gone
     place_after: Place | None = None  # where it shows once its condition has gone; None: where it was
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from monitor.alarm import Alarm
 
-GRACE_S = 3.0  # after the cause has gone, its consequences get this long to go too
+GRACE_S = 3.0  # for the alarms which explain that messages are missing: the messages need a moment to come again
 
 
 class CauseTable:
@@ -16,38 +16,43 @@ class CauseTable:
     stale signal needs no row: its value cannot be read, its check is UNKNOWN, and UNKNOWN neither raises nor clears;
     nor a grace: once the signal is back, what it says is true at once.
 
-    An inhibitor holds from its condition on, before its own delays have passed, until `GRACE_S` after its condition and
-    its alarm have gone.
+    An inhibitor holds while its condition does, whatever its own delays, and for its grace after. The grace is for
+    missing messages; where a value is judged it must be 0, for a danger that is seen again waits for nothing.
     """
 
-    def __init__(self, inhibited_by: Mapping[str, tuple[str, ...]]) -> None:
+    def __init__(self, inhibited_by: Mapping[str, tuple[str, ...]], grace_s: Mapping[str, float] | None = None) -> None:
         """`inhibited_by` has the direct inhibitors of each alarm; raises ValueError for an unknown name or a circle."""
+        self._grace_s = dict(grace_s or {})
         self._closure: dict[str, tuple[str, ...]] = {}
         self.order: list[str] = []  # every alarm after all that inhibit it
         for alarm_id in inhibited_by:
             self._visit(alarm_id, inhibited_by, ())
         self.inhibitors = frozenset(name for names in self._closure.values() for name in names)
-        self._held_at_s: dict[str, float] = {}  # when each inhibitor was last seen to hold
+        self._gone_at_s: dict[str, float | None] = {}  # when each inhibitor's condition went; None: it is there
 
     def note(self, alarm: Alarm, now_s: float) -> None:
         """Remember whether this alarm holds; to be told after each of its judgements."""
         if alarm.id not in self.inhibitors:
             return
-        if alarm.condition or alarm.active:
-            self._held_at_s[alarm.id] = now_s
-        elif self._held_at_s.get(alarm.id, now_s) > now_s:
-            self._held_at_s[alarm.id] = now_s  # the clock went back: the grace begins anew, it does not last for ever
+        if alarm.condition:
+            self._gone_at_s[alarm.id] = None
+        elif alarm.id in self._gone_at_s:
+            gone_at_s = self._gone_at_s[alarm.id]
+            if gone_at_s is None or gone_at_s > now_s:  # it goes now, or the clock went back: the grace begins anew
+                self._gone_at_s[alarm.id] = now_s
 
     def holding(self, alarm_id: str, now_s: float) -> tuple[str, ...]:
         """The alarms that now explain this one away."""
-        return tuple(
-            name
-            for name in self._closure[alarm_id]
-            if name in self._held_at_s and now_s - self._held_at_s[name] < GRACE_S
-        )
+        return tuple(name for name in self._closure[alarm_id] if self._holds(name, now_s))
 
     def clear(self) -> None:
-        self._held_at_s.clear()
+        self._gone_at_s.clear()
+
+    def _holds(self, name: str, now_s: float) -> bool:
+        if name not in self._gone_at_s:
+            return False
+        gone_at_s = self._gone_at_s[name]
+        return gone_at_s is None or now_s - gone_at_s < self._grace_s.get(name, 0.0)
 
     def _visit(self, alarm_id: str, table: Mapping[str, tuple[str, ...]], path: tuple[str, ...]) -> None:
         if alarm_id in path:
@@ -65,4 +70,7 @@ class CauseTable:
 
 
 def table_of(alarms: Iterable[Alarm]) -> CauseTable:
-    return CauseTable({alarm.id: alarm.spec.inhibited_by for alarm in alarms})
+    known = tuple(alarms)
+    return CauseTable(
+        {alarm.id: alarm.spec.inhibited_by for alarm in known}, {alarm.id: alarm.spec.grace_s for alarm in known}
+    )

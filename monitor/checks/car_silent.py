@@ -16,6 +16,7 @@ from monitor.check import (
     ok,
     unknown,
 )
+from monitor.inhibition import GRACE_S
 from monitor.silence import BRIDGE_WITHIN_S, silence
 from monitor.state import Snapshot
 
@@ -54,6 +55,7 @@ CHECKS = (
             actions=(Action.ACKNOWLEDGE, Action.RECONNECT, Action.EXIT),
             advice="The car may still be moving: watch the car.",
             inhibited_by=("link_lost",),
+            grace_s=GRACE_S,
             place_after=Place.LIST,
         ),
         limits=Limits,

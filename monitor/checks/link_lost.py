@@ -17,6 +17,7 @@ from monitor.check import (
     ok,
     unknown,
 )
+from monitor.inhibition import GRACE_S
 from monitor.state import Snapshot
 
 
@@ -50,6 +51,7 @@ CHECKS = (
             off_delay_s=1.0,
             actions=(Action.RECONNECT, Action.CHANGE_ADDRESS, Action.EXIT),
             advice="The car may still be moving: watch the car.",
+            grace_s=GRACE_S,
             place_after=Place.LIST,  # the dialog closes by itself when the link is back
         ),
         limits=Limits,

@@ -18,6 +18,7 @@ from monitor.check import (
     ok,
     unknown,
 )
+from monitor.inhibition import GRACE_S
 from monitor.state import Snapshot
 
 WITHIN_S = 5.0
@@ -65,6 +66,7 @@ CHECKS = (
             actions=(Action.RECONNECT, Action.EXIT),
             advice="Seen after a restart of roscore: restart rosbridge too.",
             inhibited_by=("link_lost",),
+            grace_s=GRACE_S,
         ),
         limits=Limits,
         find=find,

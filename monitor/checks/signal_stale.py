@@ -110,6 +110,7 @@ def check(signal: Signal) -> Check[Limits]:
             actions=(Action.ACKNOWLEDGE,),  # not to be shelved: it is why other checks do not judge
             advice="What depends on it is not checked.",
             inhibited_by=("car_silent", "no_message"),
+            grace_s=GRACE_S,
         ),
         limits=SignalLimits,
         find=partial(find, signal),

@@ -330,6 +330,14 @@ def test_the_end_of_shelving_is_an_announcement_of_its_own() -> None:
     assert alarm.shelved_by is None
 
 
+def test_a_shelf_that_ends_while_suppressed_is_not_announced() -> None:
+    shelf = Act("shelve", minutes=1.0)
+    _, happened = play(
+        [(0.0, BAD, NORMAL), (1.0, BAD, UNACKED), (2.0, shelf, SHELVED), (62.0, (LINK, BAD), SUPPRESSED)]
+    )
+    assert [(t.change, t.announces) for t in happened[2:]] == [("suppressed", False), ("unshelved", False)]
+
+
 def test_nothing_is_announced_from_the_shelf() -> None:
     alarm, happened = play(
         [(0.0, A, NORMAL), (1.0, A, UNACKED), (2.0, SHELVE, SHELVED), (3.0, A_AND_B, SHELVED), (4.0, OK, SHELVED)]

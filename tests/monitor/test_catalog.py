@@ -61,6 +61,13 @@ def test_what_a_check_must_have(check: AnyCheck) -> None:
 
 
 @every_check
+def test_only_what_explains_missing_messages_has_a_grace(check: AnyCheck) -> None:
+    """A grace delays what is explained; what is judged by values must be told at once when it is seen again."""
+    explains_messages = check.id in ("link_lost", "car_silent", "no_message") or check.id.startswith("signal_stale.")
+    assert (check.alarm.grace_s > 0.0) == explains_messages
+
+
+@every_check
 def test_a_check_of_the_link_is_not_blinded_by_it(check: AnyCheck) -> None:
     assert (check.scope is Scope.LINK) == (check.id in ("connect_failed", "no_message", "link_lost"))
 

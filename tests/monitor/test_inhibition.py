@@ -13,6 +13,7 @@ from tests.monitor.test_alarm import SPEC
 TABLE = {"slow": ("stale",), "stale": ("silent",), "silent": ("lost",), "lost": (), "speed": ()}
 LOST = Alarm(id="lost", spec=SPEC, condition=True)
 GONE = replace(LOST, condition=False)
+GRACES = {"lost": GRACE_S}
 
 
 def test_causes_of_causes_count_and_come_first() -> None:
@@ -31,16 +32,35 @@ def test_causes_of_causes_count_and_come_first() -> None:
 
 @pytest.mark.parametrize(("after_s", "holds"), [(0.0, True), (GRACE_S - 0.01, True), (GRACE_S, False)])
 def test_the_consequences_get_a_grace_to_go_too(after_s: float, holds: bool) -> None:
-    table = CauseTable(TABLE)
-    table.note(LOST, 10.0)
-    table.note(GONE, 10.0 + after_s)
+    table = CauseTable(TABLE, GRACES)
+    table.note(LOST, 9.0)
+    table.note(GONE, 10.0)
     assert bool(table.holding("stale", 10.0 + after_s)) == holds
 
 
-def test_it_holds_while_the_alarm_waits_out_its_own_delay() -> None:
+def test_it_holds_by_its_condition_whatever_its_own_delays() -> None:
     table = CauseTable(TABLE)
-    table.note(replace(GONE, active=True), 10.0)
+    table.note(LOST, 10.0)  # not active yet: waits out its on-delay
     assert table.holding("stale", 10.0) == ("lost",)
+    table.note(replace(GONE, active=True), 11.0)  # still active: waits out its off-delay
+    assert table.holding("stale", 11.0) == ()
+
+
+def test_without_a_grace_a_danger_that_is_seen_again_waits_for_nothing() -> None:
+    table = CauseTable(TABLE)
+    table.note(LOST, 10.0)
+    table.note(GONE, 10.1)
+    assert table.holding("stale", 10.1) == ()
+
+
+def test_the_grace_counts_from_the_end_of_the_condition() -> None:
+    table = CauseTable(TABLE, GRACES)
+    table.note(LOST, 10.0)
+    assert table.holding("stale", 99.0) == ("lost",)
+    for now_s in (99.0, 100.0, 101.9):
+        table.note(GONE, now_s)
+        assert table.holding("stale", now_s) == ("lost",)
+    assert table.holding("stale", 102.0) == ()
 
 
 def test_what_never_happened_explains_nothing() -> None:
@@ -50,8 +70,9 @@ def test_what_never_happened_explains_nothing() -> None:
 
 
 def test_a_clock_that_goes_back_does_not_make_the_grace_last_for_ever() -> None:
-    table = CauseTable(TABLE)
-    table.note(LOST, 1e6)
+    table = CauseTable(TABLE, GRACES)
+    table.note(LOST, 1e6 - 1.0)
+    table.note(GONE, 1e6)
     table.note(GONE, 5.0)
     assert table.holding("stale", 5.0) == ("lost",)
     table.note(GONE, 5.0 + GRACE_S)
