@@ -1,0 +1,107 @@
+"""The bench's processes, started when first asked for and ended together, and the pace of a run."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from tests.bench.child import Child
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pace:
+    """How long things are measured."""
+
+    probes: int  # alarms a series
+    probe_every_s: float
+    load_s: float  # how long load is measured
+    gap_s: float  # how long a page reads nothing
+    settle_s: float  # between connecting and measuring
+    crowd: int  # pages that look on
+    many: int  # pages on the bridge
+    most: int  # pages on the server
+
+
+FULL = Pace(probes=240, probe_every_s=0.08, load_s=10.0, gap_s=10.0, settle_s=1.0, crowd=30, many=50, most=100)
+QUICK = Pace(probes=20, probe_every_s=0.06, load_s=0.8, gap_s=2.0, settle_s=0.1, crowd=30, many=50, most=100)
+
+
+class Rig:
+    """A car, a server, pages and clients of the bridge, each a process. Leave it by `with`, so that all of them end."""
+
+    def __init__(self, pace: Pace) -> None:
+        self.pace = pace
+        self._stack = contextlib.ExitStack()
+        self._children: dict[str, Child] = {}
+
+    def __enter__(self) -> Rig:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    @property
+    def car(self) -> Child:
+        """The car at full load: 181 and 180 beams at 75 Hz, and all else at the real car's rates."""
+        return self._child("car", "car")
+
+    @property
+    def dense_car(self) -> Child:
+        """The same car with 1081 beams at 20 Hz."""
+        return self._child("dense car", "car", beams=1081)
+
+    @property
+    def server(self) -> Child:
+        return self._child("server", "serving")
+
+    @contextlib.contextmanager
+    def pages(self, count: int, *, car: Child | None = None, **more: Any) -> Iterator[Child]:
+        """So many pages that watch the car through catgraph, until the block ends; then the bridge is rid of it."""
+        self.server.ask("command", kind="connect", address=(car or self.car).hello["url"])
+        try:
+            with self.pages_at(self.server.hello["url"], count, **more) as pages:
+                yield pages
+        finally:
+            self.server.ask("command", kind="disconnect")
+
+    @contextlib.contextmanager
+    def pages_at(self, url: str, count: int, **more: Any) -> Iterator[Child]:
+        """So many pages at a server of any kind, until the block ends."""
+        with self._settled(self._child("pages", "pages"), url=url, count=count, **more) as pages:
+            yield pages
+
+    @contextlib.contextmanager
+    def direct(self, *, car: Child | None = None, **more: Any) -> Iterator[Child]:
+        """Clients straight on the car's bridge, until the block ends."""
+        car = car or self.car
+        child = self._child("direct", "direct")
+        with self._settled(child, url=car.hello["url"], topics=car.hello["topics"], **more) as direct:
+            yield direct
+
+    @contextlib.contextmanager
+    def relay(self) -> Iterator[Child]:
+        """A bare relay between the car and pages, until the block ends."""
+        relay = Child("relay", bridge=self.car.hello["url"], topics=self.car.hello["topics"])
+        try:
+            yield relay
+        finally:
+            relay.stop()
+
+    @contextlib.contextmanager
+    def _settled(self, child: Child, **connect: Any) -> Iterator[Child]:
+        try:
+            child.ask("connect", **connect)
+            time.sleep(self.pace.settle_s)
+            yield child
+        finally:
+            child.ask("leave")
+
+    def _child(self, name: str, module: str, **options: Any) -> Child:
+        if name not in self._children:
+            child = Child(module, **options)
+            self._stack.callback(child.stop)
+            self._children[name] = child
+        return self._children[name]

@@ -1,0 +1,101 @@
+"""The bench's server: catgraph as `catgraph serve` runs it, but its speed alarm has no delays, and it is timed inside.
+
+Without the delays every speed above the limit is an alarm of its own, so what is measured is the way through the
+server and not the operator's patience.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import dataclasses
+import io
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from monitor import catalog
+from monitor.runner import Monitor
+from server import app, frames, serving
+from server.config import Config
+from server.session import Session
+from tests.bench.orders import obey, options
+
+VEHICLE = "car"
+
+
+def impatient_checks() -> list[catalog.AnyCheck]:
+    """All checks, the speed limit's alarm without delays."""
+    return [
+        dataclasses.replace(check, alarm=dataclasses.replace(check.alarm, on_delay_s=0.0, off_delay_s=0.0))
+        if check.id == "speed_limit"
+        else check
+        for check in catalog.load()
+    ]
+
+
+class Timed:
+    """Counts the calls of a function and the processor time of this thread in them [ns]."""
+
+    def __init__(self, owner: Any, name: str) -> None:
+        self.calls = self.spent_ns = 0
+        inner: Callable[..., Any] = getattr(owner, name)
+
+        def outer(*args: Any, **kwargs: Any) -> Any:
+            began_ns = time.thread_time_ns()
+            try:
+                return inner(*args, **kwargs)
+            finally:
+                self.spent_ns += time.thread_time_ns() - began_ns
+                self.calls += 1
+
+        setattr(owner, name, outer)
+
+
+async def main() -> None:
+    timed = {
+        "parse": Timed(frames, "decode"),
+        "message": Timed(Session, "message_received"),
+        "step": Timed(Monitor, "step"),
+        "tick": Timed(Session, "tick"),
+        "frame": Timed(Session, "frame"),
+    }
+    made: list[Any] = []
+
+    def create_app(config: Config) -> Any:
+        made.append(app.create_app(config, checks=impatient_checks()))
+        return made[-1]
+
+    serving.create_app = create_app  # so that uvicorn is set up as the product sets it up
+    announced = io.StringIO()
+    kept = tempfile.TemporaryDirectory()  # the alarm log is on a disk, as in earnest
+    with contextlib.redirect_stdout(announced):
+        running = asyncio.create_task(serving.serve(Config(port=0, data=Path(kept.name))))
+        while "listens on" not in announced.getvalue() or not made[-1].state.running.bus.vehicles:
+            if running.done():
+                running.result()
+            await asyncio.sleep(0.01)
+    url = announced.getvalue().split()[3].replace("http://", "ws://")
+
+    async def command(**command: Any) -> Any:
+        """What a page may ask for: connect, disconnect."""
+        return await made[-1].state.running.bus.request(VEHICLE, command)
+
+    async def timings() -> dict[str, Any]:
+        """Calls and processor time [ns] of the timed functions so far, and the clock [ns]."""
+        spent = {name: [one.calls, one.spent_ns] for name, one in timed.items()}
+        return {"at_ns": time.monotonic_ns(), "spent": spent}
+
+    try:
+        await obey({"command": command, "timings": timings}, {"url": f"{url}ws"})
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+        kept.cleanup()
+
+
+if __name__ == "__main__":
+    with serving.uvloop_runner() as runner:
+        runner.run(main(**options()))

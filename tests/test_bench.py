@@ -1,0 +1,80 @@
+"""The bench measures what it says, and leaves nothing running."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import orjson
+import psutil
+import pytest
+
+from tests.bench.__main__ import main
+from tests.bench.child import Child, Failed
+from tests.bench.rig import QUICK, Rig
+from tests.bench.rows.latency import latencies_ms
+from tests.bench.table import Group, Row, printed
+
+MS = 1_000_000
+
+
+@pytest.mark.slow
+def test_a_run_has_a_figure_for_each_way_and_leaves_nothing_running(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = tmp_path / "found.json"
+    assert main(["--quick", "--only", "latency", "--json", str(found)]) == 0
+    assert psutil.Process().children() == []
+    printed_lines = capsys.readouterr().out.splitlines()
+    assert any("alarm to one viewer, p50 [ms]" in line for line in printed_lines)
+    (group,) = orjson.loads(found.read_bytes())["groups"]
+    p50, p99, longest = group["rows"]
+    for way in ("catgraph", "floor", "today"):
+        assert 0 < p50[way] <= p99[way] <= longest[way] < 5000
+
+
+@pytest.mark.slow
+def test_a_process_that_fails_says_why_and_none_is_left() -> None:
+    with Rig(QUICK) as rig:
+        with pytest.raises(Failed, match="KeyError: 'no such order'"):
+            rig.car.ask("no such order")
+        assert rig.car.ask("counts")["dropped"] == 0, "it goes on"
+    assert psutil.Process().children() == []
+
+
+def test_a_process_that_does_not_start_says_why() -> None:
+    with pytest.raises(Failed, match="No module named"):
+        Child("nowhere")
+    assert psutil.Process().children() == []
+
+
+def test_alarms_are_matched_with_their_speeds() -> None:
+    sent = [[12.0, 10 * MS], [12.1, 20 * MS]]
+    assert latencies_ms(sent, [["12.0 m/s, limit 11.0 m/s", 11 * MS], [12.1, 25 * MS]]) == [1.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    "alarms",
+    [
+        [["12.0 m/s", 11 * MS]],
+        [["12.1 m/s", 11 * MS], ["12.0 m/s", 25 * MS]],
+        [["12.0 m/s", 11 * MS], ["12.1 m/s", 25 * MS], ["12.1 m/s", 26 * MS]],
+    ],
+    ids=["one lost", "out of order", "one twice"],
+)
+def test_alarms_that_are_not_those_sent_are_no_measurement(alarms: list[list[object]]) -> None:
+    with pytest.raises(Failed, match="are others"):
+        latencies_ms([[12.0, 10 * MS], [12.1, 20 * MS]], alarms)
+
+
+def test_the_table_tells_what_is_reached() -> None:
+    rows = (
+        Row(what="load", unit="%", catgraph=50, floor=10, today=100, reach=40, digits=0),
+        Row(what="silence", unit="s", catgraph=0.1, reach=0.2),
+    )
+    title, _, heading, load, silence = printed([Group(name="a", title="On the bridge", rows=rows)]).splitlines()
+    assert title.split() == ["reach", "catgraph", "floor", "today", "ours/floor", "today/ours"]
+    assert heading == "On the bridge"
+    assert load.split("  ")[1] == "load [%]"
+    assert "≤ 40 MISSED" in load
+    assert load.endswith("5.00 ×      2.00 ×")
+    assert "≤ 0.20 ok" in silence
