@@ -15,17 +15,23 @@ from tests.tree import PROJECT
 FILES = sorted(Path(monitor.__file__).parent.rglob("*.py"))
 MAY_KNOW = {
     "__future__",
+    "abc",
+    "bisect",
     "collections",
     "dataclasses",
     "enum",
     "functools",
+    "heapq",
     "importlib",  # the catalog's walk
     "itertools",
     "math",
     "monitor",
     "numpy",
+    "operator",
     "pkgutil",
     "pydantic",
+    "re",
+    "statistics",
     "traceback",
     "types",
     "typing",
