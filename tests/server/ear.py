@@ -1,0 +1,164 @@
+"""Who listens to a link in tests, and the small servers it is tried on."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import Any
+
+import orjson
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
+
+from server.address import parse
+from server.link import RosLink
+from server.problems import Problem
+
+Handler = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
+
+
+class Ear:
+    """Writes down what the link tells."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[str, Any]] = []
+
+    def link_opened(self) -> None:
+        self.told.append(("opened", None))
+
+    def link_closed(self, problem: Problem) -> None:
+        self.told.append(("closed", problem))
+
+    def dial_failed(self, problem: Problem) -> None:
+        self.told.append(("failed", problem))
+
+    def message_received(self, topic: str, message: Any, note: str | None) -> None:
+        self.told.append(("message", (topic, message, note)))
+
+    def status_received(self, level: str, text: str) -> None:
+        self.told.append(("status", (level, text)))
+
+    def junk_received(self, why: str) -> None:
+        self.told.append(("junk", why))
+
+    def all(self, kind: str) -> list[Any]:
+        return [what for name, what in self.told if name == kind]
+
+    async def hears(self, kind: str, count: int = 1, *, within_s: float = 5.0) -> Any:
+        """What was told the `count`-th time."""
+        await until(lambda: len(self.all(kind)) >= count, within_s=within_s, or_say=lambda: f"no {kind}: {self.told}")
+        return self.all(kind)[count - 1]
+
+
+async def until(
+    condition: Callable[[], Any], *, within_s: float = 5.0, or_say: Callable[[], str] = lambda: "it did not happen"
+) -> None:
+    deadline_s = time.monotonic() + within_s
+    while not condition():
+        assert time.monotonic() < deadline_s, or_say()
+        await asyncio.sleep(0.005)
+
+
+@contextlib.asynccontextmanager
+async def linked(address: str, ear: Ear) -> AsyncIterator[RosLink]:
+    """A started link, stopped at the end, with nothing told after that."""
+    link = RosLink(parse(address), ear, now=time.monotonic)
+    link.start()
+    try:
+        yield link
+    finally:
+        link.stop()
+        told = len(ear.told)
+        for _ in range(10):
+            await asyncio.sleep(0)
+        assert len(ear.told) == told
+
+
+class Bridge:
+    """A WebSocket server that writes down each connection's operations, and says what the test says."""
+
+    def __init__(self) -> None:
+        self.port = 0
+        self.connections: list[list[dict[str, Any]]] = []
+        self.sockets: list[ServerConnection] = []
+        self.answer: Callable[[dict[str, Any]], dict[str, Any] | None] = lambda operation: None
+        self.hangs_up = False  # as soon as a connection has said something
+
+    @property
+    def address(self) -> str:
+        return f"ws://127.0.0.1:{self.port}"
+
+    @property
+    def socket(self) -> ServerConnection:
+        return self.sockets[-1]
+
+    @property
+    def operations(self) -> list[dict[str, Any]]:
+        """Of the newest connection."""
+        return self.connections[-1] if self.connections else []
+
+    async def say(self, operation: Any) -> None:
+        """One frame: bytes are binary, text is text, anything else is JSON."""
+        if not isinstance(operation, (bytes, str)):
+            operation = orjson.dumps(operation).decode()
+        await self.socket.send(operation)
+
+    async def serve(self, connection: ServerConnection) -> None:
+        said: list[dict[str, Any]] = []
+        self.connections.append(said)
+        self.sockets.append(connection)
+        with contextlib.suppress(ConnectionClosed):
+            async for text in connection:
+                operation = orjson.loads(text)
+                said.append(operation)
+                answer = self.answer(operation)
+                if answer is not None:
+                    await connection.send(orjson.dumps(answer).decode())
+                if self.hangs_up:
+                    connection.transport.abort()
+
+
+@contextlib.asynccontextmanager
+async def bridging(port: int = 0, **options: Any) -> AsyncIterator[Bridge]:
+    bridge = Bridge()
+    options = {"ping_interval": None, "close_timeout": 0.2, "max_size": None, "compression": None} | options
+    async with serve(bridge.serve, "127.0.0.1", port, **options) as server:
+        bridge.port = next(iter(server.sockets)).getsockname()[1]
+        yield bridge
+        for socket in bridge.sockets:
+            socket.transport.abort()
+
+
+@contextlib.asynccontextmanager
+async def answering(handler: Handler, **options: Any) -> AsyncIterator[int]:
+    """A raw TCP server, on 127.0.0.1 unless told otherwise; yields its port."""
+    writers: set[asyncio.StreamWriter] = set()
+
+    async def handle(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writers.add(writer)
+        with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
+            await handler(reader, writer)
+
+    where = {} if "sock" in options else {"host": "127.0.0.1", "port": 0}
+    server = await asyncio.start_server(handle, **(where | options))
+    try:
+        yield server.sockets[0].getsockname()[1]
+    finally:
+        server.close()
+        for writer in writers:
+            writer.transport.abort()
+        await asyncio.sleep(0)
+
+
+async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """The server's half of the WebSocket handshake (RFC 6455), by hand."""
+    from websockets.utils import accept_key
+
+    request = (await reader.readuntil(b"\r\n\r\n")).decode()
+    key = next(line.partition(":")[2].strip() for line in request.splitlines() if line.startswith("Sec-WebSocket-Key"))
+    writer.write(
+        b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        b"Sec-WebSocket-Accept: " + accept_key(key).encode() + b"\r\n\r\n"
+    )
