@@ -165,8 +165,6 @@ def _open(path: Path, kind: Kind) -> FileSource:
         return Bag2(path, kind)
     except RecordingUnreadable:
         raise
-    except PermissionError:
-        raise RecordingUnreadable(f"{path} may not be read by this user: permission denied") from None
     except Exception as error:  # a damaged file makes the readers fail in every way there is
         raise RecordingUnreadable(_what_is_wrong(path, error)) from None
 
@@ -181,6 +179,8 @@ def _safely(source: FileSource, numbers: set[int], start_ns: int) -> Iterator[tu
 
 
 def _what_is_wrong(path: Path, error: Exception) -> str:
+    if isinstance(error, PermissionError) or isinstance(error.__cause__, PermissionError):
+        return f"{path} may not be read by this user: permission denied"
     said = " ".join(str(error).split()).rstrip(".")
     if "not indexed" in said:
         return f"{path} was not closed properly and has no index: repair it with `rosbag reindex`"
