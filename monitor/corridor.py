@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,10 +65,9 @@ def look(scan: LaserScan, corridor: Corridor, reach_m: float) -> Sight:
     n = scan.beams
     if n == 0:
         return Sight(beams=0, blind=0, gap_m=None, bearing_rad=None)
-    angles = scan.angle_min_rad + scan.angle_increment_rad * np.arange(n)
+    cosines, sines = _directions(n, scan.angle_min_rad, scan.angle_increment_rad)
     good = usable(scan.ranges_m, scan.range_min_m, scan.range_max_m)
     ranges = np.where(good, scan.ranges_m, np.nan).astype(np.float64)
-    cosines, sines = np.cos(angles), np.sin(angles)
     with np.errstate(invalid="ignore"):
         along_m, aside_m = along_and_aside(ranges * cosines, ranges * sines, corridor)
         inside = good & (aside_m <= 0) & (along_m > 0) & (ranges * cosines > 0)
@@ -78,8 +78,8 @@ def look(scan: LaserScan, corridor: Corridor, reach_m: float) -> Sight:
         both_m = np.where(pairs, np.maximum(along_m[:-1], along_m[1:]), np.inf)
         at = int(np.argmin(both_m))
         nearer = at if along_m[at] <= along_m[at + 1] else at + 1
-        gap_m, bearing_rad = float(both_m[at]), float(angles[nearer])
-    watched = _points_into(cosines, sines, corridor, reach_m)
+        gap_m, bearing_rad = float(both_m[at]), scan.angle_min_rad + nearer * scan.angle_increment_rad
+    watched = _points_into(n, scan.angle_min_rad, scan.angle_increment_rad, corridor, reach_m)
     return Sight(
         beams=int(np.count_nonzero(watched)),
         blind=int(np.count_nonzero(watched & ~good)),
@@ -88,10 +88,21 @@ def look(scan: LaserScan, corridor: Corridor, reach_m: float) -> Sight:
     )
 
 
+# A laser keeps its geometry (two of them, where it is interlaced), so that this is reckoned once and not 75 times
+# a second.
+@lru_cache(maxsize=16)
+def _directions(n: int, angle_min_rad: float, increment_rad: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Cosines and sines of the beams, each shape (n,), never to be written to."""
+    angles = angle_min_rad + increment_rad * np.arange(n)
+    return np.cos(angles), np.sin(angles)
+
+
+@lru_cache(maxsize=256)
 def _points_into(
-    cosines: NDArray[np.float64], sines: NDArray[np.float64], corridor: Corridor, reach_m: float
+    n: int, angle_min_rad: float, increment_rad: float, corridor: Corridor, reach_m: float
 ) -> NDArray[np.bool_]:
     """Which beams would see something that stands at `reach_m` in the corridor; shape (n,)."""
+    cosines, sines = _directions(n, angle_min_rad, increment_rad)
     _, aside_m = along_and_aside(reach_m * cosines, reach_m * sines, corridor)
     found: NDArray[np.bool_] = (aside_m <= 0) & (cosines > 0)
     return found

@@ -114,8 +114,7 @@ CHECKS = (
             actions=(Action.ACKNOWLEDGE,),  # it explains why obstacles are not checked: never hidden
         ),
         limits=BlindLimits,
-        find=sees,
-        needs=frozenset({"scan"}),
+        find=sees,  # on the tick: it must hold for a second anyway, and 75 looks a second are not free
     ),
     Check(
         id="scan_shape",

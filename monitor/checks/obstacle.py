@@ -27,6 +27,9 @@ from monitor.instruments import ObstacleLimits, stopping_m
 from monitor.state import NotFresh, Snapshot
 
 CLOSING_AT_LEAST_MPS = 0.3  # slower is noise of two distances
+APPROACH_AT_MOST_MPS = 10.0  # what comes towards us faster is not on a test site
+BLIND_AT_M = 5.0  # where the beams of the corridor are counted
+ANGLE_STEP_RAD = 0.005  # 10 cm aside at 10 m: what was reckoned for a bend serves the next scan too
 STEADY_WITHIN_M = 3.0  # a gap that shrank more than the car can drive in between is another object's
 
 
@@ -36,14 +39,13 @@ def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Fi
     scan = snapshot.need("scan")
     speed_mps = _speed(snapshot)
     corridor = _corridor(snapshot, limits)
-    needed_m = max(limits.standoff_m, stopping_m(speed_mps or 0.0, limits))
-    sight = look(scan, corridor, needed_m)
+    sight = look(scan, corridor, BLIND_AT_M)
     if sight.beams and sight.blind > 0.9 * sight.beams:
         return unknown("The laser sees nothing in the corridor", short="blind")
     before = snapshot.scan_before
     closing_mps = None
-    if sight.gap_m is not None:
-        gap_before_m = look(before.value, corridor, needed_m).gap_m if before is not None else None
+    if sight.gap_m is not None and sight.gap_m < _soon_m(speed_mps, limits):
+        gap_before_m = look(before.value, corridor, BLIND_AT_M).gap_m if before is not None else None
         span_s = snapshot.readings["scan"].received_s - before.received_s if before is not None else 0.0
         closing_mps = _closing(sight.gap_m, gap_before_m, span_s, speed_mps)
     return _judge(sight.gap_m, sight.bearing_rad, speed_mps, closing_mps, limits, was_active, cause="scan")
@@ -71,6 +73,7 @@ def _corridor(snapshot: Snapshot, limits: ObstacleLimits) -> Corridor:
     angle_rad = 0.0
     if steering is not None and steering.is_fresh(snapshot.now_s) and math.isfinite(steering.value.percent):
         angle_rad = max(-0.6, min(0.6, steering.value.percent * TYRE_RAD_A_PERCENT))
+        angle_rad = round(angle_rad / ANGLE_STEP_RAD) * ANGLE_STEP_RAD
     return Corridor(
         half_width_m=limits.half_width_m,
         wheelbase_m=limits.wheelbase_m,
@@ -86,6 +89,11 @@ def _speed(snapshot: Snapshot) -> float | None:
     except NotFresh:
         return None
     return abs(speed_mps) if math.isfinite(speed_mps) else None
+
+
+def _soon_m(speed_mps: float | None, limits: ObstacleLimits) -> float:
+    """Nothing farther than this can be met within the time to collision."""
+    return 1.25 * limits.time_to_collision_s * ((speed_mps or 0.0) + APPROACH_AT_MOST_MPS)
 
 
 def _closing(gap_m: float, before_m: float | None, span_s: float, speed_mps: float | None) -> float | None:
