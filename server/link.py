@@ -407,7 +407,7 @@ class RosLink:
         host = self.address.host
         with contextlib.suppress(ValueError):
             return [str(ipaddress.ip_address(host))]
-        if self._lookup is None or self._lookup.done():  # one that hangs is waited for again, not started again
+        if self._lookup is None:  # one that takes longer is waited for again at the next try, not started again
             self._lookup = asyncio.ensure_future(_look_up(host, self.address.port))
             self._lookup.add_done_callback(lambda task: task.cancelled() or task.exception())
         try:
@@ -415,6 +415,9 @@ class RosLink:
                 found = await asyncio.shield(self._lookup)
         except TimeoutError:
             raise sockets.gaierror(sockets.EAI_AGAIN, "no name server answers") from None
+        finally:
+            if self._lookup.done():
+                self._lookup = None
         return list(dict.fromkeys(str(sockaddr[0]) for *_, sockaddr in found))[:MAX_ADDRESSES]
 
     async def _dial_one(self, factory: _Dialler, ip: str, within_s: float) -> _BridgeProtocol:

@@ -141,7 +141,7 @@ async def answering(handler: Handler, **options: Any) -> AsyncIterator[int]:
         with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
             await handler(reader, writer)
 
-    where = {} if "sock" in options else {"host": "127.0.0.1", "port": 0}
+    where: dict[str, Any] = {} if "sock" in options else {"host": "127.0.0.1", "port": 0}
     server = await asyncio.start_server(handle, **(where | options))
     try:
         yield server.sockets[0].getsockname()[1]

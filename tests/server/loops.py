@@ -28,4 +28,5 @@ def on_both_loops(story: Callable[..., Coroutine[Any, Any, None]]) -> Callable[.
     kinds = inspect.signature(story).parameters
     loop = inspect.Parameter("new_loop", inspect.Parameter.KEYWORD_ONLY)
     test.__signature__ = inspect.Signature([*kinds.values(), loop])  # type: ignore[attr-defined]
-    return pytest.mark.parametrize("new_loop", LOOPS.values(), ids=LOOPS)(test)
+    both: Callable[..., None] = pytest.mark.parametrize("new_loop", LOOPS.values(), ids=LOOPS)(test)
+    return both

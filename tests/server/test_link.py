@@ -416,16 +416,22 @@ async def test_ended_by_the_listener_itself() -> None:
         for kind in ("link_opened", "message_received", "link_closed"):
             ear = Ear()
             link = RosLink(parse(bridge.address), ear, now=time.monotonic)
-            setattr(ear, kind, lambda *what, link=link: link.stop())
+
+            def end(*_: Any, link: RosLink = link) -> None:
+                link.stop()
+
+            setattr(ear, kind, end)
             link.start()
             openings = len(bridge.connections)
-            await until(lambda openings=openings: len(bridge.connections) > openings)
+            while len(bridge.connections) == openings:
+                await asyncio.sleep(0.005)
             with contextlib.suppress(Exception):
                 await bridge.say({"op": "publish", "topic": "/a", "msg": {}})
                 await bridge.say({"op": "publish", "topic": "/a", "msg": {}})
                 bridge.socket.transport.abort()
             await asyncio.wait_for(bridge.socket.wait_closed(), 1)
-            await until(lambda link=link: not link.is_open)
+            while link.is_open:
+                await asyncio.sleep(0.005)
             link.stop()
 
 
