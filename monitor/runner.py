@@ -102,6 +102,10 @@ class Monitor:
             transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
         return tuple(transitions)
 
+    def heeds(self, changed: Collection[str]) -> bool:
+        """Whether a step for these signals would judge anything; where not, there is no need of a snapshot."""
+        return any(signal in self._by_signal for signal in changed)
+
     def end(self, now_s: float) -> tuple[Transition, ...]:
         """Monitoring ends by the operator's wish: nothing is judged and nothing stands any more."""
         transitions: list[Transition] = []

@@ -14,22 +14,22 @@ from monitor.runner import Monitor, Refused, Transition
 from monitor.signal_limits import expected_rates
 from monitor.signals import SIGNALS
 from monitor.state import LinkFacts, Phase, State
-from monitor.values import LaserScan, Steering
-from server import address, commands, decode, discovery, problems, wire
+from monitor.values import LaserScan
+from server import address, commands, discovery, judging, problems, wire
 from server.address import BadAddress
 from server.bus import LocalBus
 from server.config import Vehicle
 from server.frame import Facts, state_frame
+from server.judging import TICK_S
 from server.link import LinkDown, RosLink, Subscription
 from server.problems import Problem
 from server.reception import Reception, Tally
 from server.settings import BadSetting, Conflict, SettingsFile
 from server.topics import BY_SIGNAL, TOPICS, Source, map_signals
-from server.tuning import PERCENT_A_RAD, Tuning
+from server.tuning import Tuning
 
 log = logging.getLogger("catgraph.session")
 
-TICK_S = 0.1  # time judges this often, and a state goes to the pages
 SCAN_FRAME_S = 0.05  # pages are offered at most 20 scans a second
 SICK_LOOP_S = 0.25  # a loop later than this lets one heartbeat fall: a sign of life from a sick server is a lie
 PROOF_WITHIN_S = 4.0  # something that speaks WebSocket and no rosbridge is told apart by then
@@ -357,24 +357,19 @@ class Session:
         self._prove()
         self._heard.add(topic)
         self._last_message_s = now_s
-        self._reception.received += 1
-        changed: set[str] = set()
-        proper = True
-        for source in sources:
-            value = self._reception.read(source, message, note)
-            if isinstance(value, Steering) and self._tuning.profile.steering == "tyre_angle":
-                value = Steering(percent=value.percent * PERCENT_A_RAD)
-            if value is None:
-                proper = False
-                continue
-            changed.update(self._state.receive(source.signal, value, now_s, decode.stamp_s(message)))
-            if source.signal == "scan":
-                self._scan_kept = not isinstance(message["ranges"], list)
-        if not proper:
-            self._reception.rejected += 1
+        changed = judging.receive(
+            sources,
+            message,
+            now_s,
+            note,
+            reception=self._reception,
+            state=self._state,
+            profile=self._tuning.profile,
+        )
         if changed:
             self._judge(now_s, changed)
         if "scan" in changed:
+            self._scan_kept = not isinstance(message["ranges"], list)
             self._scan_number += 1
             self._put_scan(now_s)
 
@@ -454,12 +449,9 @@ class Session:
         link = self._link
         if link is None:
             return
-        by_topic: dict[str, tuple[Source, ...]] = {}
-        for source in self._sources.values():
-            by_topic[source.topic] = (*by_topic.get(source.topic, ()), source)
-        self._by_topic = by_topic
+        self._by_topic = judging.by_topic(self._sources.values())
         wanted = {}
-        for topic, sources in by_topic.items():
+        for topic, sources in self._by_topic.items():
             rows = [BY_SIGNAL[source.signal] for source in sources if source.decode is not None]
             if rows:
                 wanted[topic] = Subscription(
@@ -509,7 +501,7 @@ class Session:
             topics_subscribed=len(link.subscriptions) if link is not None else 0,
             connected_s=self._connected_s,
             last_message_s=self._last_message_s,
-            published=frozenset(s.signal for s in self._sources.values() if s.decode is not None),
+            published=judging.published(self._sources.values()),
         )
 
     def bridge_answers(self, now_s: float) -> bool:
@@ -521,8 +513,8 @@ class Session:
         self._judge(now_s, None)
         self._put_state(now_s)
 
-    def _judge(self, now_s: float, changed: Collection[str] | None) -> None:
-        transitions = self._monitor.step(self._state.snapshot(now_s), changed)
+    def _judge(self, now_s: float, changed: tuple[str, ...] | None) -> None:
+        transitions = judging.judge(self._monitor, self._state, now_s, changed)
         if self._monitor.crashes:
             self._log_crashes()
         if transitions:
