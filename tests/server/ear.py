@@ -152,6 +152,16 @@ async def answering(handler: Handler, **options: Any) -> AsyncIterator[int]:
         await asyncio.sleep(0)
 
 
+def text_frame(text: bytes, *, opcode: int = 1, final: bool = True) -> bytes:
+    """A frame as a server sends it (RFC 6455, 5.2)."""
+    head = bytes([0x80 * final | opcode])
+    if len(text) < 126:
+        return head + bytes([len(text)]) + text
+    if len(text) < 2**16:
+        return head + b"\x7e" + len(text).to_bytes(2, "big") + text
+    return head + b"\x7f" + len(text).to_bytes(8, "big") + text
+
+
 async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
     """The server's half of the WebSocket handshake (RFC 6455), by hand."""
     from websockets.utils import accept_key
