@@ -105,7 +105,7 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
 const WORSE = { fault: 2, unknown: 1, ok: 0 };
 
 /**
- * One tile for all checks that share it, in the order of their first; the worst of them speaks.
+ * One tile a label, in the order of their first; the worst of those that share it speaks.
  * @param {Check[]} checks
  * @returns {Tile[]}
  */
@@ -113,13 +113,14 @@ export function tilesOf(checks) {
   /** @type {Map<string, Tile>} */
   const tiles = new Map();
   for (const check of checks) {
-    const label = check.tile ?? check.label;
+    const { label } = check;
+    const ids = check.checks ?? [check.id];
     const tile = tiles.get(label);
     if (!tile) {
-      tiles.set(label, { label, verdict: check.verdict, brief: check.brief, text: check.text, ids: [check.id] });
+      tiles.set(label, { label, verdict: check.verdict, brief: check.brief, text: check.text, ids: [...ids] });
       continue;
     }
-    tile.ids.push(check.id);
+    tile.ids.push(...ids);
     if (WORSE[check.verdict] > WORSE[tile.verdict]) Object.assign(tile, { verdict: check.verdict, brief: check.brief, text: check.text });
   }
   return [...tiles.values()];

@@ -84,7 +84,6 @@ function speak() {
 store.on('draw', draw);
 store.on('draw', speak);
 store.on('beat', speak);
-store.on('move', () => page.draw());
 store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
 // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
 for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });

@@ -53,7 +53,8 @@ export function mount(root, store) {
   function draw() {
     const { frame } = store;
     if (!frame) return;
-    const why = store.isSilent ? 'stale' : frame.session.phase !== 'monitoring' ? 'no link' : frame.session.paused ? 'paused' : null;
+    const why = store.isSilent ? 'stale' : frame.session.phase !== 'monitoring' ? 'no link' : frame.session.paused ? 'paused'
+      : store.chain.cut !== null ? 'stale' : null;
     const shown = showTiles(frame, why, store.ink('fuel').ink !== 'not_published');
     while (list.children.length > shown.length) list.lastElementChild?.remove();
     while (list.children.length < shown.length) list.append(html('li', {}, icon('ok', 's'), html('b'), html('span')));

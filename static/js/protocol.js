@@ -31,7 +31,7 @@
  * @typedef {object} Check
  * @property {string} id
  * @property {string} label
- * @property {string} [tile] the tile it shares with others; its own label where absent
+ * @property {string[]} [checks] ids of the checks behind this tile
  * @property {Verdict} verdict
  * @property {string} text
  * @property {string} brief

@@ -40,7 +40,6 @@ export function mount(root, store, page) {
       page.say(`This server cannot slow the car: ${why}. The safety driver stops the car.`, 'Slow-down is off');
     })),
     store.on('draw', draw),
-    store.on('move', draw),
   ];
 
   function draw() {

@@ -106,8 +106,9 @@ function inkOfScan(store) {
   const state = store.ink('scan');
   if (!store.scan || state.ink === 'never' || state.ink === 'not_published') return state;
   const age_s = store.scan.age_s + (store.now() - store.scanAt_ms) / 1000;
-  const horizon_s = store.signal('scan')?.horizon_s ?? 1;
-  return { ink: age_s > Math.max(1, horizon_s) ? /** @type {const} */ ('stale') : state.ink, age_s };
+  // A server that does not know the laser's rate yet is patient with it; a picture of a moving world is not: ten periods.
+  const period_s = store.signal('scan')?.period_s ?? 0.1;
+  return { ink: age_s > Math.max(1, 10 * period_s) ? /** @type {const} */ ('stale') : state.ink, age_s };
 }
 
 function recall() {

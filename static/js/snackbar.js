@@ -39,6 +39,5 @@ export function mount(root, store, say) {
   }
 
   draw();
-  const stops = [store.on('draw', draw), store.on('move', draw)];
-  return () => stops.forEach((stop) => stop());
+  return store.on('draw', draw);
 }

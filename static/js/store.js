@@ -45,6 +45,7 @@ export class Store {
   #started_ms = 0;
   #drew_ms = -Infinity;
   #isMoved = false;
+  #urgent = '';
   #asked = 0;
   /** @type {Map<string, (answer: Answer) => void>} */
   #waiting = new Map();
@@ -243,7 +244,10 @@ export class Store {
       requestAnimationFrame(() => {
         this.#isMoved = false;
         this.#emit('move');
-        if (now_ms - this.#drew_ms >= DRAW_EVERY_MS) this.#draw();
+        // What asks for the operator is drawn at once; the rest five times a second.
+        const urgent = urgentOf(this.frame);
+        if (urgent !== this.#urgent || now_ms - this.#drew_ms >= DRAW_EVERY_MS) this.#draw();
+        this.#urgent = urgent;
       });
     }
   }
@@ -325,4 +329,14 @@ export class Store {
  */
 function answerOf({ ok, reason, problem }) {
   return { ok, ...(reason ? { reason } : {}), ...(problem?.suggestion ? { suggestion: problem.suggestion } : {}) };
+}
+
+/**
+ * What must not wait for the next drawing: alarms, the link, a pause.
+ * @param {State | null} frame
+ */
+function urgentOf(frame) {
+  if (!frame) return '';
+  const { session, link, alarms } = frame;
+  return [session.phase, session.paused, link.cut, ...alarms.map((alarm) => `${alarm.id} ${alarm.occurrence} ${alarm.state}`)].join('|');
 }

@@ -28,8 +28,7 @@ export function mount(root, store) {
   }
 
   draw();
-  const stops = [store.on('draw', draw), store.on('move', draw)];
-  return () => stops.forEach((stop) => stop());
+  return store.on('draw', draw);
 }
 
 /**

@@ -71,7 +71,7 @@ export function mount(root, store) {
   }
 
   draw();
-  const stops = [store.on('beat', rewind), store.on('draw', draw), store.on('move', draw)];
+  const stops = [store.on('beat', rewind), store.on('draw', draw)];
   return () => stops.forEach((stop) => stop());
 }
 

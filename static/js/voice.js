@@ -70,7 +70,8 @@ export class Voice {
   /** @param {Loud} sound */
   #vibrate(sound) {
     const { vibration, every_s } = burstOf(sound);
-    if (!vibration.length || typeof navigator.vibrate !== 'function') return;
+    // Browsers let nobody vibrate before a touch; then the sound is blocked too, and the page says so.
+    if (!vibration.length || typeof navigator.vibrate !== 'function' || !navigator.userActivation?.hasBeenActive) return;
     navigator.vibrate(vibration);
     this.#shake = setInterval(() => navigator.vibrate(vibration), every_s * 1000);
   }

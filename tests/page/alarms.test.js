@@ -96,13 +96,13 @@ test('the strip says the worst that stands', () => {
 });
 
 test('one tile for the checks that share it; the worst speaks', () => {
-  const check = (/** @type {string} */ id, /** @type {string} */ verdict, tile = 'Signals') => /** @type {any} */ ({ id, label: id, tile, verdict, brief: id, text: '' });
+  const check = (/** @type {string} */ id, /** @type {string} */ verdict, label = 'Signals') => /** @type {any} */ ({ id, label, verdict, brief: id, text: '' });
   assert.deepEqual(tilesOf([check('a', 'ok'), check('b', 'fault'), check('c', 'unknown'), check('d', 'ok', 'Speed')]).map(({ label, verdict, brief }) => [label, verdict, brief]),
     [['Signals', 'fault', 'b'], ['Speed', 'ok', 'd']]);
 });
 
 test('tiles: paused means not checked, whatever the frame says; fuel is never 0', () => {
-  const checks = /** @type {any} */ ([{ id: 'speed_limit', label: 'Speed', verdict: 'ok', brief: 'OK' }]);
+  const checks = /** @type {any} */ ([{ id: 'speed', label: 'Speed', verdict: 'ok', brief: 'OK', checks: ['speed_limit'] }]);
   const rows = (/** @type {string | null} */ why, frame = state({ checks })) => showTiles(frame, why, false).map(({ label, kind, lines }) => [label, kind, ...lines]);
   assert.deepEqual(rows(null), [['Speed', 'ok', 'OK'], ['Fuel', 'unk', 'not published']]);
   assert.deepEqual(rows('paused')[0], ['Speed', 'unk', 'not checked', 'paused']);

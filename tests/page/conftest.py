@@ -16,6 +16,7 @@ from tests.chromium import FLAGS
 PHONE: dict[str, Any] = {
     "viewport": {"width": 412, "height": 915},
     "device_scale_factor": 1,  # a quarter of the pixels for a machine without a graphics card
+    "color_scheme": "dark",
     "has_touch": True,
     "is_mobile": True,
     "permissions": ["geolocation"],
@@ -48,7 +49,9 @@ class Phone:
         self.page = page
         self.complaints: list[str] = []
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("console", lambda said: self.complaints.append(said.text) if said.type in ("error", "warning") else None)
+        page.on(
+            "console", lambda said: self.complaints.append(said.text) if said.type in ("error", "warning") else None
+        )
 
     async def open(self, address: str) -> None:
         await self.page.goto(address)
@@ -57,10 +60,16 @@ class Phone:
         """A field of the page by its name in the templates."""
         return self.page.locator(f'{root} [data-f="{name}"]').first
 
-    async def live(self, timeout: float = 10_000) -> None:
-        """Waits until Home shows live values."""
-        await expect(self.f("word")).to_have_text("Live", timeout=timeout)
-        await expect(self.f("veil")).not_to_have_attribute("data-on", re.compile("."), timeout=timeout)
+    async def live(self) -> None:
+        """Waits until the values are live."""
+        await expect(self.f("word")).to_have_text("Live", timeout=12_000)
+        await expect(self.f("veil")).not_to_have_attribute("data-on", re.compile("."))
+
+    async def acknowledge_all(self) -> None:
+        """Acknowledges what the car raises of its own, as an operator does."""
+        while await self.page.locator("#sheet-alarm[open]").count():
+            await self.f("acknowledge", "#sheet-alarm").tap()
+            await self.page.wait_for_timeout(300)
 
     async def speed(self) -> str:
         return str(await self.page.locator(".gauge .speed").text_content())

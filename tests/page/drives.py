@@ -58,12 +58,12 @@ def write(path: Path, says: dict[str, Callable[[float], Any]], *, seconds: float
 
 
 def steady(path: Path, speed_mps: float) -> Path:
-    """A car that drives at one speed, an object 12.4 m ahead and 3° to the right."""
+    """A car that drives at one speed, an object far ahead and 3° to the right."""
     return write(
         path,
         {
             "speed": lambda _: twist(speed_mps),
-            "distance": lambda t: number(12.4 + 0.001 * np.sin(9 * t)),  # a value that never moves would be frozen
+            "distance": lambda t: number(70.0 + 0.001 * np.sin(9 * t)),  # a value that never moves would be frozen
             "bearing": lambda t: number(-0.052 + 0.0001 * np.sin(7 * t)),
         },
     )

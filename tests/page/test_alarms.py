@@ -1,0 +1,138 @@
+"""Alarms at the glass: the dialog on every tab, its acknowledgement, pause and resume, texts that mean harm."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import re
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import httpx
+import pytest
+from playwright.async_api import expect
+
+from tests.page.conftest import Phone
+from tests.page.drives import diagnostics, number, steady, twist, write
+from tests.page.processes import Process, replay, running, server
+
+HOSTILE = (
+    "<img src=x onerror=\"document.title='owned'\">",
+    "</span><script>document.title='owned'</script>",
+    "‮gnp.exe\u0000\u0007 {{7*7}} ${7*7}",
+    "x" * 4000,
+)
+
+
+@contextlib.asynccontextmanager
+async def speeding(phone: Phone, folder: Path, tab: str = "home") -> AsyncIterator[Process]:
+    """A car at 12.6 m/s with the limit at 11.0, and the page on it."""
+    drive = steady(folder / "fast.bag", 12.6)
+    async with running(*replay(drive)) as car, running(*server(folder / "data", car.address)) as watch:
+        await phone.open(f"{watch.address}/#{tab}")
+        yield watch
+
+
+@pytest.mark.parametrize("tab", ["home", "map", "scan", "files", "settings"])
+async def test_case_17_and_18_a_speed_alarm_on_each_tab_and_its_acknowledgement(
+    phone: Phone, tmp_path: Path, tab: str
+) -> None:
+    async with speeding(phone, tmp_path, tab):
+        sheet = phone.page.locator("#sheet-alarm")
+        await expect(sheet).to_be_visible()
+        await expect(sheet).to_have_attribute("role", "alertdialog")
+        await expect(phone.f("title", "#sheet-alarm")).to_have_text("Speed above limit")
+        await expect(phone.f("measured", "#sheet-alarm")).to_have_text("12.6")
+        await expect(phone.f("limit", "#sheet-alarm")).to_have_text("11.0")
+        await expect(sheet).to_contain_text("The safety driver must slow the car.")
+        await expect(phone.f("acknowledge", "#sheet-alarm")).to_be_focused()
+        await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "asking")
+        await expect(phone.f("strip")).to_contain_text("Speed above limit")
+        if tab == "map":
+            await phone.page.keyboard.press("Escape")  # and the phone's back key: seen
+        else:
+            await phone.f("acknowledge", "#sheet-alarm").tap()
+        await expect(sheet).to_be_hidden()
+        await expect(phone.page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
+        await expect(phone.f("strip")).to_contain_text("Speed above limit")  # it stands, and is known
+        await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "critical")
+        await asyncio.sleep(1)
+        await expect(sheet).to_be_hidden()
+
+
+async def test_above_the_limit_the_gauge_and_the_tile_say_fault(phone: Phone, tmp_path: Path) -> None:
+    async with speeding(phone, tmp_path) as watch:
+        await expect(phone.page.locator(".gauge")).to_have_attribute("data-over", "")
+        tile = phone.page.locator(".checks li.crit")
+        await expect(tile).to_contain_text("Speed")
+        await expect(tile).to_contain_text(re.compile(r"FAULT 12\.6 m/s"))
+        assert await phone.speed() == "12.6"
+        async with httpx.AsyncClient() as client:  # another page acknowledges: the dialog goes here too
+            alarm = (await client.get(f"{watch.address}/api/alarms")).json()["alarms"][0]
+            await client.post(
+                f"{watch.address}/api/alarms/{alarm['id']}/acknowledge", json={"occurrence": alarm["occurrence"]}
+            )
+        await expect(phone.page.locator("#sheet-alarm")).to_be_hidden()
+
+
+async def test_before_a_touch_the_page_says_that_it_cannot_sound(phone: Phone, tmp_path: Path) -> None:
+    async with speeding(phone, tmp_path):
+        await expect(phone.f("sound-off")).to_be_visible()
+        await expect(phone.f("sound-off")).to_have_text("Alarm sound off: tap")
+        await phone.f("acknowledge", "#sheet-alarm").tap()
+        await expect(phone.f("sound-off")).to_be_hidden()
+
+
+async def test_paused_no_alarm_comes_and_every_tab_says_so(phone: Phone, tmp_path: Path) -> None:
+    drive = steady(tmp_path / "slow.bag", 4.2)
+    async with running(*replay(drive)) as car, running(*server(tmp_path / "data", car.address)) as watch:
+        await phone.open(watch.address)
+        await phone.live()
+        await phone.f("pause").tap()
+        await expect(phone.f("strip")).to_have_text(re.compile(r"Paused 0:0\d: no alarm will come"))
+        await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "paused")
+        await expect(phone.f("pause-word")).to_have_text("Resume")
+        await expect(phone.page.locator(".checks li.ok")).to_have_count(0)
+        await expect(phone.page.locator(".checks li", has_text="Speed").first).to_contain_text("paused")
+        assert re.fullmatch(r"4\.2", await phone.speed())  # the values go on
+        await phone.page.locator("[data-tab=settings]").tap()
+        await expect(phone.f("strip")).to_contain_text("Paused")
+        await phone.f("pause").tap()
+        await expect(phone.f("strip")).not_to_contain_text("Paused")
+        await expect(phone.page.locator(".frame")).not_to_have_attribute("data-mode", "paused")
+
+
+async def test_the_slow_down_says_why_it_is_off(phone: Phone, tmp_path: Path) -> None:
+    drive = steady(tmp_path / "slow.bag", 4.2)
+    async with running(*replay(drive)) as car, running(*server(tmp_path / "data", car.address)) as watch:
+        await phone.open(watch.address)
+        await phone.live()
+        await expect(phone.page.locator(".board > .rail .slide")).to_contain_text("not configured")
+        await phone.page.locator(".board > .rail .slide").tap()
+        await expect(phone.page.locator(".snack.note")).to_contain_text("The safety driver stops the car.")
+
+
+async def test_texts_that_mean_harm_are_only_text(phone: Phone, tmp_path: Path) -> None:
+    """Whatever a car says of itself stands on the page letter by letter, and breaks nothing."""
+    drive = write(
+        tmp_path / "hostile.bag",
+        {
+            "speed": lambda _: twist(4.2),
+            "distance": lambda t: number(70 + 0.01 * t),
+            "bearing": lambda t: number(0.01 * t),
+            "diagnostics": lambda _: diagnostics(*((text, 2, text) for text in HOSTILE)),
+        },
+    )
+    async with running(*replay(drive)) as car, running(*server(tmp_path / "data", car.address)) as watch:
+        await phone.open(watch.address)
+        await phone.live()
+        before = await phone.page.locator("script, img, iframe, object").count()
+        await phone.f("menu").tap()
+        await phone.page.locator("#sheet-menu").get_by_text("Signals").tap()
+        row = phone.page.locator(".sig", has_text="Diagnostics")
+        await expect(row).to_contain_text("ERROR")
+        await row.tap()
+        await expect(phone.page.locator(".sig-more:not([hidden])")).to_contain_text("<img src=x onerror=")
+        assert await phone.page.locator("script, img, iframe, object").count() == before
+        assert await phone.page.title() == "catgraph"
+        assert await phone.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
