@@ -189,7 +189,7 @@ class _BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
             return
         if quiet_s >= PING_EVERY_S / 2:
             self.sendPing()
-        next_s = max(min(now_s + PING_EVERY_S, self.heard_s + SILENT_AFTER_S + 0.001), now_s + 0.05)
+        next_s = max(min(now_s + PING_EVERY_S, self.heard_s + SILENT_AFTER_S + 0.001), now_s + LATE_S)
         self._timer = loop.call_at(next_s, self._look, next_s)
 
     # A message is gathered here, so that one beyond the limit can be skipped where autobahn would hang up.
