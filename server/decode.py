@@ -50,23 +50,27 @@ class Rejected(ValueError):
 
 
 def number(message: Any, *path: str) -> float:
-    """The number at a path of fields; NaN where it is null. Raises Rejected for what is missing or is no number."""
+    """The number at a path of fields; NaN where it is null, and where it is infinite, which JSON says as null too: a
+    recording tells nothing that its replay would not tell. Raises Rejected for what is missing or is no number."""
     value = message
     for name in path:
-        if not isinstance(value, Mapping):
+        if type(value) is not dict and not isinstance(value, Mapping):
             raise Rejected(f"{'.'.join(path)} is missing")
         try:
             value = value[name]
         except KeyError:
             raise Rejected(f"{'.'.join(path)} is missing") from None
+    if type(value) is float:  # nearly always
+        return value if math.isfinite(value) else math.nan
     if value is None:
         return math.nan
     if isinstance(value, (bool, str)) or not isinstance(value, (int, float, np.number)):
         raise Rejected(f"{'.'.join(path)} is not a number")
     try:
-        return float(value)
+        whole = float(value)
     except OverflowError:
         raise Rejected(f"{'.'.join(path)} is too large") from None
+    return whole if math.isfinite(whole) else math.nan
 
 
 def finite(message: Any, *path: str) -> float:
@@ -90,6 +94,8 @@ def text(message: Any, *path: str, default: str = "") -> str:
 
 def stamp_s(message: Any) -> float | None:
     """The header's stamp in seconds, ROS 1 or ROS 2; None where there is none or it is zero or absurd."""
+    if type(message) is dict and "header" not in message:
+        return None
     header = message.get("header") if isinstance(message, Mapping) else None
     stamp = header.get("stamp") if isinstance(header, Mapping) else None
     if not isinstance(stamp, Mapping):
