@@ -1,4 +1,4 @@
-"""The simulated car before the whole judge: faults raise their own alarm, once, in time; a healthy drive raises none."""
+"""The simulated car before the judge: a fault raises its own alarm, once, in time; a healthy drive raises none."""
 
 from __future__ import annotations
 
