@@ -338,6 +338,23 @@ def test_a_shelf_that_ends_while_suppressed_is_not_announced() -> None:
     assert [(t.change, t.announces) for t in happened[2:]] == [("suppressed", False), ("unshelved", False)]
 
 
+def test_a_new_cause_is_told_when_the_suppression_ends() -> None:
+    _, happened = play(
+        [
+            (0.0, A, NORMAL),
+            (1.0, A, UNACKED),
+            (1.5, ACK, ACKED),
+            (2.0, (LINK, A_AND_B), SUPPRESSED),
+            (9.0, A_AND_B, UNACKED),
+        ]
+    )
+    assert [(t.change, t.announces) for t in happened[2:]] == [
+        ("suppressed", False),
+        ("unsuppressed", False),
+        ("recaused", True),
+    ]
+
+
 def test_nothing_is_announced_from_the_shelf() -> None:
     alarm, happened = play(
         [(0.0, A, NORMAL), (1.0, A, UNACKED), (2.0, SHELVE, SHELVED), (3.0, A_AND_B, SHELVED), (4.0, OK, SHELVED)]

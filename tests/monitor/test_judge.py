@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from time import process_time
+
 import pytest
 
 from monitor import catalog
@@ -308,3 +310,11 @@ def test_components_of_diagnostics_are_no_signals() -> None:
     car.values["diagnostics"] = Diagnostics()
     car.to(20.0)
     assert car.log == []
+
+
+def test_judging_the_full_load_of_a_car_is_a_small_part_of_a_core() -> None:
+    """Some 360 messages a second and ten ticks: 1 % of a core when it was written. Ten times that is a defect."""
+    car = drive().open().to(5.0)
+    before_s = process_time()
+    car.to(25.0)
+    assert process_time() - before_s < 0.1 * 20.0

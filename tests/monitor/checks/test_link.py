@@ -93,7 +93,11 @@ def test_whose_silence_it_is(answers: bool, topics: int, text: str) -> None:
 
 
 def silent(
-    *ages_s: float, bridge_s: float | None = None, was_active: bool = False, slow_s: float | None = None
+    *ages_s: float,
+    bridge_s: float | None = None,
+    was_active: bool = False,
+    slow_s: float | None = None,
+    command_s: float | None = None,
 ) -> Finding:
     """A car at 100 s whose fast signals are so old, and whose diagnostics, once a second, may be younger."""
     names = ("speed", "brake", "steering", "distance")
@@ -103,6 +107,8 @@ def silent(
     }
     if slow_s is not None:
         readings["diagnostics"] = Reading(value=0, received_s=100.0 - slow_s, horizon_s=10.0, period_s=1.0, count=9)
+    if command_s is not None:
+        readings["command"] = Reading(value=0, received_s=100.0 - command_s, horizon_s=1.0, period_s=0.05, count=9)
     heard_s = max((reading.received_s for reading in readings.values()), default=None)
     link = replace(OPEN, bridge_heard_s=bridge_s)
     return ask(
@@ -122,6 +128,7 @@ def silent(
         pytest.param(silent(2.7, 2.7, 2.7), FAULT, id="whatever the bridge, it must be said"),
         pytest.param(silent(1.5, 1.5, 1.5, was_active=True), FAULT, id="active, it stays"),
         pytest.param(silent(1.5, 1.5, 1.5, slow_s=0.1), FAULT, id="diagnostics alone are not a car"),
+        pytest.param(silent(1.5, 1.5, 1.5, command_s=0.1), FAULT, id="what the car is ordered is not what it says"),
         pytest.param(silent(1.5, slow_s=0.1), OK, id="one fast signal alone is the signal's own alarm"),
         pytest.param(silent(1.5, slow_s=2.0, bridge_s=99.9), FAULT, id="one fast signal and nothing since"),
         pytest.param(silent(), UNKNOWN, id="never spoke"),

@@ -120,6 +120,11 @@ def test_while_the_whole_car_is_silent_no_signal_is_blamed() -> None:
     assert stale("brake", together).brief == "not checked: silent"
 
 
+def test_the_first_of_a_silent_crowd_is_not_blamed_though_diagnostics_still_come() -> None:
+    crowd = snapshot(brake=heard(1.1), steering=heard(0.9), position=heard(0.8, 0.1), diagnostics=heard(0.1, 1.0, 10.0))
+    assert stale("brake", crowd).brief == "not checked: silent"
+
+
 def test_a_reading_from_the_future_is_waited_for() -> None:
     """The clock went back, and nothing came since."""
     assert stale("brake", snapshot(brake=heard(-50.0))).verdict is UNKNOWN
