@@ -134,11 +134,13 @@ async def bridging(port: int = 0, **options: Any) -> AsyncIterator[Bridge]:
 @contextlib.asynccontextmanager
 async def answering(handler: Handler, **options: Any) -> AsyncIterator[int]:
     """A raw TCP server, on 127.0.0.1 unless told otherwise; yields its port."""
-    writers: set[asyncio.StreamWriter] = set()
+    serving: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
 
     async def handle(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        writers.add(writer)
-        with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
+        task = asyncio.current_task()
+        assert task is not None
+        serving[task] = writer
+        with contextlib.suppress(ConnectionError, EOFError, asyncio.LimitOverrunError, asyncio.CancelledError):
             await handler(reader, writer)
 
     where: dict[str, Any] = {} if "sock" in options else {"host": "127.0.0.1", "port": 0}
@@ -147,9 +149,10 @@ async def answering(handler: Handler, **options: Any) -> AsyncIterator[int]:
         yield server.sockets[0].getsockname()[1]
     finally:
         server.close()
-        for writer in writers:
+        for task, writer in serving.items():
             writer.transport.abort()
-        await asyncio.sleep(0)
+            task.cancel()
+        await asyncio.gather(*serving)
 
 
 def text_frame(text: bytes, *, opcode: int = 1, final: bool = True) -> bytes:
