@@ -14,6 +14,7 @@ from monitor.gps_watch import GpsFollower, GpsWatch
 from monitor.headings import Headings
 from monitor.link import LinkFacts, Phase
 from monitor.motion import Slope, Standstill
+from monitor.quick import maker
 from monitor.rates import Rate, RateMeter
 from monitor.signals import SIGNALS
 from monitor.tracks import Track, TrackPoint
@@ -182,6 +183,11 @@ class Snapshot:
         return reading.value
 
 
+_new_snapshot, _new_reading = maker(Snapshot), maker(Reading)
+_HEADLINES = {name: signal.headline for name, signal in SIGNALS.items()}
+_TELLING = frozenset({Twist, GpsFix, Odometry, Heading})  # from which something else is derived
+
+
 class _Heard:
     """What the state keeps of one signal between messages."""
 
@@ -206,6 +212,8 @@ class State:
         }
         self._readings: dict[str, Reading[Any]] = {}
         self._extents: dict[str, Extent] = {}
+        # A snapshot shares both; what it shares is copied before it is changed.
+        self._readings_shared = self._extents_shared = False
         self._rates: Mapping[str, Rate] = MappingProxyType({})
         self._rates_at_s: float | None = None
         self._heard_s: float | None = None
@@ -236,7 +244,7 @@ class State:
         self._heard_s = received_s
         if isinstance(value, Diagnostics):
             value = self._components.merge(value, received_s)
-        reading = Reading(
+        reading = _new_reading(
             value=value,
             received_s=received_s,
             stamp_s=stamp_s,
@@ -244,13 +252,20 @@ class State:
             period_s=heard.meter.period_s,
             count=heard.count,
         )
+        if self._readings_shared:
+            self._readings = self._readings.copy()
+            self._readings_shared = False
         self._readings[signal] = reading
         earlier = self._earlier.get(signal)
         if earlier is not None:
             earlier.add(reading)
         self._extend(signal, value)
-        derived = self._derive(signal, reading)
+        derived = self._derive(signal, reading) if type(value) in _TELLING else None
         return (signal,) if derived is None else (signal, derived)
+
+    def reading(self, signal: str) -> Reading[Any] | None:
+        """The newest reading whatever its age, as `Snapshot.get`, without a snapshot."""
+        return self._readings.get(signal)
 
     def link(self, facts: LinkFacts) -> None:
         """What is now known of the link. A link that opens (again) starts the measuring of rates anew."""
@@ -265,14 +280,15 @@ class State:
     def snapshot(self, now_s: float) -> Snapshot:
         """What is known at `now_s`, which later messages do not change."""
         self._follow_clock(now_s)
-        return Snapshot(
+        self._readings_shared = self._extents_shared = True
+        return _new_snapshot(
             now_s=now_s,
-            readings=MappingProxyType(self._readings.copy()),
+            readings=MappingProxyType(self._readings),
             link=self._link,
             rates=self._measure(now_s),
             paused=self._paused,
             heard_s=self._heard_s,
-            extents=MappingProxyType(self._extents.copy()),
+            extents=MappingProxyType(self._extents),
             track=self._track.points,
             track_m=self._track.distance_m,
             gps=self._gps,
@@ -334,7 +350,7 @@ class State:
     def _derived(self, signal: str, value: Value | None, source: str, reading: Reading[Any]) -> str | None:
         if value is None:
             return None
-        self._readings[signal] = Reading(
+        self._readings[signal] = _new_reading(
             value=value,
             received_s=reading.received_s,
             stamp_s=reading.stamp_s,
@@ -357,12 +373,17 @@ class State:
         return self._rates
 
     def _extend(self, signal: str, value: Value) -> None:
-        headline = SIGNALS[signal].headline
+        headline = _HEADLINES[signal]
         number = None if headline is None else getattr(value, headline, None)
         if number is None or not math.isfinite(number):
             return
         extent = self._extents.get(signal)
+        if extent is not None and extent.lowest <= number <= extent.highest:
+            return
+        if self._extents_shared:
+            self._extents = self._extents.copy()
+            self._extents_shared = False
         if extent is None:
             self._extents[signal] = Extent(lowest=number, highest=number)
-        elif not extent.lowest <= number <= extent.highest:
+        else:
             self._extents[signal] = Extent(lowest=min(extent.lowest, number), highest=max(extent.highest, number))
