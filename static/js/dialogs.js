@@ -36,7 +36,8 @@ export function dialogOf({ frame, isSilent, silence_s, isChoosing, isAnswered })
   if (dialog && !isAboutLink(dialog)) return { kind: 'alarm', alarm: dialog };
   if (isChoosing) return null;
   if (phase === 'lost' || frame.link.cut === 'server-bridge') return isAnswered ? null : { kind: 'lost', alarm: dialog };
-  if (dialog || (frame.link.cut === 'bridge-car' && frame.link.topics_heard === 0)) return isAnswered ? null : { kind: 'mute', alarm: dialog };
+  if (dialog) return isAnswered ? null : { kind: dialog.priority === 'critical' ? 'lost' : 'mute', alarm: dialog };
+  if (frame.link.cut === 'bridge-car' && frame.link.topics_heard === 0) return isAnswered ? null : { kind: 'mute', alarm: null };
   return null;
 }
 
@@ -78,7 +79,7 @@ export function mount(store, page) {
     }));
   }
   on(sheets.alarm, 'acknowledge', answer);
-  on(sheets.lost, 'retry', () => page.retry());
+  on(sheets.lost, 'retry', () => (store.chain.cut === 2 ? page.reconnect() : page.retry()));
   on(sheets.lost, 'change', () => page.choose());
   on(sheets.lost, 'exit', () => page.exit());
   on(sheets.mute, 'retry', () => page.reconnect());
@@ -95,9 +96,9 @@ export function mount(store, page) {
     if (!standing) return;
     const { kind, alarm } = standing;
     if (kind !== 'alarm') page.answered = lossKey(store.frame, store.isSilent);
-    if (alarm && alarm.actions.includes('acknowledge')) {
+    if (alarm) {
       const reply = await store.ask('acknowledge', { alarm: alarm.id, occurrence: alarm.occurrence });
-      if (!reply.ok) page.say(reply.reason ?? 'Refused.', 'Not acknowledged');
+      if (!reply.ok && kind === 'alarm') page.say(reply.reason ?? 'Refused.', 'Not acknowledged');
     }
     draw();
   }
@@ -124,6 +125,7 @@ export function mount(store, page) {
     if (!standing || !wanted) return;
     if (standing.kind === 'alarm') fillAlarm(wanted, standing.alarm);
     else fillLink(wanted, standing.kind, store);
+    if (standing.kind === 'lost') setText(field(wanted, 'title'), standing.alarm?.title ?? 'Connection lost');
     if (standing.kind === 'failed') setWords(field(wanted, 'change'), page.suggestion ? `Use ${page.suggestion}` : 'Change the address');
     if (!wanted.open) {
       wanted.showModal();
@@ -191,7 +193,7 @@ export function linkWords(kind, view, frame) {
     return [view.sentence, heard, view.detail];
   }
   const isServer = view.cut === 0;
-  const again = isServer ? view.detail : `The server is there and dials again${link?.attempts ? `; ${counted(link.attempts, 'try', 'tries')} so far` : ''}.`;
+  const again = view.cut !== 1 ? view.detail : `The server is there and dials again${link?.attempts ? `; ${counted(link.attempts, 'try', 'tries')} so far` : ''}.`;
   const until = !isServer && frame && frame.recording.state !== 'off' && view.since_ms !== null ? ` Recording saved up to ${timeOfDay(view.since_ms)}.` : '';
   return [view.sentence, again, `The car may still be moving: watch the car.${until}`];
 }

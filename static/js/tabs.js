@@ -63,7 +63,13 @@ export class Tabs {
     if (!this.pager.clientWidth) return;
     this.#isPlaced = true;
     this.pager.scrollTo({ left: this.#leftOf(this.index), behavior: 'instant' });
+    this.#still();
     this.onFront();
+  }
+
+  /** What is out of sight is out of reach of keys and readers. */
+  #still() {
+    this.panels.forEach((panel, i) => setAttribute(panel, 'inert', !this.shows(TABS[i] ?? 'home')));
   }
 
   /**
@@ -105,8 +111,10 @@ export class Tabs {
       Math.abs(this.#leftOf(i) - scrollLeft) < Math.abs(this.#leftOf(best) - scrollLeft) ? i : best, 0);
     if (this.#aim !== null && nearest !== this.#aim) return;
     this.#aim = null;
-    if (nearest === this.index) this.onFront();
-    else this.#bring(nearest);
+    if (nearest === this.index) {
+      this.#still();
+      this.onFront();
+    } else this.#bring(nearest);
   }
 
   /** @param {KeyboardEvent} event */
@@ -128,6 +136,7 @@ export class Tabs {
     this.index = index;
     if (index === this.#front) return;
     this.#front = index;
+    this.#still();
     const tab = TABS[index] ?? 'home';
     this.buttons.forEach((button, i) => {
       setAttribute(button, 'aria-selected', String(i === index));

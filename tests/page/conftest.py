@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -48,10 +50,23 @@ class Phone:
     def __init__(self, page: Page) -> None:
         self.page = page
         self.complaints: list[str] = []
+        self.stutter_s = 0.0
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on(
             "console", lambda said: self.complaints.append(said.text) if said.type in ("error", "warning") else None
         )
+
+    @property
+    def slack_s(self) -> float:
+        """What must be granted beside a limit: the time of looking, and thrice what this machine lets anyone wait."""
+        return 0.4 + 3 * self.stutter_s
+
+    async def watch_machine(self) -> None:
+        """Notes the longest time by which a short sleep was late, for as long as it runs."""
+        while True:
+            due_s = time.monotonic() + 0.05
+            await asyncio.sleep(0.05)
+            self.stutter_s = max(self.stutter_s, time.monotonic() - due_s)
 
     async def open(self, address: str) -> None:
         await self.page.goto(address)
@@ -80,7 +95,9 @@ async def phone(browser: Browser) -> AsyncIterator[Phone]:
     """A fresh phone; at the end its console must be clean but for the lost connections a test made."""
     context = await browser.new_context(**PHONE)
     phone = Phone(await context.new_page())
+    machine = asyncio.create_task(phone.watch_machine())
     yield phone
+    machine.cancel()
     await context.close()
     lost = re.compile(r"WebSocket connection to|Failed to load resource: net::ERR_(CONNECTION|EMPTY)|ERR_CONNECTION")
     assert [said for said in phone.complaints if not lost.search(said)] == []

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import re
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 import httpx
 import pytest
+import pytest_asyncio
 from playwright.async_api import expect
 
 from tests.page.conftest import Phone
@@ -24,92 +24,109 @@ HOSTILE = (
 )
 
 
-@contextlib.asynccontextmanager
-async def speeding(phone: Phone, folder: Path, tab: str = "home") -> AsyncIterator[Process]:
-    """A car at 12.6 m/s with the limit at 11.0, and the page on it."""
-    drive = steady(folder / "fast.bag", 12.6)
-    async with running(*replay(drive)) as car, running(*server(folder / "data", car.address)) as watch:
-        await phone.open(f"{watch.address}/#{tab}")
-        yield watch
+@pytest_asyncio.fixture(loop_scope="module", scope="module")
+async def track(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[tuple[Process, Process, Process]]:
+    """Two cars, one at 12.6 m/s with the limit at 11.0 and one at 4.2 m/s, and a server that can watch either."""
+    folder = tmp_path_factory.mktemp("drives")
+    fast, slow = steady(folder / "fast.bag", 12.6), steady(folder / "slow.bag", 4.2)
+    async with running(*replay(fast)) as hare, running(*replay(slow)) as snail, running(*server(folder)) as watch:
+        yield hare, snail, watch
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def speeding(track: tuple[Process, Process, Process]) -> Process:
+    """The server, newly connected to the fast car: nothing is acknowledged."""
+    hare, _, watch = track
+    return await watching(watch, hare.address)
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def calm(track: tuple[Process, Process, Process]) -> Process:
+    """The server, newly connected to the slow car."""
+    _, snail, watch = track
+    return await watching(watch, snail.address)
+
+
+async def watching(watch: Process, address: str) -> Process:
+    async with httpx.AsyncClient() as client:
+        await client.post(f"{watch.address}/api/disconnect")
+        await client.post(f"{watch.address}/api/connect", json={"address": address})
+    return watch
 
 
 @pytest.mark.parametrize("tab", ["home", "map", "scan", "files", "settings"])
 async def test_case_17_and_18_a_speed_alarm_on_each_tab_and_its_acknowledgement(
-    phone: Phone, tmp_path: Path, tab: str
+    phone: Phone, speeding: Process, tab: str
 ) -> None:
-    async with speeding(phone, tmp_path, tab):
-        sheet = phone.page.locator("#sheet-alarm")
-        await expect(sheet).to_be_visible()
-        await expect(sheet).to_have_attribute("role", "alertdialog")
-        await expect(phone.f("title", "#sheet-alarm")).to_have_text("Speed above limit")
-        await expect(phone.f("measured", "#sheet-alarm")).to_have_text("12.6")
-        await expect(phone.f("limit", "#sheet-alarm")).to_have_text("11.0")
-        await expect(sheet).to_contain_text("The safety driver must slow the car.")
-        await expect(phone.f("acknowledge", "#sheet-alarm")).to_be_focused()
-        await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "asking")
-        await expect(phone.f("strip")).to_contain_text("Speed above limit")
-        if tab == "map":
-            await phone.page.keyboard.press("Escape")  # and the phone's back key: seen
-        else:
-            await phone.f("acknowledge", "#sheet-alarm").tap()
-        await expect(sheet).to_be_hidden()
-        await expect(phone.page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
-        await expect(phone.f("strip")).to_contain_text("Speed above limit")  # it stands, and is known
-        await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "critical")
-        await asyncio.sleep(1)
-        await expect(sheet).to_be_hidden()
-
-
-async def test_above_the_limit_the_gauge_and_the_tile_say_fault(phone: Phone, tmp_path: Path) -> None:
-    async with speeding(phone, tmp_path) as watch:
-        await expect(phone.page.locator(".gauge")).to_have_attribute("data-over", "")
-        tile = phone.page.locator(".checks li.crit")
-        await expect(tile).to_contain_text("Speed")
-        await expect(tile).to_contain_text(re.compile(r"FAULT 12\.6 m/s"))
-        assert await phone.speed() == "12.6"
-        async with httpx.AsyncClient() as client:  # another page acknowledges: the dialog goes here too
-            alarm = (await client.get(f"{watch.address}/api/alarms")).json()["alarms"][0]
-            await client.post(
-                f"{watch.address}/api/alarms/{alarm['id']}/acknowledge", json={"occurrence": alarm["occurrence"]}
-            )
-        await expect(phone.page.locator("#sheet-alarm")).to_be_hidden()
-
-
-async def test_before_a_touch_the_page_says_that_it_cannot_sound(phone: Phone, tmp_path: Path) -> None:
-    async with speeding(phone, tmp_path):
-        await expect(phone.f("sound-off")).to_be_visible()
-        await expect(phone.f("sound-off")).to_have_text("Alarm sound off: tap")
+    await phone.open(f"{speeding.address}/#{tab}")
+    sheet = phone.page.locator("#sheet-alarm")
+    await expect(sheet).to_be_visible()
+    await expect(sheet).to_have_attribute("role", "alertdialog")
+    await expect(phone.f("title", "#sheet-alarm")).to_have_text("Speed above limit")
+    await expect(phone.f("measured", "#sheet-alarm")).to_have_text("12.6")
+    await expect(phone.f("limit", "#sheet-alarm")).to_have_text("11.0")
+    await expect(sheet).to_contain_text("The safety driver must slow the car.")
+    await expect(phone.f("acknowledge", "#sheet-alarm")).to_be_focused()
+    await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "asking")
+    await expect(phone.f("strip")).to_contain_text("Speed above limit")
+    if tab == "map":
+        await phone.page.keyboard.press("Escape")  # and the phone's back key: seen
+    else:
         await phone.f("acknowledge", "#sheet-alarm").tap()
-        await expect(phone.f("sound-off")).to_be_hidden()
+    await expect(sheet).to_be_hidden()
+    await expect(phone.page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
+    await expect(phone.f("strip")).to_contain_text("Speed above limit")  # it stands, and is known
+    await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "critical")
+    await asyncio.sleep(1)
+    await expect(sheet).to_be_hidden()
 
 
-async def test_paused_no_alarm_comes_and_every_tab_says_so(phone: Phone, tmp_path: Path) -> None:
-    drive = steady(tmp_path / "slow.bag", 4.2)
-    async with running(*replay(drive)) as car, running(*server(tmp_path / "data", car.address)) as watch:
-        await phone.open(watch.address)
-        await phone.live()
-        await phone.f("pause").tap()
-        await expect(phone.f("strip")).to_have_text(re.compile(r"Paused 0:0\d: no alarm will come"))
-        await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "paused")
-        await expect(phone.f("pause-word")).to_have_text("Resume")
-        await expect(phone.page.locator(".checks li.ok")).to_have_count(0)
-        await expect(phone.page.locator(".checks li", has_text="Speed").first).to_contain_text("paused")
-        assert re.fullmatch(r"4\.2", await phone.speed())  # the values go on
-        await phone.page.locator("[data-tab=settings]").tap()
-        await expect(phone.f("strip")).to_contain_text("Paused")
-        await phone.f("pause").tap()
-        await expect(phone.f("strip")).not_to_contain_text("Paused")
-        await expect(phone.page.locator(".frame")).not_to_have_attribute("data-mode", "paused")
+async def test_above_the_limit_the_gauge_and_the_tile_say_fault(phone: Phone, speeding: Process) -> None:
+    await phone.open(speeding.address)
+    await expect(phone.page.locator(".gauge")).to_have_attribute("data-over", "")
+    tile = phone.page.locator(".checks li.crit")
+    await expect(tile).to_contain_text("Speed")
+    await expect(tile).to_contain_text(re.compile(r"FAULT 12\.6 m/s"))
+    assert await phone.speed() == "12.6"
+    async with httpx.AsyncClient() as client:  # another page acknowledges: the dialog goes here too
+        alarm = (await client.get(f"{speeding.address}/api/alarms")).json()["alarms"][0]
+        await client.post(
+            f"{speeding.address}/api/alarms/{alarm['id']}/acknowledge", json={"occurrence": alarm["occurrence"]}
+        )
+    await expect(phone.page.locator("#sheet-alarm")).to_be_hidden()
 
 
-async def test_the_slow_down_says_why_it_is_off(phone: Phone, tmp_path: Path) -> None:
-    drive = steady(tmp_path / "slow.bag", 4.2)
-    async with running(*replay(drive)) as car, running(*server(tmp_path / "data", car.address)) as watch:
-        await phone.open(watch.address)
-        await phone.live()
-        await expect(phone.page.locator(".board > .rail .slide")).to_contain_text("not configured")
-        await phone.page.locator(".board > .rail .slide").tap()
-        await expect(phone.page.locator(".snack.note")).to_contain_text("The safety driver stops the car.")
+async def test_before_a_touch_the_page_says_that_it_cannot_sound(phone: Phone, speeding: Process) -> None:
+    await phone.open(speeding.address)
+    await expect(phone.f("sound-off")).to_be_visible()
+    await expect(phone.f("sound-off")).to_have_text("Alarm sound off: tap")
+    await phone.f("acknowledge", "#sheet-alarm").tap()
+    await expect(phone.f("sound-off")).to_be_hidden()
+
+
+async def test_paused_no_alarm_comes_and_every_tab_says_so(phone: Phone, calm: Process) -> None:
+    await phone.open(calm.address)
+    await phone.live()
+    await phone.f("pause").tap()
+    await expect(phone.f("strip")).to_have_text(re.compile(r"Paused 0:0\d: no alarm will come"))
+    await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "paused")
+    await expect(phone.f("pause-word")).to_have_text("Resume")
+    await expect(phone.page.locator(".checks li.ok")).to_have_count(0)
+    await expect(phone.page.locator(".checks li", has_text="Speed").first).to_contain_text("paused")
+    assert re.fullmatch(r"4\.2", await phone.speed())  # the values go on
+    await phone.page.locator("[data-tab=settings]").tap()
+    await expect(phone.f("strip")).to_contain_text("Paused")
+    await phone.f("pause").tap()
+    await expect(phone.f("strip")).not_to_contain_text("Paused")
+    await expect(phone.page.locator(".frame")).not_to_have_attribute("data-mode", "paused")
+
+
+async def test_the_slow_down_says_why_it_is_off(phone: Phone, calm: Process) -> None:
+    await phone.open(calm.address)
+    await phone.live()
+    await expect(phone.page.locator(".board > .rail .slide")).to_contain_text("not configured")
+    await phone.page.locator(".board > .rail .slide").tap()
+    await expect(phone.page.locator(".snack.note")).to_contain_text("The safety driver stops the car.")
 
 
 async def test_texts_that_mean_harm_are_only_text(phone: Phone, tmp_path: Path) -> None:

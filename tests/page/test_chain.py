@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-import pytest
 from playwright.async_api import expect
 
 from tests.page.conftest import Phone
@@ -19,9 +18,10 @@ from tests.page.drives import number, steady, twist, write
 from tests.page.processes import Process, free_port, replay, running, server, simulate
 from tests.page.radio import Radio
 
-CAR_S = 2.0 + 0.4  # what the design allows, and what a loaded machine and the looking cost
-FROZEN_S = 2.5 + 0.4
-VEIL_S = 2.25 + 0.4
+CAR_S = 2.0  # what the design allows; to each is added what the looking and a busy machine cost: phone.slack_s
+FROZEN_S = 2.5
+VEIL_S = 2.25
+BACK_S = 4.0
 
 
 @contextlib.asynccontextmanager
@@ -37,7 +37,7 @@ async def covered(phone: Phone, kind: str, sentence: str, within_s: float, began
     """The veil stands and names the part, in time."""
     await expect(phone.f("veil")).to_have_attribute("data-on", kind)
     took_s = time.monotonic() - began_s
-    assert took_s <= within_s, f"covered after {took_s:.2f} s"
+    assert took_s <= within_s + phone.slack_s, f"covered after {took_s:.2f} s"
     await expect(phone.f("veil-words")).to_contain_text(sentence)
     opacity = await phone.f("veil").evaluate("veil => getComputedStyle(veil).opacity")
     assert opacity == "1"
@@ -54,9 +54,13 @@ async def test_case_06_a_silent_car(phone: Phone, tmp_path: Path) -> None:
         await car.type("all-silent 60")
         began_s = time.monotonic()
         await covered(phone, "values", "The car fell silent.", CAR_S, began_s)
+        sheet = phone.page.locator("#sheet-lost")
+        await expect(sheet).to_contain_text("The car may still be moving: watch the car.")
+        await phone.page.keyboard.press("Escape")  # seen: the sheet goes, the veil stays
+        await expect(sheet).to_be_hidden()
         await cut_between(phone, "#monitor .veil", "Bridge", "Car")
         await expect(phone.f("word")).to_have_text("Silent")
-        await expect(phone.f("strip")).to_contain_text(re.compile("Values are not live|silent"))
+        await expect(phone.f("strip")).to_contain_text("The car fell silent")
         await expect(phone.f("veil-then")).to_have_text(re.compile(r"\d+\.\d m/s"))
         await expect(phone.page.locator(".checks li.ok")).to_have_count(0)
         await car.type("stop")
@@ -64,26 +68,27 @@ async def test_case_06_a_silent_car(phone: Phone, tmp_path: Path) -> None:
         await expect(phone.page.locator("dialog[open]")).to_have_count(0)
 
 
-@pytest.mark.parametrize("tab", ["home", "map", "scan", "files", "settings"])
-async def test_case_12_and_13_a_frozen_bridge_is_said_on_every_tab_and_its_return_leads_home(
-    phone: Phone, tmp_path: Path, tab: str
+async def test_case_12_and_13_a_frozen_bridge_is_said_on_every_tab_and_its_return_leads_back(
+    phone: Phone, tmp_path: Path
 ) -> None:
     async with driving(phone, tmp_path) as (car, _):
-        await phone.page.locator(f"[data-tab={tab}]").tap()
-        car.freeze()
-        began_s = time.monotonic()
-        sheet = phone.page.locator("#sheet-lost")
-        await expect(sheet).to_be_visible()
-        assert time.monotonic() - began_s <= FROZEN_S
-        await expect(sheet).to_contain_text("The bridge does not answer.")
-        await expect(sheet).to_contain_text("The car may still be moving")
-        await cut_between(phone, "#sheet-lost", "Server", "Bridge")
-        await expect(phone.f("veil")).to_have_attribute("data-on", "values")
-        car.thaw()
-        back_s = time.monotonic()
-        await phone.live()
-        assert time.monotonic() - back_s <= 4.4
-        await expect(sheet).to_be_hidden()
+        for tab in ("home", "map", "scan", "files", "settings"):
+            await phone.page.locator(f"[data-tab={tab}]").tap()
+            car.freeze()
+            began_s = time.monotonic()
+            sheet = phone.page.locator("#sheet-lost")
+            await expect(sheet).to_be_visible()
+            assert time.monotonic() - began_s <= FROZEN_S + phone.slack_s
+            await expect(sheet).to_contain_text("The bridge does not answer.")
+            await expect(sheet).to_contain_text("The car may still be moving")
+            await cut_between(phone, "#sheet-lost", "Server", "Bridge")
+            await expect(phone.f("veil")).to_have_attribute("data-on", "values")
+            car.thaw()
+            back_s = time.monotonic()
+            await phone.live()
+            assert time.monotonic() - back_s <= BACK_S + phone.slack_s
+            await expect(sheet).to_be_hidden()
+            await expect(phone.page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
 
 
 async def test_a_killed_bridge_and_its_return_on_the_same_port(phone: Phone, tmp_path: Path) -> None:
@@ -93,7 +98,7 @@ async def test_a_killed_bridge_and_its_return_on_the_same_port(phone: Phone, tmp
         await phone.live()
         await car.kill()
         sheet = phone.page.locator("#sheet-lost")
-        await expect(sheet).to_be_visible(timeout=2400)
+        await expect(sheet).to_be_visible()
         await cut_between(phone, "#sheet-lost", "Server", "Bridge")
         await phone.page.keyboard.press("Escape")  # seen: the sheet goes, the veil and the strip stay
         await expect(sheet).to_be_hidden()
@@ -102,7 +107,7 @@ async def test_a_killed_bridge_and_its_return_on_the_same_port(phone: Phone, tmp
         async with running(*simulate(port=port)):
             back_s = time.monotonic()
             await phone.live()
-            assert time.monotonic() - back_s <= 4.4
+            assert time.monotonic() - back_s <= BACK_S + phone.slack_s
 
 
 async def test_case_14_exit_from_a_lost_connection_leads_to_the_connect_screen(phone: Phone, tmp_path: Path) -> None:
@@ -128,7 +133,7 @@ async def test_a_frozen_server_is_said_by_the_page_alone(phone: Phone, tmp_path:
         watch.thaw()
         back_s = time.monotonic()
         await phone.live()
-        assert time.monotonic() - back_s <= 5
+        assert time.monotonic() - back_s <= BACK_S + 1 + phone.slack_s
         await expect(phone.page.locator("#sheet-lost")).to_be_hidden()
 
 
@@ -156,25 +161,26 @@ async def test_one_silent_signal_loses_its_ink_and_no_other(phone: Phone, tmp_pa
 async def test_the_veil_comes_though_the_page_hangs(phone: Phone, tmp_path: Path) -> None:
     """The picture on the glass, taken by the browser while the page's script stands still."""
     async with driving(phone, tmp_path):
-        bright = await hanging(phone, 3.5)
-        assert bright[0] < 0.5, bright  # the instruments: mostly dark
-        assert bright[-1] > 1.15 * bright[0], bright  # hatched over
+        before, hung = await hanging(phone, 3.5)
+        assert before < 0.03, "the instruments were hatched before"
+        assert hung > 0.1, "the veil did not come"
         await phone.live()
 
 
-async def hanging(phone: Phone, seconds: float) -> list[float]:
-    """Mean brightness of the view in the frames the browser draws while the script hangs, oldest first."""
+async def hanging(phone: Phone, seconds: float) -> tuple[float, float]:
+    """How much of the view is hatched: just before the script hangs, and in the last picture while it hangs."""
     cdp = await phone.page.context.new_cdp_session(phone.page)
-    frames: list[str] = []
+    pictures: list[tuple[float, str]] = []
 
     def keep(event: dict[str, Any]) -> None:
-        frames.append(event["data"])
+        pictures.append((time.monotonic(), event["data"]))
         task = asyncio.ensure_future(cdp.send("Page.screencastFrameAck", {"sessionId": event["sessionId"]}))
         task.add_done_callback(lambda done: done.exception())
 
     cdp.on("Page.screencastFrame", keep)
     await cdp.send("Page.startScreencast", {"format": "png", "everyNthFrame": 1})
-    await asyncio.sleep(0.5)
+    await asyncio.sleep(0.7)
+    began_s = time.monotonic()
     await phone.page.evaluate(
         """(ms) => void setTimeout(() => {
           const end = performance.now() + ms;
@@ -182,15 +188,16 @@ async def hanging(phone: Phone, seconds: float) -> list[float]:
         }, 0)""",
         seconds * 1000,
     )
-    await asyncio.sleep(seconds - 0.4)
-    seen = [frames[-40] if len(frames) > 40 else frames[0], frames[-1]]
-    await asyncio.sleep(1)
+    await asyncio.sleep(seconds + 1)
     await cdp.send("Page.stopScreencast")
-    return [await brightness(phone, picture) for picture in seen]
+    before = [data for at_s, data in pictures if at_s < began_s][-1]
+    hung = [data for at_s, data in pictures if began_s + 1 < at_s < began_s + seconds - 0.1][-1]
+    return await hatched(phone, before), await hatched(phone, hung)
 
 
-async def brightness(phone: Phone, picture: str) -> float:
-    found = await phone.page.evaluate(
+async def hatched(phone: Phone, picture: str) -> float:
+    """Which share of the view has the colour of the veil's hatching."""
+    share = await phone.page.evaluate(
         """async (data) => {
           const image = new Image();
           image.src = `data:image/png;base64,${data}`;
@@ -201,13 +208,15 @@ async def brightness(phone: Phone, picture: str) -> float:
           g.drawImage(image, 0, 0);
           const top = Math.round(image.height * 0.18);
           const { data: pixels } = g.getImageData(0, top, image.width, Math.round(image.height * 0.12));
-          let sum = 0;
-          for (let i = 0; i < pixels.length; i += 4) sum += pixels[i];
-          return sum / (pixels.length / 4) / 255;
+          let found = 0;
+          for (let i = 0; i < pixels.length; i += 4) {
+            found += [0x59, 0x64, 0x6a].every((value, k) => Math.abs(pixels[i + k] - value) < 10);
+          }
+          return found / (pixels.length / 4);
         }""",
         picture,
     )
-    return float(found)
+    return float(share)
 
 
 async def test_a_page_that_slept_shows_the_veil_first(phone: Phone, tmp_path: Path) -> None:
