@@ -7,6 +7,7 @@ import random
 from pathlib import Path
 
 import pytest
+from geographiclib.geodesic import Geodesic
 
 from monitor.geo import offset_m, turn_deg
 from monitor.tracks import POINTS, Track
@@ -105,6 +106,17 @@ def test_noise_does_not_lengthen_a_straight_drive(sigma_m: float | None) -> None
     assert track.distance_m == pytest.approx(500.0, rel=0.03)
 
 
+def test_short_hops_add_up() -> None:
+    """Twenty times 0.9 m with a halt between: no hop is as long as a chord."""
+    track, at_s, east_m = Track(), 0.0, 0.0
+    for _ in range(20):
+        for speed_mps in [0.6] * 15 + [0.0] * 40:
+            at_s += 0.1
+            east_m += 0.1 * speed_mps
+            track.receive(fix(east_m, 0.0), at_s, speed_mps, speed_mps == 0.0 and at_s % 5.5 > 3.5)
+    assert track.distance_m == pytest.approx(18.0, rel=0.05)
+
+
 def test_a_curve_keeps_its_length() -> None:
     track = Track()
     for n in range(1000):
@@ -179,13 +191,15 @@ def test_no_course_below_half_a_metre_a_second(speed_mps: float, known: bool) ->
 
 
 def test_a_long_drive_stays_bounded_and_true() -> None:
-    """240 km due east, across several planes."""
-    track = Track()
+    """240 km to the north-east along a geodesic, across several planes."""
+    track, line = Track(), Geodesic.WGS84.Line(LAT_DEG, LON_DEG, 45.0)
     for n in range(8000):
-        track.receive(fix(30.0 * n, 0.0), float(n), 30.0, False)
+        there = line.Position(30.0 * n)
+        track.receive(GpsFix(lat_deg=there["lat2"], lon_deg=there["lon2"]), float(n), 30.0, False)
     assert len(track.points) <= POINTS
     assert track.points[0].lon_deg == LON_DEG
-    assert track.distance_m == pytest.approx(7999 * 30.0, rel=2e-3)
+    assert track.distance_m == pytest.approx(7999 * 30.0, rel=1e-3)
+    assert track.course_deg == pytest.approx(there["azi2"], abs=0.1)  # north turns along the way
     assert sorted(point.at_s for point in track.points) == [point.at_s for point in track.points]
 
 
