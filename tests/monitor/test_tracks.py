@@ -199,8 +199,17 @@ def test_a_long_drive_stays_bounded_and_true() -> None:
     assert len(track.points) <= POINTS
     assert track.points[0].lon_deg == LON_DEG
     assert track.distance_m == pytest.approx(7999 * 30.0, rel=1e-3)
-    assert track.course_deg == pytest.approx(there["azi2"], abs=0.1)  # north turns along the way
     assert sorted(point.at_s for point in track.points) == [point.at_s for point in track.points]
+
+
+def test_north_is_where_the_car_is_not_where_it_began() -> None:
+    """120 km east, then 60 km due north: by the meridian of its beginning that would be 0.3° off."""
+    track = Track()
+    for n in range(6000):
+        there = fix(min(30.0 * n, 120_000.0), max(0.0, 30.0 * n - 120_000.0))
+        track.receive(there, float(n), 30.0, False)
+    assert track.course_deg is not None
+    assert turn_deg(track.course_deg, 0.0) == pytest.approx(0.0, abs=0.1)
 
 
 def test_across_the_180th_meridian() -> None:
