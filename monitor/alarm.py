@@ -118,7 +118,8 @@ class Alarm:
         return self.spec.sound if self.state is AlarmState.UNACKED else Sound.NONE
 
     @property
-    def _is_at_rest(self) -> bool:
+    def is_at_rest(self) -> bool:
+        """Normal in every respect: another judgement which is no fault changes nothing of it."""
         return not (
             self.condition
             or self.active
@@ -134,7 +135,7 @@ def advance(
     """One judgement at `now_s`: the alarm after it, and what happened. `inhibited_by` explains it away for now."""
     if alarm.out_of_service:
         return alarm, ()
-    if finding.verdict is not Verdict.FAULT and not inhibited_by and alarm._is_at_rest:
+    if finding.verdict is not Verdict.FAULT and not inhibited_by and alarm.is_at_rest:
         return alarm, ()  # by far the most frequent case, and nothing of it needs remembering
     alarm = rebased(alarm, now_s)
     step = _Step(alarm, finding, now_s if alarm.at_s is None else max(now_s, alarm.at_s))

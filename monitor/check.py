@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
+from monitor.quick import maker
 from monitor.state import NotFresh, Snapshot
 
 __all__ = [
@@ -65,12 +66,14 @@ class Finding:
     applies: bool = True  # False: there is nothing here to check (an optional signal that is not published)
 
 
+_finding = maker(Finding)  # every check makes one ten times a second
+
 OK = Finding(verdict=Verdict.OK, text="OK", brief="OK")
 
 
 def ok(text: str, *, measured: Quantity | None = None, limit: Quantity | None = None) -> Finding:
     """All is well; `text` says how well."""
-    return Finding(verdict=Verdict.OK, text=text, brief="OK", measured=measured, limit=limit)
+    return _finding(verdict=Verdict.OK, text=text, brief="OK", measured=measured, limit=limit)
 
 
 def fault(
@@ -84,7 +87,7 @@ def fault(
 ) -> Finding:
     """Something is wrong. `brief` follows the word FAULT on the tile ("12.6 m/s"); what does not fit is left out."""
     short = f"FAULT {brief}" if brief else "FAULT"
-    return Finding(
+    return _finding(
         verdict=Verdict.FAULT,
         text=text,
         brief=short if len(short) <= BRIEF_LETTERS else "FAULT",
@@ -98,12 +101,12 @@ def fault(
 def unknown(why: str, *, short: str = "") -> Finding:
     """It cannot be told. `short` (at most 7 letters: "no link", "stale") follows "not checked:" on the tile."""
     brief = f"not checked: {short}" if short else "not checked"
-    return Finding(verdict=Verdict.UNKNOWN, text=why, brief=brief if len(brief) <= BRIEF_LETTERS else "not checked")
+    return _finding(verdict=Verdict.UNKNOWN, text=why, brief=brief if len(brief) <= BRIEF_LETTERS else "not checked")
 
 
 def absent(why: str, *, brief: str = "not published") -> Finding:
     """There is nothing to check: unknown, but no reason to call the tile unknown."""
-    return Finding(verdict=Verdict.UNKNOWN, text=why, brief=brief, applies=False)
+    return _finding(verdict=Verdict.UNKNOWN, text=why, brief=brief, applies=False)
 
 
 class Limits(BaseModel):

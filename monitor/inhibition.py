@@ -43,7 +43,13 @@ class CauseTable:
 
     def holding(self, alarm_id: str, now_s: float) -> tuple[str, ...]:
         """The alarms that now explain this one away."""
+        if not self._gone_at_s:
+            return ()
         return tuple(name for name in self._closure[alarm_id] if self._holds(name, now_s))
+
+    def remembers(self, alarm_id: str) -> bool:
+        """Whether this alarm has ever held, so that `note` has something to follow even when it is at rest."""
+        return alarm_id in self._gone_at_s
 
     def clear(self) -> None:
         self._gone_at_s.clear()

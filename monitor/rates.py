@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+from monitor.quick import maker
+
 WINDOW_S = (
     5.0  # the measured rate looks back this far: long against Wi-Fi bunching, short against an operator's patience …
 )
@@ -29,6 +31,9 @@ class Rate:
     expected_hz: float | None  # None: neither declared, set nor learned
     settled: bool  # whether `expected_hz` may be held against the car
     learning: bool = False  # whether it may still settle; a signal without a default that never keeps a rate does not
+
+
+_new_rate = maker(Rate)
 
 
 class RateMeter:
@@ -125,7 +130,7 @@ class RateMeter:
         return max(STALE_PERIODS * (self.period_s or 0.0), floor_s)
 
     def rate(self, now_s: float) -> Rate:
-        return Rate(
+        return _new_rate(
             measured_hz=self.measured_hz(now_s),
             expected_hz=self.expected_hz,
             settled=self.is_settled,

@@ -97,10 +97,17 @@ class Monitor:
             return ()
         transitions: list[Transition] = []
         for check in checks:
-            transitions += self._judge(check, snapshot)
+            happened = self._judge(check, snapshot)
+            if happened:
+                transitions += happened
         if changed is None or self.crashes:
             transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
         return tuple(transitions)
+
+    @property
+    def checks(self) -> tuple[AnyCheck, ...]:
+        """What is judged, in the order of the home tab."""
+        return self._declared
 
     def heeds(self, changed: Collection[str]) -> bool:
         """Whether a step for these signals would judge anything; where not, there is no need of a snapshot."""
@@ -172,6 +179,11 @@ class Monitor:
     def _judge(self, check: AnyCheck, snapshot: Snapshot) -> tuple[Transition, ...]:
         finding = self._find(check, snapshot)
         by = self._causes.holding(check.id, snapshot.now_s)
+        if not by and finding.verdict is not Verdict.FAULT and not snapshot.paused:
+            alarm = self.alarms[check.id]
+            if alarm.is_at_rest and not self._causes.remembers(check.id):
+                self.findings[check.id] = finding
+                return ()  # by far the most frequent case
         if by and finding.verdict is Verdict.FAULT:
             why = self.alarms[by[0]].spec.title
             self.findings[check.id] = unknown(f"Not judged yet: {why}", short="waiting")
@@ -195,7 +207,7 @@ class Monitor:
                 return PAUSED
         try:
             finding = check.find(snapshot, self._limits_of[check.id], self.alarms[check.id].active)
-            if not isinstance(finding, Finding):
+            if type(finding) is not Finding:
                 raise TypeError(f"{check.id} found {finding!r}, which is no finding")
         except NotFresh as missing:
             finding = unknown(missing.why, short=missing.short)
@@ -208,7 +220,8 @@ class Monitor:
                 count=self._failed[check.id],
             )
             return unknown("This check fails", short="failed")
-        self.crashes.pop(check.id, None)
+        if self.crashes:
+            self.crashes.pop(check.id, None)
         return finding
 
     def _impaired(self) -> Finding:
