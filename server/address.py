@@ -23,6 +23,7 @@ _NAT64 = (ipaddress.ip_network("64:ff9b::/96"), ipaddress.ip_network("64:ff9b:1:
 _COMPATIBLE = ipaddress.ip_network("::/96")  # IPv4 in IPv6 as of old, RFC 4291 2.5.5.1
 
 _NETLOC = re.compile(r"(\[[^\[\]]*\]|[^\[\]:]*)(:[^:]*)?\Z")
+_RUN_ON = re.compile(r"^\[[^\]/?#]*\][^:/?#]")  # a bracket and then no colon
 _FEW_SLASHES = re.compile(r"(?i)(wss?):/?(?=[^/\d]|\d+\.)")
 _EXAMPLE = "Type a host and a port, such as 192.168.4.1:9090."
 _IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
@@ -108,17 +109,18 @@ def _split(typed: str) -> Address:
 
 
 def _url_parts(typed: str) -> SplitResult:
+    rest = typed.partition("://")[2]
+    if _RUN_ON.match(rest):  # said here, because urlsplit lets it pass in Python 3.11 and refuses it later
+        raise _run_together()
     try:
         return urlsplit(typed)
     except ValueError:  # brackets that hold no IPv6 address, letters that turn into / or @ when made plain
-        raise _no_host(typed.partition("://")[2]) from None
+        raise _no_host(rest) from None
 
 
 def _port(parts: SplitResult) -> int | None:
     if not _NETLOC.match(parts.netloc):
-        raise BadAddress(
-            "Host and port cannot be told apart.", "Type host:port; an IPv6 address in brackets, [fd00::1]:9090."
-        )
+        raise _run_together()
     try:
         return parts.port
     except ValueError:
@@ -136,6 +138,12 @@ def _host_of(host: str) -> str:
     if not _is_ip(host) and not _HOST.match(host):
         raise _no_host(host)
     return host
+
+
+def _run_together() -> BadAddress:
+    return BadAddress(
+        "Host and port cannot be told apart.", "Type host:port; an IPv6 address in brackets, [fd00::1]:9090."
+    )
 
 
 def _no_host(text: str) -> BadAddress:
