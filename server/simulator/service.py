@@ -48,7 +48,7 @@ class CarService:
         if not 0 < rate <= 100:
             raise ValueError(f"The rate must lie above 0 and be at most 100, not {rate:g}.")
         plan = tuple(planned(entry) if isinstance(entry, str) else entry for entry in scenarios)
-        self._host, self._port, self._rate = host, port, rate
+        self._host, self._port, self._rate, self._clock = host, port, rate, clock
         self.car = SimulatedCar(seed=seed, ros_version=ros_version, start_s=clock(), scan_beams=scan_beams, plan=plan)
         self.bridge = RosBridge(ros_version=ros_version, now=lambda: self.car.now_s, node="/simulated_car")
         for published in self.car.published:
@@ -95,6 +95,8 @@ class CarService:
         return {**self.car.state(), "rate": self._rate, "clients": self.bridge.clients}
 
     async def _drive(self) -> None:
+        # building the car and opening the port took their time: its clock is set when it drives off
+        self.car.skip_clock(self._clock() - self.car.now_s)
         steps = self.car.steps()
         step = next(steps)
         began_s = time.monotonic() - self.car.elapsed_s / self._rate

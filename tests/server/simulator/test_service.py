@@ -73,6 +73,19 @@ async def test_the_cars_clock_is_that_of_the_machine(car: Car) -> None:
         assert answer["secs"] + answer["nsecs"] * 1e-9 == pytest.approx(service.car.now_s, abs=0.2)
 
 
+async def test_the_cars_clock_is_set_when_it_drives_off_however_long_that_took() -> None:
+    now_s = 1_000.0
+    service = CarService(clock=lambda: now_s)
+    now_s = 1_060.0
+    port = await service.start()
+    try:
+        async with bridge_client(port) as client:
+            await client.subscribe("/gps_fix")
+            assert (await client.next("/gps_fix"))["header"]["stamp"]["secs"] >= 1_059
+    finally:
+        await service.stop()
+
+
 async def test_a_scenario_is_started_and_stopped_by_a_service_while_the_car_drives(car: Car) -> None:
     _, port = car
     async with bridge_client(port) as client:
