@@ -77,6 +77,7 @@ class Client:
         try:
             while True:
                 raw = await self._connection.recv(decode=False)
+                await self._connection.awake.wait()
                 self.handle(raw)
                 if self._outbox.reply_bytes > REPLY_BYTES:
                     self._may_listen.clear()

@@ -25,7 +25,8 @@ class Connection(ServerConnection):
     def __init__(self, listener: Listener, protocol: ServerProtocol, server: Server, **options: Any) -> None:
         super().__init__(protocol, server, **options)
         self._listener = listener
-        self._frozen = False
+        self.awake = asyncio.Event()  # not frozen
+        self.awake.set()
         self._unread = bytearray()
         self._deadline: asyncio.TimerHandle | None = None  # of the handshake
         self.on_ready: Callable[[], None] | None = None
@@ -36,7 +37,7 @@ class Connection(ServerConnection):
         """Open, not frozen, and with room in the socket's buffer."""
         return (
             not self.paused
-            and not self._frozen
+            and self.awake.is_set()
             and self.protocol.state is State.OPEN
             and not self.transport.is_closing()
         )
@@ -51,11 +52,11 @@ class Connection(ServerConnection):
         self.transport.write(frame)
 
     def freeze(self) -> None:
-        self._frozen = True
+        self.awake.clear()
         self.transport.pause_reading()
 
     def thaw(self) -> None:
-        self._frozen = False
+        self.awake.set()
         unread = bytes(self._unread)
         self._unread.clear()
         if unread:
@@ -79,11 +80,12 @@ class Connection(ServerConnection):
         if self._deadline is not None:
             self._deadline.cancel()
         super().connection_lost(exc)
+        self.awake.set()
         if self.on_lost is not None:
             self.on_lost()
 
     def data_received(self, data: bytes) -> None:
-        if self._frozen:  # websockets may have resumed reading by itself
+        if not self.awake.is_set():  # websockets may have resumed reading by itself
             self._unread += data
             self.transport.pause_reading()
             return
@@ -102,7 +104,7 @@ class Connection(ServerConnection):
     def _end_handshake(self) -> None:
         if self.protocol.state is not State.CONNECTING:
             return
-        if self._frozen:
+        if not self.awake.is_set():
             self._deadline = self.loop.call_later(HANDSHAKE_S, self._end_handshake)
         else:
             self.transport.abort()

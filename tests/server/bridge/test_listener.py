@@ -82,14 +82,29 @@ async def test_a_frozen_bridge_answers_nothing_and_keeps_its_clients(talk: RosBr
     await (await asyncio.wait_for(newcomer, 2)).close()
 
 
-async def test_a_freeze_is_the_same_for_clients_that_send_much(talk: RosBridge, probe: Probe) -> None:
-    sent = [probe.send(op="call_service", service="/rosapi/get_time", id=number) for number in range(200)]
-    await asyncio.gather(*sent[:100])
-    talk.freeze()
-    await asyncio.gather(*sent[100:])
-    await asyncio.sleep(0.05)
-    talk.thaw()
-    assert [(await probe.hear())["id"] for _ in range(200)] == list(range(200))
+async def test_a_freeze_is_total_for_a_client_that_sends_much(bridge: RosBridge, probe: Probe) -> None:
+    handled = 0
+
+    def toil(args: object) -> dict[str, int]:
+        nonlocal handled
+        handled += 1
+        time.sleep(0.001)
+        return {}
+
+    bridge.add_service("/toil", "demo/Toil", toil)
+    call = json.dumps({"op": "call_service", "service": "/toil"}).encode()
+    probe.socket.transport.write(b"".join(Frame(Opcode.TEXT, call).serialize(mask=True) for _ in range(200)))
+    await until(lambda: handled > 20)
+    bridge.freeze()  # many wait to be handled, and websockets has stopped reading for that
+    before = handled
+    pong = await probe.socket.ping()
+    await asyncio.sleep(0.3)
+    assert handled <= before + 1
+    assert not pong.done()
+    bridge.thaw()
+    for _ in range(200):
+        await probe.hear_op("service_response")
+    await asyncio.wait_for(pong, 2)
 
 
 async def test_a_killed_bridge_drops_all_and_refuses_until_revived(talk: RosBridge, port: int, probe: Probe) -> None:
@@ -135,13 +150,13 @@ async def test_a_slow_client_delays_nobody_and_loses_only_its_own(port: int, tal
         await slow.subscribe("/talk", queue_length=3)
         slow.socket.transport.pause_reading()
         big = {"data": "x" * 100_000}
-        worst = 0.0
+        waits_s = []
         for number in range(200):
             began = time.perf_counter()
             talk.publish("/talk", {**big, "number": number})
             assert (await probe.hear())["msg"]["number"] == number
-            worst = max(worst, time.perf_counter() - began)
-        assert worst < 0.1
+            waits_s.append(time.perf_counter() - began)
+        assert sorted(waits_s)[190] < 0.1  # a bridge that waited for the slow one would not get this far at all
         assert talk.dropped > 50
         dropped = talk.dropped
         slow.socket.transport.resume_reading()
@@ -173,20 +188,21 @@ async def test_a_client_that_asks_and_never_reads_is_not_listened_to(port: int, 
     def count(args: object) -> dict[str, str]:
         nonlocal asked
         asked += 1
-        return {"much": "x" * 10_000}
+        return {"much": "x" * 100_000}
 
     talk.add_service("/much", "demo/Much", count)
-    request = json.dumps({"op": "call_service", "service": "/much"})
-    async with probing(port) as greedy:
+    request = json.dumps({"op": "call_service", "service": "/much"}).encode()
+    async with probing(port) as greedy, probing(port) as other:
         greedy.socket.transport.pause_reading()
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(2.0):
-                for _ in range(30_000):
-                    await greedy.socket.send(request)
-        assert asked * 10_000 < 60_000_000  # what the system's own buffers take, and a little more
-        async with probing(port) as other:
-            assert (await other.call("/rosapi/get_time"))["result"] is True
+        greedy.socket.transport.write(b"".join(Frame(Opcode.TEXT, request).serialize(mask=True) for _ in range(2_000)))
+        before = -1
+        while asked != before:
+            before = asked
+            await asyncio.sleep(0.3)
+        assert asked < 500  # what the system's own buffers take, and a little more
+        assert (await other.call("/rosapi/get_time"))["result"] is True
         greedy.socket.transport.abort()
+        await until(lambda: talk.clients == 1)
 
 
 async def test_a_message_beyond_the_limit_ends_the_connection() -> None:
@@ -226,16 +242,25 @@ async def test_sockets_that_say_nothing_are_bounded_too(monkeypatch: pytest.Monk
             assert (await probe.call("/rosapi/get_time"))["result"] is True
 
 
-async def test_a_flood_of_pings_without_reading_ends(port: int, bridge: RosBridge) -> None:
-    async with probing(port) as probe:
-        wire = probe.socket.transport
-        wire.pause_reading()
+async def test_a_flood_of_pings_without_reading_ends(
+    port: int, bridge: RosBridge, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("server.bridge.connection.LARGEST_BUFFER", 50_000)
+    narrow = socket.socket()
+    narrow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 16_384)
+    narrow.connect(("127.0.0.1", port))
+    narrow.setblocking(False)
+    async with websockets.connect(f"ws://127.0.0.1:{port}", sock=narrow, ping_interval=None) as deaf:
+        deaf.transport.pause_reading()
         pings = b"".join(Frame(Opcode.PING, bytes(125)).serialize(mask=True) for _ in range(1_000))
-        async with asyncio.timeout(10):
-            while bridge.clients:
-                if wire.get_write_buffer_size() < 1_000_000:
-                    wire.write(pings)
-                await asyncio.sleep(0)
+        try:
+            async with asyncio.timeout(20):
+                while bridge.clients:
+                    if deaf.transport.get_write_buffer_size() < 1_000_000:
+                        deaf.transport.write(pings)
+                    await asyncio.sleep(0)
+        finally:
+            deaf.transport.abort()
 
 
 async def test_a_browser_that_comes_by_mistake_gets_words(port: int) -> None:
