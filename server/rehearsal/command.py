@@ -1,0 +1,194 @@
+"""`catgraph check`: every check over a recording, faster than it happened."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import math
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import orjson
+
+from server.recording.read import Recording, RecordingUnreadable, open_recording
+from server.rehearsal import summary
+from server.rehearsal.as_json import as_json
+from server.rehearsal.faults import CannotInject, Faults
+from server.rehearsal.progress import Progress
+from server.rehearsal.rehearse import Extract, Rehearsed, rehearse
+from server.rehearsal.report import Report
+from server.rehearsal.thresholds import BadSettingsFile, Wishes, read_wishes
+from server.settings import BadSetting
+from server.simulator.scenarios import Planned, UnknownScenario, planned
+
+NO_CRITICAL, CRITICAL, CANNOT = 0, 1, 2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's arguments."""
+    parser.add_argument(
+        "files",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help="ROS 1 bag, ROS 2 bag directory, .mcap, .db3; several are one recording",
+    )
+    parser.add_argument("--json", type=Path, metavar="OUT", help="write all that was found as JSON; - for the screen")
+    parser.add_argument("--html", type=Path, metavar="OUT", help="write a page with plots, one file, works offline")
+    parser.add_argument("--settings", type=Path, metavar="FILE", help="thresholds to judge by, as TOML")
+    parser.add_argument(
+        "--compare",
+        nargs=2,
+        type=Path,
+        metavar=("A", "B"),
+        help="two files of settings: which alarms appear, vanish or move from A to B",
+    )
+    parser.add_argument(
+        "--inject",
+        type=_fault,
+        action="append",
+        default=[],
+        metavar="FAULT@T[+D]",
+        help="lay a fault of `catgraph simulate` over the recording from T s on, for D s; may be repeated",
+    )
+    parser.add_argument("--start", type=_seconds, default=0.0, metavar="S", help="begin S seconds after the start")
+    parser.add_argument("--duration", type=_seconds, default=math.inf, metavar="S", help="judge S seconds at most")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 no critical alarm was raised (with --compare: by B), 1 one was, 2 it cannot be told."""
+    began_s = time.perf_counter()
+    try:
+        _demand_sense(args)
+        wishes = [read_wishes(path) for path in args.compare or ([args.settings] if args.settings else [])] or [
+            Wishes()
+        ]
+        with open_recording(args.files) as recording:
+            _demand_extract(recording, args)
+            report = _report(recording, wishes, args, began_s)
+            _write(report, args)
+    except BadSettingsFile as error:
+        for sentence in error.sentences:
+            _complain(sentence)
+        return CANNOT
+    except (RecordingUnreadable, CannotInject, BadSetting, _Impossible) as error:
+        _complain(str(error))
+        return CANNOT
+    if report.run.broke_off is not None:
+        _complain(report.run.broke_off)
+        return CANNOT
+    return CRITICAL if report.has_critical else NO_CRITICAL
+
+
+class _Impossible(Exception):
+    """What was asked for cannot be done. The text is one sentence."""
+
+
+def _report(recording: Recording, wishes: Sequence[Wishes], args: argparse.Namespace, began_s: float) -> Report:
+    extract = Extract(start_s=args.start, duration_s=args.duration)
+    faults: list[Planned] = args.inject
+    with_traces = args.html is not None
+    open_s = time.perf_counter() - began_s
+    before: Rehearsed | None = None
+    if len(wishes) == 2:
+        before = _rehearse(recording, wishes[0], extract, faults, "First settings", with_traces=False)
+    elif faults:
+        before = _rehearse(recording, wishes[0], extract, (), "Without faults", with_traces=False)
+    found = _rehearse(recording, wishes[-1], extract, faults, "Checking", with_traces=with_traces)
+    return Report(
+        files=[str(path) for path in args.files], recording=recording, run=found, before=before, open_s=open_s
+    )
+
+
+def _rehearse(
+    recording: Recording, wishes: Wishes, extract: Extract, faults: Sequence[Planned], what: str, *, with_traces: bool
+) -> Rehearsed:
+    end_s = min(recording.duration_s, extract.start_s + extract.duration_s)
+    progress = Progress(extract.start_s, end_s, what)
+    recording.rejected.clear()
+    try:
+        return rehearse(
+            recording,
+            wishes=wishes,
+            extract=extract,
+            faults=faults,
+            with_traces=with_traces,
+            on_progress=progress,
+        )
+    finally:
+        progress.close()
+
+
+def _write(report: Report, args: argparse.Namespace) -> None:
+    on_screen = args.json is not None and str(args.json) == "-"
+    _say(orjson.dumps(as_json(report), option=orjson.OPT_INDENT_2).decode() if on_screen else summary.text(report))
+    if args.json is not None and not on_screen:
+        _keep(args.json, orjson.dumps(as_json(report), option=orjson.OPT_INDENT_2) + b"\n")
+    if args.html is not None:
+        from server.rehearsal.page import page  # jinja2 takes its time to load
+
+        _keep(args.html, page(report).encode())
+        if not on_screen:
+            _say(f"\nPage: {args.html}")
+
+
+def _keep(path: Path, content: bytes) -> None:
+    """Whole or not at all."""
+    new = path.with_name(f".{path.name}.{os.getpid()}.new")
+    try:
+        new.write_bytes(content)
+        os.replace(new, path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            new.unlink()
+        raise _Impossible(f"{path} cannot be written: {error.strerror or error}.") from None
+
+
+def _demand_sense(args: argparse.Namespace) -> None:
+    if args.compare and args.settings:
+        raise _Impossible("--compare names both settings already: leave --settings out.")
+    Faults(args.inject)
+
+
+def _demand_extract(recording: Recording, args: argparse.Namespace) -> None:
+    if args.start > recording.duration_s:
+        raise _Impossible(
+            f"--start {args.start:g} lies behind the end: the recording has {recording.duration_s:.1f} s."
+        )
+    if args.duration == 0.0:
+        raise _Impossible("--duration 0 leaves nothing to judge.")
+    for fault in args.inject:
+        if fault.after_s > recording.duration_s:
+            raise _Impossible(
+                f"{fault.scenario.name} at {fault.after_s:g} s lies behind the end: the recording has "
+                f"{recording.duration_s:.1f} s."
+            )
+
+
+def _fault(text: str) -> Planned:
+    try:
+        return planned(text)
+    except UnknownScenario as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds, 0 or more")
+    return value
+
+
+def _complain(sentence: str) -> None:
+    print(f"catgraph check: {sentence}", file=sys.stderr)
+
+
+def _say(text: str) -> None:
+    with contextlib.suppress(BrokenPipeError):  # who read the other end of a pipe has seen enough
+        print(text, flush=True)

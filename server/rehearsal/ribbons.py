@@ -1,0 +1,95 @@
+"""How each tile of the home tab stood over time: in order, at fault, or not checked and why."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from monitor.check import Verdict
+from monitor.runner import Monitor, Tile
+
+
+@dataclass(slots=True)
+class Ribbon:
+    """One tile over one run. Times are seconds since the beginning of the recording."""
+
+    label: str
+    spans: list[tuple[float, float, Verdict, str]] = field(default_factory=list)  # from, to, verdict, what it said
+
+    def seconds(self, verdict: Verdict) -> float:
+        return sum(to_s - from_s for from_s, to_s, found, _ in self.spans if found is verdict)
+
+    @property
+    def why_not(self) -> str:
+        """Why it could not be checked, the reason that lasted longest; "" where it always could."""
+        reasons: Counter[str] = Counter()
+        for from_s, to_s, found, text in self.spans:
+            if found is Verdict.UNKNOWN:
+                reasons[text] += max(to_s - from_s, 1e-9)  # type: ignore[assignment]
+        return max(reasons, key=lambda text: reasons[text], default="")
+
+
+class Ribbons:
+    """Sampled about once a second: a tile is for the eye, and the alarms have their own exact times."""
+
+    def __init__(self) -> None:
+        self._by_label: dict[str, Ribbon] = {}
+        self._last: dict[str, tuple[Verdict, str]] = {}
+
+    def sample(self, tiles: Sequence[Tile], now_s: float) -> None:
+        for tile in tiles:
+            ribbon = self._by_label.get(tile.label)
+            if ribbon is None:
+                ribbon = self._by_label[tile.label] = Ribbon(label=tile.label)
+            spans = ribbon.spans
+            before = spans[-1] if spans else None
+            # What an OK says changes with every number; only why something is not checked is worth keeping.
+            text = tile.text if tile.verdict is not Verdict.OK else ""
+            if before is not None:
+                spans[-1] = (before[0], now_s, before[2], before[3])
+                if before[2] is tile.verdict and (before[3] == text or tile.verdict is Verdict.FAULT):
+                    continue
+            spans.append((now_s, now_s, tile.verdict, text))
+
+    def finish(self, end_s: float) -> tuple[Ribbon, ...]:
+        for ribbon in self._by_label.values():
+            from_s, _, verdict, text = ribbon.spans[-1]
+            ribbon.spans[-1] = (from_s, max(from_s, end_s), verdict, text)
+        return tuple(self._by_label.values())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unchecked:
+    """A check that could never be made, so that no alarm of its means nothing."""
+
+    check_id: str
+    label: str
+    why: str
+
+
+class Coverage:
+    """Which checks were ever answered; sampled as the ribbons are."""
+
+    def __init__(self) -> None:
+        self._answered: set[str] = set()
+        self._idle: set[str] = set()  # with nothing to check here: what is optional and not there is no gap
+        self._reasons: dict[str, Counter[str]] = {}
+
+    def sample(self, monitor: Monitor) -> None:
+        for check_id, finding in monitor.findings.items():
+            if check_id in self._answered:
+                continue
+            if finding.verdict is not Verdict.UNKNOWN:
+                self._answered.add(check_id)
+            elif not finding.applies:
+                self._idle.add(check_id)
+            else:
+                self._reasons.setdefault(check_id, Counter())[finding.text] += 1
+
+    def unchecked(self, monitor: Monitor) -> tuple[Unchecked, ...]:
+        return tuple(
+            Unchecked(check_id=check.id, label=check.label, why=self._reasons[check.id].most_common(1)[0][0])
+            for check in monitor.checks
+            if check.id in self._reasons and check.id not in self._answered | self._idle
+        )

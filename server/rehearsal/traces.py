@@ -1,0 +1,132 @@
+"""What the plots need: every signal's numbers over time, and what the checks measured against which limit."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+from monitor.geo import Plane
+from monitor.runner import Monitor
+from monitor.signals import SIGNALS
+from monitor.state import Reading
+from monitor.values import GpsFix
+
+MOST_POINTS = 12_000  # of one curve: beyond that the lowest and the highest of each stretch stand for the rest
+GAP_PERIODS = 10
+GAP_FLOOR_S = 1.0
+
+
+@dataclass(slots=True)
+class Series:
+    """Numbers over time, in the order of time."""
+
+    at_s: array[float] = field(default_factory=lambda: array("d"))
+    values: array[float] = field(default_factory=lambda: array("d"))
+
+    def add(self, at_s: float, value: float) -> None:
+        self.at_s.append(at_s)
+        self.values.append(value)
+
+    def points(self) -> list[tuple[float, float | None]]:
+        """As drawn: thinned where they are too many, with a None where nothing came for long."""
+        pairs = list(zip(self.at_s, self.values, strict=True))
+        if len(pairs) > MOST_POINTS:
+            pairs = _extremes(pairs)
+        return _with_gaps(pairs)
+
+
+@dataclass(slots=True)
+class Measure:
+    """What one check measured and allowed, tick by tick, where it measures a quantity."""
+
+    check_id: str
+    label: str  # of what is measured
+    unit: str
+    needs: frozenset[str]
+    measured: Series = field(default_factory=Series)
+    allowed: Series = field(default_factory=Series)
+
+
+class Traces:
+    """Collects while a recording is judged."""
+
+    def __init__(self) -> None:
+        self.signals: dict[str, Series] = {}
+        self.measures: dict[str, Measure] = {}
+        self.track: list[tuple[float, float, float, float | None]] = []  # s, east m, north m, stated sigma m
+        self._plane: Plane | None = None
+        self._headlines = {name: signal.headline for name, signal in SIGNALS.items()}
+
+    def take(self, changed: Iterable[str], reading: Callable[[str], Reading[Any] | None], now_s: float) -> None:
+        """What a message changed."""
+        for signal in changed:
+            found = reading(signal)
+            if found is None:
+                continue
+            value = found.value
+            if isinstance(value, GpsFix):
+                self._fix(value, now_s)
+            headline = self._headlines[signal]
+            number = None if headline is None else getattr(value, headline, None)
+            if headline is not None:
+                series = self.signals.get(signal)
+                if series is None:
+                    series = self.signals[signal] = Series()
+                series.add(now_s, math.nan if number is None else float(number))
+
+    def judged(self, monitor: Monitor, now_s: float) -> None:
+        """What all checks found at a tick."""
+        for check in monitor.checks:
+            finding = monitor.findings.get(check.id)
+            if finding is None or (finding.measured is None and finding.limit is None):
+                continue
+            quantity = finding.measured or finding.limit
+            assert quantity is not None
+            measure = self.measures.get(check.id)
+            if measure is None:
+                measure = self.measures[check.id] = Measure(
+                    check_id=check.id, label=quantity.label, unit=quantity.unit, needs=check.needs
+                )
+            if finding.measured is not None:
+                measure.measured.add(now_s, finding.measured.value)
+            if finding.limit is not None:
+                measure.allowed.add(now_s, finding.limit.value)
+
+    def _fix(self, fix: GpsFix, now_s: float) -> None:
+        if fix.status < 0 or not (math.isfinite(fix.lat_deg) and math.isfinite(fix.lon_deg)):
+            return
+        if self._plane is None:
+            self._plane = Plane(fix.lat_deg, fix.lon_deg)
+        east_m, north_m = self._plane.enu(fix.lat_deg, fix.lon_deg)
+        self.track.append((now_s, east_m, north_m, fix.sigma_m))
+
+
+def _extremes(pairs: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Each stretch's lowest and highest, so that no peak is lost."""
+    stretch = math.ceil(2 * len(pairs) / MOST_POINTS)
+    kept: list[tuple[float, float]] = []
+    for begin in range(0, len(pairs), stretch):
+        part = pairs[begin : begin + stretch]
+        known = [pair for pair in part if not math.isnan(pair[1])]
+        if not known:
+            kept.append(part[0])
+            continue
+        low, high = min(known, key=lambda pair: pair[1]), max(known, key=lambda pair: pair[1])
+        kept += sorted({low, high})
+    return kept
+
+
+def _with_gaps(pairs: list[tuple[float, float]]) -> list[tuple[float, float | None]]:
+    steps = sorted(b[0] - a[0] for a, b in pairwise(pairs))
+    usual_s = steps[len(steps) // 2] if steps else 0.0
+    gap_s = max(GAP_FLOOR_S, GAP_PERIODS * usual_s)
+    points: list[tuple[float, float | None]] = []
+    for at_s, value in pairs:
+        if points and at_s - points[-1][0] > gap_s:
+            points.append((points[-1][0] + usual_s, None))
+        points.append((at_s, value if math.isfinite(value) else None))
+    return points
