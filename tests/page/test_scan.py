@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 from pathlib import Path
 
@@ -73,8 +74,9 @@ async def test_the_scan_is_sent_only_while_its_tab_is_in_front(phone: Phone, tmp
         assert scans == []
         await phone.page.locator("[data-tab=scan]").tap()
         await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"))
-        await phone.page.wait_for_timeout(800)
-        assert len(scans) > 5
+        async with asyncio.timeout(8):
+            while len(scans) < 6:  # Playwright tells by calling
+                await asyncio.sleep(0.05)
         await phone.f("menu").tap()
         await phone.page.locator("#sheet-menu").get_by_text("About").tap()
         await phone.page.wait_for_timeout(300)

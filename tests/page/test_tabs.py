@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator
 
 import pytest
 import pytest_asyncio
+from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import expect
 
 from tests.page.conftest import Phone
@@ -147,3 +148,17 @@ async def test_no_width_breaks_the_page(phone: Phone, watch: Process, size: tupl
     view = await phone.page.locator("#monitor .view").bounding_box()
     assert view is not None
     assert view["height"] >= 180
+
+
+async def test_no_barrier_that_a_machine_can_find(phone: Phone, watch: Process) -> None:
+    """Contrast, names, roles, landmarks: WCAG as axe measures it."""
+    await phone.open(f"{watch.address}/#home")
+    await phone.live()
+    for screen in ("home", "signals"):
+        if screen == "signals":
+            await phone.f("menu").tap()
+            await phone.page.locator("#sheet-menu").get_by_text("Signals").tap()
+        for theme in ("dark", "light"):
+            await phone.page.emulate_media(color_scheme=theme)
+            found = (await Axe().run(phone.page)).response["violations"]
+            assert [(one["id"], one["nodes"][0]["html"]) for one in found] == [], f"{screen}, {theme}"
