@@ -77,6 +77,7 @@ class _Replay:
         self._bridge = RosBridge(ros_version=recording.ros_version, node="/replay")
         self._names = _renamed(recording, dict(args.remap))
         self._played = 0
+        self._began_s: float | None = None  # of the playing, on the monotonic clock
         self._at_s = 0.0  # place in the recording
         self._subscribed = asyncio.Event()  # a client subscribed to something
         if not recording.count:
@@ -95,7 +96,6 @@ class _Replay:
         self._bridge.on_subscribe.append(lambda _: self._subscribed.set())
         port = await self._bridge.start(self._args.host, self._args.port)
         self._print_what_comes(port)
-        began_s = time.monotonic()
         playing, progress = asyncio.ensure_future(self._play()), asyncio.ensure_future(self._show_progress())
         try:
             await asyncio.wait({playing, interrupted}, return_when=asyncio.FIRST_COMPLETED)
@@ -108,7 +108,7 @@ class _Replay:
             for task in (playing, progress):
                 task.cancel()
             await asyncio.wait({playing, progress})
-            self._print_summary(time.monotonic() - began_s)
+            self._print_summary()
             if self._args.stay and not interrupted.done() and _is_well(playing):
                 _say("The bridge stays up until interrupted (Ctrl-C).")
                 code = int(await interrupted)
@@ -118,6 +118,7 @@ class _Replay:
     async def _play(self) -> None:
         if self._args.wait:
             await self._wait_for_subscribers()
+        self._began_s = time.monotonic()
         while True:
             round_ends_s = time.monotonic() + SHORTEST_ROUND_S
             await play(self._messages(), self._bridge, rate=self._args.rate, ahead=AHEAD, on_message=self._note_message)
@@ -183,7 +184,8 @@ class _Replay:
         host = f"[{args.host}]" if ":" in args.host else args.host
         _say(f"rosbridge at ws://{host}:{port}")
 
-    def _print_summary(self, took_s: float) -> None:
+    def _print_summary(self) -> None:
+        took_s = time.monotonic() - self._began_s if self._began_s is not None else 0.0
         if sys.stdout.isatty():
             _say("\r", end="")
         fate = f"{_grouped(self._bridge.sent)} sent to clients, {_grouped(self._bridge.dropped)} dropped"

@@ -166,18 +166,18 @@ async def test_a_flood_from_one_client_leaves_the_others_their_turn(bridge: RosB
     def toil(args: object) -> dict[str, Any]:
         nonlocal handled
         handled += 1
-        ends = time.perf_counter() + 0.0002
-        while time.perf_counter() < ends:
+        ends = time.thread_time() + 0.0002
+        while time.thread_time() < ends:
             pass
         return {}
 
     bridge.add_service("/toil", "demo/Toil", toil)
     call = json.dumps({"op": "call_service", "service": "/toil"}).encode()
     probe.socket.transport.write(b"".join(Frame(Opcode.TEXT, call).serialize(mask=True) for _ in range(3_000)))
-    longest_s, last = 0.0, time.perf_counter()
+    longest_s, last = 0.0, time.thread_time()  # our own time: other programs' turns do not count
     while handled < 3_000:  # others' turns
         await asyncio.sleep(0)
-        now = time.perf_counter()
+        now = time.thread_time()
         longest_s, last = max(longest_s, now - last), now
     assert longest_s < 0.35  # all at once they would take 0.6 s
     probe.socket.transport.abort()  # the answers are of no interest
