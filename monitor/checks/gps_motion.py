@@ -61,6 +61,8 @@ def drifts(snapshot: Snapshot, limits: DriftLimits, was_active: bool) -> Finding
     snapshot.need("speed")
     watch = snapshot.gps
     if snapshot.standing_since_s is None:
+        if was_active:
+            return ok("The car moves: no drift at standstill any more")  # else it would stand until the next stop
         return unknown("The car moves", short="moving")
     if len(watch.drift_m) < FIXES or watch.anchored_s is None:
         return unknown("Taking the place where the car stopped", short="waiting")

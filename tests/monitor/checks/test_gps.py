@@ -86,6 +86,7 @@ def test_the_drift_that_is_allowed_follows_from_the_receivers_error(
 def test_drift_is_not_checked_while_moving_and_the_anchor_is_taken_anew() -> None:
     walk = Walk(sigma_m=0.2).go(6.0).go(10.0, speed_mps=3.0)
     assert walk.ask("gps_drift") == "unknown"
+    assert walk.ask("gps_drift", was_active=True) == "ok"
     assert walk.ask("gps_jump") == "ok"
     walk.go(3.0)
     assert walk.ask("gps_drift") == "unknown"
