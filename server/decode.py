@@ -42,7 +42,14 @@ NONE_YET_M = 2147483647.0  # what its steering-based variant says before the fir
 FARTHEST_M = 1000.0  # no sensor on a car sees farther
 MAX_BEAMS = 65535
 MAX_COMPONENTS = 500
+FULLEST_PERCENT = 10_000.0  # a hundred times all there is: another unit, or noise
 FASTEST_MPS = 150.0  # beyond that a wheel sensor or a unit is broken, not the car fast
+
+HARDEST_MPS2 = 300.0  # a crash; what is beyond is another unit, or noise
+SIDEWAYS = 0.25  # of the way made: a car rolls forwards or backwards, and slips a little
+FARTHEST_SCAN_M = 10_000.0  # a range_max beyond is "no end", which drivers write as the largest float there is
+WIDEST_RAD = 4 * math.pi  # two turns: no laser sweeps more
+_REAL = (int, float, np.integer, np.floating)
 
 
 class Rejected(ValueError):
@@ -64,7 +71,7 @@ def number(message: Any, *path: str) -> float:
         return value if math.isfinite(value) else math.nan
     if value is None:
         return math.nan
-    if isinstance(value, (bool, str)) or not isinstance(value, (int, float, np.number)):
+    if isinstance(value, bool) or not isinstance(value, _REAL):
         raise Rejected(f"{'.'.join(path)} is not a number")
     try:
         whole = float(value)
@@ -102,15 +109,22 @@ def stamp_s(message: Any) -> float | None:
         return None
     seconds = stamp.get("secs", stamp.get("sec"))
     nanoseconds = stamp.get("nsecs", stamp.get("nanosec"))
-    if type(seconds) is not int or type(nanoseconds) is not int:
+    if type(seconds) is not int or type(nanoseconds) is not int or not 0 <= seconds < 1e11:
         return None
-    whole = seconds + nanoseconds * 1e-9
-    return whole if 0 < whole < 1e11 else None
+    if not 0 <= nanoseconds < 10**9:
+        return None
+    return seconds + nanoseconds * 1e-9 or None
 
 
 def _speed(value: float) -> float:
     if abs(value) > FASTEST_MPS:
         raise Rejected("a speed beyond any car")
+    return value
+
+
+def _percent(value: float) -> float:
+    if abs(value) > FULLEST_PERCENT:
+        raise Rejected("a percentage beyond any pedal")
     return value
 
 
@@ -124,7 +138,17 @@ def twist_stamped(message: Any) -> Twist:
 
 
 def twist_of_odometry(message: Any) -> Twist:
-    return twist(_inner(_inner(message, "twist"), "twist"))
+    """Speed of a nav_msgs/Odometry; its twist is in the body frame by definition, and in east and north as the
+    CATVehicle's drivers and Gazebo fill it. The way made is the same in both; backwards is what points back and hardly
+    aside."""
+    body = _inner(_inner(message, "twist"), "twist")
+    x, y = finite(body, "linear", "x"), number(body, "linear", "y")
+    y = 0.0 if math.isnan(y) else y
+    speed = math.hypot(x, y)
+    yaw_rate = number(body, "angular", "z") if "angular" in body else math.nan
+    return Twist(
+        speed_mps=_speed(-speed if x < 0 and abs(y) <= SIDEWAYS * speed else speed), yaw_rate_radps=known(yaw_rate)
+    )
 
 
 def speed_of_float(message: Any) -> Twist:
@@ -133,20 +157,20 @@ def speed_of_float(message: Any) -> Twist:
 
 def effort(message: Any) -> Effort:
     """Percent in force.x of a Wrench, as the car's pedals have it."""
-    return Effort(percent=finite(message, "force", "x"))
+    return Effort(percent=_percent(finite(message, "force", "x")))
 
 
 def effort_of_float(message: Any) -> Effort:
-    return Effort(percent=finite(message, "data"))
+    return Effort(percent=_percent(finite(message, "data")))
 
 
 def steering(message: Any) -> Steering:
     """Percent in torque.z of a Wrench, negative = left."""
-    return Steering(percent=finite(message, "torque", "z"))
+    return Steering(percent=_percent(finite(message, "torque", "z")))
 
 
 def steering_of_float(message: Any) -> Steering:
-    return Steering(percent=finite(message, "data"))
+    return Steering(percent=_percent(finite(message, "data")))
 
 
 def distance(message: Any) -> Distance:
@@ -172,17 +196,18 @@ def bearing(message: Any) -> Bearing:
 def nav_sat_fix(message: Any) -> GpsFix:
     """Position on WGS84. Raises Rejected for coordinates that are no place on Earth; without a fix they may be
     anything."""
-    status = number(message, "status", "status")
-    if not math.isfinite(status):
-        raise Rejected("status.status is null")
+    status = finite(message, "status", "status")
+    if status != int(status) or not -128 <= status <= 127:  # an int8; beyond −1…2 drivers have their own
+        raise Rejected("status.status is no status")
     latitude, longitude = number(message, "latitude"), number(message, "longitude")
-    if int(status) >= 0 or not (math.isnan(latitude) or math.isnan(longitude)):
-        if math.isnan(latitude) or math.isnan(longitude):
+    if math.isnan(latitude) or math.isnan(longitude):
+        if status >= 0:
             raise Rejected("latitude or longitude is null")
-        if abs(latitude) > 90 or abs(longitude) > 360:
-            raise Rejected("latitude or longitude out of range")
+        latitude = longitude = math.nan
+    elif abs(latitude) > 90 or abs(longitude) > 360:
+        raise Rejected("latitude or longitude out of range")
     kind = number(message, "position_covariance_type")
-    kind_is_known = math.isfinite(kind) and kind in (1, 2, 3)
+    kind_is_known = kind in (1, 2, 3)
     return GpsFix(
         lat_deg=latitude,
         lon_deg=(longitude + 180) % 360 - 180 if abs(longitude) > 180 else longitude,
@@ -197,20 +222,18 @@ def _sigma(covariance: Any) -> float | None:
     """Horizontal one-sigma error in m from the ENU covariance (row-major, m²); None where it is not to be trusted."""
     if not isinstance(covariance, (list, tuple, np.ndarray)) or len(covariance) != 9:
         return None
-    east, north = covariance[0], covariance[4]
-    for variance in (east, north):
-        if isinstance(variance, (bool, str)) or not isinstance(variance, (int, float, np.number)):
-            return None
-        if not (math.isfinite(variance) and variance > 0):
-            return None
-    return math.sqrt((float(east) + float(north)) / 2)
+    try:
+        east, north = (number({"variance": covariance[at]}, "variance") for at in (0, 4))
+    except Rejected:
+        return None
+    return known(math.sqrt(east / 2 + north / 2)) if east > 0 and north > 0 else None  # false for NaN
 
 
 def odometry(message: Any) -> Odometry:
     pose = _inner(_inner(message, "pose"), "pose")
     body = _inner(_inner(message, "twist"), "twist")
-    east, north = number(body, "linear", "x"), number(body, "linear", "y")
-    speed = math.hypot(east, 0.0 if math.isnan(north) else north)
+    x, y = number(body, "linear", "x"), number(body, "linear", "y")
+    speed = math.hypot(x, 0.0 if math.isnan(y) else y)
     return Odometry(
         x_m=finite(pose, "position", "x"),
         y_m=finite(pose, "position", "y"),
@@ -232,11 +255,17 @@ def _yaw(pose: Any) -> float | None:
 
 
 def acceleration_of_imu(message: Any) -> Acceleration:
-    return Acceleration(acceleration_mps2=finite(message, "linear_acceleration", "x"), source="topic")
+    return Acceleration(acceleration_mps2=_push(finite(message, "linear_acceleration", "x")), source="topic")
 
 
 def acceleration_of_float(message: Any) -> Acceleration:
-    return Acceleration(acceleration_mps2=finite(message, "data"), source="topic")
+    return Acceleration(acceleration_mps2=_push(finite(message, "data")), source="topic")
+
+
+def _push(value: float) -> float:
+    if abs(value) > HARDEST_MPS2:
+        raise Rejected("an acceleration beyond any car")
+    return value
 
 
 def heading_of_imu(message: Any) -> Heading:
@@ -244,25 +273,41 @@ def heading_of_imu(message: Any) -> Heading:
     yaw = _yaw(message)
     if yaw is None:
         raise Rejected("orientation is no rotation")
-    return Heading(heading_deg=(90 - math.degrees(yaw)) % 360, source="topic")
+    return Heading(heading_deg=_compass(90 - math.degrees(yaw)), source="topic")
 
 
 def heading_of_float(message: Any) -> Heading:
-    return Heading(heading_deg=finite(message, "data") % 360, source="topic")
+    value = finite(message, "data")
+    if abs(value) > 720:
+        raise Rejected("a heading beyond two turns")
+    return Heading(heading_deg=_compass(value), source="topic")
+
+
+def _compass(degrees: float) -> float:
+    return degrees % 360 % 360  # the first alone makes 360 of the smallest angle west of north
 
 
 def level(message: Any) -> Level:
-    return Level(value=finite(message, "data"), unit="%")
+    return Level(value=_not_below_zero(finite(message, "data")), unit="%")
 
 
 def battery(message: Any) -> Level:
-    return Level(value=finite(message, "percentage") * 100, unit="%")
+    """`percentage` is 0 … 1 by definition, and 0 … 100 in many a driver."""
+    share = _not_below_zero(finite(message, "percentage"))
+    return Level(value=share * 100 if share <= 1.0 else share, unit="%")
+
+
+def _not_below_zero(value: float) -> float:
+    if value < 0:
+        raise Rejected("a level below zero")
+    return _percent(value)
 
 
 def command(message: Any) -> MotionCommand:
     """What a controller asks of the car. The real car's angular.z is NaN in every message: unknown, not wrong."""
+    speed = known(number(message, "linear", "x"))
     return MotionCommand(
-        speed_mps=known(number(message, "linear", "x")), tyre_angle_rad=known(number(message, "angular", "z"))
+        speed_mps=None if speed is None else _speed(speed), tyre_angle_rad=known(number(message, "angular", "z"))
     )
 
 
@@ -275,18 +320,21 @@ def laser_scan(message: Any) -> LaserScan:
     ranges = _numbers(message, "ranges")
     if ranges.size > MAX_BEAMS:
         raise Rejected(f"more than {MAX_BEAMS} beams")
-    increment = finite(message, "angle_increment")
+    first, last, increment = (finite(message, f"angle_{name}") for name in ("min", "max", "increment"))
+    sweep = max(ranges.size - 1, 1) * abs(increment)
+    if max(abs(first), abs(last), sweep) > WIDEST_RAD:
+        raise Rejected("angles beyond two turns; they are radians")
     if increment == 0 and ranges.size > 1:
         raise Rejected("angle_increment is zero")
     nearest, farthest = finite(message, "range_min"), number(message, "range_max")
-    if math.isnan(farthest):
+    if math.isnan(farthest) or farthest > FARTHEST_SCAN_M:
         farthest = math.inf  # an open end; JSON cannot say so
     if nearest < 0 or farthest <= nearest:
         raise Rejected("range_min and range_max contradict each other")
     return LaserScan(
         ranges_m=ranges,
-        angle_min_rad=finite(message, "angle_min"),
-        angle_max_rad=finite(message, "angle_max"),
+        angle_min_rad=first,
+        angle_max_rad=last,
         angle_increment_rad=increment,
         time_increment_s=_or_zero(number(message, "time_increment")),
         scan_time_s=_or_zero(number(message, "scan_time")),
@@ -304,7 +352,8 @@ def _numbers(message: Any, name: str) -> npt.NDArray[np.float32]:
     """A list of numbers and nulls as float32, nulls as NaN."""
     values = message.get(name) if isinstance(message, Mapping) else None
     if isinstance(values, np.ndarray) and values.ndim == 1 and values.dtype.kind in "fiu":
-        return values.astype(np.float32)
+        with np.errstate(over="ignore"):
+            return values.astype(np.float32)
     if not isinstance(values, (list, tuple)):
         raise Rejected(f"{name} is missing" if values is None else f"{name} is not a list")
     if not {type(value) for value in values} <= {float, int, type(None)}:
