@@ -41,22 +41,41 @@ def find_chromium() -> str:
 
 def install_chromium() -> None:
     """Install one: from the system's packages as root on Debian, else Playwright's build in the user's cache."""
-    if os.geteuid() == 0 and shutil.which("apt-get") and _is_debian():
-        apt = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
-        packages = ["chromium", "fonts-liberation"]
-        subprocess.run(["apt-get", "update", "-q"], check=False, env=apt, stdin=subprocess.DEVNULL)
-        done = subprocess.run(
-            ["apt-get", "install", "-q", "-y", "--no-install-recommends", *packages],
-            check=False,
-            env=apt,
-            stdin=subprocess.DEVNULL,
-        )
-        if done.returncode == 0:
-            return
+    if _is_debian() and _apt_install("chromium", "fonts-liberation", "libatomic1"):
+        return
     command = [sys.executable, "-m", "playwright", "install", "chromium"]
-    if os.geteuid() == 0 and shutil.which("apt-get"):
+    if _has_apt():
         command.insert(-1, "--with-deps")
     subprocess.run(command, check=False, stdin=subprocess.DEVNULL)
+
+
+def check_driver() -> None:
+    """Make sure that Playwright's own Node starts: it needs a library that a bare system lacks. Raises NoChromium."""
+    if not _driver_starts():
+        _apt_install("libatomic1")
+        if not _driver_starts():
+            raise NoChromium(
+                "Playwright does not start on this machine: install libatomic1 with the system's packages."
+            )
+
+
+def _driver_starts() -> bool:
+    command = [sys.executable, "-m", "playwright", "--version"]
+    return subprocess.run(command, capture_output=True, check=False, stdin=subprocess.DEVNULL).returncode == 0
+
+
+def _has_apt() -> bool:
+    return os.geteuid() == 0 and shutil.which("apt-get") is not None
+
+
+def _apt_install(*packages: str) -> bool:
+    """Whether they are there now; False where apt is not ours to use."""
+    if not _has_apt():
+        return False
+    quiet = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    install = ["apt-get", "install", "-q", "-y", "--no-install-recommends", *packages]
+    subprocess.run(["apt-get", "update", "-q"], check=False, env=quiet, stdin=subprocess.DEVNULL)
+    return subprocess.run(install, check=False, env=quiet, stdin=subprocess.DEVNULL).returncode == 0
 
 
 def _candidates() -> Iterator[str]:
@@ -92,10 +111,12 @@ def _is_debian() -> bool:
 def main() -> int:
     """Print the path of the Chromium to use, after installing one where needed; 1 with a sentence where none can be."""
     try:
-        print(f"Chromium: {_found_or_installed()}")
+        path = _found_or_installed()
+        check_driver()
     except NoChromium as why:
         print(why, file=sys.stderr)
         return 1
+    print(f"Chromium: {path}")
     return 0
 
 
