@@ -33,10 +33,15 @@ def find_chromium() -> str:
         if _starts(named):
             return named
         raise NoChromium(f"CATGRAPH_CHROMIUM names {named}, which does not start.")
+    broken = []
     for path in _candidates():
         if _starts(path):
             return path
-    raise NoChromium("No Chromium for the tests: run `python -m tests.chromium`, or name one in CATGRAPH_CHROMIUM.")
+        broken.append(path)
+    found = f" ({', '.join(broken)} does not start)" if broken else ""
+    raise NoChromium(
+        f"No Chromium for the tests{found}: run `python -m tests.chromium`, or name one in CATGRAPH_CHROMIUM."
+    )
 
 
 def install_chromium() -> None:

@@ -54,6 +54,12 @@ def test_none_is_said(machine: Path) -> None:
         find_chromium()
 
 
+def test_one_that_is_there_and_does_not_start_is_named(machine: Path) -> None:
+    stub = put(machine / "bin/chromium-browser", STUB)
+    with pytest.raises(NoChromium, match=f"{stub} does not start"):
+        find_chromium()
+
+
 def test_the_one_that_was_named_is_taken_or_nothing(
     machine: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
