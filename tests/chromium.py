@@ -46,7 +46,7 @@ def find_chromium() -> str:
 
 def install_chromium() -> None:
     """Install one: from the system's packages as root on Debian, else Playwright's build in the user's cache."""
-    if _is_debian() and _apt_install("chromium", "fonts-liberation", "libatomic1"):
+    if _is_debian() and _apt_install("chromium", "fonts-dejavu-core", "fonts-roboto-unhinted", "libatomic1"):
         return
     command = [sys.executable, "-m", "playwright", "install", "chromium"]
     if _has_apt():
