@@ -23,6 +23,7 @@ from server.rehearsal.report import Report
 from server.rehearsal.thresholds import BadSettingsFile, Wishes, read_wishes
 from server.settings import BadSetting
 from server.simulator.scenarios import Planned, UnknownScenario, planned
+from server.web.assets import AssetsMissing
 
 NO_CRITICAL, CRITICAL, CANNOT = 0, 1, 2
 
@@ -74,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         for sentence in error.sentences:
             _complain(sentence)
         return CANNOT
-    except (RecordingUnreadable, CannotInject, BadSetting, _Impossible) as error:
+    except (RecordingUnreadable, CannotInject, BadSetting, AssetsMissing, _Impossible) as error:
         _complain(str(error))
         return CANNOT
     if report.run.broke_off is not None:

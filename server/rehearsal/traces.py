@@ -44,6 +44,7 @@ class Measure:
     """What one check measured and allowed, tick by tick, where it measures a quantity."""
 
     check_id: str
+    title: str
     label: str  # of what is measured
     unit: str
     needs: frozenset[str]
@@ -89,7 +90,11 @@ class Traces:
             measure = self.measures.get(check.id)
             if measure is None:
                 measure = self.measures[check.id] = Measure(
-                    check_id=check.id, label=quantity.label, unit=quantity.unit, needs=check.needs
+                    check_id=check.id,
+                    title=check.label,
+                    label=quantity.label,
+                    unit=quantity.unit,
+                    needs=check.needs,
                 )
             if finding.measured is not None:
                 measure.measured.add(now_s, finding.measured.value)
