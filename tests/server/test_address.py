@@ -6,7 +6,7 @@ import socket
 
 import pytest
 from autobahn.websocket.util import parse_url
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.address import Address, BadAddress, parse, refuse_forbidden
@@ -195,6 +195,7 @@ def answer_to(typed: str) -> Address | str:
         return str(why)
 
 
+@settings(deadline=None)
 @given(st.text(max_size=320) | st.from_regex(r"(wss?://)?[^\s/]{0,20}(:[0-9a-z]{0,6})?(/.{0,10})?", fullmatch=True))
 def test_any_text_is_an_address_or_refused_with_a_sentence(typed: str) -> None:
     address = answer_to(typed)

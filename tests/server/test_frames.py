@@ -11,7 +11,7 @@ import cbor2
 import numpy as np
 import orjson
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server import frames
@@ -177,6 +177,7 @@ def read(payload: bytes, *, is_binary: bool) -> dict[str, Any] | None:
         return None
 
 
+@settings(deadline=None)
 @given(payload=st.binary(max_size=200), is_binary=st.booleans())
 def test_noise_is_refused_or_an_object(payload: bytes, is_binary: bool) -> None:
     assert isinstance(read(payload, is_binary=is_binary), dict | None)
@@ -189,6 +190,7 @@ json_values = st.recursive(
 )
 
 
+@settings(deadline=None)
 @given(st.dictionaries(st.text(max_size=4), json_values, max_size=5))
 def test_what_is_read_can_be_written_again(operation: dict[str, Any]) -> None:
     """Python writes Infinity bare, as ROS 2 bridges do: both readers are tried."""
