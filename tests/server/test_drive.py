@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from server.config import Config, Vehicle
+from tests.environment import users_own
 from tests.server.conftest import serving
 from tests.server.viewer import Viewer, viewer
 
@@ -37,6 +38,7 @@ async def replaying(path: Path, *options: str) -> AsyncIterator[str]:
         *(sys.executable, "-m", "server", "replay", str(path), "--port", "0", "--wait", "--stay", *options),
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
+        env=users_own(),
     )
     assert process.stdout is not None
     try:

@@ -18,6 +18,7 @@ from queue import Empty, Queue
 
 import pytest
 
+from tests.environment import users_own
 from tests.server.simulator.conftest import PATIENCE_S, bridge_client
 
 PROJECT = Path(__file__).resolve().parents[3]
@@ -32,6 +33,7 @@ class Simulator:
         self.process = subprocess.Popen(
             [*COMMAND, "--port", "0", *options],
             cwd=PROJECT,
+            env=users_own(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -77,7 +79,9 @@ def simulator(*options: str) -> Iterator[Simulator]:
 
 def refused(*options: str) -> str:
     """What the command says when it does not start."""
-    ended = subprocess.run([*COMMAND, *options], cwd=PROJECT, capture_output=True, text=True, timeout=60, check=False)
+    ended = subprocess.run(
+        [*COMMAND, *options], cwd=PROJECT, env=users_own(), capture_output=True, text=True, timeout=60, check=False
+    )
     assert ended.returncode == 2
     assert ended.stdout == ""
     return ended.stderr
@@ -127,6 +131,7 @@ def test_without_any_input_it_drives_on() -> None:
     with subprocess.Popen(
         ["/bin/sh", "-c", 'exec "$@" <&-', "sh", *COMMAND, "--port", "0"],
         cwd=PROJECT,
+        env=users_own(),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
