@@ -1,0 +1,61 @@
+"""The real drive of 2016-06-01 at true speed, read off the page as an operator reads it."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.page.conftest import Phone
+from tests.page.processes import running, server
+
+# Notes every text of these fields, several times a second.
+NOTE = """() => {
+  const fields = { speed: '.gauge .speed', brake: '[data-f=brake]', accelerator: '[data-f=accelerator]',
+    steering: '[data-f=steering]', side: '[data-f=steering-unit]', distance: '[data-f=distance]' };
+  window.seen = [];
+  setInterval(() => {
+    const row = {};
+    for (const [name, where] of Object.entries(fields)) row[name] = document.querySelector(where)?.textContent ?? '';
+    window.seen.push(row);
+  }, 100);
+}"""
+
+RECEIVED = "fetch('/api/state').then((answer) => answer.json()).then((state) => state.session.received)"
+
+
+def number(text: str) -> float | None:
+    found = re.search(r"[−-]?\d+(\.\d+)?", text)
+    return float(found.group().replace("−", "-")) if found else None
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(180)
+async def test_the_real_drive_as_the_operator_sees_it(phone: Phone, tmp_path: Path, recordings: Path) -> None:
+    bag = recordings / "catvehicle_2016-06-01.bag"
+    async with (
+        running("replay", str(bag), "--port", "0", "--wait", "--stay") as car,
+        running(*server(tmp_path, car.address)) as watch,
+    ):
+        await phone.page.add_init_script(f"({NOTE})()")
+        await phone.open(watch.address)
+        async with asyncio.timeout(110):
+            while await phone.page.evaluate(RECEIVED) < 14228:
+                await phone.page.wait_for_timeout(500)
+        await phone.page.wait_for_timeout(500)
+        rows = await phone.page.evaluate("window.seen")
+        state = await phone.page.evaluate("fetch('/api/state').then((r) => r.json())")
+    read = {name: [n for row in rows if (n := number(row[name])) is not None] for name in rows[0] if name != "side"}
+    assert max(read["speed"]) == pytest.approx(4.2, abs=0.051)
+    assert max(read["brake"]) == pytest.approx(22, abs=0.5)
+    assert set(read["accelerator"]) == {0.0}
+    left = [number(row["steering"]) for row in rows if "left" in row["side"]]
+    right = [number(row["steering"]) for row in rows if "right" in row["side"]]
+    assert max(left) == pytest.approx(4, abs=0.5)  # −4.33 %: negative is left
+    assert max(right) == pytest.approx(2, abs=0.5)
+    assert min(read["distance"]) == pytest.approx(4.1, abs=0.051)
+    assert max(read["distance"]) == pytest.approx(14.5, abs=0.11)
+    assert (state["session"]["received"], state["session"]["rejected"]) == (14228, 0)
+    assert state["session"]["track_m"] == pytest.approx(76, abs=1)
