@@ -7,6 +7,7 @@ import contextlib
 import gc
 import itertools
 import socket
+import statistics
 import time
 from collections.abc import AsyncIterator
 from typing import Any
@@ -326,7 +327,7 @@ async def test_the_wait_between_two_tries_grows_to_its_limit_and_not_beyond(monk
     waits_s = [later - earlier for earlier, later in itertools.pairwise(times_s)]
     assert waits_s[0] < 0.08
     assert 0.1 <= min(waits_s[5:])
-    assert max(waits_s) < 0.4
+    assert statistics.median(waits_s[5:]) < 0.2  # one of them may be held up by a busy machine
 
 
 @on_both_loops

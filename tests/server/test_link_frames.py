@@ -124,7 +124,7 @@ async def test_a_message_of_20_mb_is_skipped_and_the_link_stays() -> None:
         await ear.hears("message", within_s=8)
         why = "a message of more than 16 MB"
         assert ear.told == [("opened", None), ("junk", why), ("junk", why), ("message", ("/a", {"data": 1}, None))]
-        assert grown < 30e6  # what the sender in this process holds is in it
+        assert grown < 37e6  # the sender in this process holds 20 MB of it; a copy kept by the link would make it 40
 
 
 @on_both_loops
