@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import inspect
 import logging
 import time
 from collections.abc import Callable
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from websockets.exceptions import ConnectionClosed
 
 from server.bridge import fields
+from server.bridge.calls import Calls
 from server.bridge.completion import Misfit
 from server.bridge.connection import Connection
 from server.bridge.encoding import Encoding, Outgoing, Unencodable, json_frame
@@ -31,7 +31,6 @@ LEVELS = ("info", "warning", "error", "none")
 MOST_SUBSCRIPTIONS = 1_000
 MOST_WISHES = 100  # subscribe operations for one topic under different ids
 MOST_ADVERTISED = 1_000
-MOST_CALLS = 100  # service calls without an answer yet
 BACKLOG_BYTES = 16_000_000  # messages that may wait for one client
 REPLY_BYTES = 1_000_000  # answers that may wait before we stop listening to the client
 TURN_S = 0.005  # one client's flood holds the loop no longer than this
@@ -53,7 +52,7 @@ class Client:
         self._level = "error"
         self._subscriptions: dict[str, Subscription] = {}
         self._advertised: dict[str, set[object]] = {}  # topic → ids under which it was advertised
-        self._calls: set[asyncio.Task[None]] = set()
+        self._calls = Calls(bridge.services, self._outbox.reply)
         self._may_listen = asyncio.Event()
         self._may_listen.set()
         self._operations: dict[str, Callable[[dict[str, Any], object], None]] = {
@@ -62,7 +61,7 @@ class Client:
             "advertise": self._advertise,
             "unadvertise": self._unadvertise,
             "publish": self._publish,
-            "call_service": self._call_service,
+            "call_service": self._calls.call,
             "set_level": self._set_level,
             "status_level": self._set_level,
             "fragment": self._fragment,
@@ -229,38 +228,6 @@ class Client:
         if whole is not None:
             self.handle(whole, whole=True)
 
-    def _call_service(self, operation: dict[str, Any], id: object) -> None:
-        name = fields.text(operation, "service")
-        args = operation.get("args", {})
-        name, _, tail = name.partition("#")  # an old way to give the id
-        if id is None and tail:
-            id = tail[: fields.LONGEST_ID]
-        if len(self._calls) >= MOST_CALLS:
-            raise Refused(f"{MOST_CALLS} service calls have no answer yet")
-        try:
-            values: Any = self._bridge.services.call(name, args)
-        except Exception as error:  # a handler's mistake is the caller's answer, never the bridge's end
-            self._respond(name, id, str(error) or type(error).__name__, result=False)
-            return
-        if inspect.isawaitable(values):
-            task = asyncio.ensure_future(self._answer_later(name, id, values))
-            self._calls.add(task)
-            task.add_done_callback(self._calls.discard)
-        else:
-            self._respond(name, id, values, result=True)
-
-    async def _answer_later(self, service: str, id: object, values: Any) -> None:
-        try:
-            self._respond(service, id, await values, result=True)
-        except Exception as error:
-            self._respond(service, id, str(error) or type(error).__name__, result=False)
-
-    def _respond(self, service: str, id: object, values: Any, *, result: bool) -> None:
-        response: dict[str, Any] = {"op": "service_response", "service": service, "values": values, "result": result}
-        if id is not None:
-            response["id"] = id
-        self._outbox.reply(json_frame(response))
-
     def type_became(self, topic: Topic, subscription: Subscription) -> None:
         """The topic exists now: those who asked for another type get an error and no data."""
         subscription.settle(topic.type)
@@ -278,8 +245,7 @@ class Client:
 
     def _leave(self) -> None:
         self._connection.on_ready = self._connection.on_lost = None
-        for task in self._calls:
-            task.cancel()
+        self._calls.close()
         self._outbox.close()
         for spelling in list(self._subscriptions):
             self._end(spelling)

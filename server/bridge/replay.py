@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import contextlib
 import math
 import signal
 import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import uvloop
 
-from server.bridge.names import BadName, canonical_name
+from server.bridge.names import BadName, canonical_name, canonical_type
 from server.bridge.player import play
+from server.bridge.replay_report import Report, say
 from server.bridge.server import CannotListen, RosBridge
 from server.recording.read import Recording, RecordingUnreadable, open_recording
 from server.source import Message
@@ -76,11 +75,9 @@ class _Replay:
         self._args = args
         self._bridge = RosBridge(ros_version=recording.ros_version, node="/replay")
         self._names = _renamed(recording, dict(args.remap))
-        self._played = 0
-        self._began_s: float | None = None  # of the playing, on the monotonic clock
-        self._at_s = 0.0  # place in the recording
+        self._report = Report(recording, self._bridge)
         self._subscribed = asyncio.Event()  # a client subscribed to something
-        if not recording.count:
+        if not any(recording.topics[topic].count for topic in self._names):
             raise _Impossible(f"{args.files[0]} holds no messages that can be played")
         if args.start > recording.duration_s:
             raise _Impossible(
@@ -91,12 +88,13 @@ class _Replay:
         interrupted = asyncio.get_running_loop().create_future()
         for number in (signal.SIGINT, signal.SIGTERM):
             asyncio.get_running_loop().add_signal_handler(number, _settle, interrupted, 128 + number)
-        for topic, info in self._recording.topics.items():
-            self._bridge.advertise(self._names[topic], info.type, info.definition, latch=info.is_latched)
+        for topic, name in self._names.items():
+            info = self._recording.topics[topic]
+            self._bridge.advertise(name, info.type, info.definition, latch=info.is_latched)
         self._bridge.on_subscribe.append(lambda _: self._subscribed.set())
         port = await self._bridge.start(self._args.host, self._args.port)
-        self._print_what_comes(port)
-        playing, progress = asyncio.ensure_future(self._play()), asyncio.ensure_future(self._show_progress())
+        self._report.open(self._args, self._names, port)
+        playing, progress = asyncio.ensure_future(self._play()), asyncio.ensure_future(self._report.show_progress())
         try:
             await asyncio.wait({playing, interrupted}, return_when=asyncio.FIRST_COMPLETED)
             code = 0 if playing.done() else int(interrupted.result())
@@ -108,9 +106,9 @@ class _Replay:
             for task in (playing, progress):
                 task.cancel()
             await asyncio.wait({playing, progress})
-            self._print_summary()
+            self._report.close()
             if self._args.stay and not interrupted.done() and _is_well(playing):
-                _say("The bridge stays up until interrupted (Ctrl-C).")
+                say("The bridge stays up until interrupted (Ctrl-C).")
                 code = int(await interrupted)
             await self._bridge.stop()
         return code
@@ -118,21 +116,22 @@ class _Replay:
     async def _play(self) -> None:
         if self._args.wait:
             await self._wait_for_subscribers()
-        self._began_s = time.monotonic()
+        self._report.begin()
         while True:
             round_ends_s = time.monotonic() + SHORTEST_ROUND_S
-            await play(self._messages(), self._bridge, rate=self._args.rate, ahead=AHEAD, on_message=self._note_message)
+            await play(self._messages(), self._bridge, rate=self._args.rate, ahead=AHEAD, on_message=self._report.note)
             if not self._args.loop:
                 return
             await asyncio.sleep(max(0.0, round_ends_s - time.monotonic()))
 
     def _messages(self) -> Iterator[Message]:
         for message in self._recording.messages(self._args.start):
-            name = self._names[message.topic]
-            yield message if name == message.topic else replace(message, topic=name)
+            name = self._names.get(message.topic)
+            if name is not None:
+                yield message if name == message.topic else replace(message, topic=name)
 
     async def _wait_for_subscribers(self) -> None:
-        _say("Waiting for a subscriber …")
+        say("Waiting for a subscriber …")
         while True:
             self._subscribed.clear()
             if not self._is_heard():
@@ -148,59 +147,18 @@ class _Replay:
         topics = (self._bridge.graph.find(name) for name in self._names.values())
         return any(topic is not None and topic.subscribers for topic in topics)
 
-    def _note_message(self, message: Message) -> None:
-        self._played += 1
-        self._at_s = message.at_s - self._recording.start_s
-
-    async def _show_progress(self) -> None:
-        is_terminal = sys.stdout.isatty()
-        while True:
-            await asyncio.sleep(1.0 if is_terminal else 10.0)
-            line = (
-                f"  {self._at_s:7.1f} s of {self._recording.duration_s:.1f} s · {_grouped(self._played)} messages · "
-                f"{_counted(self._bridge.clients, 'client')} · {_grouped(self._bridge.dropped)} dropped"
-            )
-            _say(f"\r{line} " if is_terminal else line, end="" if is_terminal else "\n")
-
-    def _print_what_comes(self, port: int) -> None:
-        recording, args = self._recording, self._args
-        when = datetime.fromtimestamp(recording.start_s, UTC)
-        _say(f"Replaying {', '.join(str(file) for file in args.files)}")
-        _say(
-            f"  ROS {recording.ros_version}, recorded {when:%Y-%m-%d %H:%M:%S} UTC, {recording.duration_s:.1f} s, "
-            f"{_counted(recording.count, 'message')} on {_counted(len(recording.topics), 'topic')}"
-            + (f", at {args.rate:g} × true speed" if args.rate != 1 else "")
-            + (f", from {args.start:g} s on" if args.start else "")
-        )
-        rows = [
-            (self._names[topic] + (f" (was {topic})" if self._names[topic] != topic else ""), info)
-            for topic, info in sorted(recording.topics.items())
-        ]
-        widths = max(len(name) for name, _ in rows), max(len(info.type) for _, info in rows)
-        for name, info in rows:
-            _say(f"  {name:{widths[0]}}  {info.type:{widths[1]}}  {_grouped(info.count):>9}")
-        for note in recording.notes:
-            _say(f"  Note: {note}")
-        host = f"[{args.host}]" if ":" in args.host else args.host
-        _say(f"rosbridge at ws://{host}:{port}")
-
-    def _print_summary(self) -> None:
-        took_s = time.monotonic() - self._began_s if self._began_s is not None else 0.0
-        if sys.stdout.isatty():
-            _say("\r", end="")
-        fate = f"{_grouped(self._bridge.sent)} sent to clients, {_grouped(self._bridge.dropped)} dropped"
-        _say(f"Played {_counted(self._played, 'message')} in {took_s:.1f} s: {fate}.")
-        for topic, count in sorted(self._recording.rejected.items()):
-            why = self._recording.why_rejected[topic]
-            _say(f"  Note: {_counted(count, 'message')} on {topic} left out: {why}")
-
 
 def _renamed(recording: Recording, remap: dict[str, str]) -> dict[str, str]:
-    """The name under which each recorded topic is published."""
+    """The name under which each recorded topic is published; topics that no bridge could carry are noted."""
     names: dict[str, str] = {}
     types: dict[str, str] = {}
     for topic, info in recording.topics.items():
-        full = canonical_name(topic)
+        try:
+            full = canonical_name(topic)
+            canonical_type(info.type, recording.ros_version)
+        except BadName as error:
+            recording.notes.append(f"{topic!r} ({info.count} messages) is left out: {error}")
+            continue
         name = names[topic] = remap.pop(full, full)
         if types.setdefault(name, info.type) != info.type:
             raise _Impossible(f"two topics of different types would both be {name}: {types[name]} and {info.type}")
@@ -250,16 +208,3 @@ def _settle(interrupted: asyncio.Future[int], code: int) -> None:
 
 def _is_well(task: asyncio.Future[None]) -> bool:
     return task.done() and not task.cancelled() and task.exception() is None
-
-
-def _say(text: str, end: str = "\n") -> None:
-    with contextlib.suppress(BrokenPipeError):  # who listened at the other end of a pipe has gone: play on
-        print(text, end=end, flush=True)
-
-
-def _grouped(number: int) -> str:
-    return f"{number:,}".replace(",", " ")
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{_grouped(number)} {what}{'' if number == 1 else 's'}"

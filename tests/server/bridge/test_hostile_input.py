@@ -142,7 +142,7 @@ class DeafSocket:
         self.frames.append(frame)
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
 @given(sequence=st.lists(operations, min_size=1, max_size=6))
 def test_no_sequence_of_operations_fails_inside(sequence: list[dict[str, Any]]) -> None:
     async def handle() -> None:

@@ -107,6 +107,20 @@ async def test_a_freeze_is_total_for_a_client_that_sends_much(bridge: RosBridge,
     await asyncio.wait_for(pong, 2)
 
 
+async def test_a_frozen_bridge_answers_nothing_even_when_websockets_resumes_reading(
+    bridge: RosBridge, probe: Probe
+) -> None:
+    await probe.settle()
+    bridge.freeze()
+    [connection] = bridge._listener._sockets
+    connection.transport.resume_reading()  # as websockets does when its queue has room again
+    pong = await probe.socket.ping()
+    await asyncio.sleep(0.1)
+    assert not pong.done()
+    bridge.thaw()
+    await asyncio.wait_for(pong, 2)
+
+
 async def test_a_killed_bridge_drops_all_and_refuses_until_revived(talk: RosBridge, port: int, probe: Probe) -> None:
     await probe.subscribe("/talk")
     await talk.kill()

@@ -311,3 +311,11 @@ async def test_damage_in_the_middle_is_said_after_what_was_good(tmp_path: Path) 
     assert code == 2
     assert err == "catgraph replay: hurt.bag is damaged: a part of it cannot be unpacked\n"
     assert json.loads(re.sub(" ", "", re.search(r"Played ([\d ]+) messages", out)[1])) > 100  # type: ignore[index]
+
+
+async def test_topics_that_no_bridge_could_carry_are_noted(tmp_path: Path) -> None:
+    messages = [(0.0, "/a topic", "std_msgs/msg/String", {"data": "x"}), (0.1, "/n", "std_msgs/msg/Int32", {"data": 1})]
+    code, out, err = await ending(write_ros1(tmp_path / "a.bag", Drive(messages=messages)), "--port", "0")
+    assert (code, err) == (0, "")
+    assert "Note: '/a topic' (1 messages) is left out: '/a topic' is not a valid name" in out
+    assert "Played 1 message in" in out
