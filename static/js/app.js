@@ -38,7 +38,7 @@ const store = new Store(() => new WebSocket(address));
 const voice = new Voice();
 const arming = new Arming(voice);
 const monitor = need(document, '#monitor');
-const say = notices(field(monitor, 'snacks'));
+const say = notices(field(document, 'snacks'));
 const page = new Page(store, arming, say);
 
 const scan = mountScan(need(monitor, '[data-panel="scan"]'), store);
@@ -62,7 +62,7 @@ mountChecks(need(monitor, '[data-part="checks"]'), store);
 mountSheets();
 mountPreferences();
 mountRail(monitor, store, page);
-mountSnackbar(field(monitor, 'snacks'), store, say);
+mountSnackbar(field(document, 'snacks'), store, say);
 mountDialogs(store, page);
 
 /** The scan is sent and drawn only while its tab is in front and nothing lies over it. */
@@ -82,8 +82,8 @@ function speak() {
 }
 
 store.on('draw', draw);
-store.on('draw', speak);
 store.on('beat', speak);
+store.on('tick', speak);
 store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
 // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
 for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });

@@ -65,7 +65,7 @@ export function mount(store, page) {
   /** @type {Dialog | null} */
   let standing = null;
   /** @type {(() => void)[]} */
-  const stops = [store.on('draw', draw), store.on('beat', () => document.hidden && judge())];
+  const stops = [store.on('draw', draw), store.on('tick', () => document.hidden && judge())];
 
   for (const sheet of Object.values(sheets)) {
     // Escape and the phone's back key mean: I have seen it.

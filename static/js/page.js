@@ -59,11 +59,9 @@ export class Page {
   }
 
   async retry() {
-    if (this.store.isSilent) {
-      this.store.wire.hurry();
-      return;
-    }
-    await this.#ask('retry', 'Not tried again');
+    if (this.store.isSilent) this.store.wire.hurry();
+    else if (!this.store.frame?.session.address) this.choose(); // what was typed is no address: there is nothing to dial
+    else await this.#ask('retry', 'Not tried again');
   }
 
   async reconnect() {

@@ -18,9 +18,9 @@ const REPLY_MS = 4000;
  * @typedef {import('./protocol.js').State} State
  * @typedef {import('./protocol.js').AlarmEvent} AlarmEvent
  * @typedef {import('./events.js').Gap} Gap
- * @typedef {'move' | 'draw' | 'scan' | 'beat' | 'log' | 'gap' | 'open'} Topic
+ * @typedef {'move' | 'draw' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open'} Topic
  *   move: a fresh frame is to be drawn · draw: five times a second, seen or not by a frame · scan: a new scan ·
- *   beat: a fresh frame came (also while the page is hidden) · log: new events · gap: a blind time is over · open: connected
+ *   beat: a fresh frame came (also while the page is hidden) · tick: time passed (seldom while it is hidden) · log: new events · gap: a blind time is over · open: connected
  * @typedef {{ok: boolean, reason?: string, suggestion?: string}} Answer suggestion: an address that would do
  */
 
@@ -274,7 +274,7 @@ export class Store {
     this.deadMan.look(now_ms);
     this.wire.look(now_ms);
     if (!document.hidden && now_ms - this.#drew_ms >= DRAW_EVERY_MS - 20) requestAnimationFrame(() => this.#draw());
-    if (document.hidden) this.#emit('beat');
+    this.#emit('tick');
   }
 
   #draw() {
