@@ -91,7 +91,7 @@ def _data(report: Report) -> dict[str, Any]:
         "panels": [] if traces is None else plots.panels(traces),
         "track": None if traces is None else plots.track(traces),
         "episodes": [_bar(episode) for episode in run.episodes],
-        "before": [] if report.before is None else [_bar(episode) for episode in report.before.episodes],
+        "before": [_bar(change.before) for change in report.changes if change.before is not None],
         "ribbons": _ribbons(report),
         "injected": [[laid.name, round(laid.from_s, 2), round(laid.to_s, 2)] for laid in run.faults],
     }
@@ -120,7 +120,7 @@ def _ribbons(report: Report) -> list[dict[str, Any]]:
             spans.append(
                 [round(from_s, 2), round(to_s, 2), str(verdict), words.printable(text, 160) if left > 0 else ""]
             )
-        rows.append({"label": ribbon.label, "spans": spans})
+        rows.append({"label": ribbon.label, "priority": str(ribbon.priority), "spans": spans})
     return rows
 
 

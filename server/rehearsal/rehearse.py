@@ -251,7 +251,7 @@ class _Run:
         )
 
     def _sample(self, now_s: float) -> None:
-        self._ribbons.sample(self._monitor.tiles(), now_s)
+        self._ribbons.sample(self._monitor, now_s)
         self._coverage.sample(self._monitor)
 
     def _offered(self) -> dict[str, str]:

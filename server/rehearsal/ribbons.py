@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from monitor.alarm_spec import Priority
 from monitor.check import Verdict
-from monitor.runner import Monitor, Tile
+from monitor.runner import Monitor
 
 
 @dataclass(slots=True)
@@ -15,6 +15,7 @@ class Ribbon:
     """One tile over one run. Times are seconds since the beginning of the recording."""
 
     label: str
+    priority: Priority  # of the most urgent alarm among its checks
     spans: list[tuple[float, float, Verdict, str]] = field(default_factory=list)  # from, to, verdict, what it said
 
     def seconds(self, verdict: Verdict) -> float:
@@ -35,13 +36,14 @@ class Ribbons:
 
     def __init__(self) -> None:
         self._by_label: dict[str, Ribbon] = {}
-        self._last: dict[str, tuple[Verdict, str]] = {}
 
-    def sample(self, tiles: Sequence[Tile], now_s: float) -> None:
-        for tile in tiles:
+    def sample(self, monitor: Monitor, now_s: float) -> None:
+        for tile in monitor.tiles():
             ribbon = self._by_label.get(tile.label)
             if ribbon is None:
-                ribbon = self._by_label[tile.label] = Ribbon(label=tile.label)
+                priorities = [monitor.alarms[check_id].spec.priority for check_id in tile.checks]
+                priority = min(priorities, key=lambda priority: priority.rank)
+                ribbon = self._by_label[tile.label] = Ribbon(label=tile.label, priority=priority)
             spans = ribbon.spans
             before = spans[-1] if spans else None
             # What an OK says changes with every number; only why something is not checked is worth keeping.

@@ -6,7 +6,7 @@
  * @typedef {{title: string, unit: string, digits: number, curves: Curve[]}} Panel
  * @typedef {{alarm: string, title: string, priority: string, from: number, to: number, open: boolean, said: number[],
  *   hidden: [number, number][]}} Bar
- * @typedef {{label: string, spans: [number, number, string, string][]}} Ribbon
+ * @typedef {{label: string, priority: string, spans: [number, number, string, string][]}} Ribbon
  * @typedef {{from: number, to: number, startMs: number | null, panels: Panel[], track: {t: number[], e: number[],
  *   n: number[]} | null, episodes: Bar[], before: Bar[], ribbons: Ribbon[], injected: [string, number, number][]}} Data
  */
@@ -20,7 +20,8 @@ const REASONS = { ok: 'in order', fault: '', unknown: 'not checked' };
 
 /** @type {Data} */
 const data = JSON.parse(must('data').textContent ?? '');
-const view = { from: data.from, to: data.to, at: data.from };
+const worst = data.episodes.find((bar) => bar.priority === 'critical') ?? data.episodes[0];
+const view = { from: data.from, to: data.to, at: worst ? worst.from : (data.from + data.to) / 2 };
 /** @type {(() => void)[]} what is redrawn when the view changes */
 const redraws = [];
 /** @type {(() => void)[]} what follows the needle */
@@ -78,7 +79,10 @@ export function joined(/** @type {Curve[]} */ curves) {
     /** @type {(number | null | undefined)[]} */
     const column = new Array(times.length).fill(undefined);
     curve.t.forEach((time, index) => { column[/** @type {number} */ (place.get(time))] = curve.v[index]; });
-    return column;
+    if (!curve.limit) return column;
+    /** @type {number | null} */
+    let held = null; // a limit is told where it changes, and stands between
+    return column.map((value) => (held = value === undefined ? held : value));
   });
   return [times, ...columns];
 }
@@ -245,7 +249,7 @@ function mountPanel(/** @type {Panel} */ panel) {
     padding: [8, SIDE, 0, 0],
     cursor: { show: false },
     legend: { show: false },
-    scales: { x: { time: false, range: () => [view.from, view.to] }, y: { range: (/** @type {any} */ _, /** @type {number} */ low, /** @type {number} */ high) => rangeOf(panel, low, high) } },
+    scales: { x: { time: false, range: () => [view.from, view.to] }, y: { range: rangeOf(panel) } },
     axes: [
       { ...axis, size: 24, gap: 4, values: (/** @type {any} */ _, /** @type {number[]} */ times) => times.map(shortClock) },
       { ...axis, size: GUTTER, gap: 6, splits: undefined, space: 32 },
@@ -280,14 +284,20 @@ function shortClock(/** @type {number} */ seconds) {
   return `${Number(seconds.toFixed(2))}`;
 }
 
-/** From zero where the numbers lie on one side of it, with a little air. */
-function rangeOf(/** @type {Panel} */ panel, /** @type {number} */ low, /** @type {number} */ high) {
-  if (low === null || high === null || !Number.isFinite(low) || !Number.isFinite(high)) return [0, 1];
+/** The same however far the view goes in, so that curves can be compared; from zero, with a little air. */
+function rangeOf(/** @type {Panel} */ panel) {
   const isTurn = panel.unit === '°';
-  const bottom = isTurn ? low : Math.min(low, 0);
-  const top = isTurn ? high : Math.max(high, 0);
-  const air = Math.max((top - bottom) * 0.06, panel.digits > 1 ? 0.05 : 0.5);
-  return [bottom < 0 || isTurn ? bottom - air : 0, top + air];
+  let [low, high] = isTurn ? [Infinity, -Infinity] : [0, 0];
+  for (const curve of panel.curves) {
+    for (const value of curve.v) {
+      if (value === null) continue;
+      low = Math.min(low, value);
+      high = Math.max(high, value);
+    }
+  }
+  if (low > high) [low, high] = [0, 1];
+  const air = Math.max((high - low) * 0.06, panel.digits > 1 ? 0.05 : 0.5);
+  return /** @type {[number, number]} */ ([low < 0 || isTurn ? low - air : 0, high + air]);
 }
 
 /** Where the panel's own curve has a gap, nothing is known: hatched, never bridged. */
@@ -337,7 +347,7 @@ function mountRibbons() {
       redraws.push(() => lay(part, from, to));
     }
     const said = make('span');
-    root.append(make('div', { class: 'ribbon' }, track, make('div', { class: 'name' }, make('b', {}, ribbon.label), said)));
+    root.append(make('div', { class: 'ribbon', 'data-priority': ribbon.priority }, track, make('div', { class: 'name' }, make('b', {}, ribbon.label), said)));
     const starts = ribbon.spans.map(([from]) => from);
     followers.push(() => {
       const span = ribbon.spans[Math.max(0, indexAt(starts, view.at))];
