@@ -12,31 +12,26 @@ import orjson
 from monitor.catalog import AnyCheck
 from monitor.runner import Monitor, Refused, Transition
 from monitor.signal_limits import expected_rates
-from monitor.signals import SIGNALS
 from monitor.state import LinkFacts, Phase, State
-from monitor.values import LaserScan
-from server import address, commands, discovery, judging, problems, wire
+from server import address, answers, commands, judging, problems, wire
 from server.address import BadAddress
 from server.bus import LocalBus
 from server.config import Vehicle
+from server.conversation import Conversation
 from server.frame import Facts, state_frame
 from server.judging import TICK_S
-from server.link import LinkDown, RosLink, Subscription
+from server.link import RosLink
 from server.problems import Problem
 from server.reception import Reception, Tally
-from server.settings import BadSetting, Conflict, SettingsFile
-from server.topics import BY_SIGNAL, TOPICS, Source, map_signals
+from server.scan_feed import ScanFeed
+from server.settings import SettingsFile
 from server.tuning import Tuning
 
 log = logging.getLogger("catgraph.session")
 
-SCAN_FRAME_S = 0.05  # pages are offered at most 20 scans a second
 SICK_LOOP_S = 0.25  # a loop later than this lets one heartbeat fall: a sign of life from a sick server is a lie
 PROOF_WITHIN_S = 4.0  # something that speaks WebSocket and no rosbridge is told apart by then
-ALIVE_EVERY_S = 1.0
-LOOK_AGAIN_S = 5.0  # the car's software may start after its bridge
 BRIDGE_SILENT_S = 1.4  # the bridge answers a ping every 0.5 s
-CBOR_TRIES = 5  # unreadable binary frames before scans are asked for as JSON
 
 
 class Session:
@@ -82,24 +77,21 @@ class Session:
         self._dialled_s = self._now()
         self._connected_s: float | None = None
         self._last_message_s: float | None = None
-        self._ros_alive: bool | None = None
-        self._ros_alive_s: float | None = None
-        self._ros_version: int | None = None
-        self._sources: dict[str, Source] = {}
-        self._by_topic: dict[str, tuple[Source, ...]] = {}
-        self._unmapped: dict[str, str] = {}
         self._heard: set[str] = set()
         self._proved = False
-        self._looked = False
-        self._offers_nothing = False
         self._reception = Reception()
         self._state = State(expected_rates(self._tuning.limits))
-        self._offer: discovery.Offer | None = None
-        self._scan_number = 0
-        self._scan_kept = False
-        self._scan_put_s = -1.0
-        self._cbor_failed = False  # then scans come as JSON
-        self._cbor_noise = 0
+        self._scans = ScanFeed(self.vehicle.name, self._bus)
+        self._conversation = self._begin(None)
+
+    def _begin(self, link: RosLink | None) -> Conversation:
+        return Conversation(
+            link,
+            self._tuning,
+            now=self._now,
+            proved=self._prove,
+            recognised=lambda title: self._tuned([f"Taken for: {title}"], by=None),
+        )
 
     # -- life --------------------------------------------------------------------------------------------------------
 
@@ -179,34 +171,18 @@ class Session:
             self._put_state(self._now())
             return {"ok": True}
         if message.get("kind") == "signals":
-            return self._signals()
+            return answers.signals(self._conversation.unmapped, self._reception)
         if message.get("kind") == "settings":
             return self._tuning.as_json() | {"toml": self._tuning.as_toml()}
         if message.get("kind") == "track":
-            return self._track()
+            return answers.track(self._state.snapshot(self._now()))
         try:
-            command = commands.read(dict(message))
-            self._obey(command)
-        except commands.NotUnderstood as why:
-            return {"ok": False, "reason": str(why)}
-        except BadAddress as error:
-            problem = problems.of_bad_address(error)
-            if self._phase in ("idle", "failed"):
-                self._phase, self._problem = "failed", problem
+            self._obey(commands.read(dict(message)))
+        except answers.REFUSALS as why:
+            if isinstance(why, BadAddress) and self._phase in ("idle", "failed"):
+                self._phase, self._problem = "failed", problems.of_bad_address(why)
                 self._put_state(self._now())
-            return {
-                "ok": False,
-                "reason": f"{problem.title} {problem.hint}".strip(),
-                "problem": problem.as_json() | {"suggestion": error.suggestion},
-            }
-        except Refused as why:
-            return {"ok": False, "reason": why.reason}
-        except BadSetting as why:
-            return {"ok": False, "reason": str(why), "field": why.field}
-        except Conflict as why:
-            return {"ok": False, "reason": str(why), "conflict": True}
-        except OSError as why:
-            return {"ok": False, "reason": f"The settings cannot be kept: {why.strerror or why}."}
+            return answers.refusal(why)
         return {"ok": True}
 
     def _obey(self, command: commands.Command) -> None:
@@ -249,8 +225,7 @@ class Session:
             self._note("settings", "; ".join(lines), by=by)
         self._monitor.limits = self._tuning.limits
         self._state.expect(expected_rates(self._tuning.limits))
-        if self._offer is not None:
-            self._map(self._offer)
+        self._conversation.map_again()
         self._judge(self._now(), None)
 
     def _connect(self, typed: str) -> None:
@@ -264,6 +239,7 @@ class Session:
         self._end()
         self._phase, self._address = "connecting", target
         self._link = RosLink(target, self, now=self._now)
+        self._conversation = self._begin(self._link)
         self._link.start()
 
     def _disconnect(self) -> None:
@@ -280,6 +256,7 @@ class Session:
         self._clear()
 
     def _drop_link(self) -> None:
+        self._conversation.end()
         if self._link is not None:
             self._link.stop()
             self._link = None
@@ -306,7 +283,7 @@ class Session:
             self._spawn(self._demand_proof(link), "proof")
         if self._proved:
             self._reopened()
-        self._spawn(self._converse(link), "conversation")
+        self._spawn(self._conversation.go_on(), "conversation")
 
     def link_closed(self, problem: Problem) -> None:
         now_s = self._now()
@@ -335,22 +312,18 @@ class Session:
     def status_received(self, level: str, text: str) -> None:
         self._prove()
         log.info("the bridge of %s says: %s: %s", self.vehicle.name, level, text)
-        if level == "error" and "cbor" in text.lower() and "compression" in text.lower() and not self._cbor_failed:
-            self._cbor_failed = True  # an old bridge: scans come as JSON from now on
-            self._subscribe()
+        if level == "error":
+            self._conversation.bridge_complains(text)
 
     def junk_received(self, why: str) -> None:
         self._reception.junk(why)
-        if why == "binary noise" and not self._scan_number and not self._cbor_failed:
-            self._cbor_noise += 1
-            if self._cbor_noise >= CBOR_TRIES:
-                self._cbor_failed = True
-                self._subscribe()
+        if why == "binary noise" and self._scans.is_empty:
+            self._conversation.binary_noise()
 
     def message_received(self, topic: str, message: Any, note: str | None) -> None:
         """One message of the car: decoded, applied and judged in the same pass."""
         now_s = self._now()
-        sources = self._by_topic.get(topic)
+        sources = self._conversation.by_topic.get(topic)
         if sources is None:
             self._reception.unasked += 1
             return
@@ -369,11 +342,11 @@ class Session:
         if changed:
             self._judge(now_s, changed)
         if "scan" in changed:
-            self._scan_kept = not isinstance(message["ranges"], list)
-            self._scan_number += 1
-            self._put_scan(now_s)
+            self._scans.count()
+            if self._scans.is_due(now_s):
+                self._scans.put(self._state.snapshot(now_s), kinds_kept=not isinstance(message["ranges"], list))
 
-    # -- conversation with the bridge --------------------------------------------------------------------------------
+    # -- is it a rosbridge? ------------------------------------------------------------------------------------------
 
     async def _demand_proof(self, link: RosLink) -> None:
         """A WebSocket that says nothing of rosbridge's is not one."""
@@ -398,90 +371,6 @@ class Session:
         self._phase, self._since_s, self._problem = "monitoring", now_s, None
         self._after_link_change(now_s)
 
-    async def _converse(self, link: RosLink) -> None:
-        """While this opening lasts: looks at what the car offers, and asks whether ROS behind the bridge lives."""
-        looked_s = -LOOK_AGAIN_S
-        while link is self._link and link.is_open:
-            try:
-                if self._now() - looked_s >= (LOOK_AGAIN_S if self._sources else 1.0):
-                    looked_s = self._now()
-                    await self._look(link)
-                alive = await discovery.ask_alive(link)
-            except LinkDown:
-                return
-            if link is not self._link:
-                return
-            if alive:
-                self._ros_alive_s = self._now()
-                self._prove()
-            self._ros_alive = alive if self._ros_alive_s is not None else None
-            await asyncio.sleep(ALIVE_EVERY_S)
-
-    async def _look(self, link: RosLink) -> None:
-        offer = await discovery.ask_topics(link)
-        if link is not self._link:
-            return
-        if offer is None:
-            if not self._looked and not self._sources:
-                self._subscribe_by_name(link)  # no rosapi: try the names we know
-            return
-        self._looked = True
-        self._prove()
-        self._ros_version = offer.ros or self._ros_version
-        self._offer = offer
-        if self._tuning.recognise(offer.topics, offer.ros):
-            self._tuned([f"Taken for: {self._tuning.profile.title}"], by=None)
-        self._map(offer)
-
-    def _map(self, offer: discovery.Offer) -> None:
-        """Chooses the topic of each signal and subscribes to them."""
-        sources = map_signals(offer.topics, self._tuning.settings.topics)
-        gone = {
-            s: source for s, source in self._sources.items() if s not in sources and source.topic not in offer.topics
-        }
-        self._sources = gone | sources  # a topic that vanished stays subscribed: it may come back
-        mapped = {source.topic for source in self._sources.values()}
-        self._unmapped = {name: kind for name, kind in offer.topics.items() if name not in mapped}
-        self._offers_nothing = not self._sources
-        self._subscribe()
-
-    def _subscribe(self) -> None:
-        link = self._link
-        if link is None:
-            return
-        self._by_topic = judging.by_topic(self._sources.values())
-        wanted = {}
-        for topic, sources in self._by_topic.items():
-            rows = [BY_SIGNAL[source.signal] for source in sources if source.decode is not None]
-            if rows:
-                wanted[topic] = Subscription(
-                    topic=topic,
-                    type=sources[0].type,
-                    compression="cbor" if rows[0].compression == "cbor" and not self._cbor_failed else "none",
-                    queue_length=min(row.queue_length for row in rows),
-                )
-        for row in link.subscriptions:
-            if row.topic not in wanted:
-                link.unsubscribe(row.topic)
-        for subscription in wanted.values():
-            link.subscribe(subscription)
-
-    def _subscribe_by_name(self, link: RosLink) -> None:
-        """Without rosapi: every name of the table, its type left to the bridge."""
-        by_topic: dict[str, tuple[Source, ...]] = {}
-        for row in TOPICS:
-            for name in row.names:
-                source = Source(
-                    signal=row.signal,
-                    topic=name,
-                    type=None,
-                    decode=row.types[row.expected_type],
-                    note="subscribed by name: the bridge has no rosapi",
-                )
-                by_topic[name] = (source,)
-                link.subscribe(Subscription(topic=name, type=None, queue_length=row.queue_length))
-        self._by_topic = by_topic
-
     # -- judging -----------------------------------------------------------------------------------------------------
 
     def _watch_link(self, now_s: float) -> None:
@@ -501,7 +390,7 @@ class Session:
             topics_subscribed=len(link.subscriptions) if link is not None else 0,
             connected_s=self._connected_s,
             last_message_s=self._last_message_s,
-            published=judging.published(self._sources.values()),
+            published=judging.published(self._conversation.sources.values()),
         )
 
     def bridge_answers(self, now_s: float) -> bool:
@@ -556,7 +445,7 @@ class Session:
             wall_ms=self._wall_ms(),
             phase=self._phase,
             address=self._address,
-            ros_version=self._ros_version,
+            ros_version=self._conversation.ros_version,
             connected_s=self._connected_s,
             paused_since_s=self._paused_since_s,
             profile=self._tuning.profile.title,
@@ -566,12 +455,12 @@ class Session:
             problem=self._problem,
             link=self._link,
             last_message_s=self._last_message_s,
-            ros_answered_s=self._ros_alive_s,
-            ros_alive=self._ros_alive,
-            offers_nothing=self._offers_nothing,
+            ros_answered_s=self._conversation.ros_answered_s,
+            ros_alive=self._conversation.ros_alive,
+            offers_nothing=self._conversation.offers_nothing,
             bridge_answers=self.bridge_answers(now_s),
             reception=self._reception,
-            sources=self._sources,
+            sources=self._conversation.sources,
             topics_heard=len(self._heard),
         )
         return state_frame(facts, self._state.snapshot(now_s), self._monitor)
@@ -590,40 +479,3 @@ class Session:
         self._state_is_due = False
         if self._bus.watched(self.vehicle.name):
             self._bus.put(self.vehicle.name, "state", orjson.dumps(self.frame()).decode())
-
-    def _put_scan(self, now_s: float) -> None:
-        if now_s - self._scan_put_s < SCAN_FRAME_S or not self._bus.wanted(self.vehicle.name, "scan"):
-            return
-        reading = self._state.snapshot(now_s).get("scan")
-        if reading is not None and isinstance(reading.value, LaserScan):
-            self._scan_put_s = now_s
-            frame = wire.scan_frame(
-                reading.value,
-                number=self._scan_number,
-                age_s=now_s - reading.received_s,
-                kinds_kept=self._scan_kept,
-            )
-            self._bus.put(self.vehicle.name, "scan", frame)
-
-    def _track(self) -> dict[str, Any]:
-        """The positions since connecting, thinned, as a GeoJSON LineString (longitude, latitude; WGS84)."""
-        snapshot = self._state.snapshot(self._now())
-        points = [[round(p.lon_deg, 7), round(p.lat_deg, 7)] for p in snapshot.track]
-        return {
-            "type": "Feature",
-            "geometry": {"type": "LineString", "coordinates": points},
-            "properties": {"length_m": wire.plain(snapshot.track_m, 1)},
-        }
-
-    def _signals(self) -> dict[str, Any]:
-        """Topics beyond the signals, and what came that was no message."""
-        return {
-            "topics": [{"topic": name, "type": kind} for name, kind in sorted(self._unmapped.items())],
-            "rejected": {
-                SIGNALS[name].label: dict(tally.reasons)
-                for name, tally in self._reception.by_signal.items()
-                if tally.rejected
-            },
-            "unreadable_frames": dict(self._reception.frames.reasons),
-            "unasked": self._reception.unasked,
-        }
