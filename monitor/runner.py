@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from traceback import format_exception
 from typing import Any
@@ -19,6 +19,8 @@ from monitor.tiles import Tile, tiles
 __all__ = ["Crash", "Monitor", "Refused", "Tile", "Transition"]
 
 IMPAIRED = "monitoring_impaired"
+KEPT_SETS = 200  # of signals that come together: there are a dozen
+ASKED_EVERY = 10  # ticks: within so many every check is really asked, so that one which fails is found out
 IMPAIRED_SPEC = AlarmSpec(
     title="Monitoring impaired",
     priority=Priority.WARNING,
@@ -50,13 +52,19 @@ class Monitor:
 
     The caller reads `findings` (by check id), `alarms` (by alarm id, which is the check's) and `crashes` (checks that
     fail now, by check id), and never writes to them.
+
+    Most checks find nothing, most of the time. Where a check's quick look shows that it cannot be a fault and its alarm
+    is at rest, it is not asked: no alarm can come of it. Its words are made when somebody reads them.
     """
 
     def __init__(self, checks: Sequence[AnyCheck] | None = None, limits: AllLimits | None = None) -> None:
         """Without `checks` all there are, without `limits` their defaults. Raises ValueError when the checks contradict
         each other: two of one id, a circle of inhibition."""
         declared = CHECKS if checks is None else tuple(checks)
-        self.findings: dict[str, Finding] = {}
+        self._findings: dict[str, Finding] = {}
+        self._passed: dict[str, AnyCheck] = {}  # not asked on the last tick, because harmless …
+        self._passed_on: Snapshot | None = None  # … of this snapshot
+        self._ticks = 0
         self.crashes: dict[str, Crash] = {}
         self._failed: dict[str, int] = {}
         self.alarms = {check.id: Alarm(id=check.id, spec=check.alarm) for check in declared}
@@ -71,6 +79,7 @@ class Monitor:
         for check in self._checks:
             for signal in check.needs:
                 self._by_signal[signal] = (*self._by_signal.get(signal, ()), check)
+        self._by_signals: dict[frozenset[str], tuple[AnyCheck, ...]] = {}  # of the sets that were ever asked for
         self.limits = compose(declared)() if limits is None else limits  # type: ignore[assignment]
 
     @property
@@ -92,17 +101,52 @@ class Monitor:
         """
         if snapshot.link.phase == "idle":
             return self.end(snapshot.now_s)
-        checks = self._checks if changed is None else self._needing(changed)
-        if not checks:
-            return ()
+        if changed is None:
+            return self._tick(snapshot)
         transitions: list[Transition] = []
-        for check in checks:
-            happened = self._judge(check, snapshot)
-            if happened:
-                transitions += happened
-        if changed is None or self.crashes:
+        may_pass = self._may_pass(snapshot)
+        for check in self._needing(changed):
+            if may_pass and self._is_harmless(check, snapshot):
+                continue  # the words are those of the last tick, for a moment
+            transitions += self._judge(check, snapshot)
+        if self.crashes:
             transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
         return tuple(transitions)
+
+    @property
+    def findings(self) -> Mapping[str, Finding]:
+        """What each check last found, by its id."""
+        if self._passed_on is not None:
+            for check in self._passed.values():
+                self._findings[check.id] = self._find(check, self._passed_on)
+            self._passed.clear()
+            self._passed_on = None
+        return self._findings
+
+    def _tick(self, snapshot: Snapshot) -> tuple[Transition, ...]:
+        self._ticks += 1
+        self._passed.clear()
+        may_pass = self._may_pass(snapshot) and self._ticks % ASKED_EVERY != 0
+        transitions: list[Transition] = []
+        for check in self._checks:
+            if may_pass and self._is_harmless(check, snapshot):
+                self._passed[check.id] = check
+            else:
+                transitions += self._judge(check, snapshot)
+        self._passed_on = snapshot if self._passed else None
+        transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
+        return tuple(transitions)
+
+    def _may_pass(self, snapshot: Snapshot) -> bool:
+        return snapshot.link.phase == "monitoring" and not snapshot.paused
+
+    def _is_harmless(self, check: AnyCheck, snapshot: Snapshot) -> bool:
+        if check.is_harmless is None or not self.alarms[check.id].is_at_rest or self._causes.remembers(check.id):
+            return False
+        try:
+            return check.is_harmless(snapshot, self._limits_of[check.id])
+        except Exception:  # as in `_find`: it will be asked, and if it fails too, that is said
+            return False
 
     @property
     def checks(self) -> tuple[AnyCheck, ...]:
@@ -119,7 +163,9 @@ class Monitor:
         for alarm_id, alarm in self.alarms.items():
             self.alarms[alarm_id], happened = end(alarm, now_s, ENDED)
             transitions += happened
-        self.findings.clear()
+        self._findings.clear()
+        self._passed.clear()
+        self._passed_on = None
         self.crashes.clear()
         self._causes.clear()
         return tuple(transitions)
@@ -170,25 +216,29 @@ class Monitor:
         return transitions
 
     def _needing(self, changed: Collection[str]) -> tuple[AnyCheck, ...]:
-        if len(changed) == 1:
-            (signal,) = changed
-            return self._by_signal.get(signal, ())
-        wanted = {check.id for signal in changed for check in self._by_signal.get(signal, ())}
-        return tuple(check for check in self._checks if check.id in wanted) if wanted else ()
+        together = frozenset(changed)
+        found = self._by_signals.get(together)
+        if found is None:
+            wanted = {check.id for signal in together for check in self._by_signal.get(signal, ())}
+            found = tuple(check for check in self._checks if check.id in wanted)
+            if len(self._by_signals) < KEPT_SETS:
+                self._by_signals[together] = found
+        return found
 
     def _judge(self, check: AnyCheck, snapshot: Snapshot) -> tuple[Transition, ...]:
         finding = self._find(check, snapshot)
+        self._passed.pop(check.id, None)
         by = self._causes.holding(check.id, snapshot.now_s)
         if not by and finding.verdict is not Verdict.FAULT and not snapshot.paused:
             alarm = self.alarms[check.id]
             if alarm.is_at_rest and not self._causes.remembers(check.id):
-                self.findings[check.id] = finding
+                self._findings[check.id] = finding
                 return ()  # by far the most frequent case
         if by and finding.verdict is Verdict.FAULT:
             why = self.alarms[by[0]].spec.title
-            self.findings[check.id] = unknown(f"Not judged yet: {why}", short="waiting")
+            self._findings[check.id] = unknown(f"Not judged yet: {why}", short="waiting")
         else:
-            self.findings[check.id] = finding
+            self._findings[check.id] = finding
         if snapshot.paused and check.scope is Scope.CAR:
             by = ("paused", *by)
         return self._advance(check.id, finding, snapshot.now_s, by)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -17,7 +19,8 @@ from monitor.check import (
     unknown,
 )
 from monitor.inhibition import GRACE_S
-from monitor.silence import BRIDGE_WITHIN_S, silence
+from monitor.signals import SIGNALS
+from monitor.silence import BRIDGE_WITHIN_S, FAST_HORIZON_S, silence
 from monitor.state import Snapshot
 
 
@@ -37,6 +40,21 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
         measured=Quantity(label="Silent for", value=found.silent_s, unit="s"),
         causes=("car",),
     )
+
+
+def is_harmless(snapshot: Snapshot, limits: Limits) -> bool:
+    """One fast signal is fresh."""
+    now_s, opened_s = snapshot.now_s, snapshot.link.opened_s or -math.inf
+    for name, reading in snapshot.readings.items():
+        if (
+            reading.horizon_s <= FAST_HORIZON_S
+            and reading.received_s >= opened_s
+            and reading.is_fresh(now_s)
+            and reading.derived_from is None
+            and not SIGNALS[name].event_like
+        ):
+            return True
+    return False
 
 
 CHECKS = (
@@ -60,5 +78,6 @@ CHECKS = (
         ),
         limits=Limits,
         find=find,
+        is_harmless=is_harmless,
     ),
 )

@@ -68,6 +68,24 @@ def by_estimator(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -
     return _judge(distance.distance_m, bearing_rad, speed_mps, closing_mps, limits, was_active, cause="distance")
 
 
+def estimator_is_clear(snapshot: Snapshot, limits: ObstacleLimits) -> bool:
+    distance = snapshot.get("distance")
+    if distance is None or distance.value.distance_m is None:
+        return True
+    gap_m = distance.value.distance_m
+    speed = snapshot.get("speed")
+    speed_mps = 0.0 if speed is None else abs(speed.value.speed_mps)
+    if not gap_m >= max(limits.standoff_m, stopping_m(speed_mps, limits)):
+        return False
+    closing_mps = speed_mps
+    before = snapshot.distance_before
+    if before is not None and before.value.distance_m is not None:
+        span_s = distance.received_s - before.received_s
+        if span_s > 0.0:
+            closing_mps = max(closing_mps, (before.value.distance_m - gap_m) / span_s)
+    return gap_m >= limits.time_to_collision_s * closing_mps
+
+
 def _corridor(snapshot: Snapshot, limits: ObstacleLimits) -> Corridor:
     steering = snapshot.get("steering")
     angle_rad = 0.0
@@ -175,6 +193,7 @@ CHECKS = (
         alarm=_alarm("Object too near", ("obstacle",)),
         limits=ObstacleLimits,
         find=by_estimator,
+        is_harmless=estimator_is_clear,
         needs=frozenset({"distance"}),
     ),
 )

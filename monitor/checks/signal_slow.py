@@ -56,6 +56,13 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
     )
 
 
+def is_harmless(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> bool:
+    rate = snapshot.rates.get(signal.name)
+    if rate is None or rate.expected_hz is None or rate.measured_hz is None or not rate.settled:
+        return True
+    return rate.measured_hz >= rate.expected_hz * limits.slow_below_percent / 100.0
+
+
 def _brief(signal: Signal, hz: float) -> str:
     long = f"{signal.label} {hz:.0f} Hz"
     return long if len(f"FAULT {long}") <= BRIEF_LETTERS else signal.label
@@ -79,10 +86,11 @@ def check(signal: Signal) -> Check[Limits]:
             off_delay_s=2.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
             advice="The car or the radio is busy; what depends on it comes late.",
-            inhibited_by=(f"signal_stale.{signal.name}",),
+            inhibited_by=(f"signal_stale.{signal.name}", "all_slow"),
         ),
         limits=SignalLimits,
         find=partial(find, signal),
+        is_harmless=partial(is_harmless, signal),
     )
 
 

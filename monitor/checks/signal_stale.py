@@ -58,6 +58,14 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
     )
 
 
+def is_harmless(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> bool:
+    """Fresh, or not on the car."""
+    reading = snapshot.readings.get(signal.name)
+    if reading is None or reading.derived_from is not None:
+        return signal.name not in snapshot.link.published
+    return reading.is_fresh(snapshot.now_s)
+
+
 def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Finding:
     is_wanted = not signal.optional or set_hz(limits, signal.name) > 0.0
     if signal.name not in snapshot.link.published:
@@ -114,6 +122,7 @@ def check(signal: Signal) -> Check[Limits]:
         ),
         limits=SignalLimits,
         find=partial(find, signal),
+        is_harmless=partial(is_harmless, signal),
     )
 
 

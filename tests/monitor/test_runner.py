@@ -220,7 +220,7 @@ def test_thresholds_may_change_while_running() -> None:
         return OK
 
     speed = next(check for check in catalog.CHECKS if check.id == "speed_limit")
-    monitor = Monitor([replace(speed, find=find)])
+    monitor = Monitor([replace(speed, find=find, is_harmless=None)])
     monitor.step(at(0.0))
     monitor.limits = catalog.changed(AllLimits(), {"speed_limit.max_mps": 5.0})
     monitor.step(at(0.1))
