@@ -163,8 +163,8 @@ class Check(Generic[L]):
     needs: frozenset[str] = (
         frozenset()
     )  # signals whose every message is judged at once; all checks are judged on the tick
-    # A quick look: True only where `find`, not yet active, could say anything but FAULT. Then it need not be asked until
-    # somebody reads its words.
+    # A quick look: True only where `find`, not yet active, could not say FAULT. Then it need not be asked until somebody
+    # reads its words.
     is_harmless: Callable[[Snapshot, L], bool] | None = None
     group: str = ""  # name of its thresholds; a family shares one; "" = id
     tile: str = ""  # the tile of the home tab it belongs to; "" = label
