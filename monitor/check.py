@@ -34,7 +34,7 @@ __all__ = [
     "unknown",
 ]
 
-BRIEF_LETTERS = 20  # what fits a tile of the home tab beside its mark
+BRIEF_LETTERS = 21  # what fits a tile of the home tab beside its mark: "not checked: standing"
 
 
 class Verdict(StrEnum):
@@ -58,7 +58,7 @@ class Finding:
 
     verdict: Verdict
     text: str  # what, how much, against what
-    brief: str  # at most 20 letters, for the tile
+    brief: str  # at most 21 letters, for the tile
     measured: Quantity | None = None
     limit: Quantity | None = None
     causes: tuple[str, ...] = ()  # what is at fault, where one alarm stands for several things; a new one re-alarms
@@ -99,7 +99,7 @@ def fault(
 
 
 def unknown(why: str, *, short: str = "") -> Finding:
-    """It cannot be told. `short` (at most 7 letters: "no link", "stale") follows "not checked:" on the tile."""
+    """It cannot be told. `short` (at most 8 letters: "no link", "stale") follows "not checked:" on the tile."""
     brief = f"not checked: {short}" if short else "not checked"
     return _finding(verdict=Verdict.UNKNOWN, text=why, brief=brief if len(brief) <= BRIEF_LETTERS else "not checked")
 
@@ -163,8 +163,8 @@ class Check(Generic[L]):
     needs: frozenset[str] = (
         frozenset()
     )  # signals whose every message is judged at once; all checks are judged on the tick
-    # A quick look: True only where `find`, not yet active, could not say FAULT. Then it need not be asked until somebody
-    # reads its words.
+    # A quick look: True only where `find`, not yet active, could not say FAULT. Then it need not be asked until
+    # somebody reads its words.
     is_harmless: Callable[[Snapshot, L], bool] | None = None
     group: str = ""  # name of its thresholds; a family shares one; "" = id
     tile: str = ""  # the tile of the home tab it belongs to; "" = label

@@ -53,12 +53,18 @@ class RateMeter:
         "_declared_hz",
         "_first_s",
         "_heard",
+        "_is_settled",
         "_last_block_hz",
         "_last_s",
         "_learned_hz",
         "_set_hz",
-        "_settled",
+        "horizon_s",
+        "period_s",
     )
+
+    # Both are asked at every message, and change seldom.
+    period_s: float | None  # between two messages as far as known; until settled the longer of declared and observed
+    horizon_s: float  # age from which a reading is stale: max(10 periods, 1 s), more patient until the rate is settled
 
     def __init__(self, declared_hz: float | None, set_hz: float | None = None) -> None:
         self._declared_hz = declared_hz
@@ -66,8 +72,7 @@ class RateMeter:
         self._learned_hz: float | None = None
         self._blocks = 0
         self._arrivals: deque[float] = deque(maxlen=20_000)
-        self._settled: tuple[float, float] | None = None  # period and horizon [s] once settled: asked at every message
-        self._settle()
+        self._is_settled = False
         self.restart()
 
     def restart(self) -> None:
@@ -76,9 +81,10 @@ class RateMeter:
         self._first_s = 0.0
         self._last_s: float | None = None
         self._heard = 0
-        self._block_start_s: float | None = None
+        self._block_start_s = 0.0
         self._block_n = 0
         self._last_block_hz: float | None = None
+        self._settle()
 
     def expect(self, set_hz: float | None) -> None:
         """The operator's own figure; None or 0 hands back to learning."""
@@ -86,18 +92,19 @@ class RateMeter:
         self._settle()
 
     def receive(self, at_s: float) -> None:
-        last_s = self._last_s
-        if last_s is not None and (at_s < last_s or at_s - last_s > self.horizon_s):
+        if self._last_s is None or not self._last_s <= at_s <= self._last_s + self.horizon_s:
             # A silence long enough to be called stale has its own alarm; a clock that went back tells nothing at all.
             self.restart()
-            last_s = None
-        if last_s is None:
-            self._first_s = at_s
+            self._first_s = self._block_start_s = at_s
+            self._block_n = -1
         self._last_s = at_s
         self._heard += 1
         self._arrivals.append(at_s)
-        self._forget(at_s)
-        self._learn(at_s)
+        self._block_n += 1
+        if self._block_n >= BLOCK_INTERVALS and at_s - self._block_start_s >= BLOCK_S:
+            self._end_block(at_s)
+        if not self._is_settled:
+            self._settle()
 
     @property
     def expected_hz(self) -> float | None:
@@ -108,26 +115,6 @@ class RateMeter:
         if self._set_hz or self._learned_hz:
             return True
         return self._declared_hz is not None and self._blocks >= DECIDED_BLOCKS
-
-    @property
-    def period_s(self) -> float | None:
-        """Seconds between two messages as far as known; until settled the longer of the declared and the observed."""
-        if self._settled is not None:
-            return self._settled[0]
-        expected_hz = self.expected_hz
-        if self._heard < 2 or self._last_s is None:
-            return None if expected_hz is None else 1.0 / expected_hz
-        observed_s = (self._last_s - self._first_s) / (self._heard - 1)
-        period_s = observed_s if expected_hz is None else max(observed_s, 1.0 / expected_hz)
-        return period_s if period_s > 0.0 else None
-
-    @property
-    def horizon_s(self) -> float:
-        """Age from which a reading is stale: max(10 periods, 1 s), more patient until the rate is settled."""
-        if self._settled is not None:
-            return self._settled[1]
-        floor_s = STARTING_S if self._declared_hz is not None else UNDECLARED_S
-        return max(STALE_PERIODS * (self.period_s or 0.0), floor_s)
 
     def rate(self, now_s: float) -> Rate:
         return _new_rate(
@@ -159,16 +146,8 @@ class RateMeter:
         while len(arrivals) > 2 and now_s - arrivals[0] > window_s:
             arrivals.popleft()
 
-    def _learn(self, at_s: float) -> None:
-        if self._block_start_s is None:
-            self._block_start_s = at_s
-            self._block_n = 0
-            return
-        self._block_n += 1
-        span_s = at_s - self._block_start_s
-        if span_s < BLOCK_S or self._block_n < BLOCK_INTERVALS:
-            return
-        block_hz, before_hz = self._block_n / span_s, self._last_block_hz
+    def _end_block(self, at_s: float) -> None:
+        block_hz, before_hz = self._block_n / (at_s - self._block_start_s), self._last_block_hz
         self._block_start_s, self._block_n, self._last_block_hz = at_s, 0, block_hz
         self._blocks += 1
         self._agree(block_hz, before_hz)
@@ -183,10 +162,20 @@ class RateMeter:
             self._learned_hz = steady_hz
 
     def _settle(self) -> None:
-        """To be called whenever what is expected may have changed."""
+        """To be called whenever what is expected may have changed, and until it is settled at every message."""
         expected_hz = self.expected_hz
-        if self.is_settled and expected_hz is not None:
-            period_s = 1.0 / expected_hz
-            self._settled = period_s, max(STALE_PERIODS * period_s, STALE_FLOOR_S)
-        else:
-            self._settled = None
+        self._is_settled = self.is_settled and expected_hz is not None
+        if self._is_settled and expected_hz is not None:
+            self.period_s = 1.0 / expected_hz
+            self.horizon_s = max(STALE_PERIODS * self.period_s, STALE_FLOOR_S)
+            return
+        self.period_s = self._observed_s(expected_hz)
+        floor_s = STARTING_S if self._declared_hz is not None else UNDECLARED_S
+        self.horizon_s = max(STALE_PERIODS * (self.period_s or 0.0), floor_s)
+
+    def _observed_s(self, expected_hz: float | None) -> float | None:
+        if self._heard < 2 or self._last_s is None:
+            return None if expected_hz is None else 1.0 / expected_hz
+        observed_s = (self._last_s - self._first_s) / (self._heard - 1)
+        period_s = observed_s if expected_hz is None else max(observed_s, 1.0 / expected_hz)
+        return period_s if period_s > 0.0 else None

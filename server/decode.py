@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from monitor.quick import maker
 from monitor.values import (
     Acceleration,
     Bearing,
@@ -37,7 +38,7 @@ from monitor.values import (
 
 Decode = Callable[[Any], Any]
 
-NONE_IN_RANGE_M = (81.0, 180.0)  # what the distance estimator says of nothing ahead: real car, simulator
+NONE_REAL_M, NONE_SIMULATED_M = 81.0, 180.0  # what the distance estimator says of nothing ahead: car, simulator
 NONE_YET_M = 2147483647.0  # what its steering-based variant says before the first object
 FARTHEST_M = 1000.0  # no sensor on a car sees farther
 MAX_BEAMS = 65535
@@ -50,6 +51,10 @@ SIDEWAYS = 0.25  # of the way made: a car rolls forwards or backwards, and slips
 FARTHEST_SCAN_M = 10_000.0  # a range_max beyond is "no end", which drivers write as the largest float there is
 WIDEST_RAD = 4 * math.pi  # two turns: no laser sweeps more
 _REAL = (int, float, np.integer, np.floating)
+
+# What comes a hundred times a second is made quickly.
+_twist, _effort, _steering = maker(Twist), maker(Effort), maker(Steering)
+_distance, _bearing = maker(Distance), maker(Bearing)
 
 
 class Rejected(ValueError):
@@ -130,7 +135,7 @@ def _percent(value: float) -> float:
 
 def twist(message: Any) -> Twist:
     yaw_rate = number(message, "angular", "z") if isinstance(message, Mapping) and "angular" in message else math.nan
-    return Twist(speed_mps=_speed(finite(message, "linear", "x")), yaw_rate_radps=known(yaw_rate))
+    return _twist(speed_mps=_speed(finite(message, "linear", "x")), yaw_rate_radps=known(yaw_rate))
 
 
 def twist_stamped(message: Any) -> Twist:
@@ -157,7 +162,7 @@ def speed_of_float(message: Any) -> Twist:
 
 def effort(message: Any) -> Effort:
     """Percent in force.x of a Wrench, as the car's pedals have it."""
-    return Effort(percent=_percent(finite(message, "force", "x")))
+    return _effort(percent=_percent(finite(message, "force", "x")))
 
 
 def effort_of_float(message: Any) -> Effort:
@@ -166,7 +171,7 @@ def effort_of_float(message: Any) -> Effort:
 
 def steering(message: Any) -> Steering:
     """Percent in torque.z of a Wrench, negative = left."""
-    return Steering(percent=_percent(finite(message, "torque", "z")))
+    return _steering(percent=_percent(finite(message, "torque", "z")))
 
 
 def steering_of_float(message: Any) -> Steering:
@@ -179,9 +184,9 @@ def distance(message: Any) -> Distance:
         raise Rejected("data is null")
     if value < 0:
         raise Rejected("a distance below zero")
-    if value >= FARTHEST_M or any(abs(value - limit) < 1e-3 for limit in NONE_IN_RANGE_M):
-        return Distance(distance_m=None, none_in_range=True)
-    return Distance(distance_m=value, none_in_range=False)
+    if value >= FARTHEST_M or abs(value - NONE_REAL_M) < 1e-3 or abs(value - NONE_SIMULATED_M) < 1e-3:
+        return _distance(distance_m=None, none_in_range=True)
+    return _distance(distance_m=value, none_in_range=False)
 
 
 def bearing(message: Any) -> Bearing:
@@ -190,7 +195,7 @@ def bearing(message: Any) -> Bearing:
         raise Rejected("data is null")
     if abs(value) > 2 * math.pi:
         raise Rejected("an angle beyond a full turn")
-    return Bearing(bearing_rad=value)
+    return _bearing(bearing_rad=value)
 
 
 def nav_sat_fix(message: Any) -> GpsFix:

@@ -50,7 +50,7 @@ class Reception:
 
     def read(self, source: Source, message: Any, note: str | None) -> Any | None:
         """The decoded value, or None where it was rejected; either way it is counted."""
-        tally = self.tally(source.signal)
+        tally = self.by_signal.get(source.signal) or self.tally(source.signal)
         tally.received += 1
         if note is not None:
             tally.repaired += 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import operator
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -20,7 +20,7 @@ from server.recording.recognise import Kind, recognise
 from server.recording.rosbag1 import Bag1
 from server.recording.rosbag2 import Bag2
 from server.recording.source import Channel, FileSource
-from server.source import Message, RosVersion
+from server.source import Message, RosVersion, message_of
 
 __all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
 
@@ -91,15 +91,16 @@ class Recording:
         """Messages of all topics that can be read."""
         return sum(topic.count for topic in self.topics.values())
 
-    def messages(self, start_s: float = 0.0) -> Iterator[Message]:
+    def messages(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Message]:
         """All messages in time order, from `start_s` after the beginning on, read as they are asked for.
 
-        What cannot be decoded is left out and counted in `rejected`. Raises RecordingUnreadable where a file turns out
+        Where `topics` are given, those of other topics come too, but empty: unpacking is most of the work. What cannot
+        be decoded is left out and counted in `rejected`. Raises RecordingUnreadable where a file turns out
         to be damaged.
         """
         start_ns = self._start_ns + round(start_s * 1e9)
         streams = [
-            self._read(source, roads, start_ns)
+            self._read(source, roads, start_ns, topics)
             for source, roads in zip(self._sources, self._roads, strict=True)
             if roads
         ]
@@ -144,16 +145,31 @@ class Recording:
             )
         return roads
 
-    def _read(self, source: FileSource, roads: dict[int, _Road], start_ns: int) -> Iterator[Message]:
-        for time_ns, number, raw in _safely(source, set(roads), start_ns):
-            road = roads[number]
-            try:
-                message = road.decode(raw)
-            except Undecodable as why:
-                self.rejected[road.topic] = self.rejected.get(road.topic, 0) + 1
-                self.why_rejected.setdefault(road.topic, str(why))
-                continue
-            yield Message(at_s=time_ns / 1e9, topic=road.topic, type=road.type, message=message)
+    def _read(
+        self, source: FileSource, roads: dict[int, _Road], start_ns: int, topics: Collection[str] | None
+    ) -> Iterator[Message]:
+        ways = {
+            number: (road.topic, road.type, road.decode if topics is None or road.topic in topics else _nothing)
+            for number, road in roads.items()
+        }
+        try:
+            for time_ns, number, raw in source.messages(set(roads), start_ns):
+                topic, type, decode = ways[number]
+                try:
+                    message = decode(raw)
+                except Undecodable as why:
+                    self.rejected[topic] = self.rejected.get(topic, 0) + 1
+                    self.why_rejected.setdefault(topic, str(why))
+                    continue
+                yield message_of(at_s=time_ns / 1e9, topic=topic, type=type, message=message)
+        except RecordingUnreadable:
+            raise
+        except Exception as error:  # a damaged file makes the readers fail in every way there is
+            raise RecordingUnreadable(_what_is_wrong(source.path, error)) from None
+
+
+def _nothing(raw: bytes) -> dict[str, Any]:
+    return {}
 
 
 def _open(path: Path, kind: Kind) -> FileSource:
@@ -165,17 +181,8 @@ def _open(path: Path, kind: Kind) -> FileSource:
         return Bag2(path, kind)
     except RecordingUnreadable:
         raise
-    except Exception as error:  # a damaged file makes the readers fail in every way there is
-        raise RecordingUnreadable(_what_is_wrong(path, error)) from None
-
-
-def _safely(source: FileSource, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-    try:
-        yield from source.messages(numbers, start_ns)
-    except RecordingUnreadable:
-        raise
     except Exception as error:  # as above
-        raise RecordingUnreadable(_what_is_wrong(source.path, error)) from None
+        raise RecordingUnreadable(_what_is_wrong(path, error)) from None
 
 
 def _what_is_wrong(path: Path, error: Exception) -> str:

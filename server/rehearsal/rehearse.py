@@ -6,7 +6,7 @@ import contextlib
 import gc
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from monitor.alarm import Transition
@@ -167,7 +167,7 @@ class _Run:
         count = 0
         from_s = at_s = self._extract.start_s
         tick_s = math.inf
-        for message in self._messages(origin_s):
+        for message in self._messages(origin_s, listeners):
             now_s = message.at_s - origin_s
             if count == 0:
                 from_s = self._opened_s = now_s
@@ -194,9 +194,9 @@ class _Run:
                     traces.take(changed, state.reading, now_s)
         return count, from_s, at_s
 
-    def _messages(self, origin_s: float) -> Iterator[Message]:
+    def _messages(self, origin_s: float, listeners: Collection[str]) -> Iterator[Message]:
         """Read as they are asked for; a recording that breaks off half way is judged up to there."""
-        messages = self._recording.messages(self._extract.start_s)
+        messages = self._recording.messages(self._extract.start_s, listeners)
         stream = self._faults.over(messages, origin_s, self._signal_of()) if self._faults.laid else messages
         is_first = True
         try:

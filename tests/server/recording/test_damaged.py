@@ -68,7 +68,7 @@ def test_what_is_not_there_or_no_file(tmp_path: Path) -> None:
     (tmp_path / "gone").symlink_to(tmp_path / "nothing")
     assert "does not exist" in why_unreadable(tmp_path / "gone")
     assert why_unreadable() == "no recording was named"
-    assert "cannot be read" in why_unreadable(tmp_path / ("x" * 300))
+    assert "cannot be read" in why_unreadable(tmp_path / ("x" * 256))
 
 
 def test_a_folder_with_several_recordings_asks_which(tmp_path: Path) -> None:
