@@ -54,6 +54,11 @@ class Transition:
     text: str  # what the check said at that moment
     by: str | None = None  # who, where a person did it
     announces: bool = False  # the operator is to be told now
+    state: AlarmState = AlarmState.NORMAL  # where the alarm stands after it
+    finding: Finding | None = None  # what the check had last said; None: it had said nothing, or monitoring ended
+    causes: tuple[str, ...] = ()  # what the operator had been told of, as far as it was still there
+    suppressed_by: tuple[str, ...] = ()
+    shelved_until_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,9 +103,7 @@ class Alarm:
             return AlarmState.SUPPRESSED
         if self.shelved_until_s is not None:
             return AlarmState.SHELVED
-        if self.active:
-            return AlarmState.ACKED if self.acknowledged else AlarmState.UNACKED
-        return AlarmState.NORMAL if self.acknowledged else AlarmState.RTN_UNACKED
+        return _state(self.active, self.acknowledged)
 
     @property
     def is_standing(self) -> bool:
@@ -129,6 +132,37 @@ class Alarm:
         )
 
 
+def _state(active: bool, acknowledged: bool) -> AlarmState:
+    if active:
+        return AlarmState.ACKED if acknowledged else AlarmState.UNACKED
+    return AlarmState.NORMAL if acknowledged else AlarmState.RTN_UNACKED
+
+
+def transition(
+    alarm: Alarm, change: Change, at_s: float, *, text: str = "", by: str | None = None, announces: bool = False
+) -> Transition:
+    """That `change` has made of the alarm what it is now."""
+    return Transition(
+        alarm_id=alarm.id,
+        occurrence=alarm.occurrence,
+        change=change,
+        at_s=at_s,
+        text=text,
+        by=by,
+        announces=announces,
+        state=alarm.state,
+        finding=alarm.finding,
+        causes=there(alarm.causes),
+        suppressed_by=alarm.suppressed_by,
+        shelved_until_s=alarm.shelved_until_s,
+    )
+
+
+def there(causes: Collection[Cause]) -> tuple[str, ...]:
+    """The names of those which are not away."""
+    return tuple(cause.name for cause in causes if cause.absent_s is None)
+
+
 def advance(
     alarm: Alarm, finding: Finding, now_s: float, inhibited_by: Collection[str] = ()
 ) -> tuple[Alarm, tuple[Transition, ...]]:
@@ -146,12 +180,13 @@ def advance(
 
 
 def end(alarm: Alarm, now_s: float, why: str) -> tuple[Alarm, tuple[Transition, ...]]:
-    """Monitoring ends: the alarm goes back to normal, and says so where it stood."""
+    """Monitoring ends: the alarm goes back to normal, and says so where it stood or lay on the shelf."""
     fresh = Alarm(id=alarm.id, spec=alarm.spec, occurrence=alarm.occurrence, out_of_service=alarm.out_of_service)
-    if not alarm.is_standing:
-        return fresh, ()
-    told = Transition(alarm_id=alarm.id, occurrence=alarm.occurrence, change="cleared", at_s=now_s, text=why)
-    return fresh, (told,)
+    if alarm.is_standing:
+        return fresh, (transition(fresh, "cleared", now_s, text=why),)
+    if alarm.shelved_until_s is not None:
+        return fresh, (transition(fresh, "unshelved", now_s, text=why),)
+    return fresh, ()
 
 
 def rebased(alarm: Alarm, now_s: float) -> Alarm:
@@ -311,13 +346,5 @@ class _Step:
         self._tell(change, announces=not (self._shelved or self._suppressed))
 
     def _tell(self, change: Change, *, announces: bool = False) -> None:
-        self._transitions.append(
-            Transition(
-                alarm_id=self._alarm.id,
-                occurrence=self._occurrence,
-                change=change,
-                at_s=self._now_s,
-                text=self._finding.text,
-                announces=announces,
-            )
-        )
+        alarm, _ = self.result()
+        self._transitions.append(transition(alarm, change, self._now_s, text=self._finding.text, announces=announces))

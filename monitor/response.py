@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from monitor.alarm import Alarm, Change, Refused, Transition, rebased
+from monitor.alarm import Alarm, Change, Refused, Transition, rebased, transition
 
 SHELVE_AT_MOST_MIN = 15.0  # longer is forgotten
 
@@ -59,12 +59,5 @@ def unshelve(alarm: Alarm, by: str, now_s: float) -> tuple[Alarm, tuple[Transiti
 
 
 def _transition(alarm: Alarm, change: Change, by: str | None, now_s: float, *, announces: bool = False) -> Transition:
-    return Transition(
-        alarm_id=alarm.id,
-        occurrence=alarm.occurrence,
-        change=change,
-        at_s=now_s,
-        text="" if alarm.finding is None else alarm.finding.text,
-        by=by,
-        announces=announces,
-    )
+    text = "" if alarm.finding is None else alarm.finding.text
+    return transition(alarm, change, now_s, text=text, by=by, announces=announces)

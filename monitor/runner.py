@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from traceback import format_exception
 from typing import Any
@@ -13,6 +13,7 @@ from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
 from monitor.catalog import CHECKS, AllLimits, AnyCheck, compose
 from monitor.check import OK, Finding, Scope, Verdict, fault, unknown
 from monitor.inhibition import table_of
+from monitor.restoring import numbered_on, restore
 from monitor.state import NotFresh, Snapshot
 from monitor.tiles import Tile, tiles
 
@@ -169,6 +170,14 @@ class Monitor:
         self.crashes.clear()
         self._causes.clear()
         return tuple(transitions)
+
+    def restore(self, transitions: Iterable[Transition]) -> None:
+        """Goes on from where the alarms stood after these transitions, oldest first; see `monitor.restoring`."""
+        self.alarms = restore(self.alarms, transitions)
+
+    def number_on(self, transitions: Iterable[Transition]) -> None:
+        """Only counts on from the occurrences of these transitions: what they told of is over, or not yet due."""
+        self.alarms = numbered_on(self.alarms, transitions)
 
     def standing(self) -> list[Alarm]:
         """Alarms to show, most urgent first: active or unacknowledged, shelved ones last, suppressed ones not."""

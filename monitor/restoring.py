@@ -1,0 +1,69 @@
+"""Where the alarms stood, from the transitions that the log has kept: a restart is a replay of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from monitor.alarm import Alarm, AlarmState, Cause, Transition
+
+
+def restore(alarms: Mapping[str, Alarm], transitions: Iterable[Transition]) -> dict[str, Alarm]:
+    """The alarms after the transitions, oldest first, whose times are on the clock that goes on (they may be negative).
+
+    What was told comes back: active, acknowledged and by whom, shelved until when, suppressed by what, the causes and
+    the values of the trip, the number of the occurrence. What the checks say does not: every condition is unknown until
+    it is judged again, and unknown clears nothing. Transitions of alarms that are not there are passed over.
+    """
+    restored = dict(alarms)
+    for transition in transitions:
+        alarm = restored.get(transition.alarm_id)
+        if alarm is not None:
+            restored[alarm.id] = _after(alarm, transition)
+    return restored
+
+
+def numbered_on(alarms: Mapping[str, Alarm], transitions: Iterable[Transition]) -> dict[str, Alarm]:
+    """The alarms as they are, but with occurrences that count on from those of the transitions."""
+    last = {name: alarm.occurrence for name, alarm in restore(alarms, transitions).items()}
+    return {name: replace(alarm, occurrence=last[name]) for name, alarm in alarms.items()}
+
+
+def _after(alarm: Alarm, transition: Transition) -> Alarm:
+    occurrence = max(alarm.occurrence, transition.occurrence)  # a number is never given twice
+    if transition.state is AlarmState.NORMAL:
+        return Alarm(id=alarm.id, spec=alarm.spec, occurrence=occurrence, out_of_service=alarm.out_of_service)
+    alarm = replace(
+        alarm,
+        occurrence=occurrence,
+        suppressed_by=transition.suppressed_by,
+        shelved_until_s=transition.shelved_until_s,
+        shelved_by=alarm.shelved_by if transition.shelved_until_s is not None else None,
+        causes=tuple(Cause(name=name) for name in transition.causes),
+    )
+    match transition.change:
+        case "raised":
+            alarm = replace(alarm, active=True, raised_s=transition.at_s, worst=transition.finding)
+            return _announced(alarm, transition)
+        case "recaused":
+            return _announced(replace(alarm, active=True), transition)
+        case "cleared":
+            acknowledged = alarm.acknowledged or not alarm.spec.needs_ack
+            return replace(alarm, active=False, acknowledged=acknowledged, cleared_s=transition.at_s)
+        case "acknowledged":
+            return replace(alarm, acknowledged=True, acknowledged_by=transition.by)
+        case "shelved":
+            return replace(alarm, shelved_by=transition.by)
+        case "unshelved" if alarm.active:  # its end announces the alarm anew
+            return _announced(alarm, transition)
+    return alarm
+
+
+def _announced(alarm: Alarm, transition: Transition) -> Alarm:
+    return replace(
+        alarm,
+        acknowledged=False,
+        acknowledged_by=None,
+        announced_s=transition.at_s,
+        trip=transition.finding or alarm.trip,
+    )
