@@ -25,6 +25,15 @@ class SlowLimits(Limits):
         step=1.0,
         help="Of the expected rate.",
     )
+    frozen_after_s: float = threshold(
+        2.0,
+        "Frozen after",
+        unit="s",
+        low=1.0,
+        high=60.0,
+        step=0.5,
+        help="Of messages that go on saying the same while the car moves, or carry one stamp.",
+    )
 
 
 _rates: dict[str, Any] = {

@@ -16,7 +16,9 @@ from monitor.link import LinkFacts, Phase
 from monitor.motion import Slope, Standstill
 from monitor.quick import maker
 from monitor.rates import Rate, RateMeter
+from monitor.repeats import RepeatFollower, Repeats, Wheels
 from monitor.signals import SIGNALS
+from monitor.stamps import MANY_WRITERS, ClockJump, StampFollower, merged
 from monitor.tracks import Track, TrackPoint
 from monitor.values import (
     Acceleration,
@@ -68,6 +70,10 @@ class Reading(Generic[T_co]):
     period_s: float | None = None  # seconds between two messages, as far as known
     count: int = 0  # messages since connecting; 0 for a derived value
     derived_from: str | None = None  # the signal it was computed from; None: published by the car
+    repeats: Repeats | None = None  # what it repeats of the messages before it; None: nothing of it can be followed
+    # How much further its stamp is behind the receiver's clock (negative) or ahead of it (positive) than usual since
+    # connecting; None: no stamp, or many writers.
+    stamp_change_s: float | None = None
 
     def age_s(self, now_s: float) -> float:
         return max(0.0, now_s - self.received_s)
@@ -101,6 +107,7 @@ class Snapshot:
     link: LinkFacts = field(default_factory=LinkFacts)
     rates: Mapping[str, Rate] = field(default_factory=dict)  # of every signal; up to 0.1 s old
     paused: bool = False
+    paused_since_s: float | None = None
     heard_s: float | None = None  # when any signal last came
     extents: Mapping[str, Extent] = field(default_factory=dict)  # where a headline number was ever heard
     track: tuple[TrackPoint, ...] = ()  # where the car was, thinned and bounded, oldest first
@@ -109,6 +116,8 @@ class Snapshot:
     scan_before: Reading[LaserScan] | None = None  # some 0.4 s before the newest
     distance_before: Reading[Distance] | None = None
     standing_since_s: float | None = None  # when the car came to rest by its wheels; None: it moves, or cannot be told
+    speed_slope_mps2: float | None = None  # how the wheels' speed changes, over 0.6 s; None: too little heard to tell
+    clock_jump: ClockJump | None = None  # the newest since connecting
 
     @overload
     def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...
@@ -191,11 +200,20 @@ _TELLING = frozenset({Twist, GpsFix, Odometry, Heading})  # from which something
 class _Heard:
     """What the state keeps of one signal between messages."""
 
-    __slots__ = ("count", "meter")
+    __slots__ = ("count", "meter", "repeats", "stamps")
 
-    def __init__(self, declared_hz: float | None, set_hz: float | None) -> None:
+    def __init__(self, declared_hz: float | None, set_hz: float | None, *, one_writer: bool) -> None:
         self.meter = RateMeter(declared_hz, set_hz)
+        self.repeats = RepeatFollower()
+        self.stamps = StampFollower() if one_writer else None
         self.count = 0
+
+    def restart(self) -> None:
+        """Measure anew: what comes now does not follow upon what came before."""
+        self.meter.restart()
+        self.repeats.restart()
+        if self.stamps is not None:
+            self.stamps.restart()
 
 
 class State:
@@ -208,7 +226,8 @@ class State:
     def reset(self) -> None:
         """Forget everything but the operator's rates: another car, or monitoring begins anew."""
         self._heard = {
-            name: _Heard(signal.expected_hz, self._expected_hz.get(name)) for name, signal in SIGNALS.items()
+            name: _Heard(signal.expected_hz, self._expected_hz.get(name), one_writer=name not in MANY_WRITERS)
+            for name, signal in SIGNALS.items()
         }
         self._readings: dict[str, Reading[Any]] = {}
         self._extents: dict[str, Extent] = {}
@@ -219,6 +238,9 @@ class State:
         self._heard_s: float | None = None
         self._latest_s = -math.inf
         self._slope = Slope()
+        self._slope_mps2: float | None = None
+        self._wheels = Wheels()
+        self._clock_jump: ClockJump | None = None
         self._standstill = Standstill()
         self._track = Track()
         self._headings = Headings()
@@ -228,6 +250,7 @@ class State:
         self._earlier = {"scan": Earlier(), "distance": Earlier()}
         self._link = LinkFacts()
         self._paused = False
+        self._paused_since_s: float | None = None
 
     def expect(self, expected_hz: Mapping[str, float]) -> None:
         """The operator's rates [Hz] by signal; 0 or absent: learn the car's own."""
@@ -244,6 +267,8 @@ class State:
         self._heard_s = received_s
         if isinstance(value, Diagnostics):
             value = self._components.merge(value, received_s)
+        elif type(value) is Twist:
+            self._wheels.add(received_s, value.speed_mps)
         reading = _new_reading(
             value=value,
             received_s=received_s,
@@ -251,6 +276,8 @@ class State:
             horizon_s=heard.meter.horizon_s,
             period_s=heard.meter.period_s,
             count=heard.count,
+            repeats=heard.repeats.receive(value, stamp_s, received_s, self._wheels),
+            stamp_change_s=None if stamp_s is None else self._compare_clocks(signal, heard, stamp_s, received_s),
         )
         if self._readings_shared:
             self._readings = self._readings.copy()
@@ -272,14 +299,19 @@ class State:
         before, self._link = self._link, facts
         if facts.opened_s is not None and facts.opened_s != before.opened_s:
             for heard in self._heard.values():
-                heard.meter.restart()
+                heard.restart()
+            self._clock_jump = None
 
-    def set_paused(self, paused: bool) -> None:
+    def set_paused(self, paused: bool, since_s: float | None = None) -> None:
+        """Monitoring is paused or goes on. `since_s` is when the pause began, where it was not now."""
         self._paused = paused
+        self._paused_since_s = since_s if paused else None
 
     def snapshot(self, now_s: float) -> Snapshot:
         """What is known at `now_s`, which later messages do not change."""
         self._follow_clock(now_s)
+        if self._paused and self._paused_since_s is None:
+            self._paused_since_s = now_s
         self._readings_shared = self._extents_shared = True
         return _new_snapshot(
             now_s=now_s,
@@ -287,6 +319,7 @@ class State:
             link=self._link,
             rates=self._measure(now_s),
             paused=self._paused,
+            paused_since_s=self._paused_since_s,
             heard_s=self._heard_s,
             extents=MappingProxyType(self._extents),
             track=self._track.points,
@@ -295,6 +328,8 @@ class State:
             scan_before=self._earlier["scan"].before,
             distance_before=self._earlier["distance"].before,
             standing_since_s=self._standstill.since_s if self._is_fresh("speed", now_s) else None,
+            speed_slope_mps2=self._slope_mps2,
+            clock_jump=self._clock_jump,
         )
 
     def _follow_clock(self, at_s: float) -> None:
@@ -311,8 +346,20 @@ class State:
         }
         if self._heard_s is not None:
             self._heard_s += shift_s
+        if self._paused_since_s is not None:
+            self._paused_since_s += shift_s
+        self._clock_jump = None
         for heard in self._heard.values():
-            heard.meter.restart()
+            heard.restart()
+
+    def _compare_clocks(self, signal: str, heard: _Heard, stamp_s: float, received_s: float) -> float | None:
+        stamps = heard.stamps
+        if stamps is None:
+            return None
+        jump_s = stamps.receive(stamp_s, received_s)
+        if jump_s is not None:
+            self._clock_jump = merged(self._clock_jump, signal, received_s, jump_s)
+        return stamps.change_s
 
     def _derive(self, signal: str, reading: Reading[Any]) -> str | None:
         """Follow what this reading tells of other signals; the name of the derived signal that changed."""
@@ -341,7 +388,7 @@ class State:
         self._standstill.add(reading.received_s, speed_mps)
         # The car's own stamps are free of the jitter of the way here, where there are any.
         at_s = reading.received_s if reading.stamp_s is None else reading.stamp_s
-        slope_mps2 = self._slope.add(at_s, speed_mps)
+        slope_mps2 = self._slope_mps2 = self._slope.add(at_s, speed_mps)
         if slope_mps2 is None or self._heard["acceleration"].count:
             return None
         acceleration = Acceleration(acceleration_mps2=slope_mps2, source="speed")

@@ -1,0 +1,86 @@
+"""Do most signals come slower than they should at once? Then one cause is to blame, and it is told once."""
+
+from __future__ import annotations
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+)
+from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
+from monitor.signals import SIGNALS
+from monitor.state import Snapshot
+
+AT_LEAST = 3  # signals: fewer are judged each by itself
+SHARE, SHARE_WHILE_ACTIVE = 0.5, 0.3
+
+
+def find(snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
+    shares = _shares(snapshot, limits)
+    judged, slow = len(shares), sum(share < limits.slow_below_percent / 100.0 for share in shares)
+    if judged < AT_LEAST:
+        return absent(f"{judged} signals with a known rate are too few to compare", brief="too few")
+    text = f"{slow} of {judged} signals come slower than expected"
+    needed = max(AT_LEAST, (SHARE_WHILE_ACTIVE if was_active else SHARE) * judged)
+    if slow < needed:
+        return ok(text)
+    return fault(
+        f"{text}, down to {100 * min(shares):.0f} %: bridge, radio or server overloaded",
+        brief=f"{slow} of {judged}",
+        measured=Quantity(label="Slow", value=slow, unit=""),
+        limit=Quantity(label="Of", value=judged, unit=""),
+        causes=("load",),
+    )
+
+
+def is_harmless(snapshot: Snapshot, limits: SlowLimits) -> bool:
+    return sum(share < limits.slow_below_percent / 100.0 for share in _shares(snapshot, limits)) < AT_LEAST
+
+
+def _shares(snapshot: Snapshot, limits: SlowLimits) -> list[float]:
+    """How much of its expected rate each signal keeps that has one; a silent signal has its own alarm."""
+    readings = snapshot.readings
+    return [
+        rate.measured_hz / rate.expected_hz
+        for name, rate in snapshot.rates.items()
+        if rate.settled
+        and rate.measured_hz
+        and rate.expected_hz
+        and name in readings
+        and readings[name].derived_from is None
+        and not (SIGNALS[name].event_like and set_hz(limits, name) == 0.0)
+    ]
+
+
+CHECKS = (
+    Check(
+        id="all_slow",
+        label="All rates",
+        tile="Rates",
+        order=110,
+        group=GROUP,
+        alarm=AlarmSpec(
+            title="Most signals are slow",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.MEDIUM,
+            needs_ack=True,
+            on_delay_s=5.0,  # the window of the rates, as for the single ones: a hiccup shorter than that is none
+            off_delay_s=5.0,
+            actions=(Action.ACKNOWLEDGE,),  # it explains the single rates: never hidden
+            advice="Bridge, radio or server is overloaded: what is shown comes late.",
+            inhibited_by=("car_silent", "no_message"),
+        ),
+        limits=SignalLimits,
+        find=find,
+        is_harmless=is_harmless,
+    ),
+)

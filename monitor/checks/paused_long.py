@@ -1,0 +1,78 @@
+"""Has somebody paused the monitoring and forgotten it? Told after some minutes, and again each time these double."""
+
+from __future__ import annotations
+
+import math
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Scope,
+    Sound,
+    fault,
+    ok,
+    threshold,
+)
+from monitor.state import Snapshot
+
+
+class PausedLimits(Limits):
+    after_min: float = threshold(
+        5.0,
+        "Pause is said after",
+        unit="min",
+        low=0.5,
+        high=60.0,
+        step=0.5,
+        help="And again after 2, 4, 8 times as long.",
+    )
+
+
+def find(snapshot: Snapshot, limits: PausedLimits, was_active: bool) -> Finding:
+    if not snapshot.paused or snapshot.paused_since_s is None:
+        return ok("Monitoring is on")
+    paused_s = max(0.0, snapshot.now_s - snapshot.paused_since_s)
+    after_s = 60.0 * limits.after_min
+    text = f"Monitoring paused for {paused_s / 60:.0f} min: no alarm comes"
+    if paused_s < after_s:
+        return ok(text)
+    return fault(
+        text,
+        brief=f"{paused_s / 60:.0f} min",
+        measured=Quantity(label="Paused for", value=paused_s, unit="s"),
+        limit=Quantity(label="Said after", value=after_s, unit="s"),
+        causes=("paused",),
+        level=1 + math.floor(math.log2(paused_s / after_s)),
+    )
+
+
+def is_harmless(snapshot: Snapshot, limits: PausedLimits) -> bool:
+    return not snapshot.paused
+
+
+CHECKS = (
+    Check(
+        id="paused_long",
+        label="Monitoring",
+        order=127,
+        alarm=AlarmSpec(
+            title="Monitoring paused too long",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.MEDIUM,
+            needs_ack=False,  # to go on is to have seen it
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="Press Resume: until then nothing is checked and nothing is told.",
+        ),
+        limits=PausedLimits,
+        find=find,
+        is_harmless=is_harmless,
+        scope=Scope.SERVER,
+    ),
+)

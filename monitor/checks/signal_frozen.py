@@ -1,0 +1,142 @@
+"""Does a signal go on talking, but always say the same? One alarm for each signal, made from the table of signals.
+
+Most values may rest: a brake at 0 %, an accelerator nobody touches, a wheel held straight, an estimator that repeats
+its last object. So a value is held against a signal only where it cannot rest while the car moves: a position,
+odometry, a scan with returns; and, where the signal has been seen to change with nearly every message, its own noise:
+speed, acceleration, heading. A stamp may never rest, whatever the car does.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from monitor.check import (
+    BRIEF_LETTERS,
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+    unknown,
+)
+from monitor.motion import MOVES_ABOVE_MPS
+from monitor.repeats import Repeats
+from monitor.signal_limits import GROUP, SignalLimits, SlowLimits
+from monitor.signals import SIGNALS, Signal
+from monitor.state import Reading, Snapshot
+from monitor.values import GpsFix, LaserScan
+
+BY_MOTION = frozenset({"position", "odometry", "scan"})
+BY_NOISE = frozenset({"speed", "acceleration", "heading"})
+LEAST_WAY_M = 3.0  # a position in whole metres, or of a receiver that holds it at a crawl, has changed by then
+LEAST_REPEATS = 3  # two messages of one stamp are a driver's way of correcting itself
+LIVELY = 0.8  # share of messages with a new value: 0.97 on the real car; below, a held value proves nothing
+RETURNS = 20  # a scan with fewer may see nothing but parts of the car itself
+
+
+def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
+    reading = snapshot.get(signal.name)
+    if reading is None or reading.derived_from is not None:
+        return absent(f"{signal.label}: no messages to compare", brief="no messages")
+    snapshot.need(signal.name)  # while stale nothing comes that could be frozen
+    repeats = reading.repeats
+    if repeats is None:
+        return absent(f"{signal.label} may rest, and its messages carry no stamp", brief="may rest")
+    if repeats.stamp_n >= LEAST_REPEATS and repeats.stamp_s >= limits.frozen_after_s:
+        return _frozen(signal, "one stamp", repeats.stamp_s, limits)
+    if signal.name in BY_MOTION | BY_NOISE:
+        return _value(signal, reading, repeats, snapshot, limits)
+    return ok(f"{signal.label}: its stamps go on")
+
+
+def _value(
+    signal: Signal, reading: Reading[object], repeats: Repeats, snapshot: Snapshot, limits: SlowLimits
+) -> Finding:
+    if repeats.value_n == 0:
+        return ok(f"{signal.label}: its values go on")
+    held_s = repeats.value_s
+    is_long = repeats.value_n >= LEAST_REPEATS and held_s >= limits.frozen_after_s
+    if is_long:
+        why_not = _why_not(signal, reading, repeats)
+        return _frozen(signal, "one value", held_s, limits) if why_not is None else why_not
+    if abs(snapshot.need("speed").speed_mps) > MOVES_ABOVE_MPS:
+        return ok(f"{signal.label}: the same value for {held_s:.1f} s of driving")
+    if reading.stamp_s is not None:
+        return ok(f"{signal.label}: its stamps go on")
+    return unknown(f"{signal.label}: the car stands, where a value may rest", short="stands")
+
+
+def _why_not(signal: Signal, reading: Reading[object], repeats: Repeats) -> Finding | None:
+    """Why a value that was held so long proves nothing, None where it does."""
+    if signal.name in BY_NOISE:
+        if repeats.liveliness is None:
+            return unknown(f"{signal.label}: not yet known how often it changes", short="waiting")
+        if repeats.liveliness < LIVELY:
+            return absent(f"{signal.label} often repeats a value: it proves nothing", brief="often repeats")
+        return None
+    if repeats.value_m < LEAST_WAY_M:
+        return ok(f"{signal.label}: the same value for {repeats.value_m:.1f} m of driving")
+    match reading.value:
+        case GpsFix(status=status) if status < 0:
+            return unknown("The receiver has no fix", short="no fix")
+        case LaserScan() as scan if scan.usable < RETURNS:
+            return unknown(f"{scan.usable} returns are too few to compare scans by", short="returns")
+    return None
+
+
+def _frozen(signal: Signal, what: str, held_s: float, limits: SlowLimits) -> Finding:
+    brief = f"{signal.label} {held_s:.0f} s"
+    return fault(
+        f"{signal.label}: messages come, but with {what} for {held_s:.1f} s"
+        + (" of driving" if what == "one value" else ""),
+        brief=brief if len(f"FAULT {brief}") <= BRIEF_LETTERS else signal.label,
+        measured=Quantity(label="Unchanged for", value=held_s, unit="s"),
+        limit=Quantity(label="Allowed", value=limits.frozen_after_s, unit="s"),
+        causes=(signal.name,),
+    )
+
+
+def is_harmless(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> bool:
+    reading = snapshot.readings.get(signal.name)
+    if reading is None or reading.repeats is None:
+        return True
+    return reading.repeats.value_s < limits.frozen_after_s and reading.repeats.stamp_s < limits.frozen_after_s
+
+
+def check(signal: Signal) -> Check[Limits]:
+    # A speed that is frozen says nothing of how far the car has come, by which the others are judged.
+    explains = signal.name == "speed"
+    return Check(
+        id=f"signal_frozen.{signal.name}",
+        label=f"{signal.label} changes",
+        tile="Frozen",
+        order=105,
+        group=GROUP,
+        alarm=AlarmSpec(
+            title=f"{signal.label} frozen",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.MEDIUM,
+            needs_ack=True,
+            off_delay_s=2.0,
+            actions=(Action.ACKNOWLEDGE,) if explains else (Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="Messages come, but what they say is old: do not trust the value shown.",
+            inhibited_by=(
+                f"signal_stale.{signal.name}",
+                *(("signal_frozen.speed",) if signal.name in BY_MOTION else ()),
+            ),
+        ),
+        limits=SignalLimits,
+        find=partial(find, signal),
+        is_harmless=partial(is_harmless, signal),
+    )
+
+
+CHECKS = tuple(check(signal) for signal in SIGNALS.values())

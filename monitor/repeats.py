@@ -1,0 +1,128 @@
+"""Does a signal go on saying the same? For how long, and how far the car drove meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from monitor.motion import MOVES_ABOVE_MPS
+from monitor.quick import maker
+from monitor.values import Acceleration, GpsFix, Heading, LaserScan, Odometry, Twist
+
+STEP_AT_MOST_S = 1.0  # between two speeds farther apart the car may have done anything
+MEMORY = 200  # messages: how a signal behaves is told by its last ten seconds in motion, at 20 Hz …
+KNOWN_AFTER = 40  # … and not before two
+WEIGHT_AT_MOST = 20  # repetitions of one stretch that count: one that was frozen does not make a signal sluggish
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repeats:
+    """What the newest message of a signal repeats of those before it; all zero where it says something new."""
+
+    value_n: int = 0  # messages before it in a row with the same value, to the last bit
+    value_s: float = 0.0  # how long the car moved meanwhile, by its wheels
+    value_m: float = 0.0  # how far
+    stamp_n: int = 0  # messages before it in a row with the same stamp
+    stamp_s: float = 0.0  # how long that has lasted
+    liveliness: float | None = None  # share of the messages in motion that said something new; None: too few to tell
+
+
+_repeats = maker(Repeats)
+_NOTHING = Repeats()
+
+
+class Wheels:
+    """How long and how far the car has moved, by the speed of its wheels."""
+
+    __slots__ = ("_at_s", "is_moving", "moved_m", "moved_s")
+
+    def __init__(self) -> None:
+        self.moved_s = self.moved_m = 0.0
+        self.is_moving = False  # by the newest speed
+        self._at_s: float | None = None
+
+    def add(self, at_s: float, speed_mps: float) -> None:
+        speed_mps = abs(speed_mps)
+        self.is_moving = speed_mps > MOVES_ABOVE_MPS  # false for NaN
+        if self.is_moving and self._at_s is not None and 0.0 < at_s - self._at_s <= STEP_AT_MOST_S:
+            self.moved_s += at_s - self._at_s
+            self.moved_m += speed_mps * (at_s - self._at_s)
+        self._at_s = at_s
+
+
+# What of a value would differ from message to message; of types not named here a value may rest as long as it likes.
+_SAID: dict[type, Callable[[Any], Any]] = {
+    Twist: lambda twist: twist.speed_mps,
+    Acceleration: lambda acceleration: acceleration.acceleration_mps2,
+    Heading: lambda heading: heading.heading_deg,
+    GpsFix: lambda fix: (fix.lat_deg, fix.lon_deg),
+    Odometry: lambda odometry: (odometry.x_m, odometry.y_m, odometry.yaw_rad),
+    LaserScan: lambda scan: scan.ranges_m.tobytes(),  # NaN is NaN, and 1081 beams take half a microsecond
+}
+
+
+class RepeatFollower:
+    """Follows the messages of one signal."""
+
+    __slots__ = (
+        "_in_motion",
+        "_known",
+        "_lively",
+        "_said",
+        "_stamp_n",
+        "_stamp_s",
+        "_stamp_since_s",
+        "_value_n",
+        "_way",
+    )
+
+    def __init__(self) -> None:
+        self._lively = 1.0
+        self._known = 0
+        self.restart()
+
+    def restart(self) -> None:
+        """What came before a gap is not repeated by what comes after; how the signal behaves stays known."""
+        self._said: Any = None
+        self._value_n = self._in_motion = self._stamp_n = 0
+        self._way = (0.0, 0.0)  # of the wheels, when the value was new
+        self._stamp_s: float | None = None
+        self._stamp_since_s = 0.0
+
+    def receive(self, value: Any, stamp_s: float | None, at_s: float, wheels: Wheels) -> Repeats | None:
+        """One message; None where nothing of it can be followed."""
+        say = _SAID.get(type(value))
+        if say is None and stamp_s is None:
+            return None
+        if stamp_s is None or stamp_s != self._stamp_s:
+            self._stamp_s, self._stamp_since_s, self._stamp_n = stamp_s, at_s, 0
+        else:
+            self._stamp_n += 1
+        if say is not None:
+            said = say(value)
+            if said != self._said:
+                if wheels.is_moving:
+                    self._learn()
+                self._said, self._value_n, self._in_motion = said, 0, 0
+                self._way = (wheels.moved_s, wheels.moved_m)
+            else:
+                self._value_n += 1
+                self._in_motion += wheels.is_moving
+        if not (self._value_n or self._stamp_n):
+            return _NOTHING
+        moved_s, moved_m = self._way
+        return _repeats(
+            value_n=self._value_n,
+            value_s=wheels.moved_s - moved_s if self._value_n else 0.0,
+            value_m=wheels.moved_m - moved_m if self._value_n else 0.0,
+            stamp_n=self._stamp_n,
+            stamp_s=at_s - self._stamp_since_s if self._stamp_n else 0.0,
+            liveliness=self._lively if self._known >= KNOWN_AFTER else None,
+        )
+
+    def _learn(self) -> None:
+        """A new value ends a stretch of repetitions; both tell how lively the signal is."""
+        for is_new in (*[False] * min(self._in_motion, WEIGHT_AT_MOST), True):
+            self._known += 1
+            self._lively += (float(is_new) - self._lively) / min(self._known, MEMORY)
