@@ -71,6 +71,20 @@ class LocalBus:
     def last_event(self, vehicle: str) -> int:
         return self._journal.last(vehicle)
 
+    def alarms_told(self, vehicle: str) -> list[str]:
+        """The ids of all alarms that any event was ever of."""
+        return self._journal.alarms(vehicle)
+
+    def save_events(self) -> str | None:
+        """Tries again to keep what the disk refused; why events are not kept, as a sentence, or None."""
+        self._journal.save()
+        return self._journal.trouble
+
+    @property
+    def log_complaint(self) -> str | None:
+        """What was wrong with the log when the server started, and was put right."""
+        return self._journal.complaint
+
     def serve(self, vehicle: str, handler: Handler) -> None:
         """From now on `handler` answers what is asked of the vehicle."""
         self._handlers[vehicle] = handler
