@@ -14,6 +14,7 @@ from monitor.gps_watch import GpsFollower, GpsWatch
 from monitor.headings import Headings
 from monitor.link import LinkFacts, Phase
 from monitor.motion import Slope, Standstill
+from monitor.phones import NO_PHONE, Phones, PhoneView, PhoneWord
 from monitor.quick import maker
 from monitor.rates import Rate, RateMeter
 from monitor.repeats import RepeatFollower, Repeats, Wheels
@@ -49,7 +50,7 @@ T_co = TypeVar("T_co", covariant=True)
 
 
 class NotFresh(Exception):
-    """A value is missing or too old to judge by; `short` is the reason in at most 7 letters."""
+    """A value is missing or too old to judge by; `short` is the reason in at most 8 letters."""
 
     def __init__(self, why: str, short: str = "stale") -> None:
         super().__init__(why)
@@ -113,6 +114,7 @@ class Snapshot:
     track: tuple[TrackPoint, ...] = ()  # where the car was, thinned and bounded, oldest first
     track_m: float | None = None  # distance driven since connecting; None: never had a position
     gps: GpsWatch = field(default_factory=GpsWatch)  # what the newest fixes tell of the receiver
+    phone: PhoneView = NO_PHONE  # the operator's phone beside the car
     scan_before: Reading[LaserScan] | None = None  # some 0.4 s before the newest
     distance_before: Reading[Distance] | None = None
     standing_since_s: float | None = None  # when the car came to rest by its wheels; None: it moves, or cannot be told
@@ -247,6 +249,7 @@ class State:
         self._components = Components()
         self._gps_follower = GpsFollower()
         self._gps = GpsWatch()
+        self._phones = Phones()
         self._earlier = {"scan": Earlier(), "distance": Earlier()}
         self._link = LinkFacts()
         self._paused = False
@@ -290,6 +293,11 @@ class State:
         derived = self._derive(signal, reading) if type(value) in _TELLING else None
         return (signal,) if derived is None else (signal, derived)
 
+    def hear_phone(self, word: PhoneWord, now_s: float) -> None:
+        """What an operator's phone says of its own position; judged on the next tick."""
+        self._follow_clock(now_s)
+        self._phones.hear(word, now_s)
+
     def reading(self, signal: str) -> Reading[Any] | None:
         """The newest reading whatever its age, as `Snapshot.get`, without a snapshot."""
         return self._readings.get(signal)
@@ -325,6 +333,7 @@ class State:
             track=self._track.points,
             track_m=self._track.distance_m,
             gps=self._gps,
+            phone=self._phones.view,
             scan_before=self._earlier["scan"].before,
             distance_before=self._earlier["distance"].before,
             standing_since_s=self._standstill.since_s if self._is_fresh("speed", now_s) else None,
@@ -341,6 +350,7 @@ class State:
         if shift_s > -CLOCK_BACK_S:
             return  # a message waited a moment between its arrival and here
         self._latest_s = at_s
+        self._phones = Phones()  # they speak again within seconds
         self._readings = {
             name: replace(reading, received_s=reading.received_s + shift_s) for name, reading in self._readings.items()
         }
@@ -373,6 +383,7 @@ class State:
                 self._track.receive(value, at_s, speed_mps, is_standing)
                 standing_since_s = None if speed_mps is None else self._standstill.since_s
                 self._gps = self._gps_follower.receive(value, at_s, reading.stamp_s, standing_since_s)
+                self._phones.car(value, at_s)
                 heading = self._headings.on_course(
                     self._track.course_deg, speed_mps, yaw_is_fresh=self._is_fresh("odometry", at_s)
                 )

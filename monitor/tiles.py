@@ -20,7 +20,7 @@ class Tile:
     label: str
     verdict: Verdict
     text: str
-    brief: str  # at most 20 letters
+    brief: str  # at most 21 letters
     checks: tuple[str, ...]  # ids
 
 

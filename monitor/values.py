@@ -69,6 +69,18 @@ class GpsFix:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PhoneFix:
+    """What the operator's phone says of its own place, as the W3C Geolocation API has it (WGS84)."""
+
+    lat_deg: float
+    lon_deg: float
+    accuracy_m: float  # radius; see `agreement.phone_sigma_m`
+    alt_m: float | None = None  # above the ellipsoid
+    speed_mps: float | None = None
+    heading_deg: float | None = None  # 0 north, clockwise; None while standing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Odometry:
     """Pose in `frame_id` and forward speed in the body frame."""
 

@@ -1,0 +1,174 @@
+"""Are the operator's phone and the car where both say they are, and do they move as one?
+
+The gate compares the two places at the phone's own time with what the errors of both receivers explain (chi-square,
+99.9 %, `agreement.gate_m`). The tracks of the last minute are correlated, both axes pooled (`agreement.correlate`);
+that says nothing where the car hardly moved, and then nothing is said.
+"""
+
+from __future__ import annotations
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+    threshold,
+    unknown,
+)
+from monitor.phone_words import why_words
+from monitor.phones import FIX_LIVES_S, NO_PHONE
+from monitor.state import Snapshot
+
+FAULTS = 3  # of the newest five comparisons
+DEADBAND = 0.8  # it clears when they are nearer by a fifth
+PAIRS = 20
+SPAN_S = 30.0
+SPREAD_SIGMAS = 3.0  # of the phone: a car that moved less has no track to compare
+
+
+class AgreementLimits(Limits):
+    least_m: float = threshold(
+        10.0,
+        "Phone and car apart",
+        unit="m",
+        low=2.0,
+        high=1000.0,
+        step=1.0,
+        help="And at least what the errors of both receivers explain: 9, 14, 25, 50 m for phones that state 3, 5, 10, "
+        "20 m beside a good receiver in the car.",
+    )
+    least_correlation: float = threshold(
+        0.7,
+        "Correlation of the tracks",
+        unit="r",
+        low=0.0,
+        high=0.95,
+        step=0.05,
+        help="A healthy pair that moves enough to be judged lies above 0.8.",
+    )
+
+
+def _why_not(snapshot: Snapshot, was_active: bool) -> Finding | None:
+    """Why the phone cannot be compared with the car, None where it can."""
+    if snapshot.get("position") is None and "position" not in snapshot.link.published:
+        return absent("Position is not published")
+    view, now_s = snapshot.phone, snapshot.now_s
+    if not view.is_there(now_s):
+        why = "No phone tells its position"
+        return ok(why) if was_active else absent(why, brief="no phone")  # else the alarm would stand for ever
+    if snapshot.need("position").status < 0:
+        return unknown("The car's receiver has no fix", short="no fix")
+    reason = view.why_not(now_s)
+    if reason is not None:
+        words = why_words(reason, view, now_s)
+        return unknown(words.sentence, short=words.short)
+    return None
+
+
+def is_harmless(snapshot: Snapshot, limits: AgreementLimits) -> bool:
+    return snapshot.phone is NO_PHONE
+
+
+def agree(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -> Finding:
+    why_not = _why_not(snapshot, was_active)
+    if why_not is not None:
+        return why_not
+    view = snapshot.phone
+    comparisons = view.comparisons
+    if len(comparisons) < FAULTS:
+        return unknown("Comparing phone and car", short="waiting")
+    age_s = snapshot.now_s - comparisons[-1].at_s
+    if age_s > FIX_LIVES_S:
+        return unknown(f"Phone and car were last compared {age_s:.0f} s ago", short="stale")
+    share = DEADBAND if was_active else 1.0
+    apart = [one for one in comparisons if one.distance_m > share * max(one.gate_m, limits.least_m)]
+    is_fault = len(apart) >= FAULTS
+    newest = apart[-1] if is_fault else comparisons[-1]
+    allowed_m = max(newest.gate_m, limits.least_m)
+    which = f" (one of {view.count} phones)" if view.count > 1 else ""
+    text = f"The phone{which} is {newest.distance_m:.0f} m from the car; {allowed_m:.0f} m are explained"
+    measured = Quantity(label="Apart", value=newest.distance_m, unit="m")
+    limit = Quantity(label="Explained", value=allowed_m, unit="m")
+    if is_fault:
+        return fault(
+            text, brief=f"{newest.distance_m:.0f} m", measured=measured, limit=limit, causes=("phone", "position")
+        )
+    return ok(text, measured=measured, limit=limit)
+
+
+def move_as_one(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -> Finding:
+    why_not = _why_not(snapshot, was_active)
+    if why_not is not None:
+        return why_not
+    tracks = snapshot.phone.tracks
+    if tracks is None or tracks.pairs < PAIRS or tracks.span_s < SPAN_S:
+        pairs = 0 if tracks is None else tracks.pairs
+        return unknown(
+            f"Taking both tracks: {pairs} places so far, {PAIRS} within {SPAN_S:.0f} s are needed", short="waiting"
+        )
+    needed_m = SPREAD_SIGMAS * tracks.phone_sigma_m
+    if tracks.car_spread_m <= needed_m:
+        return unknown(
+            f"Standing: the car's track spreads {tracks.car_spread_m:.1f} m, {needed_m:.1f} m would tell",
+            short="standing",
+        )
+    r = 0.0 if tracks.correlation is None else tracks.correlation  # a phone that never moved moves with nothing
+    text = f"The tracks correlate with {r:.2f}; {limits.least_correlation:.2f} is the least"
+    measured = Quantity(label="Correlation", value=r, unit="r")
+    limit = Quantity(label="At least", value=limits.least_correlation, unit="r")
+    if r < limits.least_correlation + (0.05 if was_active else 0.0):
+        return fault(text, brief=f"r {r:.2f}", measured=measured, limit=limit, causes=("phone", "position"))
+    return ok(text, measured=measured, limit=limit)
+
+
+CHECKS = (
+    Check(
+        id="phone_car",
+        label="Phone–car",
+        order=52,
+        alarm=AlarmSpec(
+            title="Phone and car disagree",
+            priority=Priority.WARNING,
+            place=Place.DIALOG,
+            sound=Sound.MEDIUM,
+            needs_ack=True,
+            off_delay_s=5.0,
+            actions=(Action.ACKNOWLEDGE,),
+            advice="Where phone and car are together, do not trust the car's position.",
+            inhibited_by=("gps_jump", "gps_drift"),
+            place_after=Place.LIST,
+        ),
+        limits=AgreementLimits,
+        find=agree,
+        is_harmless=is_harmless,
+    ),
+    Check(
+        id="phone_tracks",
+        label="Tracks",
+        order=54,
+        group="phone_car",
+        alarm=AlarmSpec(
+            title="Tracks do not correlate",
+            priority=Priority.ADVISORY,
+            place=Place.SNACKBAR,
+            sound=Sound.LOW,
+            needs_ack=False,
+            on_delay_s=3.0,
+            off_delay_s=5.0,
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="The phone does not move as the car does: see whether it is in the car.",
+            inhibited_by=("phone_car",),
+        ),
+        limits=AgreementLimits,
+        find=move_as_one,
+        is_harmless=is_harmless,
+    ),
+)

@@ -1,0 +1,86 @@
+"""Has the operator's phone a position, and if not, why?
+
+Only a page that is there is asked for one. A computer on a desk has no receiver and is not blamed for it, unless
+somebody refused it the permission; a page that said farewell, or was not heard for a minute, is no phone any more.
+"""
+
+from __future__ import annotations
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+    threshold,
+    unknown,
+)
+from monitor.phone_words import why_words
+from monitor.phones import NO_PHONE
+from monitor.state import Snapshot
+
+
+class MissingLimits(Limits):
+    after_s: float = threshold(10.0, "Missing phone position is said after", unit="s", low=2.0, high=300.0, step=1.0)
+
+
+def find(snapshot: Snapshot, limits: MissingLimits, was_active: bool) -> Finding:
+    view, now_s = snapshot.phone, snapshot.now_s
+    if not view.is_there(now_s):
+        return _none("No phone tells its position", was_active)
+    if snapshot.get("position") is None and "position" not in snapshot.link.published:
+        return _none("The car publishes no position to compare with", was_active)
+    why = view.why_not(now_s)
+    if why is None:
+        radius_m = view.fix.accuracy_m if view.fix is not None else 0.0
+        return ok(f"The phone knows its position to {radius_m:.0f} m")
+    if not view.is_handheld and why != "denied":
+        return _none("This is no phone: no position is expected of it", was_active)
+    words, missing_s = why_words(why, view, now_s), view.missing_s(now_s)
+    if missing_s < limits.after_s and not was_active:
+        return unknown(words.sentence, short=words.short)
+    return fault(
+        f"{words.sentence}; none for {missing_s:.0f} s",
+        brief=words.brief,
+        measured=Quantity(label="Missing for", value=missing_s, unit="s"),
+        limit=Quantity(label="Said after", value=limits.after_s, unit="s"),
+        causes=("permission" if why in ("denied", "insecure") else "phone",),
+    )
+
+
+def _none(why: str, was_active: bool) -> Finding:
+    return ok(why) if was_active else absent(why, brief="no phone")  # else the alarm would stand for ever
+
+
+def is_harmless(snapshot: Snapshot, limits: MissingLimits) -> bool:
+    return snapshot.phone is NO_PHONE
+
+
+CHECKS = (
+    Check(
+        id="phone_missing",
+        label="Phone position",
+        tile="Phone–car",
+        order=53,
+        alarm=AlarmSpec(
+            title="Phone position missing",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.LOW,
+            needs_ack=False,
+            off_delay_s=2.0,
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="Allow this page the location and keep it open: without it nobody checks the car's position.",
+        ),
+        limits=MissingLimits,
+        find=find,
+        is_harmless=is_harmless,
+    ),
+)

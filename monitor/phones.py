@@ -1,0 +1,227 @@
+"""The phones that tell where they are, which of them is compared with the car, and what the comparisons gave.
+
+Several pages may tell a position; one is compared. Until phones have roles the rule is: the first that told a position
+which can be used stays the one for as long as it has one, and for 10 s more; then the next in the order in which they
+came takes over. The car is looked up at the phone's own time, so nothing here depends on how often either speaks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Literal
+
+from monitor.agreement import Pair, Tracks, correlate, gate_m, phone_sigma_m
+from monitor.geo import offset_m
+from monitor.trail import Trail
+from monitor.values import GpsFix, PhoneFix
+
+WORST_ACCURACY_M = 50.0  # a worse one comes from masts and access points
+FIX_LIVES_S = 5.0  # phones tell their position about once a second
+UNCERTAIN_AT_MOST_S = 1.0  # of the moment of a fix: a message that hung in the radio says nothing of now
+SILENT_AFTER_S = 5.0  # a page speaks at least every 3 s, be it to say why it has no position
+HOLD_S = 10.0
+FORGOTTEN_AFTER_S = 60.0
+MOST = 32
+UNCERTAIN_S = 0.3  # beside that: the phone's own delay, and what a radio bunches of the car's positions
+COMPARISONS = 5
+COMPARED_WITHIN_S = 15.0
+TRACK_S = 60.0
+MOST_PAIRS = 256  # of a phone that tells its position four times a second
+
+Why = Literal["denied", "unavailable", "timeout", "insecure", "hidden", "off", "coarse", "old", "late", "silent"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PhoneWord:
+    """What one phone said: where it is, or why it cannot tell. Times are on the receiver's monotonic clock."""
+
+    phone: str  # its own name for itself, the same over reconnections
+    is_handheld: bool  # not a computer on a desk, of which no GPS is expected
+    fix: PhoneFix | None = None
+    measured_s: float = 0.0  # when it was there …
+    uncertain_s: float = 0.0  # … give or take
+    why: Why | None = None  # without a fix; "off": it leaves
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Phone and car at one moment."""
+
+    at_s: float
+    distance_m: float
+    gate_m: float  # what the errors of both explain in this direction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PhoneView:
+    """The phone that is compared, at one moment."""
+
+    phone: str | None = None  # None: none has spoken
+    count: int = 0  # phones heard within the last minute
+    is_handheld: bool = False
+    heard_s: float = -math.inf
+    usable_s: float = -math.inf  # the moment of its newest usable fix; before there is one, when it first spoke
+    fix: PhoneFix | None = None  # the newest, usable or not
+    measured_s: float = -math.inf
+    why: Why | None = None  # why its newest word is no usable fix
+    comparisons: tuple[Comparison, ...] = ()  # the newest five, oldest first
+    tracks: Tracks | None = None  # over the last minute
+
+    def is_there(self, now_s: float) -> bool:
+        """Whether a phone is to be compared at all; one that left, or was not heard for a minute, is not."""
+        return self.phone is not None and now_s - self.heard_s <= FORGOTTEN_AFTER_S
+
+    def why_not(self, now_s: float) -> Why | None:
+        """Why this phone has no position that can be used now; None where it has."""
+        if now_s - self.heard_s > SILENT_AFTER_S:
+            return "silent"
+        if self.why is not None:
+            return self.why
+        return "old" if now_s - self.measured_s > FIX_LIVES_S else None
+
+    def missing_s(self, now_s: float) -> float:
+        """For how long there has been no usable position [s]."""
+        return max(0.0, now_s - self.usable_s)
+
+
+NO_PHONE = PhoneView()
+
+
+@dataclass(slots=True, kw_only=True)
+class _Phone:
+    """One phone, as last heard."""
+
+    name: str
+    usable_s: float
+    is_handheld: bool = True
+    heard_s: float = -math.inf
+    fix: PhoneFix | None = None
+    measured_s: float = -math.inf
+    why: Why | None = None
+    was_usable: bool = False  # ever
+
+
+class Phones:
+    """Hears the phones and the car's positions; `view` is what the checks judge by."""
+
+    def __init__(self) -> None:
+        self.view = NO_PHONE
+        self._phones: dict[str, _Phone] = {}  # in the order in which they came
+        self._chosen: str | None = None
+        self._trail = Trail()
+        self._waiting: PhoneWord | None = None  # the chosen phone's fix, until the car's next position comes
+        self._comparisons: deque[Comparison] = deque(maxlen=COMPARISONS)
+        self._pairs: deque[Pair] = deque(maxlen=MOST_PAIRS)
+
+    def hear(self, word: PhoneWord, now_s: float) -> None:
+        """One word of one phone."""
+        self._phones = {n: p for n, p in self._phones.items() if now_s - p.heard_s <= FORGOTTEN_AFTER_S}
+        if word.why == "off":
+            self._phones.pop(word.phone, None)
+        elif word.phone in self._phones or len(self._phones) < MOST:
+            self._note(word, now_s)
+        self._choose(now_s)
+        if word.phone == self._chosen and word.fix is not None and self._phones[word.phone].why is None:
+            if not self._pairs or word.measured_s > self._pairs[-1].at_s:  # else it was told before
+                self._waiting = word
+                self._compare()
+        self._look()
+
+    def car(self, fix: GpsFix, at_s: float) -> None:
+        """One position of the car."""
+        self._trail.add(fix, at_s)
+        if self._waiting is not None and self._compare():
+            self._look()
+
+    def _note(self, word: PhoneWord, now_s: float) -> None:
+        phone = self._phones.get(word.phone)
+        if phone is None:
+            phone = self._phones[word.phone] = _Phone(name=word.phone, usable_s=now_s)
+        phone.heard_s, phone.is_handheld, phone.why = now_s, word.is_handheld, word.why
+        if word.fix is None:
+            return
+        phone.fix, phone.measured_s = word.fix, word.measured_s
+        phone.why = _why_not_usable(word.fix, now_s - word.measured_s, word.uncertain_s)
+        if phone.why is None:
+            phone.usable_s, phone.was_usable = word.measured_s, True
+
+    def _choose(self, now_s: float) -> None:
+        chosen = self._phones.get(self._chosen or "")
+        if chosen is not None and chosen.was_usable and now_s - chosen.usable_s <= HOLD_S:
+            return
+        found = next(
+            (p for p in self._phones.values() if p.was_usable and p.why is None and now_s - p.usable_s <= FIX_LIVES_S),
+            None,
+        )
+        if found is None:  # none can be compared: told of is the one that ought to be
+            rest = sorted(self._phones.values(), key=lambda p: (not p.is_handheld, p.name != self._chosen))
+            found = rest[0] if rest else None
+        name = None if found is None else found.name
+        if name != self._chosen:
+            self._chosen, self._waiting = name, None
+            self._comparisons.clear()
+            self._pairs.clear()
+
+    def _compare(self) -> bool:
+        """Compares the fix that waits, if the car's positions have reached its moment; whether it was."""
+        word = self._waiting
+        if word is None or word.fix is None or self._trail.newest_s < word.measured_s:
+            return False
+        self._waiting = None
+        place = self._trail.at(word.measured_s)
+        if place is None:
+            return False
+        fix, at_s, sigma_m = word.fix, word.measured_s, phone_sigma_m(word.fix.accuracy_m)
+        east_m, north_m = offset_m(place.lat_deg, place.lon_deg, fix.lat_deg, fix.lon_deg)
+        gate = gate_m(
+            east_m,
+            north_m,
+            car_sigma_m=place.sigma_m,
+            phone_sigma_m=sigma_m,
+            velocity_mps=place.velocity_mps,
+            uncertain_s=UNCERTAIN_S + word.uncertain_s,
+        )
+        self._comparisons.append(Comparison(at_s=at_s, distance_m=math.hypot(east_m, north_m), gate_m=gate))
+        while self._comparisons[0].at_s < at_s - COMPARED_WITHIN_S:
+            self._comparisons.popleft()
+        self._pairs.append(
+            Pair(
+                at_s=at_s,
+                phone_lat_deg=fix.lat_deg,
+                phone_lon_deg=fix.lon_deg,
+                phone_sigma_m=sigma_m,
+                car_lat_deg=place.lat_deg,
+                car_lon_deg=place.lon_deg,
+            )
+        )
+        while self._pairs[0].at_s < at_s - TRACK_S:
+            self._pairs.popleft()
+        return True
+
+    def _look(self) -> None:
+        phone = self._phones.get(self._chosen or "")
+        if phone is None:
+            self.view = NO_PHONE
+            return
+        self.view = PhoneView(
+            phone=phone.name,
+            count=len(self._phones),
+            is_handheld=phone.is_handheld,
+            heard_s=phone.heard_s,
+            usable_s=phone.usable_s,
+            fix=phone.fix,
+            measured_s=phone.measured_s,
+            why=phone.why,
+            comparisons=tuple(self._comparisons),
+            tracks=correlate(self._pairs) if self._pairs else None,
+        )
+
+
+def _why_not_usable(fix: PhoneFix, age_s: float, uncertain_s: float) -> Why | None:
+    if uncertain_s > UNCERTAIN_AT_MOST_S:
+        return "late"
+    if age_s > FIX_LIVES_S:
+        return "old"
+    return None if fix.accuracy_m <= WORST_ACCURACY_M else "coarse"
