@@ -248,6 +248,7 @@ class _Run:
             connected_s=self._opened_s,
             last_message_s=self._last_message_s,
             published=self._published,
+            wall_zero_s=self._recording.start_s,
         )
 
     def _sample(self, now_s: float) -> None:

@@ -12,11 +12,9 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from server.simulator.fields import EFFORT_PATHS, SPEED_PATHS, changed, number_at, with_fields, with_number
 from server.simulator.place import metres_per_degree
 from server.source import Message
-
-_SPEED_PATHS = (("linear", "x"), ("twist", "linear", "x"), ("twist", "twist", "linear", "x"), ("data",))
-_EFFORT_PATHS = (("force", "x"), ("data",))
 
 
 class Effect:
@@ -49,18 +47,18 @@ class Silence(Effect):
 
 
 class SlowRate(Effect):
-    """Of one signal only every second message comes."""
+    """Of the signals named, or of every topic, only every second message comes."""
 
-    def __init__(self, signal: str) -> None:
+    def __init__(self, *signals: str) -> None:
         super().__init__()
-        self._signal = signal
-        self._skips = False
+        self._signals = frozenset(signals)
+        self._skips: dict[str, bool] = {}  # by topic
 
     def apply(self, message: Message, signal: str | None) -> Sequence[Message]:
-        if signal != self._signal:
+        if self._signals and signal not in self._signals:
             return (message,)
-        self._skips = not self._skips
-        return () if self._skips else (message,)
+        skips = self._skips[message.topic] = not self._skips.get(message.topic, False)
+        return () if skips else (message,)
 
 
 class Speeding(Effect):
@@ -79,7 +77,7 @@ class Speeding(Effect):
         return self.is_ending and self._extra_mps == 0.0
 
     def apply(self, message: Message, signal: str | None) -> Sequence[Message]:
-        speed_mps = _number_at(message, _SPEED_PATHS) if signal == "speed" else None
+        speed_mps = number_at(message, SPEED_PATHS) if signal == "speed" else None
         if speed_mps is None:
             return (message,)
         passed_s = 0.0 if self._before_s is None else max(0.0, message.at_s - self._before_s)
@@ -87,7 +85,7 @@ class Speeding(Effect):
         wanted_mps = 0.0 if self.is_ending else max(0.0, self.REACHED_MPS - speed_mps)
         step = self.CLIMB_MPS2 * passed_s
         self._extra_mps += min(step, max(-step, wanted_mps - self._extra_mps))
-        return (_with_number(message, _SPEED_PATHS, speed_mps + self._extra_mps),)
+        return (with_number(message, SPEED_PATHS, speed_mps + self._extra_mps),)
 
 
 class FrozenSpeed(Effect):
@@ -102,10 +100,27 @@ class FrozenSpeed(Effect):
         if signal != "speed":
             return (message,)
         if self._frozen is None:
-            if (_number_at(message, _SPEED_PATHS) or 0.0) > self._above_mps:
+            if (number_at(message, SPEED_PATHS) or 0.0) > self._above_mps:
                 self._frozen = message.message
             return (message,)
-        return (_with(message, self._frozen),)
+        return (with_fields(message, self._frozen),)
+
+
+class IgnoredCommand(Effect):
+    """Whoever drives orders a stop while the car is in motion; the car does what it would have done anyway."""
+
+    ABOVE_MPS = 2.0
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._speed_mps = 0.0
+
+    def apply(self, message: Message, signal: str | None) -> Sequence[Message]:
+        if signal == "speed":
+            self._speed_mps = abs(number_at(message, SPEED_PATHS) or 0.0)
+        if signal != "command" or self._speed_mps < self.ABOVE_MPS:
+            return (message,)
+        return (with_number(message, SPEED_PATHS, 0.0),)
 
 
 class BothPedals(Effect):
@@ -117,8 +132,8 @@ class BothPedals(Effect):
         least = self.PERCENT.get(signal or "")
         if least is None:
             return (message,)
-        percent = max(least, _number_at(message, _EFFORT_PATHS) or 0.0)
-        return (_with_number(message, _EFFORT_PATHS, percent),)
+        percent = max(least, number_at(message, EFFORT_PATHS) or 0.0)
+        return (with_number(message, EFFORT_PATHS, percent),)
 
 
 class GpsOffset(Effect):
@@ -167,7 +182,7 @@ class GpsOffset(Effect):
         return (message,)
 
     def _heed_speed(self, message: Message) -> None:
-        speed_mps = _number_at(message, _SPEED_PATHS)
+        speed_mps = number_at(message, SPEED_PATHS)
         if speed_mps is None:
             return
         self._speed_mps = abs(speed_mps)
@@ -196,12 +211,12 @@ class GpsOffset(Effect):
                 return self._stood_since_s is not None and now_s - self._stood_since_s >= self._after_s
 
     def _moved_fix(self, message: Message) -> Message:
-        lat_deg = _number_at(message, (("latitude",),))
-        lon_deg = _number_at(message, (("longitude",),))
+        lat_deg = number_at(message, (("latitude",),))
+        lon_deg = number_at(message, (("longitude",),))
         if lat_deg is None or lon_deg is None or self._offset_m == 0.0:
             return message
         east_m, north_m = metres_per_degree(lat_deg)
-        return _with(
+        return with_fields(
             message,
             {
                 **message.message,
@@ -212,11 +227,11 @@ class GpsOffset(Effect):
 
     def _moved_odometry(self, message: Message) -> Message:
         x_path, y_path = ("pose", "pose", "position", "x"), ("pose", "pose", "position", "y")
-        x, y = _number_at(message, (x_path,)), _number_at(message, (y_path,))
+        x, y = number_at(message, (x_path,)), number_at(message, (y_path,))
         if x is None or y is None or self._offset_m == 0.0:
             return message
-        moved = _changed(message.message, x_path, x + self.EAST * self._offset_m)
-        return _with(message, _changed(moved, y_path, y + self.NORTH * self._offset_m))
+        moved = changed(message.message, x_path, x + self.EAST * self._offset_m)
+        return with_fields(message, changed(moved, y_path, y + self.NORTH * self._offset_m))
 
 
 class BlindLaser(Effect):
@@ -233,14 +248,14 @@ class BlindLaser(Effect):
                 ranges = message.message.get("ranges")
                 if ranges is None:
                     return (message,)
-                self._range_max_m = _number_at(message, (("range_max",),)) or self._range_max_m
-                self._angle_min_rad = _number_at(message, (("angle_min",),)) or self._angle_min_rad
+                self._range_max_m = number_at(message, (("range_max",),)) or self._range_max_m
+                self._angle_min_rad = number_at(message, (("angle_min",),)) or self._angle_min_rad
                 nothing = np.full(len(ranges), np.inf, dtype=np.float32)
-                return (_with(message, {**message.message, "ranges": nothing}),)
+                return (with_fields(message, {**message.message, "ranges": nothing}),)
             case "distance":
-                return (_with(message, {**message.message, "data": self._range_max_m}),)
+                return (with_fields(message, {**message.message, "data": self._range_max_m}),)
             case "bearing":
-                return (_with(message, {**message.message, "data": self._angle_min_rad}),)
+                return (with_fields(message, {**message.message, "data": self._angle_min_rad}),)
         return (message,)
 
 
@@ -255,16 +270,16 @@ class ObstacleAhead(Effect):
             case "scan":
                 return (self._hidden_behind(message),)
             case "distance":
-                distance_m = _number_at(message, (("data",),))
+                distance_m = number_at(message, (("data",),))
                 nearer = self.AHEAD_M if distance_m is None else min(self.AHEAD_M, distance_m)
-                return (_with(message, {**message.message, "data": nearer}),)
+                return (with_fields(message, {**message.message, "data": nearer}),)
             case "bearing":
-                return (_with(message, {**message.message, "data": 0.0}),)
+                return (with_fields(message, {**message.message, "data": 0.0}),)
         return (message,)
 
     def _hidden_behind(self, message: Message) -> Message:
         given = message.message.get("ranges")
-        first, increment = (_number_at(message, ((name,),)) for name in ("angle_min", "angle_increment"))
+        first, increment = (number_at(message, ((name,),)) for name in ("angle_min", "angle_increment"))
         if given is None or first is None or increment is None:
             return message
         ranges = np.array(given, dtype=np.float32)  # null becomes NaN
@@ -272,13 +287,15 @@ class ObstacleAhead(Effect):
         hit = np.abs(angles) < math.atan2(self.HALF_WIDTH_M, self.AHEAD_M)
         face = (self.AHEAD_M / np.cos(angles[hit])).astype(np.float32)
         ranges[hit] = np.fmin(face, ranges[hit])
-        return _with(message, {**message.message, "ranges": ranges})
+        return with_fields(message, {**message.message, "ranges": ranges})
 
 
-class ComponentError(Effect):
-    """One component of the diagnostics reports an error: the first that is there, or one of its own."""
+class ComponentReport(Effect):
+    """One component of the diagnostics reports a level of badness: the first that is there, or one of its own."""
 
-    MESSAGE = "No data from the device for 2.0 s"
+    def __init__(self, level: int, text: str) -> None:
+        super().__init__()
+        self._report = {"level": level, "message": text}
 
     def apply(self, message: Message, signal: str | None) -> Sequence[Message]:
         if signal != "diagnostics":
@@ -287,40 +304,5 @@ class ComponentError(Effect):
         rows = [dict(row) for row in given if isinstance(row, Mapping)] if isinstance(given, list | tuple) else []
         if not rows:
             rows = [{"name": "by-wire: brake", "hardware_id": "", "values": []}]
-        rows[0].update(level=2, message=self.MESSAGE)
-        return (_with(message, {**message.message, "status": rows}),)
-
-
-def _with(message: Message, fields: Mapping[str, Any]) -> Message:
-    return Message(at_s=message.at_s, topic=message.topic, type=message.type, message=fields)
-
-
-def _with_number(message: Message, paths: Sequence[tuple[str, ...]], value: float) -> Message:
-    """The message with the number changed at the first of the paths that it has."""
-    for path in paths:
-        if _found(message.message, path) is not None:
-            return _with(message, _changed(message.message, path, value))
-    return message
-
-
-def _number_at(message: Message, paths: Sequence[tuple[str, ...]]) -> float | None:
-    """The finite number at the first of the paths that the message has; None where there is none."""
-    for path in paths:
-        value = _found(message.message, path)
-        if isinstance(value, int | float | np.number) and not isinstance(value, bool):
-            return float(value) if math.isfinite(value) else None
-    return None
-
-
-def _found(fields: Any, path: tuple[str, ...]) -> Any:
-    for name in path:
-        if not isinstance(fields, Mapping) or name not in fields:
-            return None
-        fields = fields[name]
-    return fields
-
-
-def _changed(fields: Mapping[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
-    """A copy with one inner value changed; what lies beside the path is shared with the original."""
-    name, *rest = path
-    return {**fields, name: _changed(fields[name], tuple(rest), value) if rest else value}
+        rows[0].update(self._report)
+        return (with_fields(message, {**message.message, "status": rows}),)

@@ -11,15 +11,18 @@ from server.simulator.driver import Order
 from server.simulator.effects import (
     BlindLaser,
     BothPedals,
-    ComponentError,
+    ComponentReport,
     Effect,
     FrozenSpeed,
     GpsOffset,
+    IgnoredCommand,
     ObstacleAhead,
     Silence,
     SlowRate,
     Speeding,
 )
+from server.simulator.other_clock import OtherClock
+from server.simulator.sensor_faults import CutScan, FrozenPosition, FrozenScan, NearObject, NoFix
 from server.source import Message
 
 BridgeFault = Literal["freeze", "kill"]
@@ -32,7 +35,8 @@ class Scenario:
     """A fault on demand.
 
     `effect` works on the messages of any source. `order` is what the simulated car's driver does meanwhile; where
-    `order_suffices` the simulated car shows the fault by its own motion and the effect is left to recordings.
+    `order_suffices` the simulated car shows the fault by its own motion and the effect, if there is one, is left to
+    recordings.
     """
 
     name: str
@@ -64,6 +68,29 @@ _SCENARIOS = (
         consequences=("nearest object",),
         effect=ObstacleAhead,
         order=Order.YIELD,
+        order_suffices=True,
+    ),
+    Scenario(
+        name="near-object",
+        sentence="The distance estimator tells of an object 3.5 m ahead; the laser sees none.",
+        duration_s=5.0,
+        alarm="nearest object",
+        effect=NearObject,
+    ),
+    Scenario(
+        name="command-ignored",
+        sentence="Whoever drives orders a stop, and the car drives on as if nothing had been said.",
+        duration_s=6.0,
+        alarm="command without response",
+        effect=IgnoredCommand,
+        order=Order.STEADY,
+    ),
+    Scenario(
+        name="standing",
+        sentence="The car stops on its way and stands there.",
+        duration_s=20.0,  # down to standstill, and ten seconds until that is told
+        alarm="vehicle not moving",
+        order=Order.STAND,
         order_suffices=True,
     ),
     Scenario(
@@ -109,6 +136,13 @@ _SCENARIOS = (
         effect=lambda: Silence("position"),
     ),
     Scenario(
+        name="no-fix",
+        sentence="The receiver loses its satellites and says so; its coordinates go on.",
+        duration_s=10.0,
+        alarm="GPS no fix",
+        effect=NoFix,
+    ),
+    Scenario(
         name="silent-scan",
         sentence="No laser scan comes any more; all else goes on.",
         duration_s=10.0,
@@ -133,6 +167,30 @@ _SCENARIOS = (
         order=Order.STEADY,  # faster than the frozen speed, the true way would look like a GPS jump
     ),
     Scenario(
+        name="short-scan",
+        sentence="Each scan lacks ten of the beams that its own angles promise.",
+        duration_s=6.0,
+        alarm="scan inconsistent",
+        effect=CutScan,
+    ),
+    Scenario(
+        name="frozen-position",
+        sentence="The car drives on, but its positions repeat one place, with new stamps.",
+        duration_s=10.0,
+        alarm="signal frozen: position",
+        consequences=("phone and car disagree",),
+        effect=FrozenPosition,
+    ),
+    Scenario(
+        name="frozen-scan",
+        sentence="The laser sends one scan again and again, its old stamp included.",
+        duration_s=8.0,
+        alarm="signal frozen: scan",
+        consequences=("obstacle in corridor",),
+        effect=FrozenScan,
+        order=Order.STEADY,  # faster, and the way seen free would be too short
+    ),
+    Scenario(
         name="slow-rate",
         sentence="Speed comes 10 times a second instead of 20.",
         duration_s=15.0,
@@ -140,11 +198,39 @@ _SCENARIOS = (
         effect=lambda: SlowRate("speed"),
     ),
     Scenario(
+        name="all-slow",
+        sentence="Of all topics only every second message comes, as over an overloaded radio.",
+        duration_s=15.0,
+        alarm="all signals slow",
+        effect=SlowRate,
+    ),
+    Scenario(
+        name="clock-jump",
+        sentence="The car's clock is set back by half a minute, and right again after some seconds.",
+        duration_s=5.0,
+        alarm="clock jump",
+        effect=lambda: OtherClock(step_s=-30.0),
+    ),
+    Scenario(
+        name="clock-slow",
+        sentence="The car's clock loses a second every four, up to 4 s, as if messages came ever later.",
+        duration_s=20.0,
+        alarm="stamp offset",
+        effect=lambda: OtherClock(pace=-0.25, most_s=4.0),
+    ),
+    Scenario(
         name="diagnostics-error",
         sentence="One component of the car reports an error.",
         duration_s=10.0,
         alarm="/diagnostics ERROR",
-        effect=ComponentError,
+        effect=lambda: ComponentReport(2, "No data from the device for 2.0 s"),
+    ),
+    Scenario(
+        name="diagnostics-warning",
+        sentence="One component of the car reports a warning.",
+        duration_s=10.0,
+        alarm="/diagnostics WARN",
+        effect=lambda: ComponentReport(1, "Temperature high"),
     ),
     Scenario(
         name="all-silent",

@@ -12,22 +12,37 @@ import pytest
 from server.simulator.effects import (
     BlindLaser,
     BothPedals,
-    ComponentError,
+    ComponentReport,
     Effect,
     FrozenSpeed,
     GpsOffset,
+    IgnoredCommand,
     ObstacleAhead,
     Silence,
     SlowRate,
     Speeding,
 )
+from server.simulator.other_clock import OtherClock
 from server.simulator.scenarios import SCENARIOS, inject, planned
+from server.simulator.sensor_faults import CutScan, FrozenPosition, FrozenScan, NearObject, NoFix
 from server.source import Message
 
 EVERY_EFFECT: list[Callable[[], Effect]] = [
     scenario.effect for scenario in SCENARIOS.values() if scenario.effect is not None
 ]
-SIGNALS = ("speed", "brake", "accelerator", "position", "odometry", "scan", "distance", "bearing", "diagnostics", None)
+SIGNALS = (
+    "speed",
+    "brake",
+    "accelerator",
+    "position",
+    "odometry",
+    "scan",
+    "distance",
+    "bearing",
+    "diagnostics",
+    "command",
+    None,
+)
 
 SPEED_SHAPES: list[Callable[[float], dict[str, Any]]] = [
     lambda speed: {"linear": {"x": speed, "y": 0.0, "z": 0.0}, "angular": {"z": 0.3}},
@@ -237,7 +252,7 @@ def test_an_obstacle_hides_what_is_behind_it_and_nothing_else(sign: int) -> None
 
 def test_a_component_error_leaves_the_other_components() -> None:
     given = {"status": [{"level": 0, "name": "a", "message": "fine"}, {"level": 1, "name": "b", "message": "so so"}]}
-    rows = apply(ComponentError(), "diagnostics", given)["status"]
+    rows = apply(ComponentReport(2, "No data"), "diagnostics", given)["status"]
     assert [row["level"] for row in rows] == [2, 1]
     assert rows[0]["name"] == "a"
     assert rows[0]["message"] != "fine"
@@ -245,7 +260,7 @@ def test_a_component_error_leaves_the_other_components() -> None:
 
 
 def test_a_component_error_where_there_is_no_component() -> None:
-    rows = apply(ComponentError(), "diagnostics", {"status": []})["status"]
+    rows = apply(ComponentReport(2, "No data"), "diagnostics", {"status": []})["status"]
     assert [row["level"] for row in rows] == [2]
 
 
@@ -274,3 +289,92 @@ def test_faults_are_laid_over_any_messages_for_their_time() -> None:
 def test_no_fault_changes_nothing() -> None:
     stream = [message({"data": 1.0}, tick / 10) for tick in range(20)]
     assert list(inject(stream, (), lambda message: "speed")) == stream
+
+
+def stamped(stamp: dict[str, Any], **fields: Any) -> dict[str, Any]:
+    return {"header": {"seq": 7, "stamp": stamp, "frame_id": "/odom"}, **fields}
+
+
+@pytest.mark.parametrize(
+    ("given", "moved"),
+    [
+        ({"secs": 1000, "nsecs": 250_000_000}, {"secs": 970, "nsecs": 250_000_000}),
+        ({"sec": 1000, "nanosec": 0}, {"sec": 970, "nanosec": 0}),
+        ({"secs": 0, "nsecs": 0}, {"secs": 0, "nsecs": 0}),
+        ({"secs": None, "nsecs": 0}, {"secs": None, "nsecs": 0}),
+        ({}, {}),
+    ],
+    ids=["ROS 1", "ROS 2", "not given", "null", "empty"],
+)
+def test_a_clock_set_back_moves_the_stamps_that_are_given(given: dict[str, Any], moved: dict[str, Any]) -> None:
+    effect = OtherClock(step_s=-30.0)
+    made = apply(effect, "position", stamped(given, latitude=1.0))
+    assert (made["header"]["stamp"], made["header"]["frame_id"], made["latitude"]) == (moved, "/odom", 1.0)
+    effect.end()
+    assert effect.is_over
+
+
+def test_a_slow_clock_falls_behind_to_its_most_and_comes_back_as_slowly() -> None:
+    effect = OtherClock(pace=-0.25, most_s=4.0)
+
+    def behind_s(at_s: float) -> float:
+        stamp = apply(effect, None, stamped({"secs": 1000, "nsecs": 0}), at_s)["header"]["stamp"]
+        return float(1000 - stamp["secs"] - stamp["nsecs"] * 1e-9)
+
+    assert behind_s(0.0) == 0.0
+    assert behind_s(8.0) == pytest.approx(2.0)
+    assert behind_s(30.0) == pytest.approx(4.0)
+    effect.end()
+    assert not effect.is_over
+    assert behind_s(38.0) == pytest.approx(2.0)
+    assert behind_s(50.0) == 0.0
+    assert effect.is_over
+
+
+def test_a_frozen_position_keeps_its_place_and_not_its_stamps() -> None:
+    effect = FrozenPosition()
+    first = apply(effect, "position", stamped({"secs": 1, "nsecs": 0}, **fix(32.0, -110.0)))
+    later = apply(effect, "position", stamped({"secs": 2, "nsecs": 0}, **fix(32.1, -110.1)))
+    assert (later["latitude"], later["longitude"]) == (first["latitude"], first["longitude"]) == (32.0, -110.0)
+    assert later["header"]["stamp"]["secs"] == 2
+    assert apply(effect, "odometry", {"data": 5.0}) == {"data": 5.0}
+
+
+def test_a_frozen_scan_repeats_all_of_the_first() -> None:
+    effect = FrozenScan()
+    first = apply(effect, "scan", stamped({"secs": 1, "nsecs": 0}, ranges=[1.0, None]))
+    assert apply(effect, "scan", stamped({"secs": 2, "nsecs": 0}, ranges=[2.0, 3.0])) == first
+
+
+@pytest.mark.parametrize("ranges", [[1.0] * 181, np.ones(181, dtype=np.float32)], ids=["list", "array"])
+def test_a_short_scan_lacks_beams_and_keeps_its_angles(ranges: Any) -> None:
+    made = apply(CutScan(), "scan", {"angle_min": -1.5, "ranges": ranges})
+    assert (len(made["ranges"]), made["angle_min"]) == (171, -1.5)
+
+
+def test_without_a_fix_the_coordinates_go_on() -> None:
+    made = apply(NoFix(), "position", {"status": {"status": 0, "service": 1}, **fix(32.0, -110.0)})
+    assert (made["status"]["status"], made["latitude"]) == (-1, 32.0)
+
+
+def test_an_object_that_only_the_estimator_sees() -> None:
+    effect = NearObject()
+    assert apply(effect, "distance", {"data": 81.0}) == {"data": NearObject.AHEAD_M}
+    assert apply(effect, "bearing", {"data": -1.5}) == {"data": 0.0}
+    assert apply(effect, "scan", {"ranges": [5.0]}) == {"ranges": [5.0]}
+
+
+def test_a_stop_is_ordered_only_in_motion_and_the_rest_of_the_command_stays() -> None:
+    effect = IgnoredCommand()
+    order = {"linear": {"x": 4.0}, "angular": {"z": None}}
+    apply(effect, "speed", {"linear": {"x": 1.0}})
+    assert apply(effect, "command", order) == order
+    apply(effect, "speed", {"linear": {"x": 5.0}})
+    assert apply(effect, "command", order) == {"linear": {"x": 0.0}, "angular": {"z": None}}
+
+
+def test_every_topic_is_halved_by_itself() -> None:
+    effect = SlowRate()
+    topics = ["/a", "/b", "/b", "/a", "/b", "/b"]
+    sent = [Message(at_s=0.0, topic=topic, type="t", message={}) for topic in topics]
+    assert [len(effect.apply(one, None)) for one in sent] == [0, 0, 1, 1, 0, 1]
