@@ -28,7 +28,7 @@ UNCERTAIN_S = 0.3  # beside that: the phone's own delay, and what a radio bunche
 COMPARISONS = 5
 COMPARED_WITHIN_S = 15.0
 TRACK_S = 60.0
-MOST_PAIRS = 256  # of a phone that tells its position four times a second
+STEP_S = 0.25  # fixes nearer to the one before tell nothing new, and a page in a frenzy costs nothing
 
 Why = Literal["denied", "unavailable", "timeout", "insecure", "hidden", "off", "coarse", "old", "late", "silent"]
 
@@ -113,7 +113,8 @@ class Phones:
         self._trail = Trail()
         self._waiting: PhoneWord | None = None  # the chosen phone's fix, until the car's next position comes
         self._comparisons: deque[Comparison] = deque(maxlen=COMPARISONS)
-        self._pairs: deque[Pair] = deque(maxlen=MOST_PAIRS)
+        self._pairs: deque[Pair] = deque(maxlen=round(TRACK_S / STEP_S) + 1)
+        self._tracks: Tracks | None = None
 
     def hear(self, word: PhoneWord, now_s: float) -> None:
         """One word of one phone."""
@@ -124,7 +125,7 @@ class Phones:
             self._note(word, now_s)
         self._choose(now_s)
         if word.phone == self._chosen and word.fix is not None and self._phones[word.phone].why is None:
-            if not self._pairs or word.measured_s > self._pairs[-1].at_s:  # else it was told before
+            if not self._pairs or word.measured_s >= self._pairs[-1].at_s + STEP_S:
                 self._waiting = word
                 self._compare()
         self._look()
@@ -163,6 +164,7 @@ class Phones:
             self._chosen, self._waiting = name, None
             self._comparisons.clear()
             self._pairs.clear()
+            self._tracks = None
 
     def _compare(self) -> bool:
         """Compares the fix that waits, if the car's positions have reached its moment; whether it was."""
@@ -198,6 +200,7 @@ class Phones:
         )
         while self._pairs[0].at_s < at_s - TRACK_S:
             self._pairs.popleft()
+        self._tracks = correlate(self._pairs)
         return True
 
     def _look(self) -> None:
@@ -215,7 +218,7 @@ class Phones:
             measured_s=phone.measured_s,
             why=phone.why,
             comparisons=tuple(self._comparisons),
-            tracks=correlate(self._pairs) if self._pairs else None,
+            tracks=self._tracks,
         )
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
 
 MAX_COMMAND_BYTES = 16 * 1024
 Name = Annotated[str, Field(min_length=1, max_length=120)]
@@ -72,7 +73,41 @@ class Import(_Command):
     toml: Annotated[str, Field(max_length=64 * 1024)]
 
 
-Command = Connect | Retry | Disconnect | Pause | Resume | Acknowledge | Shelve | Unshelve | Set | Import
+class Fix(BaseModel):
+    """A position as the W3C Geolocation API gives it, WGS84. No clock of the page is compared with the server's:
+    `age_s` is reckoned on the phone, and `heard_ms` is the server's own time in the newest state that the page had,
+    `held_s` how long it had had it."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, frozen=True, allow_inf_nan=False)
+    lat_deg: Annotated[float, Field(ge=-90, le=90)]
+    lon_deg: Annotated[float, Field(ge=-180, le=180)]
+    accuracy_m: Annotated[float, Field(ge=0, le=1e7)]
+    alt_m: Annotated[float, Field(ge=-2e4, le=1e6)] | None = None
+    speed_mps: Annotated[float, Field(ge=0, le=1e4)] | None = None
+    heading_deg: Annotated[float, Field(ge=0, le=360)] | None = None
+    at_ms: Annotated[float, Field(ge=0, le=2**53)]  # by the phone's own clock, which may be wrong by hours: shown only
+    age_s: Annotated[float, Field(ge=0, le=86_400)]
+    heard_ms: Annotated[float, Field(ge=0, le=2**53)]
+    held_s: Annotated[float, Field(ge=0, le=86_400)]
+
+
+class Position(_Command):
+    """Where this phone is, or why it cannot tell."""
+
+    kind: Literal["position"]
+    phone: Annotated[str, Field(pattern=r"^[0-9a-z-]{4,40}$")]
+    handheld: bool
+    fix: Fix | None = None
+    why: Literal["denied", "unavailable", "timeout", "insecure", "hidden", "off"] | None = None
+
+    @model_validator(mode="after")
+    def _is_either(self) -> Self:
+        if (self.fix is None) == (self.why is None):
+            raise PydanticCustomError("position", "it says either where the phone is or why it cannot tell")
+        return self
+
+
+Command = Connect | Retry | Disconnect | Pause | Resume | Acknowledge | Shelve | Unshelve | Set | Import | Position
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
 
 

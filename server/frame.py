@@ -11,7 +11,7 @@ from monitor.instruments import stopping_m, time_gap_s
 from monitor.runner import Monitor
 from monitor.signals import SIGNALS, Signal
 from monitor.state import Reading, Snapshot
-from server import problems, wire
+from server import phone, problems, wire
 from server.address import Address
 from server.link import RosLink
 from server.problems import Problem
@@ -69,6 +69,7 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str,
         "recording": {"state": "off", "for_s": None},
         "decelerate": {"state": "not_available", "why": "not configured"},
         "control": {"holder": None},
+        "phone": phone.as_json(snapshot.phone, facts.now_s),
     }
 
 

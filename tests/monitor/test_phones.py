@@ -92,7 +92,7 @@ def test_a_fix_for_which_the_car_s_position_never_comes_is_not_compared() -> Non
 
 def test_one_fix_told_twice_is_compared_once() -> None:
     road = Road().drive(2.0).say(age_s=0.2)
-    road.say(age_s=0.2).drive(0.5).say(age_s=0.7)
+    road.say(age_s=0.2).drive(0.5).say(age_s=0.7).say(age_s=0.9)
     assert len(road.view.comparisons) == 1
 
 
@@ -113,7 +113,8 @@ def test_however_fast_a_phone_speaks_what_is_kept_is_bounded() -> None:
     for _ in range(600):
         road.drive(0.1).say(age_s=0.05)
     assert road.view.tracks is not None
-    assert road.view.tracks.pairs == phones.MOST_PAIRS
+    assert road.view.tracks.pairs <= phones.TRACK_S / phones.STEP_S + 1
+    assert road.view.tracks.span_s > 59.0
 
 
 def test_old_comparisons_do_not_count() -> None:

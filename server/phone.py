@@ -1,0 +1,71 @@
+"""The operator's phone between the page and the judge: its word on the server's clock, and its part of the state."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from monitor.agreement import phone_sigma_m
+from monitor.phone_words import why_words
+from monitor.phones import PhoneView, PhoneWord
+from monitor.values import PhoneFix
+from server import commands, wire
+
+AHEAD_S = 0.25  # by so much the server's time of day may be set back between two frames; more, and nothing is known
+
+
+def word(command: commands.Position, now_s: float, wall_ms: float) -> PhoneWord:
+    """What the phone said, its moment on the clock of `now_s`.
+
+    Three durations, each between two readings of one clock: how old the fix was when the page sent it (the page's), how
+    long ago the server told the time that the page echoes (the server's), and how long the page held that (the page's).
+    The last two leave the way there and back; the fix was measured within it, so in the middle give or take half.
+    """
+    fix = command.fix
+    if fix is None:
+        return PhoneWord(phone=command.phone, is_handheld=command.handheld, why=command.why)
+    way_s = (wall_ms - fix.heard_ms) / 1000 - fix.held_s
+    half_s = max(0.0, way_s) / 2 if way_s >= -AHEAD_S else math.inf
+    return PhoneWord(
+        phone=command.phone,
+        is_handheld=command.handheld,
+        fix=PhoneFix(
+            lat_deg=fix.lat_deg,
+            lon_deg=fix.lon_deg,
+            accuracy_m=fix.accuracy_m,
+            alt_m=fix.alt_m,
+            speed_mps=fix.speed_mps,
+            heading_deg=fix.heading_deg,
+            at_ms=fix.at_ms,
+        ),
+        measured_s=now_s - fix.age_s - (half_s if math.isfinite(half_s) else 0.0),
+        uncertain_s=half_s,
+    )
+
+
+def as_json(view: PhoneView, now_s: float) -> dict[str, Any] | None:
+    """The `phone` of a state; None while no phone tells anything."""
+    if not view.is_there(now_s):
+        return None
+    why, fix = view.why_not(now_s), view.fix
+    newest = view.comparisons[-1] if view.comparisons else None
+    return {
+        "id": view.phone,
+        "count": view.count,
+        "handheld": view.is_handheld,
+        "lat_deg": wire.plain(fix.lat_deg, 8) if fix else None,
+        "lon_deg": wire.plain(fix.lon_deg, 8) if fix else None,
+        "accuracy_m": wire.plain(fix.accuracy_m, 1) if fix else None,
+        "sigma_m": wire.plain(phone_sigma_m(fix.accuracy_m), 1) if fix else None,
+        "alt_m": wire.plain(fix.alt_m, 1) if fix else None,
+        "speed_mps": wire.plain(fix.speed_mps, 2) if fix else None,
+        "heading_deg": wire.plain(fix.heading_deg, 1) if fix else None,
+        "at_ms": wire.plain(fix.at_ms, 0) if fix else None,
+        "age_s": wire.plain(max(0.0, now_s - view.measured_s), 2) if fix else None,
+        "used": why is None,
+        "why": why,
+        "why_text": why_words(why, view, now_s).sentence if why else None,
+        "apart_m": wire.plain(newest.distance_m, 1) if newest else None,
+        "explained_m": wire.plain(newest.gate_m, 1) if newest else None,
+        "correlation": wire.plain(view.tracks.correlation, 3) if view.tracks else None,
+    }
