@@ -23,6 +23,7 @@ Change = Literal["raised", "cleared", "acknowledged", "recaused", "shelved", "un
 
 CLOCK_BACK_S = 0.5  # less is a message that waited a moment, not a clock that went back
 ROUNDING_S = 1e-6  # delays are summed in steps
+LEVEL = "level "  # begins the name of a cause that is a degree of badness
 
 
 class AlarmState(StrEnum):
@@ -210,7 +211,7 @@ def rebased(alarm: Alarm, now_s: float) -> Alarm:
 
 def _names(finding: Finding) -> tuple[str, ...]:
     """What the finding blames; each degree of badness counts as a cause of its own, so a worse one is a new one."""
-    return (*finding.causes, *(f"level {level}" for level in range(1, finding.level + 1)))
+    return (*finding.causes, *(f"{LEVEL}{level}" for level in range(1, finding.level + 1)))
 
 
 def _beyond(finding: Finding | None) -> float:

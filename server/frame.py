@@ -8,12 +8,14 @@ from typing import Any
 
 from monitor import catalog, values
 from monitor.instruments import stopping_m, time_gap_s
+from monitor.load import AlarmLoad
 from monitor.runner import Monitor
 from monitor.signals import SIGNALS, Signal
 from monitor.state import Reading, Snapshot
 from server import phone, problems, wire
 from server.address import Address
 from server.link import RosLink
+from server.past import Past
 from server.problems import Problem
 from server.reception import Reception, Tally
 from server.topics import Source
@@ -37,6 +39,10 @@ class Facts:
     ros_version: int | None
     connected_s: float | None
     paused_since_s: float | None
+    paused_by: str | None
+    held: Past | None  # what stood when the server ended, while no car is monitored yet
+    load: AlarmLoad
+    log_trouble: str | None
     profile: str  # the kind of car it is taken for
     settings_version: int
     since_s: float
@@ -65,6 +71,8 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str,
         "nearest": _nearest(snapshot, monitor),
         "checks": [wire.tile(tile) for tile in monitor.tiles()],
         "alarms": [wire.alarm(alarm, facts.now_s, facts.wall_ms) for alarm in monitor.standing()],
+        "alarm_load": wire.load(facts.load, monitor.alarms),
+        "log_trouble": facts.log_trouble,
         "limits": catalog.flat(monitor.limits),
         "recording": {"state": "off", "for_s": None},
         "decelerate": {"state": "not_available", "why": "not configured"},
@@ -84,11 +92,19 @@ def _session(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
         "settings_version": facts.settings_version,
         "connected_for_s": wire.plain(connected_for, 1),
         "paused": facts.paused_since_s is not None,
+        "paused_by": facts.paused_by,
         "paused_for_s": round(facts.now_s - facts.paused_since_s, 1) if facts.paused_since_s is not None else 0.0,
+        "held": _held(facts.held),
         "track_m": wire.plain(snapshot.track_m, 1),
         "received": facts.reception.received,
         "rejected": facts.reception.rejected,
     }
+
+
+def _held(before: Past | None) -> dict[str, Any] | None:
+    if before is None:
+        return None
+    return {"address": before.address, "alarms": len(before.standing), "paused": before.paused_s is not None}
 
 
 def _link(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from typing import Any
 import orjson
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from server import commands
+from server import commands, label
 from server.bus import LocalBus, NotServed
 
 log = logging.getLogger("catgraph.hub")
@@ -50,6 +50,7 @@ class Page:
         self._events_due = False
         self._events_unanswered = False
         self._said_hello = False
+        self._name = label.NAMELESS  # what the page calls itself: who gave its orders, in the log
         self._complaints = 0
         self.skipped = 0  # frames that were replaced by newer ones before this page could take them
 
@@ -119,6 +120,7 @@ class Page:
                 await self._command(message)
 
     def _hear_hello(self, message: Mapping[str, Any]) -> None:
+        self._name = label.clean(message.get("name")) or self._name
         have = message.get("have_event")
         if type(have) is int and 0 <= have <= self._bus.last_event(self._vehicle) and not self._said_hello:
             self._event = have
@@ -132,7 +134,7 @@ class Page:
             self._complain("A command carries an id of at most 80 letters.")
             return
         try:
-            answer = await self._bus.request(self._vehicle, message)
+            answer = await self._bus.request(self._vehicle, message | {"by": self._name})
         except NotServed as why:
             answer = {"ok": False, "reason": f"{str(why).capitalize()}."}
         self._replies.append({"kind": "reply", "id": identity, **answer})

@@ -112,12 +112,15 @@ class Journal:
         since_ms: int | None = None,
         until_ms: int | None = None,
     ) -> list[dict[str, Any]]:
-        """Events newest first, numbered below `before`, of one alarm, one kind of change, one span of time."""
+        """Events newest first, numbered below `before`, of one alarm, one kind of change, one span of time.
+
+        `alarm` "" asks for those of no alarm.
+        """
         conditions: list[str] = ["vehicle = ?"]
         values: list[str | int] = [vehicle]
         for condition, value in (
             ("n < ?", before),
-            ("alarm = ?", alarm),
+            ("alarm = ?", alarm or None),
             ("change = ?", change),
             ("at_ms >= ?", since_ms),
             ("at_ms < ?", until_ms),
@@ -125,11 +128,13 @@ class Journal:
             if value is not None:
                 conditions.append(condition)
                 values.append(value)
+        if alarm == "":
+            conditions.append("alarm IS NULL")
         waiting = [
             event
             for event in reversed(self._unsaved.get(vehicle, ()))
             if (before is None or event["n"] < before)
-            and (alarm is None or event.get("alarm") == alarm)
+            and (alarm is None or (event.get("alarm") or "") == alarm)
             and (change is None or event["change"] == change)
             and (since_ms is None or event["at_ms"] >= since_ms)
             and (until_ms is None or event["at_ms"] < until_ms)

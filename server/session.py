@@ -10,10 +10,11 @@ from typing import Any
 import orjson
 
 from monitor.catalog import AnyCheck
+from monitor.load import AlarmLoad, RecentLoad
 from monitor.runner import Monitor, Refused, Transition
 from monitor.signal_limits import expected_rates
 from monitor.state import LinkFacts, Phase, State
-from server import address, answers, commands, judging, phone, problems, wire
+from server import address, answers, commands, judging, label, past, phone, problems
 from server.address import BadAddress
 from server.bus import LocalBus
 from server.config import Vehicle
@@ -21,6 +22,8 @@ from server.conversation import Conversation
 from server.frame import Facts, state_frame
 from server.judging import TICK_S
 from server.link import RosLink
+from server.logbook import Logbook
+from server.past import Past
 from server.problems import Problem
 from server.reception import Reception, Tally
 from server.scan_feed import ScanFeed
@@ -29,6 +32,7 @@ from server.tuning import Tuning
 
 log = logging.getLogger("catgraph.session")
 
+SAVE_AGAIN_S = 1.0  # the log is asked so often whether it is kept
 SICK_LOOP_S = 0.25  # a loop later than this lets one heartbeat fall: a sign of life from a sick server is a lie
 PROOF_WITHIN_S = 4.0  # something that speaks WebSocket and no rosbridge is told apart by then
 BRIDGE_SILENT_S = 1.4  # the bridge answers a ping every 0.5 s
@@ -60,11 +64,17 @@ class Session:
         self._allowed_hosts = frozenset(allowed_hosts)
         self._tuning = Tuning(settings or SettingsFile(None))
         self._monitor = Monitor(checks, self._tuning.limits)
+        self._logbook = Logbook(vehicle.name, bus, self._tuning, wall_ms=wall_ms)
+        self._load = RecentLoad()
+        self._held: Past | None = None  # what stood when the server ended, until a car is monitored again
+        self._log_trouble: str | None = None
+        self._saved_s = -SAVE_AGAIN_S
         self._crashes_told: set[str] = set()
         self._tasks: set[asyncio.Task[None]] = set()
         self._lag_s = 0.0
         self._state_is_due = False
         self._paused_since_s: float | None = None
+        self._paused_by: str | None = None
         self._clear()
 
     def _clear(self) -> None:
@@ -99,10 +109,9 @@ class Session:
         """Begins to tick, and dials where the vehicle's address is known."""
         self._bus.serve(self.vehicle.name, self.handle)
         self._spawn(self._run(), "tick")
-        if self._tuning.complaint:
-            self._note("settings", self._tuning.complaint)
+        self._remember()
         if self.vehicle.address:
-            self._connect(self.vehicle.address)
+            self._connect(self.vehicle.address, by=None)
 
     async def stop(self) -> None:
         if self._link is not None:
@@ -156,10 +165,71 @@ class Session:
         """Time judges: freshness, silence, delays. Then the pages get a state, unless the loop is too late to be
         trusted."""
         now_s = self._now()
+        if now_s - self._saved_s >= SAVE_AGAIN_S:
+            self._saved_s = now_s
+            self._log_trouble = self._bus.save_events()
         self._watch_link(now_s)
         self._judge(now_s, None)
         if put:
             self._put_state(now_s)
+
+    @property
+    def alarm_load(self) -> AlarmLoad:
+        """The alarms announced lately, of whichever car was monitored: it is one operator who bears them."""
+        return self._load.at(self._now())
+
+    @property
+    def log_trouble(self) -> str | None:
+        """Why the log is not kept on the disk, as a sentence; None: it is."""
+        return self._log_trouble
+
+    # -- the time before this run ------------------------------------------------------------------------------------
+
+    def _recall(self) -> Past:
+        return past.recall(self._bus, self.vehicle.name, now_s=self._now(), wall_ms=self._wall_ms())
+
+    def _remember(self) -> None:
+        """At the start: what stood when the server ended is held until a car is monitored again; numbers count on."""
+        before = self._recall()
+        self._monitor.number_on(before.transitions)
+        self._load.add(before.recent)
+        for sentence in (self._bus.log_complaint, self._tuning.complaint):
+            if sentence:
+                self._logbook.note("restarted", sentence)
+        if self._tuning.number_on(before.settings_version):
+            self._logbook.settings("The settings are not those that were last in force: they were lost.", by=None)
+        if before.address is not None or before.standing:
+            self._held = before
+            self._logbook.note("restarted", before.words(self._monitor.alarms))
+
+    def _come_back(self, target: address.Address) -> Past | None:
+        """Before a car is dialled: the past of that very car, where the server ended while it was monitored. Whatever
+        stood of another car ends."""
+        if self._held is None:
+            self._end()
+            return None
+        self._held = None
+        before = self._recall()
+        self._monitor.restore(before.transitions)
+        if before.address != target.url:
+            self._end()
+            return None
+        self._drop_link()
+        self._clear()
+        return before
+
+    def _go_on(self, before: Past) -> None:
+        """A pause outlasts a restart: who ordered it counts on silence. It is said anew, and shown as ever."""
+        if before.paused_s is not None:
+            self._paused_since_s, self._paused_by = before.paused_s, before.paused_by
+            self._state.set_paused(True, before.paused_s)
+            since_ms = round(self._wall_ms() - (self._now() - before.paused_s) * 1000)
+            self._logbook.note(
+                "paused",
+                "The server was restarted and monitoring is still paused: no alarm will come.",
+                by=before.paused_by,
+                since_ms=since_ms,
+            )
 
     # -- commands ----------------------------------------------------------------------------------------------------
 
@@ -177,7 +247,7 @@ class Session:
         if message.get("kind") == "track":
             return answers.track(self._state.snapshot(self._now()))
         try:
-            self._obey(commands.read(dict(message)))
+            self._obey(commands.read(dict(message)), by=label.clean(message.get("by")) or label.NAMELESS)
         except answers.REFUSALS as why:
             if isinstance(why, BadAddress) and self._phase in ("idle", "failed"):
                 self._phase, self._problem = "failed", problems.of_bad_address(why)
@@ -185,38 +255,36 @@ class Session:
             return answers.refusal(why)
         return {"ok": True}
 
-    def _obey(self, command: commands.Command) -> None:
+    def _obey(self, command: commands.Command, *, by: str) -> None:
         now_s = self._now()
         match command:
             case commands.Connect():
-                self._connect(command.address)
+                self._connect(command.address, by=by)
             case commands.Retry():
                 if self._link is None:
                     raise Refused("There is no address to dial.")
                 self._link.retry_now()
             case commands.Disconnect():
-                self._disconnect()
+                self._disconnect(by=by)
             case commands.Pause():
-                self._pause(now_s)
+                self._pause(now_s, by=by)
             case commands.Resume():
-                self._resume(now_s)
+                self._resume(now_s, by=by)
             case commands.Acknowledge():
-                self._tell(self._monitor.acknowledge(command.alarm, command.occurrence, by="operator", now_s=now_s))
+                self._tell(self._monitor.acknowledge(command.alarm, command.occurrence, by=by, now_s=now_s))
             case commands.Shelve():
                 self._tell(
-                    self._monitor.shelve(
-                        command.alarm, command.occurrence, minutes=command.minutes, by="operator", now_s=now_s
-                    )
+                    self._monitor.shelve(command.alarm, command.occurrence, minutes=command.minutes, by=by, now_s=now_s)
                 )
             case commands.Unshelve():
-                self._tell(self._monitor.unshelve(command.alarm, by="operator", now_s=now_s))
+                self._tell(self._monitor.unshelve(command.alarm, by=by, now_s=now_s))
             case commands.Set():
                 lines = self._tuning.change(
                     values=command.values, topics=command.topics, profile=command.profile, version=command.version
                 )
-                self._tuned(lines, by="operator")
+                self._tuned(lines, by=by)
             case commands.Import():
-                self._tuned(self._tuning.replace(command.toml), by="operator")
+                self._tuned(self._tuning.replace(command.toml), by=by)
             case commands.Position():
                 if self._phase == "idle":
                     raise Refused("No car is monitored: no position is needed.")
@@ -227,13 +295,13 @@ class Session:
     def _tuned(self, lines: Sequence[str], *, by: str | None) -> None:
         """New settings count from this moment on."""
         if lines:
-            self._note("settings", "; ".join(lines), by=by)
+            self._logbook.settings("; ".join(lines), by=by)
         self._monitor.limits = self._tuning.limits
         self._state.expect(expected_rates(self._tuning.limits))
         self._conversation.map_again()
         self._judge(self._now(), None)
 
-    def _connect(self, typed: str) -> None:
+    def _connect(self, typed: str, *, by: str | None) -> None:
         target = address.parse(typed)
         if self._allowed_hosts and target.host not in self._allowed_hosts and target.shown not in self._allowed_hosts:
             raise BadAddress(
@@ -241,23 +309,26 @@ class Session:
                 "Ask whoever started the server.",
                 code="not_allowed",
             )
-        self._end()
+        before = self._come_back(target)
+        self._logbook.started(target.url, target.shown, by=by)
         self._phase, self._address = "connecting", target
         self._link = RosLink(target, self, now=self._now)
         self._conversation = self._begin(self._link)
         self._link.start()
+        if before is not None:
+            self._go_on(before)
 
-    def _disconnect(self) -> None:
+    def _disconnect(self, *, by: str) -> None:
         was = self._phase
         self._end()
         if was != "idle":
-            self._note("stopped", "Monitoring was stopped.")
+            self._logbook.note("stopped", "Monitoring was stopped.", by=by)
 
     def _end(self) -> None:
         """One car's monitoring is over: its alarms end in the log, and all that is known of it is forgotten."""
         self._tell(self._monitor.end(self._now()))
         self._drop_link()
-        self._paused_since_s = None
+        self._paused_since_s = self._paused_by = None
         self._clear()
 
     def _drop_link(self) -> None:
@@ -266,17 +337,17 @@ class Session:
             self._link.stop()
             self._link = None
 
-    def _pause(self, now_s: float) -> None:
+    def _pause(self, now_s: float, *, by: str) -> None:
         if self._paused_since_s is None:
-            self._paused_since_s = now_s
+            self._paused_since_s, self._paused_by = now_s, by
             self._state.set_paused(True)
-            self._note("paused", "Monitoring is paused: no alarm will come.")
+            self._logbook.note("paused", "Monitoring is paused: no alarm will come.", by=by)
 
-    def _resume(self, now_s: float) -> None:
+    def _resume(self, now_s: float, *, by: str) -> None:
         if self._paused_since_s is not None:
-            self._paused_since_s = None
+            self._paused_since_s = self._paused_by = None
             self._state.set_paused(False)
-            self._note("resumed", "Monitoring goes on.")
+            self._logbook.note("resumed", "Monitoring goes on.", by=by)
             self._judge(now_s, None)
 
     # -- what the link says (LinkListener) ---------------------------------------------------------------------------
@@ -295,7 +366,7 @@ class Session:
         if self._proved:
             if self._phase != "lost":
                 self._phase, self._since_s = "lost", now_s
-                self._note("lost", problem.title)
+                self._logbook.note("lost", problem.title)
             self._problem = problem
         elif self._address is not None and self._phase != "failed":
             self._phase = "failed"
@@ -367,7 +438,7 @@ class Session:
         if not self._proved:
             self._proved = True
             self._connected_s = self._now()
-            self._note("connected", f"Connected to {self._address.shown if self._address else 'the car'}.")
+            self._logbook.note("connected", f"Connected to {self._address.shown if self._address else 'the car'}.")
         if self._phase != "monitoring" and self._link is not None and self._link.is_open:
             self._reopened()
 
@@ -424,19 +495,8 @@ class Session:
                 log.error("check %s failed: %s\n%s", crash.check_id, crash.error, crash.where)
 
     def _tell(self, transitions: Collection[Transition]) -> None:
-        at_ms = self._wall_ms()
-        self._bus.append(
-            self.vehicle.name,
-            [
-                wire.event(t, self._monitor.alarms[t.alarm_id], at_ms, self._tuning.settings.version)
-                for t in transitions
-            ],
-        )
-
-    def _note(self, change: str, text: str, *, by: str | None = None) -> None:
-        self._bus.append(
-            self.vehicle.name, [{"at_ms": self._wall_ms(), "alarm": None, "change": change, "text": text, "by": by}]
-        )
+        self._load.add(transitions)
+        self._logbook.tell(transitions, self._monitor.alarms, self._now())
 
     # -- frames ------------------------------------------------------------------------------------------------------
 
@@ -454,6 +514,10 @@ class Session:
             ros_version=self._conversation.ros_version,
             connected_s=self._connected_s,
             paused_since_s=self._paused_since_s,
+            paused_by=self._paused_by,
+            held=self._held,
+            load=self.alarm_load,
+            log_trouble=self._log_trouble,
             profile=self._tuning.profile.title,
             settings_version=self._tuning.settings.version,
             since_s=self._since_s,

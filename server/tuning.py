@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from monitor import catalog
@@ -23,6 +24,7 @@ class Tuning:
         self._recognised = GENERIC
         self.settings: Settings = file.read()
         self.complaint = file.complaint
+        self._told = self.in_force()
 
     @property
     def profile(self) -> Profile:
@@ -66,6 +68,25 @@ class Tuning:
             Settings(version=self.settings.version + 1, profile=read.profile, values=read.values, topics=read.topics)
         )
 
+    def number_on(self, version: int) -> bool:
+        """Counts on from a version that the log knows: a number names one set of settings for ever. True where what
+        was kept is older than that, so that something was lost."""
+        if version <= self.settings.version:
+            return False
+        self.settings = replace(self.settings, version=version + 1)
+        return True
+
+    def in_force(self) -> dict[str, Any]:
+        """Everything that is judged by: the kind of car, each threshold in SI, each topic that was picked."""
+        return {"profile": self.profile.name, "topics": dict(self.settings.topics)} | catalog.flat(self.limits)
+
+    def changes(self) -> dict[str, list[Any]]:
+        """What is in force otherwise than when this was last asked: name → [from, to]; topics are "topics.speed"."""
+        before, after = _flat(self._told), _flat(now := self.in_force())
+        self._told = now
+        names = sorted({*before, *after})
+        return {name: [before.get(name), after.get(name)] for name in names if before.get(name) != after.get(name)}
+
     def as_toml(self) -> str:
         return to_toml(self.settings)
 
@@ -92,3 +113,8 @@ class Tuning:
     def _demand(self, version: int | None) -> None:
         if version is not None and version != self.settings.version:
             raise Conflict("Somebody else has changed the settings meanwhile. Look at them again.")
+
+
+def _flat(in_force: Mapping[str, Any]) -> dict[str, Any]:
+    topics = {f"topics.{signal}": topic for signal, topic in in_force["topics"].items()}
+    return {name: value for name, value in in_force.items() if name != "topics"} | topics

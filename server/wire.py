@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ import numpy.typing as npt
 
 from monitor import values
 from monitor.alarm import Alarm, Transition
+from monitor.alarm_spec import AlarmSpec
 from monitor.check import Quantity
+from monitor.load import AlarmLoad
 from monitor.runner import Tile
 
 SCAN_MAGIC = 0x53
@@ -165,7 +168,9 @@ def alarm(alarm: Alarm, now_s: float, wall_ms: int) -> dict[str, Any]:
         "causes": list(finding.causes) if finding else [],
         "actions": [str(action) for action in spec.actions],
         "advice": spec.advice,
+        "acknowledged_by": alarm.acknowledged_by if alarm.acknowledged else None,
         "shelved_until_ms": round(wall_ms + (until_s - now_s) * 1000) if until_s is not None else None,
+        "shelved_by": alarm.shelved_by,
     }
 
 
@@ -175,9 +180,21 @@ def _quantity(quantity: Quantity | None) -> dict[str, Any] | None:
     return {"label": quantity.label, "value": plain(quantity.value), "unit": quantity.unit}
 
 
-def event(transition: Transition, alarm: Alarm, at_ms: int, settings_version: int) -> dict[str, Any]:
-    """A transition as the log keeps it and the pages get it; the log adds its number."""
-    spec = alarm.spec
+def load(load: AlarmLoad, alarms: Mapping[str, Alarm]) -> dict[str, Any]:
+    """What the alarms ask of the operator now."""
+    titles = [alarms[name].spec.title for name in load.chattering if name in alarms]
+    return {"in_10_min": load.in_10_min, "flood": load.is_flood, "bearable": load.is_bearable, "chattering": titles}
+
+
+def event(
+    transition: Transition, spec: AlarmSpec, at_ms: int, *, now_s: float, settings_version: int
+) -> dict[str, Any]:
+    """A transition as the log keeps it and the pages get it, at `at_ms`, which is `now_s`; the log adds its number.
+
+    With it alone a restart knows where the alarm stands (`server.past`).
+    """
+    finding = transition.finding
+    until_s = transition.shelved_until_s
     return {
         "at_ms": at_ms,
         "alarm": transition.alarm_id,
@@ -190,7 +207,11 @@ def event(transition: Transition, alarm: Alarm, at_ms: int, settings_version: in
         "text": transition.text,
         "by": transition.by,
         "announces": transition.announces,
+        "state": str(transition.state),
+        "causes": list(transition.causes),
+        "suppressed_by": list(transition.suppressed_by),
+        "shelved_until_ms": round(at_ms + (until_s - now_s) * 1000) if until_s is not None else None,
         "settings_version": settings_version,
-        "measured": _quantity(alarm.finding.measured if alarm.finding else None),
-        "limit": _quantity(alarm.finding.limit if alarm.finding else None),
+        "measured": _quantity(finding.measured if finding else None),
+        "limit": _quantity(finding.limit if finding else None),
     }

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from monitor.alarm_spec import Priority
+from monitor.load import BEARABLE_IN_10_MIN, FLOOD_IN_10_MIN
 from server.rehearsal.compare import Change
 from server.rehearsal.episodes import Episode
-from server.rehearsal.load import BEARABLE_IN_10_MIN, FLOOD_IN_10_MIN
 from server.rehearsal.report import Report, SignalRow, differences, name_of, not_checked
 from server.rehearsal.words import clock, counted, grouped, length, printable
 

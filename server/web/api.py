@@ -8,6 +8,7 @@ import orjson
 from fastapi import APIRouter, Body, HTTPException, Query, Request, Response, WebSocket
 from pydantic import BaseModel, ConfigDict, Field
 
+from server import label
 from server.bus import NotServed
 from server.web.errors import Problem
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from server.app import Running
 
 router = APIRouter()
+NAME_HEADER = "x-catgraph-name"  # what the caller wants to be called in the log
 VehicleName = Annotated[str | None, Query(description="Which vehicle; the first where it is left out", max_length=40)]
 
 
@@ -50,10 +52,14 @@ def vehicle_of(app: Running, name: str | None) -> str:
 
 
 async def ask(request: Request, vehicle: str | None, message: dict[str, Any]) -> dict[str, Any]:
-    """The session's answer; refused commands become 409 with the session's sentence."""
+    """The session's answer; refused commands become 409 with the session's sentence.
+
+    Who gave the order is in the log as the header X-Catgraph-Name has it, else as "api" and the program's name.
+    """
     app = running(request)
+    by = label.clean(request.headers.get(NAME_HEADER)) or label.of_program(request.headers.get("user-agent"))
     try:
-        answer = await app.bus.request(vehicle_of(app, vehicle), message)
+        answer = await app.bus.request(vehicle_of(app, vehicle), message | {"by": by})
     except NotServed as why:
         raise HTTPException(503, f"{str(why).capitalize()}.") from None
     if answer.get("ok") is False:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
@@ -16,7 +17,11 @@ from server.bus import LocalBus
 from server.web.api import VehicleName, running, vehicle_of
 
 router = APIRouter()
-COLUMNS = ("n", "time", "change", "alarm", "occurrence", "title", "priority", "text", "by", "settings_version")
+COLUMNS = (
+    *("n", "time", "change", "alarm", "occurrence", "title", "priority", "state", "text", "by"),
+    *("measured", "limit", "unit", "causes", "settings_version", "details"),
+)
+_TOLD = frozenset((*COLUMNS, "at_ms", "place", "sound", "announces"))  # the rest stands in `details`, as JSON
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet runs a cell that begins so
 _PAGE = 500
 
@@ -46,20 +51,36 @@ async def log_page(
 
 
 @router.get("/api/log.csv", tags=["alarms"], summary="The whole alarm log as CSV, oldest first")
-async def log_csv(request: Request, vehicle: VehicleName = None) -> StreamingResponse:
+async def log_csv(
+    request: Request,
+    vehicle: VehicleName = None,
+    alarm: Text = None,
+    change: Text = None,
+    since_ms: Milliseconds = None,
+    until_ms: Milliseconds = None,
+) -> StreamingResponse:
     app = running(request)
     name = vehicle_of(app, vehicle)
+    events = _all(app.bus, name, Which(alarm=alarm, change=change, since_ms=since_ms, until_ms=until_ms))
     return StreamingResponse(
-        _csv(app.bus, name), media_type="text/csv; charset=utf-8", headers=_attachment(f"catgraph-log-{name}.csv")
+        _csv(events), media_type="text/csv; charset=utf-8", headers=_attachment(f"catgraph-log-{name}.csv")
     )
 
 
 @router.get("/api/log.json", tags=["alarms"], summary="The whole alarm log as JSON, oldest first")
-async def log_json(request: Request, vehicle: VehicleName = None) -> StreamingResponse:
+async def log_json(
+    request: Request,
+    vehicle: VehicleName = None,
+    alarm: Text = None,
+    change: Text = None,
+    since_ms: Milliseconds = None,
+    until_ms: Milliseconds = None,
+) -> StreamingResponse:
     app = running(request)
     name = vehicle_of(app, vehicle)
+    events = _all(app.bus, name, Which(alarm=alarm, change=change, since_ms=since_ms, until_ms=until_ms))
     return StreamingResponse(
-        _json(app.bus, name), media_type="application/json", headers=_attachment(f"catgraph-log-{name}.json")
+        _json(events), media_type="application/json", headers=_attachment(f"catgraph-log-{name}.json")
     )
 
 
@@ -67,36 +88,69 @@ def _attachment(name: str) -> dict[str, str]:
     return {"Content-Disposition": f'attachment; filename="{name}"'}
 
 
-def _all(bus: LocalBus, vehicle: str) -> Iterator[list[dict[str, Any]]]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Which:
+    """Which events are wanted; None: all."""
+
+    alarm: str | None = None
+    change: str | None = None
+    since_ms: int | None = None
+    until_ms: int | None = None
+
+    def has(self, event: Mapping[str, Any]) -> bool:
+        return (
+            (self.alarm is None or (event.get("alarm") or "") == self.alarm)
+            and (self.change is None or event["change"] == self.change)
+            and (self.since_ms is None or event["at_ms"] >= self.since_ms)
+            and (self.until_ms is None or event["at_ms"] < self.until_ms)
+        )
+
+
+def _all(bus: LocalBus, vehicle: str, which: Which) -> Iterator[list[dict[str, Any]]]:
     """In portions; the generators that use it are asynchronous, so that they run on the loop, as the log does."""
     n = 0
     while events := bus.events_after(vehicle, n, _PAGE):
         n = events[-1]["n"]
-        yield events
+        yield [event for event in events if which.has(event)]
 
 
-async def _csv(bus: LocalBus, vehicle: str) -> AsyncIterator[str]:
+async def _csv(portions: Iterable[list[dict[str, Any]]]) -> AsyncIterator[str]:
     text = io.StringIO()
     rows = csv.writer(text)
     rows.writerow(COLUMNS)
-    for events in _all(bus, vehicle):
+    for events in portions:
         for event in events:
-            time = datetime.fromtimestamp(event["at_ms"] / 1000, UTC).isoformat(timespec="milliseconds")
-            rows.writerow([_cell(time if column == "time" else event.get(column)) for column in COLUMNS])
+            row = _row(event)
+            rows.writerow([_cell(row.get(column)) for column in COLUMNS])
         yield text.getvalue()
         text.seek(0)
         text.truncate()
     yield text.getvalue()  # the columns, where there is no event
 
 
+def _row(event: Mapping[str, Any]) -> dict[str, Any]:
+    """The columns of one event: the values at that moment as numbers, everything else it tells as JSON."""
+    measured, limit = event.get("measured") or {}, event.get("limit") or {}
+    details = {name: value for name, value in event.items() if name not in _TOLD and value not in (None, [])}
+    return {
+        **event,
+        "time": datetime.fromtimestamp(event["at_ms"] / 1000, UTC).isoformat(timespec="milliseconds"),
+        "measured": measured.get("value"),
+        "limit": limit.get("value"),
+        "unit": measured.get("unit") or limit.get("unit"),
+        "causes": "; ".join(event.get("causes") or ()),
+        "details": orjson.dumps(details).decode() if details else None,
+    }
+
+
 def _cell(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 
-async def _json(bus: LocalBus, vehicle: str) -> AsyncIterator[bytes]:
+async def _json(portions: Iterable[list[dict[str, Any]]]) -> AsyncIterator[bytes]:
     yield b"["
     first = True
-    for events in _all(bus, vehicle):
+    for events in portions:
         for event in events:
             yield (b"" if first else b",\n") + orjson.dumps(event)
             first = False

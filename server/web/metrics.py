@@ -29,7 +29,7 @@ async def metrics(request: Request) -> PlainTextResponse:
         [("", app.hub.skipped)],
     )
     add("up_seconds", "gauge", "Seconds since the server started.", [("", app.now() - app.started_s)])
-    received, rejected, open_, lag = [], [], [], []
+    received, rejected, open_, lag, load, chattering, kept = [], [], [], [], [], [], []
     for name, session in app.sessions.items():
         vehicle = f'vehicle="{name}"'
         for signal, tally in session.tallies().items():
@@ -37,6 +37,9 @@ async def metrics(request: Request) -> PlainTextResponse:
             rejected.append((f'{{{vehicle},signal="{signal}"}}', float(tally.rejected)))
         open_.append((f"{{{vehicle}}}", float(session.phase == "monitoring")))
         lag.append((f"{{{vehicle}}}", session.lag_s))
+        load.append((f"{{{vehicle}}}", float(session.alarm_load.in_10_min)))
+        chattering.append((f"{{{vehicle}}}", float(len(session.alarm_load.chattering))))
+        kept.append((f"{{{vehicle}}}", float(session.log_trouble is None)))
     add("messages_received_total", "counter", "Messages of the car, proper or not, since it was connected.", received)
     add(
         "messages_rejected_total",
@@ -45,5 +48,8 @@ async def metrics(request: Request) -> PlainTextResponse:
         rejected,
     )
     add("link_open", "gauge", "1 while the bridge is connected.", open_)
+    add("alarms_announced_10_min", "gauge", "Alarms announced in the last ten minutes; more than 10: a flood.", load)
+    add("alarms_chattering", "gauge", "Alarms that came and went three times within the last minute.", chattering)
+    add("alarm_log_kept", "gauge", "1 while the alarm log is kept on the disk.", kept)
     add("tick_lag_seconds", "gauge", "How late the newest tick was.", lag)
     return PlainTextResponse("\n".join(lines) + "\n", media_type=_TEXT)

@@ -1,0 +1,27 @@
+"""What somebody who gives an order calls himself: a label for the log, bounded and cleaned; no proof of who it is."""
+
+from __future__ import annotations
+
+import unicodedata
+
+MAX_LETTERS = 40
+NAMELESS = "operator"  # a page that gives no name
+
+
+def clean(text: object) -> str | None:
+    """The label in one line of at most 40 letters that are seen; None where nothing of it is left.
+
+    Control characters go, and so do the signs that turn the direction of writing: a name must not rewrite the line of
+    the log it stands in.
+    """
+    if not isinstance(text, str):
+        return None
+    start = text[: 8 * MAX_LETTERS]
+    seen = "".join(letter if unicodedata.category(letter)[0] not in "CZ" else " " for letter in start)
+    return " ".join(seen.split())[:MAX_LETTERS].strip() or None
+
+
+def of_program(user_agent: str | None) -> str:
+    """How a program that gives no name of its own is called: "api · curl"."""
+    product = clean((user_agent or "").split("/", 1)[0].split(" ", 1)[0])
+    return clean(f"api · {product}") if product else "api"  # type: ignore[return-value]
