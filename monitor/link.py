@@ -23,6 +23,7 @@ class LinkFacts:
     connected_s: float | None = None  # when the open connection was made
     last_message_s: float | None = None  # when the car last said anything
     published: frozenset[str] = frozenset()  # the signals that discovery found on the car
+    log_trouble: str | None = None  # why the alarm log is not kept on the disk, as a sentence; None: it is
     wall_zero_s: float | None = None  # the time of day [s since 1970] when `received_s` was 0; None: not known
 
     @property

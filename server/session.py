@@ -467,6 +467,7 @@ class Session:
             connected_s=self._connected_s,
             last_message_s=self._last_message_s,
             published=judging.published(self._conversation.sources.values()),
+            log_trouble=self._log_trouble,
             wall_zero_s=self._wall_ms() / 1000 - now_s,
         )
 
