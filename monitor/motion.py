@@ -39,12 +39,17 @@ class Slope:
 def _fit(samples: deque[tuple[float, float]]) -> float | None:
     """Slope of the least-squares line, Σ(t−t̄)(v−v̄)/Σ(t−t̄)²."""
     n = len(samples)
-    mean_s = sum(at_s for at_s, _ in samples) / n
-    mean = sum(value for _, value in samples) / n
-    spread = sum((at_s - mean_s) ** 2 for at_s, _ in samples)
-    if spread <= 0.0:
-        return None
-    return sum((at_s - mean_s) * (value - mean) for at_s, value in samples) / spread
+    sum_s = sum_value = 0.0
+    for at_s, value in samples:
+        sum_s += at_s
+        sum_value += value
+    mean_s, mean = sum_s / n, sum_value / n
+    spread = common = 0.0
+    for at_s, value in samples:
+        off_s = at_s - mean_s
+        spread += off_s * off_s
+        common += off_s * (value - mean)
+    return common / spread if spread > 0.0 else None
 
 
 class Standstill:

@@ -63,8 +63,10 @@ class Monitor:
         each other: two of one id, a circle of inhibition."""
         declared = CHECKS if checks is None else tuple(checks)
         self._findings: dict[str, Finding] = {}
-        self._passed: dict[str, AnyCheck] = {}  # not asked on the last tick, because harmless …
+        self._passed: list[AnyCheck] = []  # not asked on the last tick, because harmless …
         self._passed_on: Snapshot | None = None  # … of this snapshot
+        self._calm: dict[str, Alarm] = {}  # alarms that were found at rest
+        self._asked: set[str] = set()  # since the last tick
         self._ticks = 0
         self.crashes: dict[str, Crash] = {}
         self._failed: dict[str, int] = {}
@@ -80,7 +82,7 @@ class Monitor:
         for check in self._checks:
             for signal in check.needs:
                 self._by_signal[signal] = (*self._by_signal.get(signal, ()), check)
-        self._by_signals: dict[frozenset[str], tuple[AnyCheck, ...]] = {}  # of the sets that were ever asked for
+        self._by_signals: dict[Collection[str], tuple[AnyCheck, ...]] = {}  # of the sets that were ever asked for
         self.limits = compose(declared)() if limits is None else limits  # type: ignore[assignment]
 
     @property
@@ -118,36 +120,49 @@ class Monitor:
     def findings(self) -> Mapping[str, Finding]:
         """What each check last found, by its id."""
         if self._passed_on is not None:
-            for check in self._passed.values():
-                self._findings[check.id] = self._find(check, self._passed_on)
-            self._passed.clear()
-            self._passed_on = None
+            snapshot, self._passed_on = self._passed_on, None
+            for check in self._passed:
+                if check.id not in self._asked:
+                    self._findings[check.id] = self._find(check, snapshot)
         return self._findings
 
     def _tick(self, snapshot: Snapshot) -> tuple[Transition, ...]:
         self._ticks += 1
         self._passed.clear()
+        self._asked.clear()
         may_pass = self._may_pass(snapshot) and self._ticks % ASKED_EVERY != 0
         transitions: list[Transition] = []
         for check in self._checks:
             if may_pass and self._is_harmless(check, snapshot):
-                self._passed[check.id] = check
+                self._passed.append(check)
             else:
                 transitions += self._judge(check, snapshot)
         self._passed_on = snapshot if self._passed else None
-        transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
+        if self.crashes or not self._is_calm(IMPAIRED):
+            transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
         return tuple(transitions)
 
     def _may_pass(self, snapshot: Snapshot) -> bool:
         return snapshot.link.phase == "monitoring" and not snapshot.paused
 
     def _is_harmless(self, check: AnyCheck, snapshot: Snapshot) -> bool:
-        if check.is_harmless is None or not self.alarms[check.id].is_at_rest or self._causes.remembers(check.id):
+        look = check.is_harmless
+        if look is None or not self._is_calm(check.id):
             return False
         try:
-            return check.is_harmless(snapshot, self._limits_of[check.id])
+            return look(snapshot, self._limits_of[check.id])
         except Exception:  # as in `_find`: it will be asked, and if it fails too, that is said
             return False
+
+    def _is_calm(self, alarm_id: str) -> bool:
+        """At rest, and nothing is to be remembered of it."""
+        alarm = self.alarms[alarm_id]
+        if self._calm.get(alarm_id) is alarm:  # an alarm never changes: it is replaced
+            return True
+        if not alarm.is_at_rest or self._causes.remembers(alarm_id):
+            return False
+        self._calm[alarm_id] = alarm
+        return True
 
     @property
     def checks(self) -> tuple[AnyCheck, ...]:
@@ -156,7 +171,7 @@ class Monitor:
 
     def heeds(self, changed: Collection[str]) -> bool:
         """Whether a step for these signals would judge anything; where not, there is no need of a snapshot."""
-        return any(signal in self._by_signal for signal in changed)
+        return bool(self._needing(changed))
 
     def end(self, now_s: float) -> tuple[Transition, ...]:
         """Monitoring ends by the operator's wish: nothing is judged and nothing stands any more."""
@@ -169,6 +184,7 @@ class Monitor:
         self._passed_on = None
         self.crashes.clear()
         self._causes.clear()
+        self._calm.clear()
         return tuple(transitions)
 
     def restore(self, transitions: Iterable[Transition]) -> None:
@@ -225,7 +241,7 @@ class Monitor:
         return transitions
 
     def _needing(self, changed: Collection[str]) -> tuple[AnyCheck, ...]:
-        together = frozenset(changed)
+        together = changed if type(changed) is tuple else frozenset(changed)
         found = self._by_signals.get(together)
         if found is None:
             wanted = {check.id for signal in together for check in self._by_signal.get(signal, ())}
@@ -236,7 +252,7 @@ class Monitor:
 
     def _judge(self, check: AnyCheck, snapshot: Snapshot) -> tuple[Transition, ...]:
         finding = self._find(check, snapshot)
-        self._passed.pop(check.id, None)
+        self._asked.add(check.id)
         by = self._causes.holding(check.id, snapshot.now_s)
         if not by and finding.verdict is not Verdict.FAULT and not snapshot.paused:
             alarm = self.alarms[check.id]

@@ -18,7 +18,7 @@ from monitor.phones import NO_PHONE, Phones, PhoneView, PhoneWord
 from monitor.quick import maker
 from monitor.rates import Rate, RateMeter
 from monitor.repeats import RepeatFollower, Repeats, Wheels
-from monitor.signals import SIGNALS
+from monitor.signals import SIGNALS, Signal
 from monitor.stamps import MANY_WRITERS, ClockJump, StampFollower, merged
 from monitor.tracks import Track, TrackPoint
 from monitor.values import (
@@ -43,7 +43,7 @@ __all__ = ["Extent", "Freshness", "LinkFacts", "NotFresh", "Phase", "Reading", "
 AGEING_PERIODS = 3
 AGEING_FLOOR_S = 0.25  # three periods of a 75 Hz signal are one hiccup of Wi-Fi
 CLOCK_BACK_S = 0.5
-RATES_EVERY_S = 0.1  # a rate over 5 s does not change faster
+RATES_EVERY_S = 0.5  # a rate over 5 s does not change faster
 
 Freshness = Literal["fresh", "ageing", "stale"]
 T_co = TypeVar("T_co", covariant=True)
@@ -106,7 +106,7 @@ class Snapshot:
     now_s: float
     readings: Mapping[str, Reading[Any]] = field(default_factory=dict)  # only signals that were ever heard or derived
     link: LinkFacts = field(default_factory=LinkFacts)
-    rates: Mapping[str, Rate] = field(default_factory=dict)  # of every signal; up to 0.1 s old
+    rates: Mapping[str, Rate] = field(default_factory=dict)  # of every signal; up to 0.5 s old
     paused: bool = False
     paused_since_s: float | None = None
     heard_s: float | None = None  # when any signal last came
@@ -195,17 +195,20 @@ class Snapshot:
 
 
 _new_snapshot, _new_reading = maker(Snapshot), maker(Reading)
-_HEADLINES = {name: signal.headline for name, signal in SIGNALS.items()}
 _TELLING = frozenset({Twist, GpsFix, Odometry, Heading})  # from which something else is derived
 
 
 class _Heard:
     """What the state keeps of one signal between messages."""
 
-    __slots__ = ("count", "meter", "repeats", "stamps")
+    __slots__ = ("alone", "count", "earlier", "headline", "highest", "lowest", "meter", "repeats", "stamps")
 
-    def __init__(self, declared_hz: float | None, set_hz: float | None, *, one_writer: bool) -> None:
-        self.meter = RateMeter(declared_hz, set_hz)
+    def __init__(self, signal: Signal, set_hz: float | None, *, one_writer: bool) -> None:
+        self.alone = (signal.name,)
+        self.headline = signal.headline
+        self.lowest, self.highest = math.inf, -math.inf  # headline since connecting
+        self.earlier: Earlier | None = None  # where a check wants to know
+        self.meter = RateMeter(signal.expected_hz, set_hz)
         self.repeats = RepeatFollower()
         self.stamps = StampFollower() if one_writer else None
         self.count = 0
@@ -228,13 +231,14 @@ class State:
     def reset(self) -> None:
         """Forget everything but the operator's rates: another car, or monitoring begins anew."""
         self._heard = {
-            name: _Heard(signal.expected_hz, self._expected_hz.get(name), one_writer=name not in MANY_WRITERS)
+            name: _Heard(signal, self._expected_hz.get(name), one_writer=name not in MANY_WRITERS)
             for name, signal in SIGNALS.items()
         }
         self._readings: dict[str, Reading[Any]] = {}
         self._extents: dict[str, Extent] = {}
-        # A snapshot shares both; what it shares is copied before it is changed.
-        self._readings_shared = self._extents_shared = False
+        # The view of both that snapshots share; what is shared is copied before it is changed.
+        self._readings_shared: Mapping[str, Reading[Any]] | None = None
+        self._extents_shared: Mapping[str, Extent] | None = None
         self._rates: Mapping[str, Rate] = MappingProxyType({})
         self._rates_at_s: float | None = None
         self._heard_s: float | None = None
@@ -250,7 +254,8 @@ class State:
         self._gps_follower = GpsFollower()
         self._gps = GpsWatch()
         self._phones = Phones()
-        self._earlier = {"scan": Earlier(), "distance": Earlier()}
+        self._scan_earlier = self._heard["scan"].earlier = Earlier()
+        self._distance_earlier = self._heard["distance"].earlier = Earlier()
         self._link = LinkFacts()
         self._paused = False
         self._paused_since_s: float | None = None
@@ -263,35 +268,41 @@ class State:
 
     def receive(self, signal: str, value: Value, received_s: float, stamp_s: float | None = None) -> tuple[str, ...]:
         """Take one decoded value; returns the signals that changed by it, derived ones included, for `Monitor.step`."""
-        self._follow_clock(received_s)
+        if received_s >= self._latest_s:
+            self._latest_s = received_s
+        else:
+            self._follow_clock(received_s)
         heard = self._heard[signal]
         heard.count += 1
-        heard.meter.receive(received_s)
+        meter = heard.meter
+        meter.receive(received_s)
         self._heard_s = received_s
-        if isinstance(value, Diagnostics):
-            value = self._components.merge(value, received_s)
-        elif type(value) is Twist:
-            self._wheels.add(received_s, value.speed_mps)
+        kind = type(value)
+        if kind is Twist:
+            self._wheels.add(received_s, value.speed_mps)  # type: ignore[union-attr, arg-type]
+        elif kind is Diagnostics:
+            value = self._components.merge(value, received_s)  # type: ignore[arg-type]
         reading = _new_reading(
             value=value,
             received_s=received_s,
             stamp_s=stamp_s,
-            horizon_s=heard.meter.horizon_s,
-            period_s=heard.meter.period_s,
+            horizon_s=meter.horizon_s,
+            period_s=meter.period_s,
             count=heard.count,
             repeats=heard.repeats.receive(value, stamp_s, received_s, self._wheels),
             stamp_change_s=None if stamp_s is None else self._compare_clocks(signal, heard, stamp_s, received_s),
         )
-        if self._readings_shared:
+        if self._readings_shared is not None:
             self._readings = self._readings.copy()
-            self._readings_shared = False
+            self._readings_shared = None
         self._readings[signal] = reading
-        earlier = self._earlier.get(signal)
-        if earlier is not None:
-            earlier.add(reading)
-        self._extend(signal, value)
-        derived = self._derive(signal, reading) if type(value) in _TELLING else None
-        return (signal,) if derived is None else (signal, derived)
+        if heard.earlier is not None:
+            heard.earlier.add(reading)
+        self._extend(heard, signal, value)
+        if kind not in _TELLING:
+            return heard.alone
+        derived = self._derive(signal, reading)
+        return heard.alone if derived is None else (signal, derived)
 
     def hear_phone(self, word: PhoneWord, now_s: float) -> None:
         """What an operator's phone says of its own position; judged on the next tick."""
@@ -320,22 +331,26 @@ class State:
         self._follow_clock(now_s)
         if self._paused and self._paused_since_s is None:
             self._paused_since_s = now_s
-        self._readings_shared = self._extents_shared = True
+        readings, extents = self._readings_shared, self._extents_shared
+        if readings is None:
+            readings = self._readings_shared = MappingProxyType(self._readings)
+        if extents is None:
+            extents = self._extents_shared = MappingProxyType(self._extents)
         return _new_snapshot(
             now_s=now_s,
-            readings=MappingProxyType(self._readings),
+            readings=readings,
             link=self._link,
             rates=self._measure(now_s),
             paused=self._paused,
             paused_since_s=self._paused_since_s,
             heard_s=self._heard_s,
-            extents=MappingProxyType(self._extents),
+            extents=extents,
             track=self._track.points,
             track_m=self._track.distance_m,
             gps=self._gps,
             phone=self._phones.view,
-            scan_before=self._earlier["scan"].before,
-            distance_before=self._earlier["distance"].before,
+            scan_before=self._scan_earlier.before,
+            distance_before=self._distance_earlier.before,
             standing_since_s=self._standstill.since_s if self._is_fresh("speed", now_s) else None,
             speed_slope_mps2=self._slope_mps2,
             clock_jump=self._clock_jump,
@@ -354,6 +369,7 @@ class State:
         self._readings = {
             name: replace(reading, received_s=reading.received_s + shift_s) for name, reading in self._readings.items()
         }
+        self._readings_shared = None
         if self._heard_s is not None:
             self._heard_s += shift_s
         if self._paused_since_s is not None:
@@ -408,6 +424,9 @@ class State:
     def _derived(self, signal: str, value: Value | None, source: str, reading: Reading[Any]) -> str | None:
         if value is None:
             return None
+        if self._readings_shared is not None:
+            self._readings = self._readings.copy()
+            self._readings_shared = None
         self._readings[signal] = _new_reading(
             value=value,
             received_s=reading.received_s,
@@ -416,7 +435,7 @@ class State:
             period_s=reading.period_s,
             derived_from=source,
         )
-        self._extend(signal, value)
+        self._extend(self._heard[signal], signal, value)
         return signal
 
     def _is_fresh(self, signal: str, now_s: float) -> bool:
@@ -430,18 +449,14 @@ class State:
             self._rates = MappingProxyType({name: heard.meter.rate(now_s) for name, heard in self._heard.items()})
         return self._rates
 
-    def _extend(self, signal: str, value: Value) -> None:
-        headline = _HEADLINES[signal]
-        number = None if headline is None else getattr(value, headline, None)
-        if number is None or not math.isfinite(number):
+    def _extend(self, heard: _Heard, signal: str, value: Value) -> None:
+        if heard.headline is None:
             return
-        extent = self._extents.get(signal)
-        if extent is not None and extent.lowest <= number <= extent.highest:
+        number = getattr(value, heard.headline, None)
+        if number is None or heard.lowest <= number <= heard.highest or not math.isfinite(number):
             return
-        if self._extents_shared:
+        heard.lowest, heard.highest = min(heard.lowest, number), max(heard.highest, number)
+        if self._extents_shared is not None:
             self._extents = self._extents.copy()
-            self._extents_shared = False
-        if extent is None:
-            self._extents[signal] = Extent(lowest=number, highest=number)
-        else:
-            self._extents[signal] = Extent(lowest=min(extent.lowest, number), highest=max(extent.highest, number))
+            self._extents_shared = None
+        self._extents[signal] = Extent(lowest=heard.lowest, highest=heard.highest)

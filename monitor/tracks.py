@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import takewhile
 
 from monitor.geo import Plane, course_deg
 from monitor.values import GpsFix
@@ -97,8 +97,8 @@ class Track:
         """Speed and course over ground between the mean places at either end of the look-back."""
         first_s, last_s = self._fixes[0][0], self._fixes[-1][0]
         self.course_deg = None
-        old = _mean(list(takewhile(lambda fix: fix[0] <= first_s + ENDS_S, self._fixes)))
-        new = _mean(list(takewhile(lambda fix: fix[0] >= last_s - ENDS_S, reversed(self._fixes))))
+        old = _mean(self._fixes, first_s, first_s + ENDS_S)
+        new = _mean(reversed(self._fixes), last_s - ENDS_S, last_s)
         span_s = new[0] - old[0]
         east_m, north_m = new[1] - old[1], new[2] - old[2]
         over_ground_mps = math.hypot(east_m, north_m) / span_s if span_s >= SPAN_S else None
@@ -111,8 +111,7 @@ class Track:
             self.course_deg = course_deg(east_m, north_m)
 
     def _drive(self, fix: GpsFix, at_s: float, is_jump: bool) -> None:
-        recent = list(takewhile(lambda one: one[0] >= at_s - SMOOTH_S, reversed(self._fixes)))
-        _, east_m, north_m = _mean(recent)
+        _, east_m, north_m = _mean(reversed(self._fixes), at_s - SMOOTH_S, at_s)
         if self._anchor is None:
             self._anchor = (east_m, north_m)
             self._driven_m = self._shown_m = self._shown_m or 0.0
@@ -157,6 +156,15 @@ class Track:
         self.points = (*points, point)
 
 
-def _mean(fixes: list[tuple[float, float, float]]) -> tuple[float, float, float]:
-    n = len(fixes)
-    return sum(fix[0] for fix in fixes) / n, sum(fix[1] for fix in fixes) / n, sum(fix[2] for fix in fixes) / n
+def _mean(fixes: Iterable[tuple[float, float, float]], from_s: float, to_s: float) -> tuple[float, float, float]:
+    """Of the fixes up to the first that lies outside of a time; the first of all is inside."""
+    n = 0
+    sum_s = sum_east_m = sum_north_m = 0.0
+    for at_s, east_m, north_m in fixes:
+        if not from_s <= at_s <= to_s:
+            break
+        n += 1
+        sum_s += at_s
+        sum_east_m += east_m
+        sum_north_m += north_m
+    return sum_s / n, sum_east_m / n, sum_north_m / n

@@ -63,6 +63,28 @@ def sees(snapshot: Snapshot, limits: BlindLimits, was_active: bool) -> Finding:
     return ok(text, measured=measured, limit=limit)
 
 
+def plainly_sees(snapshot: Snapshot, limits: BlindLimits) -> bool:
+    scan = snapshot.get("scan")
+    if scan is None:
+        return True
+    sight = look(scan.value, CORRIDOR, LOOK_AHEAD_M)
+    return sight.beams > 0 and 100.0 * sight.blind <= limits.blind_percent * sight.beams
+
+
+def plainly_agrees(snapshot: Snapshot, limits: Limits) -> bool:
+    reading = snapshot.get("scan")
+    if reading is None:
+        return True
+    scan = reading.value
+    if not scan.angle_increment_rad:
+        return False
+    steps = (scan.angle_max_rad - scan.angle_min_rad) / scan.angle_increment_rad
+    beams = scan.beams
+    if not (0.0 <= steps < math.inf) or round(steps) + 1 != beams:
+        return False
+    return scan.scan_time_s <= 0.0 or (beams - 1) * scan.time_increment_s <= SWEEP_SLACK * scan.scan_time_s
+
+
 def agrees(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     """Beams = round((angle_max − angle_min) / angle_increment) + 1; time per beam within the time of a scan."""
     if _laser_is_absent(snapshot):
@@ -114,6 +136,7 @@ CHECKS = (
             actions=(Action.ACKNOWLEDGE,),  # it explains why obstacles are not checked: never hidden
         ),
         limits=BlindLimits,
+        is_harmless=plainly_sees,
         find=sees,  # on the tick: it must hold for a second anyway, and 75 looks a second are not free
     ),
     Check(
@@ -127,6 +150,7 @@ CHECKS = (
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
         ),
         limits=Limits,
+        is_harmless=plainly_agrees,
         find=agrees,
         needs=frozenset({"scan"}),
     ),

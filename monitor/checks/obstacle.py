@@ -68,22 +68,50 @@ def by_estimator(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -
     return _judge(distance.distance_m, bearing_rad, speed_mps, closing_mps, limits, was_active, cause="distance")
 
 
+def laser_is_clear(snapshot: Snapshot, limits: ObstacleLimits) -> bool:
+    scan = snapshot.get("scan")
+    if scan is None:
+        return True
+    corridor = _corridor(snapshot, limits)
+    gap_m = look(scan.value, corridor, BLIND_AT_M).gap_m
+    if gap_m is None or _is_far(gap_m, snapshot, limits):
+        return True
+    before = snapshot.scan_before
+    before_m = None if before is None else look(before.value, corridor, BLIND_AT_M).gap_m
+    span_s = 0.0 if before is None else scan.received_s - before.received_s
+    return _is_clear(gap_m, before_m, span_s, snapshot, limits)
+
+
 def estimator_is_clear(snapshot: Snapshot, limits: ObstacleLimits) -> bool:
     distance = snapshot.get("distance")
     if distance is None or distance.value.distance_m is None:
         return True
-    gap_m = distance.value.distance_m
-    speed = snapshot.get("speed")
-    speed_mps = 0.0 if speed is None else abs(speed.value.speed_mps)
+    before = snapshot.distance_before
+    before_m = None if before is None else before.value.distance_m
+    span_s = 0.0 if before is None else distance.received_s - before.received_s
+    return _is_clear(distance.value.distance_m, before_m, span_s, snapshot, limits)
+
+
+def _is_far(gap_m: float, snapshot: Snapshot, limits: ObstacleLimits) -> bool:
+    """Farther than anything that the car or another could meet soon."""
+    speed_mps = _newest_speed(snapshot)
+    return gap_m >= max(limits.standoff_m, stopping_m(speed_mps, limits), _soon_m(speed_mps, limits))
+
+
+def _is_clear(gap_m: float, before_m: float | None, span_s: float, snapshot: Snapshot, limits: ObstacleLimits) -> bool:
+    speed_mps = _newest_speed(snapshot)
     if not gap_m >= max(limits.standoff_m, stopping_m(speed_mps, limits)):
         return False
     closing_mps = speed_mps
-    before = snapshot.distance_before
-    if before is not None and before.value.distance_m is not None:
-        span_s = distance.received_s - before.received_s
-        if span_s > 0.0:
-            closing_mps = max(closing_mps, (before.value.distance_m - gap_m) / span_s)
+    if before_m is not None and span_s > 0.0:
+        closing_mps = max(closing_mps, (before_m - gap_m) / span_s)
     return gap_m >= limits.time_to_collision_s * closing_mps
+
+
+def _newest_speed(snapshot: Snapshot) -> float:
+    """Whatever its age: a stale one counts for nothing in the checks, so it may only make them be asked."""
+    speed = snapshot.get("speed")
+    return 0.0 if speed is None else abs(speed.value.speed_mps)
 
 
 def _corridor(snapshot: Snapshot, limits: ObstacleLimits) -> Corridor:
@@ -181,6 +209,7 @@ CHECKS = (
         alarm=_alarm("Obstacle ahead", ("laser_blind",)),
         limits=ObstacleLimits,
         find=by_laser,
+        is_harmless=laser_is_clear,
         needs=frozenset({"scan"}),
     ),
     Check(

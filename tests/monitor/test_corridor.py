@@ -6,8 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from monitor.corridor import Corridor, along_and_aside, look
+from monitor.scan import usable
 from monitor.values import LaserScan
 
 STRAIGHT = Corridor(half_width_m=1.2, wheelbase_m=2.62, laser_ahead_m=2.5)
@@ -68,7 +71,8 @@ def test_one_stray_beam_is_no_obstacle() -> None:
     scan = sweep([])
     scan.ranges_m[90] = 3.0
     assert look(scan, STRAIGHT, 5.0).gap_m is None
-    scan.ranges_m[91] = 3.0
+    scan = sweep([])
+    scan.ranges_m[90:92] = 3.0
     assert look(scan, STRAIGHT, 5.0).gap_m == pytest.approx(3.0, abs=0.05)
 
 
@@ -131,3 +135,42 @@ def test_what_is_nearer_than_range_min_or_behind_is_nothing() -> None:
         frame_id="rear",
     )
     assert look(behind, STRAIGHT, 5.0).gap_m is None
+
+
+def reckoned(scan: LaserScan, corridor: Corridor) -> float | None:
+    """The gap point by point, as the model has it."""
+    good = usable(scan.ranges_m, scan.range_min_m, scan.range_max_m)
+    angles = scan.angle_min_rad + scan.angle_increment_rad * np.arange(scan.beams)
+    ranges = np.where(good, scan.ranges_m, 0.0).astype(np.float64)
+    along, aside = along_and_aside(ranges * np.cos(angles), ranges * np.sin(angles), corridor)
+    inside = good & (aside <= 0) & (along > 0) & (np.cos(angles) > 0)
+    gaps = [max(along[i], along[i + 1]) for i in range(scan.beams - 1) if inside[i] and inside[i + 1]]
+    return min(gaps, default=None)
+
+
+@given(
+    seed=st.integers(0, 10_000),
+    angle_rad=st.one_of(st.floats(-0.6, 0.6), st.sampled_from([0.0, 1e-4, 6e-4, 0.6])),
+    half_width_m=st.floats(0.5, 3.0),
+    wheelbase_m=st.floats(0.5, 8.0),
+    ahead_m=st.floats(-2.0, 8.0),
+    turned=st.booleans(),
+)
+def test_every_beam_is_taken_as_the_model_has_it(
+    seed: int, angle_rad: float, half_width_m: float, wheelbase_m: float, ahead_m: float, turned: bool
+) -> None:
+    random = np.random.default_rng(seed)
+    scan = sweep([], beams=int(random.integers(1, 300)) + 1, turned=turned)
+    scan.ranges_m[:] = random.uniform(0, 12, scan.beams)
+    scan.ranges_m[random.uniform(size=scan.beams) < 0.2] = random.choice([np.nan, np.inf, -np.inf, 0.05, 99.0])
+    corridor = Corridor(
+        half_width_m=half_width_m, wheelbase_m=wheelbase_m, laser_ahead_m=ahead_m, tyre_angle_rad=angle_rad
+    )
+    found, expected = look(scan, corridor, 5.0).gap_m, reckoned(scan, corridor)
+    assert found == (expected if expected is None else pytest.approx(expected, abs=1e-4))
+
+
+def test_beams_without_a_return_are_nothing_in_the_way() -> None:
+    scan = sweep([], beams=3)  # the middle one straight ahead
+    scan.ranges_m[:] = [3.0, np.inf, 0.5]
+    assert look(scan, STRAIGHT, 5.0).gap_m is None

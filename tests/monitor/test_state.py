@@ -276,3 +276,12 @@ def test_a_message_that_waited_a_moment_moves_nothing() -> None:
     state.snapshot(10.2)
     state.receive("speed", Twist(speed_mps=1.0), 10.1)
     assert state.snapshot(10.2).readings["brake"].received_s == 10.0
+
+
+def test_a_clock_that_goes_back_is_seen_by_the_next_snapshot() -> None:
+    state = State()
+    state.receive("speed", Twist(speed_mps=1.0), 100.0)
+    state.snapshot(100.4)
+    after = state.snapshot(50.0).get("speed")
+    assert after is not None
+    assert after.age_s(50.0) == pytest.approx(0.4)
