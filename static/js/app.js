@@ -2,6 +2,7 @@
 
 import { soundOf } from './alarm-layout.js';
 import { Arming } from './arming.js';
+import { deviceName, keptHere } from './device.js';
 import { field, html, listen, need, show, words } from './dom.js';
 import { gapWords } from './events.js';
 import { notices } from './notice.js';
@@ -34,7 +35,7 @@ const LIMITS = /** @type {const} */ ([['speed_limit.max_mps', 'Speed', 'm/s'], [
 const vehicle = document.documentElement.dataset['vehicle'];
 const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
 
-const store = new Store(() => new WebSocket(address));
+const store = new Store(() => new WebSocket(address), deviceName(navigator.userAgent, keptHere()));
 const voice = new Voice();
 const arming = new Arming(voice);
 const monitor = need(document, '#monitor');

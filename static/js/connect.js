@@ -54,6 +54,17 @@ export function foundIn(answer) {
     .map((one) => ({ name: String(one.name ?? 'Vehicle'), address: one.address, phase: one.phase }));
 }
 
+/**
+ * What stood when the server ended, and how to see it again.
+ * @param {import('./protocol.js').Session['held']} held
+ */
+export function heldWords(held) {
+  if (!held?.address || (!held.alarms && !held.paused)) return '';
+  const alarms = held.alarms ? `${held.alarms} ${held.alarms === 1 ? 'alarm stood' : 'alarms stood'}` : '';
+  const what = [alarms, held.paused ? 'monitoring was paused' : ''].filter(Boolean).join(' and ');
+  return `The server was restarted while it watched ${bare(held.address)}: ${what}. Connect to it to go on.`;
+}
+
 /** As an operator writes it: without the scheme rosbridge has anyway. @param {string} address */
 export function bare(address) {
   return address.replace(/^ws:\/\//, '').replace(/\/$/, '');
@@ -75,6 +86,7 @@ export function mount(root, store, page) {
   let isTyped = false;
   let isBusy = false;
   let wasSilent = false;
+  let complaint = '';
   let shownFound = '';
   input.value = addresses()[0] ?? '';
 
@@ -133,9 +145,15 @@ export function mount(root, store, page) {
 
   /** @param {string} sentence */
   function complain(sentence) {
+    complaint = sentence;
+    drawSays();
+    setAttribute(input, 'aria-invalid', sentence !== '' || null);
+  }
+
+  function drawSays() {
+    const sentence = complaint || heldWords(store.frame?.session.held);
     setWords(says, sentence);
     show(says, sentence !== '');
-    setAttribute(input, 'aria-invalid', sentence !== '' || null);
   }
 
   function openHistory() {
@@ -194,6 +212,7 @@ export function mount(root, store, page) {
     setWords(go, isDialling && (isSame || isBusy) ? `Connecting ${age(frame?.link.trying_for_s ?? 0)} s` : isBack() ? 'Back to monitoring' : 'Connect and arm alarms');
     if (store.isSilent !== wasSilent) complain(store.isSilent ? 'The server does not answer; this page keeps trying.' : '');
     wasSilent = store.isSilent;
+    drawSays();
     const { arms } = page.arming;
     for (const what of /** @type {const} */ (['sound', 'screen', 'position'])) {
       const words = armWords(what, arms[what]);

@@ -1,7 +1,9 @@
-// The alarm log: what happened, newest first, with the times in which this page was blind.
+// The alarm log: what stands and who has seen it, then what happened, newest first, with the times in which this page was blind.
 
 import { gapWords } from './events.js';
-import { html, icon, setText, words } from './dom.js';
+import { html, icon, setText, setWords, show, words } from './dom.js';
+import { byUrgency } from './alarm-layout.js';
+import { loadWords, standingWords } from './standing.js';
 import { timeOfDay } from './words.js';
 
 /**
@@ -39,15 +41,28 @@ export function mount(root, store) {
   const shelved = html('span', { class: 'n v' });
   const number = html('span');
   const list = html('ul', { class: 'log' });
+  const now = html('ul', { class: 'log', 'data-f': 'standing' });
+  const load = html('span', { 'data-f': 'load' });
+  const trouble = html('p', { class: 'sec', 'data-f': 'trouble', role: 'status' });
   const three = (/** @type {string} */ label, /** @type {HTMLElement} */ value) => html('div', {}, html('span', { class: 'lab' }, label), html('br'), value);
   root.replaceChildren(html('section', { class: 'three two' }, three('Standing', standing), three('Shelved', shelved)),
-    html('div', { class: 'sec' }, html('span', {}, 'Newest first'), number), list);
+    trouble, now, html('div', { class: 'sec' }, load), html('div', { class: 'sec' }, html('span', {}, 'Newest first'), number), list);
   let drawn = -1;
+  let stood = '';
 
   function draw() {
     const alarms = store.frame?.alarms ?? [];
     setText(standing, String(alarms.filter((alarm) => alarm.state !== 'SHELVED').length));
     setText(shelved, String(alarms.filter((alarm) => alarm.state === 'SHELVED').length));
+    setWords(load, loadWords(store.frame?.alarm_load));
+    setWords(trouble, store.frame?.log_trouble ?? '');
+    show(trouble, Boolean(store.frame?.log_trouble));
+    const lines = byUrgency(alarms).map((alarm) => [alarm.title, standingWords(alarm), timeOfDay(alarm.raised_ms), alarm.priority]);
+    const standingKey = JSON.stringify(lines);
+    if (standingKey !== stood) {
+      stood = standingKey;
+      now.replaceChildren(...lines.map(standingRow));
+    }
     const { rows, last } = store.log;
     const key = rows.length * 1e6 + (last ?? 0);
     if (key === drawn) return;
@@ -62,6 +77,13 @@ export function mount(root, store) {
     stop();
     root.replaceChildren();
   };
+}
+
+/** @param {string[]} line title, words, time of day, priority */
+function standingRow([title = '', text = '', at = '', priority = '']) {
+  const [mark, kind] = MARKS[/** @type {keyof typeof MARKS} */ (priority)] ?? ['info', ''];
+  return html('li', {}, icon(mark ?? 'info', kind ?? ''), html('span', { class: 't' }, ...words(title)), html('span', { class: 'n h' }, at),
+    html('span', { class: 'm' }, ...words(text)));
 }
 
 /** @param {Row} entry */

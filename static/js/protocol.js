@@ -58,6 +58,10 @@
  * @property {string[]} actions
  * @property {string | null} advice
  * @property {number | null} shelved_until_ms
+ * @property {string | null} [acknowledged_by]
+ * @property {string | null} [shelved_by]
+ *
+ * @typedef {{in_10_min: number, flood: boolean, bearable: boolean, chattering: string[]}} AlarmLoad
  *
  * @typedef {{code: string, title: string, hint: string, mark: string}} Problem
  *
@@ -69,6 +73,8 @@
  * @property {number | null} connected_for_s
  * @property {boolean} paused
  * @property {number} paused_for_s
+ * @property {string | null} [paused_by]
+ * @property {{address: string | null, alarms: number, paused: boolean} | null} [held] what stood when the server ended
  * @property {number | null} track_m
  * @property {number} received
  * @property {number} rejected
@@ -97,6 +103,8 @@
  * @property {{time_gap_s: number | null, stopping_m: number | null}} nearest
  * @property {Check[]} checks
  * @property {Alarm[]} alarms
+ * @property {AlarmLoad} [alarm_load]
+ * @property {string | null} [log_trouble] why the log is not kept on the server's disk
  * @property {Record<string, number>} limits
  * @property {{state: string, for_s: number | null}} recording
  * @property {{state: string, why: string | null}} decelerate

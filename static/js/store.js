@@ -56,8 +56,9 @@ export class Store {
   #looked_ms = 0;
   #lookedWall_ms = 0;
 
-  /** @param {() => WebSocket} dial */
-  constructor(dial) {
+  /** @param {() => WebSocket} dial @param {string} [name] what this phone is called in the log */
+  constructor(dial, name = '') {
+    this.name = name;
     this.wire = new Wire(
       { opened: () => this.#opened(), text: (text) => this.#heard(text), bytes: (bytes) => this.#heardScan(bytes), closed: () => this.#closed() },
       dial,
@@ -224,7 +225,7 @@ export class Store {
   #greeted(hello) {
     const blind_s = this.heard_ms === null ? 0 : this.silence_s;
     const have_event = this.log.greet(hello.boot, hello.last_event, blind_s, Date.now());
-    this.wire.send({ kind: 'hello', have_event, boot: hello.boot });
+    this.wire.send({ kind: 'hello', have_event, boot: hello.boot, name: this.name });
     this.#caughtUp();
     this.#emit('open', hello);
   }

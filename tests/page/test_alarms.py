@@ -153,3 +153,18 @@ async def test_texts_that_mean_harm_are_only_text(phone: Phone, tmp_path: Path) 
         assert await phone.page.locator("script, img, iframe, object").count() == before
         assert await phone.page.title() == "catgraph"
         assert await phone.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+async def test_who_acknowledged_stands_in_the_alarm_log_on_every_phone(phone: Phone, speeding: Process) -> None:
+    await phone.page.add_init_script("localStorage.setItem('catgraph.device', 'Pixel 7 · a3f2')")
+    await phone.open(f"{speeding.address}/#home")
+    await phone.f("acknowledge", "#sheet-alarm").tap()
+    await expect(phone.page.locator("#sheet-alarm")).to_be_hidden()
+    async with httpx.AsyncClient() as client:
+        alarms = (await client.get(f"{speeding.address}/api/alarms")).json()["alarms"]
+    assert next(alarm for alarm in alarms if alarm["id"] == "speed_limit")["acknowledged_by"] == "Pixel 7 · a3f2"
+    await phone.f("strip").tap()
+    row = phone.page.locator("[data-f=standing] li", has_text="Speed above limit")
+    await expect(row).to_contain_text("12.6 m/s, limit 11.0 m/s · acknowledged by Pixel 7 · a3f2")
+    await expect(phone.page.locator("[data-f=load]")).to_contain_text(re.compile(r"Alarm load: [1-9]\d* in 10 min"))
+    await expect(phone.page.locator("[data-f=trouble]")).to_be_hidden()
