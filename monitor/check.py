@@ -164,8 +164,9 @@ class Check(Generic[L]):
         frozenset()
     )  # signals whose every message is judged at once; all checks are judged on the tick
     # A quick look: True only where `find`, not yet active, could not say FAULT. Then it need not be asked until
-    # somebody reads its words.
-    is_harmless: Callable[[Snapshot, L], bool] | None = None
+    # somebody reads its words. What comes of a message is looked at in the `State` itself, which has of `Snapshot`
+    # what such checks read.
+    is_harmless: Callable[[Any, L], bool] | None = None
     group: str = ""  # name of its thresholds; a family shares one; "" = id
     tile: str = ""  # the tile of the home tab it belongs to; "" = label
     scope: Scope = Scope.CAR

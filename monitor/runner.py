@@ -13,8 +13,9 @@ from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
 from monitor.catalog import CHECKS, AllLimits, AnyCheck, compose
 from monitor.check import OK, Finding, Scope, Verdict, fault, unknown
 from monitor.inhibition import table_of
+from monitor.link import LinkFacts
 from monitor.restoring import numbered_on, restore
-from monitor.state import NotFresh, Snapshot
+from monitor.state import NotFresh, Snapshot, State
 from monitor.tiles import Tile, tiles
 
 __all__ = ["Crash", "Monitor", "Refused", "Tile", "Transition"]
@@ -48,6 +49,19 @@ class Crash:
     count: int  # ever; 1 is worth a line in the log
 
 
+class _Row:
+    """A check made ready to be looked at again and again."""
+
+    __slots__ = ("calm", "check", "id", "limits", "look")
+
+    def __init__(self, check: AnyCheck, limits: Any) -> None:
+        self.check = check
+        self.id = check.id
+        self.look = check.is_harmless
+        self.limits = limits
+        self.calm: Alarm | None = None  # its alarm, as it was last found at rest
+
+
 class Monitor:
     """All checks of one vehicle and their alarms.
 
@@ -65,7 +79,6 @@ class Monitor:
         self._findings: dict[str, Finding] = {}
         self._passed: list[AnyCheck] = []  # not asked on the last tick, because harmless …
         self._passed_on: Snapshot | None = None  # … of this snapshot
-        self._calm: dict[str, Alarm] = {}  # alarms that were found at rest
         self._asked: set[str] = set()  # since the last tick
         self._ticks = 0
         self.crashes: dict[str, Crash] = {}
@@ -78,11 +91,6 @@ class Monitor:
         self._causes = table_of(self.alarms.values())
         by_id = {check.id: check for check in declared}
         self._checks = tuple(by_id[name] for name in self._causes.order if name in by_id)
-        self._by_signal: dict[str, tuple[AnyCheck, ...]] = {}
-        for check in self._checks:
-            for signal in check.needs:
-                self._by_signal[signal] = (*self._by_signal.get(signal, ()), check)
-        self._by_signals: dict[Collection[str], tuple[AnyCheck, ...]] = {}  # of the sets that were ever asked for
         self.limits = compose(declared)() if limits is None else limits  # type: ignore[assignment]
 
     @property
@@ -96,6 +104,8 @@ class Monitor:
         self._limits_of: dict[str, Any] = {
             check.id: getattr(limits, check.limits_group, None) or check.limits() for check in self._declared
         }
+        self._rows = tuple(_Row(check, self._limits_of[check.id]) for check in self._checks)
+        self._rows_by_signals: dict[Collection[str], tuple[_Row, ...]] = {}  # of the sets that were ever asked for
 
     def step(self, snapshot: Snapshot, changed: Collection[str] | None = None) -> tuple[Transition, ...]:
         """Judge. None: a tick, all checks; else only those that need one of the `changed` signals.
@@ -107,11 +117,10 @@ class Monitor:
         if changed is None:
             return self._tick(snapshot)
         transitions: list[Transition] = []
-        may_pass = self._may_pass(snapshot)
-        for check in self._needing(changed):
-            if may_pass and self._is_harmless(check, snapshot):
-                continue  # the words are those of the last tick, for a moment
-            transitions += self._judge(check, snapshot)
+        may_pass = self._may_pass(snapshot.link, snapshot.paused)
+        for row in self._needing(changed):
+            if not (may_pass and self._is_harmless(row, snapshot)):  # else its words are the last tick's, for a moment
+                transitions += self._judge(row.check, snapshot)
         if self.crashes:
             transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
         return tuple(transitions)
@@ -130,48 +139,47 @@ class Monitor:
         self._ticks += 1
         self._passed.clear()
         self._asked.clear()
-        may_pass = self._may_pass(snapshot) and self._ticks % ASKED_EVERY != 0
+        may_pass = self._may_pass(snapshot.link, snapshot.paused) and self._ticks % ASKED_EVERY != 0
         transitions: list[Transition] = []
-        for check in self._checks:
-            if may_pass and self._is_harmless(check, snapshot):
-                self._passed.append(check)
+        for row in self._rows:
+            if may_pass and self._is_harmless(row, snapshot):
+                self._passed.append(row.check)
             else:
-                transitions += self._judge(check, snapshot)
+                transitions += self._judge(row.check, snapshot)
         self._passed_on = snapshot if self._passed else None
-        if self.crashes or not self._is_calm(IMPAIRED):
+        if self.crashes or not self.alarms[IMPAIRED].is_at_rest:
             transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
         return tuple(transitions)
 
-    def _may_pass(self, snapshot: Snapshot) -> bool:
-        return snapshot.link.phase == "monitoring" and not snapshot.paused
+    def _may_pass(self, link: LinkFacts, paused: bool) -> bool:
+        return link.phase == "monitoring" and not paused
 
-    def _is_harmless(self, check: AnyCheck, snapshot: Snapshot) -> bool:
-        look = check.is_harmless
-        if look is None or not self._is_calm(check.id):
+    def _is_harmless(self, row: _Row, seen: Snapshot | State) -> bool:
+        if row.look is None:
             return False
+        alarm = self.alarms[row.id]
+        if row.calm is not alarm:  # an alarm never changes: it is replaced
+            if not alarm.is_at_rest or self._causes.remembers(row.id):
+                return False
+            row.calm = alarm
         try:
-            return look(snapshot, self._limits_of[check.id])
+            return row.look(seen, row.limits)
         except Exception:  # as in `_find`: it will be asked, and if it fails too, that is said
             return False
-
-    def _is_calm(self, alarm_id: str) -> bool:
-        """At rest, and nothing is to be remembered of it."""
-        alarm = self.alarms[alarm_id]
-        if self._calm.get(alarm_id) is alarm:  # an alarm never changes: it is replaced
-            return True
-        if not alarm.is_at_rest or self._causes.remembers(alarm_id):
-            return False
-        self._calm[alarm_id] = alarm
-        return True
 
     @property
     def checks(self) -> tuple[AnyCheck, ...]:
         """What is judged, in the order of the home tab."""
         return self._declared
 
-    def heeds(self, changed: Collection[str]) -> bool:
-        """Whether a step for these signals would judge anything; where not, there is no need of a snapshot."""
-        return bool(self._needing(changed))
+    def heeds(self, changed: Collection[str], state: State) -> bool:
+        """Whether a step for these signals could find anything; where not, there is no need of a snapshot."""
+        rows = self._needing(changed)
+        if not rows:
+            return False
+        if self.crashes or not self._may_pass(state.link_facts, state.paused):
+            return True
+        return any(not self._is_harmless(row, state) for row in rows)
 
     def end(self, now_s: float) -> tuple[Transition, ...]:
         """Monitoring ends by the operator's wish: nothing is judged and nothing stands any more."""
@@ -184,7 +192,8 @@ class Monitor:
         self._passed_on = None
         self.crashes.clear()
         self._causes.clear()
-        self._calm.clear()
+        for row in self._rows:
+            row.calm = None
         return tuple(transitions)
 
     def restore(self, transitions: Iterable[Transition]) -> None:
@@ -240,14 +249,14 @@ class Monitor:
         self.alarms[alarm_id], transitions = act(alarm)
         return transitions
 
-    def _needing(self, changed: Collection[str]) -> tuple[AnyCheck, ...]:
+    def _needing(self, changed: Collection[str]) -> tuple[_Row, ...]:
         together = changed if type(changed) is tuple else frozenset(changed)
-        found = self._by_signals.get(together)
+        found = self._rows_by_signals.get(together)
         if found is None:
-            wanted = {check.id for signal in together for check in self._by_signal.get(signal, ())}
-            found = tuple(check for check in self._checks if check.id in wanted)
-            if len(self._by_signals) < KEPT_SETS:
-                self._by_signals[together] = found
+            wanted = frozenset(together)
+            found = tuple(row for row in self._rows if not wanted.isdisjoint(row.check.needs))
+            if len(self._rows_by_signals) < KEPT_SETS:
+                self._rows_by_signals[together] = found
         return found
 
     def _judge(self, check: AnyCheck, snapshot: Snapshot) -> tuple[Transition, ...]:

@@ -309,9 +309,38 @@ class State:
         self._follow_clock(now_s)
         self._phones.hear(word, now_s)
 
-    def reading(self, signal: str) -> Reading[Any] | None:
-        """The newest reading whatever its age, as `Snapshot.get`, without a snapshot."""
+    # What `Snapshot` says of the newest moment, without a snapshot.
+
+    def get(self, signal: str) -> Reading[Any] | None:
         return self._readings.get(signal)
+
+    @property
+    def now_s(self) -> float:
+        return self._latest_s
+
+    @property
+    def link_facts(self) -> LinkFacts:
+        return self._link
+
+    @property
+    def paused(self) -> bool:
+        return self._paused
+
+    @property
+    def gps(self) -> GpsWatch:
+        return self._gps
+
+    @property
+    def scan_before(self) -> Reading[LaserScan] | None:
+        return self._scan_earlier.before
+
+    @property
+    def distance_before(self) -> Reading[Distance] | None:
+        return self._distance_earlier.before
+
+    @property
+    def standing_since_s(self) -> float | None:
+        return self._standstill.since_s if self._is_fresh("speed", self._latest_s) else None
 
     def link(self, facts: LinkFacts) -> None:
         """What is now known of the link. A link that opens (again) starts the measuring of rates anew."""

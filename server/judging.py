@@ -63,6 +63,6 @@ def judge(
     monitor: Monitor, state: State, now_s: float, changed: tuple[str, ...] | None = None
 ) -> tuple[Transition, ...]:
     """Judges what changed, at once; None: time passed, everything."""
-    if changed is not None and not monitor.heeds(changed):
+    if changed is not None and not monitor.heeds(changed, state):
         return ()
     return monitor.step(state.snapshot(now_s), changed)

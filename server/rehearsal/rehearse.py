@@ -6,7 +6,7 @@ import contextlib
 import gc
 import math
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from monitor.alarm import Transition
@@ -167,46 +167,41 @@ class _Run:
         count = 0
         from_s = at_s = self._extract.start_s
         tick_s = math.inf
-        for message in self._messages(origin_s, listeners):
-            now_s = message.at_s - origin_s
-            if count == 0:
-                from_s = self._opened_s = now_s
-                self._judge(now_s, None)
-                tick_s = from_s + TICK_S
-            elif now_s > until_s:
-                break
-            if now_s >= tick_s:
-                tick_s = self._tick_until(now_s, at_s)
-            at_s = max(at_s, now_s)
-            count += 1
-            sources = listeners.get(message.topic)
-            if sources is None:
-                continue
-            self._last_message_s = now_s
-            changed = judging.receive(
-                sources, message.message, now_s, None, reception=reception, state=state, profile=profile
-            )
-            if changed:
-                transitions = judging.judge(monitor, state, now_s, changed)
-                if transitions:
-                    self._diary.note(transitions, monitor.alarms)
-                if traces is not None:
-                    traces.take(changed, state.reading, now_s)
-        return count, from_s, at_s
-
-    def _messages(self, origin_s: float, listeners: Collection[str]) -> Iterator[Message]:
-        """Read as they are asked for; a recording that breaks off half way is judged up to there."""
-        messages = self._recording.messages(self._extract.start_s, listeners)
-        stream = self._faults.over(messages, origin_s, self._signal_of()) if self._faults.laid else messages
-        is_first = True
+        messages: Iterator[Message] = self._recording.messages(self._extract.start_s, listeners)
+        if self._faults.laid:
+            messages = self._faults.over(messages, origin_s, self._signal_of())
         try:
-            for message in stream:
-                is_first = False
-                yield message
+            for message in messages:
+                now_s = message.at_s - origin_s
+                if count == 0:
+                    from_s = self._opened_s = now_s
+                    self._judge(now_s, None)
+                    tick_s = from_s + TICK_S
+                elif now_s > until_s:
+                    break
+                if now_s >= tick_s:
+                    tick_s = self._tick_until(now_s, at_s)
+                if now_s > at_s:
+                    at_s = now_s
+                count += 1
+                sources = listeners.get(message.topic)
+                if sources is None:
+                    continue
+                self._last_message_s = now_s
+                changed = judging.receive(
+                    sources, message.message, now_s, None, reception=reception, state=state, profile=profile
+                )
+                if changed:
+                    transitions = judging.judge(monitor, state, now_s, changed)
+                    if transitions:
+                        self._diary.note(transitions, monitor.alarms)
+                    if traces is not None:
+                        traces.take(changed, state.get, now_s)
         except RecordingUnreadable as error:
-            if is_first:
+            if count == 0:
                 raise
-            self._broke_off = str(error)
+            self._broke_off = str(error)  # it is judged up to there
+        return count, from_s, at_s
 
     def _tick_until(self, now_s: float, heard_s: float) -> float:
         """All ticks up to a moment; answers when the next one is due. `heard_s`: when the last message came."""

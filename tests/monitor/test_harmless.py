@@ -33,6 +33,7 @@ from tests.monitor.drive import REAL_HZ, VALUES, Drive, sweep
 from tests.monitor.test_runner import Script, at, check
 
 QUICK = [check for check in CHECKS if check.is_harmless is not None]
+NEEDS_A_SNAPSHOT = frozenset({"no_response"})  # looks at more than what the message changed
 
 numbers = st.one_of(st.floats(-30, 30), st.sampled_from([math.nan, math.inf, -math.inf, 0.0, 5.0, 11.0]))
 ranges = st.lists(st.one_of(st.floats(0, 90, width=32), st.sampled_from([math.nan, math.inf])), max_size=9)
@@ -191,3 +192,21 @@ def test_nothing_is_passed_over_without_a_link_or_while_paused() -> None:
         briefs.append(monitor.findings["a"].brief)
     assert briefs == ["not checked: no link", "not checked: paused", "OK"]
     assert all(first != second for first, second in pairwise(briefs))
+
+
+@settings(max_examples=60)
+@given(happening=events)
+def test_the_state_itself_can_be_looked_at(happening: list[Any]) -> None:
+    """What comes of a message is first looked at without a snapshot, and must look the same."""
+    state = State()
+    state.link(LinkFacts(phase="monitoring", connected_s=0.0))
+    now_s = 10.0
+    for later_s, (name, value) in happening:
+        now_s += max(0.0, later_s)
+        state.receive(name, value, now_s)
+        snapshot = state.snapshot(now_s)
+        for one in QUICK:
+            if one.needs and one.id not in NEEDS_A_SNAPSHOT:
+                assert one.is_harmless is not None
+                limits = one.limits()
+                assert one.is_harmless(state, limits) == one.is_harmless(snapshot, limits), one.id
