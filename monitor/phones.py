@@ -67,7 +67,7 @@ class PhoneView:
     measured_s: float = -math.inf
     why: Why | None = None  # why its newest word is no usable fix
     comparisons: tuple[Comparison, ...] = ()  # the newest five, oldest first
-    tracks: Tracks | None = None  # over the last minute
+    tracks: Tracks | None = None  # over the last minute, of places that the gate explains
 
     def is_there(self, now_s: float) -> bool:
         """Whether a phone is to be compared at all; one that left, or was not heard for a minute, is not."""
@@ -115,6 +115,7 @@ class Phones:
         self._comparisons: deque[Comparison] = deque(maxlen=COMPARISONS)
         self._pairs: deque[Pair] = deque(maxlen=round(TRACK_S / STEP_S) + 1)
         self._tracks: Tracks | None = None
+        self._compared_s = -math.inf
 
     def hear(self, word: PhoneWord, now_s: float) -> None:
         """One word of one phone."""
@@ -125,7 +126,7 @@ class Phones:
             self._note(word, now_s)
         self._choose(now_s)
         if word.phone == self._chosen and word.fix is not None and self._phones[word.phone].why is None:
-            if not self._pairs or word.measured_s >= self._pairs[-1].at_s + STEP_S:
+            if word.measured_s >= self._compared_s + STEP_S:
                 self._waiting = word
                 self._compare()
         self._look()
@@ -164,7 +165,7 @@ class Phones:
             self._chosen, self._waiting = name, None
             self._comparisons.clear()
             self._pairs.clear()
-            self._tracks = None
+            self._tracks, self._compared_s = None, -math.inf
 
     def _compare(self) -> bool:
         """Compares the fix that waits, if the car's positions have reached its moment; whether it was."""
@@ -185,20 +186,23 @@ class Phones:
             velocity_mps=place.velocity_mps,
             uncertain_s=UNCERTAIN_S + word.uncertain_s,
         )
-        self._comparisons.append(Comparison(at_s=at_s, distance_m=math.hypot(east_m, north_m), gate_m=gate))
+        one = Comparison(at_s=at_s, distance_m=math.hypot(east_m, north_m), gate_m=gate)
+        self._compared_s = at_s
+        self._comparisons.append(one)
         while self._comparisons[0].at_s < at_s - COMPARED_WITHIN_S:
             self._comparisons.popleft()
-        self._pairs.append(
-            Pair(
-                at_s=at_s,
-                phone_lat_deg=fix.lat_deg,
-                phone_lon_deg=fix.lon_deg,
-                phone_sigma_m=sigma_m,
-                car_lat_deg=place.lat_deg,
-                car_lon_deg=place.lon_deg,
+        if one.distance_m <= one.gate_m:  # else it is told by the gate, and would spoil a minute of track besides
+            self._pairs.append(
+                Pair(
+                    at_s=at_s,
+                    phone_lat_deg=fix.lat_deg,
+                    phone_lon_deg=fix.lon_deg,
+                    phone_sigma_m=sigma_m,
+                    car_lat_deg=place.lat_deg,
+                    car_lon_deg=place.lon_deg,
+                )
             )
-        )
-        while self._pairs[0].at_s < at_s - TRACK_S:
+        while self._pairs and self._pairs[0].at_s < at_s - TRACK_S:
             self._pairs.popleft()
         self._tracks = correlate(self._pairs)
         return True

@@ -342,6 +342,10 @@ class State:
     def standing_since_s(self) -> float | None:
         return self._standstill.since_s if self._is_fresh("speed", self._latest_s) else None
 
+    def phones(self, now_s: float) -> int:
+        """How many phones were heard within the last minute."""
+        return self._phones.view.count if self._phones.view.is_there(now_s) else 0
+
     def link(self, facts: LinkFacts) -> None:
         """What is now known of the link. A link that opens (again) starts the measuring of rates anew."""
         before, self._link = self._link, facts

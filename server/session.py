@@ -157,6 +157,11 @@ class Session:
         """How late the newest tick was."""
         return self._lag_s
 
+    @property
+    def phones(self) -> int:
+        """How many phones tell their position, or why they cannot."""
+        return self._state.phones(self._now())
+
     def tallies(self) -> dict[str, Tally]:
         """What was received and rejected, by signal, since connecting."""
         return self._reception.by_signal

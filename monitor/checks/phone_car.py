@@ -23,6 +23,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
+from monitor.motion import MOVES_ABOVE_MPS
 from monitor.phone_words import why_words
 from monitor.phones import FIX_LIVES_S, NO_PHONE
 from monitor.state import Snapshot
@@ -112,14 +113,15 @@ def move_as_one(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -
     if tracks is None or tracks.pairs < PAIRS or tracks.span_s < SPAN_S:
         pairs = 0 if tracks is None else tracks.pairs
         return unknown(
-            f"Taking both tracks: {pairs} places so far, {PAIRS} within {SPAN_S:.0f} s are needed", short="waiting"
+            f"Taking both tracks: {pairs} places of the last minute agree, {PAIRS} over {SPAN_S:.0f} s are needed",
+            short="waiting",
         )
     needed_m = SPREAD_SIGMAS * tracks.phone_sigma_m
     if tracks.car_spread_m <= needed_m:
-        return unknown(
-            f"Standing: the car's track spreads {tracks.car_spread_m:.1f} m, {needed_m:.1f} m would tell",
-            short="standing",
-        )
+        text = f"the car's track spreads {tracks.car_spread_m:.1f} m, with this phone {needed_m:.1f} m would tell"
+        if _drives(snapshot):
+            return unknown(f"{text[0].upper()}{text[1:]}", short="near")
+        return unknown(f"Standing: {text}", short="standing")
     r = 0.0 if tracks.correlation is None else tracks.correlation  # a phone that never moved moves with nothing
     text = f"The tracks correlate with {r:.2f}; {limits.least_correlation:.2f} is the least"
     measured = Quantity(label="Correlation", value=r, unit="r")
@@ -127,6 +129,17 @@ def move_as_one(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -
     if r < limits.least_correlation + (0.05 if was_active else 0.0):
         return fault(text, brief=f"r {r:.2f}", measured=measured, limit=limit, causes=("phone", "position"))
     return ok(text, measured=measured, limit=limit)
+
+
+def _drives(snapshot: Snapshot) -> bool:
+    """Whether the wheels say that the car moves now."""
+    speed = snapshot.get("speed")
+    return (
+        speed is not None
+        and speed.is_fresh(snapshot.now_s)
+        and snapshot.standing_since_s is None
+        and abs(speed.value.speed_mps) > MOVES_ABOVE_MPS
+    )
 
 
 CHECKS = (
@@ -140,6 +153,7 @@ CHECKS = (
             place=Place.DIALOG,
             sound=Sound.MEDIUM,
             needs_ack=True,
+            on_delay_s=3.0,
             off_delay_s=5.0,
             actions=(Action.ACKNOWLEDGE,),
             advice="Where phone and car are together, do not trust the car's position.",

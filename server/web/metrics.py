@@ -29,13 +29,14 @@ async def metrics(request: Request) -> PlainTextResponse:
         [("", app.hub.skipped)],
     )
     add("up_seconds", "gauge", "Seconds since the server started.", [("", app.now() - app.started_s)])
-    received, rejected, open_, lag, load, chattering, kept = [], [], [], [], [], [], []
+    received, rejected, open_, lag, load, chattering, kept, phones = [], [], [], [], [], [], [], []
     for name, session in app.sessions.items():
         vehicle = f'vehicle="{name}"'
         for signal, tally in session.tallies().items():
             received.append((f'{{{vehicle},signal="{signal}"}}', float(tally.received)))
             rejected.append((f'{{{vehicle},signal="{signal}"}}', float(tally.rejected)))
         open_.append((f"{{{vehicle}}}", float(session.phase == "monitoring")))
+        phones.append((f"{{{vehicle}}}", float(session.phones)))
         lag.append((f"{{{vehicle}}}", session.lag_s))
         load.append((f"{{{vehicle}}}", float(session.alarm_load.in_10_min)))
         chattering.append((f"{{{vehicle}}}", float(len(session.alarm_load.chattering))))
@@ -51,5 +52,6 @@ async def metrics(request: Request) -> PlainTextResponse:
     add("alarms_announced_10_min", "gauge", "Alarms announced in the last ten minutes; more than 10: a flood.", load)
     add("alarms_chattering", "gauge", "Alarms that came and went three times within the last minute.", chattering)
     add("alarm_log_kept", "gauge", "1 while the alarm log is kept on the disk.", kept)
+    add("phones", "gauge", "Phones that tell their position, or why they cannot.", phones)
     add("tick_lag_seconds", "gauge", "How late the newest tick was.", lag)
     return PlainTextResponse("\n".join(lines) + "\n", media_type=_TEXT)

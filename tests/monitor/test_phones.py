@@ -108,6 +108,19 @@ def test_five_comparisons_and_a_minute_of_track_are_kept() -> None:
     assert road.view.tracks.correlation == pytest.approx(1.0, abs=1e-6)
 
 
+def test_places_that_the_gate_does_not_explain_are_no_part_of_the_track() -> None:
+    """Else a receiver that ran away for five seconds would spoil the correlation of the next minute."""
+    road = Road(5.0)
+    for second in range(60):
+        road.drive(1.0).say(aside_m=200.0 if 40 <= second < 45 else 3.0)
+    assert road.view.tracks is not None
+    assert road.view.tracks.pairs == 55
+    assert road.view.tracks.correlation == pytest.approx(1.0, abs=1e-6)
+    for _ in range(70):
+        road.drive(1.0).say(aside_m=200.0)
+    assert road.view.tracks.pairs == 0
+
+
 def test_however_fast_a_phone_speaks_what_is_kept_is_bounded() -> None:
     road = Road(5.0)
     for _ in range(600):
@@ -203,7 +216,7 @@ def test_the_next_takes_over_when_the_first_has_none_for_10_s_and_nothing_of_the
         assert road.view.phone == ("one" if second <= 9 else "two"), second
     assert [round(one.distance_m) for one in road.view.comparisons] == [300] * 4
     assert road.view.tracks is not None
-    assert road.view.tracks.pairs == 4
+    assert road.view.tracks.pairs == 0  # what lies beyond the gate is no track
     road.drive(1.0).say("one").say("two")
     assert road.view.phone == "two"  # who comes back is the next again, and does not push in
 

@@ -11,7 +11,7 @@ from monitor.agreement import Tracks
 from monitor.check import Finding
 from monitor.phones import NO_PHONE, Comparison, PhoneView, Why
 from monitor.state import Snapshot
-from monitor.values import GpsFix, PhoneFix
+from monitor.values import GpsFix, PhoneFix, Twist
 from tests.monitor.checks.known import LINK, ask, check_of, known
 
 NOW_S = 100.0
@@ -135,8 +135,30 @@ def test_tracks_are_judged_only_where_the_car_moved(of: Tracks | None, verdict: 
 def test_standing_is_said_and_not_taken_for_good() -> None:
     finding = asked("phone_tracks", view(tracks=tracks(0.1, car_spread_m=0.4)))
     assert finding.brief == "not checked: standing"
-    assert finding.text == "Standing: the car's track spreads 0.4 m, 10.5 m would tell"
+    assert finding.text == "Standing: the car's track spreads 0.4 m, with this phone 10.5 m would tell"
     assert asked("phone_tracks", view(tracks=tracks(pairs=3))).brief == "not checked: waiting"
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "stands_since_s", "brief"),
+    [
+        (4.0, None, "not checked: near"),
+        (-4.0, None, "not checked: near"),
+        (0.3, None, "not checked: standing"),
+        (0.0, None, "not checked: standing"),
+        (0.0, 60.0, "not checked: standing"),
+    ],
+)
+def test_a_car_that_drives_on_the_spot_of_a_coarse_phone_is_not_called_standing(
+    speed_mps: float, stands_since_s: float | None, brief: str
+) -> None:
+    snapshot = replace(
+        known(NOW_S, position=CAR, speed=Twist(speed_mps=speed_mps)),
+        phone=view(tracks=tracks(0.1, car_spread_m=40.0, phone_sigma_m=20.0)),
+        standing_since_s=stands_since_s,
+    )
+    finding = ask("phone_tracks", snapshot)
+    assert (finding.verdict, finding.brief) == ("unknown", brief)
 
 
 def test_the_correlation_has_a_deadband_and_a_setting() -> None:
