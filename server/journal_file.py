@@ -23,7 +23,7 @@ CREATE TABLE IF NOT EXISTS event (
     PRIMARY KEY (vehicle, n)
 ) WITHOUT ROWID
 """
-_INDEX = "CREATE INDEX IF NOT EXISTS event_by_alarm ON event (vehicle, alarm)"  # and so by n, which is in the key
+_INDEX = "CREATE INDEX IF NOT EXISTS event_of_alarm ON event (vehicle, alarm, n)"
 
 _WHY = {
     sqlite3.SQLITE_FULL: "the disk is full",

@@ -248,3 +248,21 @@ def test_two_servers_on_one_log_are_told_and_nothing_is_overwritten(tmp_path: Pa
     assert [kept["text"] for kept in Journal(path).after("car", 0)] == ["of one"]
     one.close()
     other.close()
+
+
+def test_one_alarm_is_found_by_an_index() -> None:
+    """A log of years is not read through for where an alarm stands."""
+    journal = Journal(None)
+    assert journal._database is not None
+    asked: list[str] = []
+    journal._database.set_trace_callback(asked.append)
+    journal.find("car", alarm="hot", before=9)
+    journal.find("car", alarm="")
+    journal.alarms("car")
+    journal._database.set_trace_callback(None)
+    assert len(asked) == 3
+    for query in asked:
+        plan = journal._database.execute(f"EXPLAIN QUERY PLAN {query}").fetchall()
+        assert "event_of_alarm (vehicle=? AND alarm" in plan[0][3]
+        assert len(plan) == 1, "it sorts"
+    journal.close()
