@@ -3,7 +3,8 @@
 Two clocks are never subtracted to get an age. What tells is the *change* of their difference, stamp − received: on a
 healthy car it stays what it was, less the moments a message waited on its way. So a step of the difference between two
 steady stretches is a jump of the car's clock (Wi-Fi can delay a message, but not send it before its time); a
-difference that shrinks bit by bit says that messages come ever later, or that the clock runs slow.
+difference that shrinks bit by bit says that messages come ever later, or that the clock runs slow. A step back by less
+than the time between two messages looks like one that waited, and counts as lateness.
 """
 
 from __future__ import annotations
@@ -61,7 +62,13 @@ class StampFollower:
         self._last_s = at_s
         settles = at_s - self._first_s <= SETTLES_S
         is_ahead = difference_s > self._best_s + JUMP_S and not settles
-        if is_ahead or stamp_s < self._newest_s - JUMP_S:
+        is_back = stamp_s < self._newest_s - JUMP_S or (
+            # once gone back, a slow signal is soon past its newest stamp again
+            bool(self._odd)
+            and difference_s < self._best_s - JUMP_S
+            and abs(difference_s - self._odd[-1]) <= AGREE_WITHIN_S
+        )
+        if is_ahead or is_back:
             return self._doubt(stamp_s, difference_s)
         if self._odd:
             self._odd.clear()

@@ -21,11 +21,13 @@ from monitor.state import Snapshot
 
 AT_LEAST = 3  # signals: fewer are judged each by itself
 SHARE, SHARE_WHILE_ACTIVE = 0.5, 0.3
+DEADBAND_PERCENT = 3.0  # rates at the very limit neither come nor go
 
 
 def find(snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
     shares = _shares(snapshot, limits)
-    judged, slow = len(shares), sum(share < limits.slow_below_percent / 100.0 for share in shares)
+    percent = min(100.0, limits.slow_below_percent + (DEADBAND_PERCENT if was_active else 0.0))
+    judged, slow = len(shares), sum(share < percent / 100.0 for share in shares)
     if judged < AT_LEAST:
         return absent(f"{judged} signals with a known rate are too few to compare", brief="too few")
     text = f"{slow} of {judged} signals come slower than expected"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -35,6 +37,8 @@ def find(snapshot: Snapshot, limits: FuelLimits, was_active: bool) -> Finding:
     level = snapshot.need("fuel")
     if level.unit != "%":
         return unknown(f"Fuel is given in {level.unit or 'an unknown unit'}, not in percent of the tank", short="unit")
+    if not math.isfinite(level.value):
+        return unknown("The fuel level is not a number", short="no data")
     below = limits.low_percent + (limits.deadband_percent if was_active else 0.0)
     text = f"{level.value:.0f} % left, low below {limits.low_percent:.0f} %"
     measured = Quantity(label="Fuel", value=level.value, unit="%")

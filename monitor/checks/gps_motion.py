@@ -96,7 +96,7 @@ def jumps(snapshot: Snapshot, limits: JumpLimits, was_active: bool) -> Finding:
     text = f"The position runs at {watch.net_mps:.1f} m/s, the car at {speed_mps:.1f} m/s"
     measured = Quantity(label="Position", value=watch.net_mps, unit="m/s")
     limit = Quantity(label="Allowed", value=allowed_mps, unit="m/s")
-    if slowest_mps > allowed_mps:
+    if slowest_mps > speed_mps + limits.margin_mps * (0.8 if was_active else 1.0):
         return fault(text, brief=f"{watch.net_mps:.0f} m/s", measured=measured, limit=limit, causes=("position",))
     return ok(text, measured=measured, limit=limit)
 

@@ -29,6 +29,7 @@ from monitor.state import Snapshot
 
 CORRIDOR = Corridor(half_width_m=1.2, wheelbase_m=2.62, laser_ahead_m=2.5)
 LOOK_AHEAD_M = 5.0  # where the beams of the corridor are counted
+DEADBAND_PERCENT = 10.0  # three of the beams of the corridor: single ones come and go from scan to scan
 SWEEP_SLACK = 1.1  # a sweep may take so much longer than the time between two scans
 
 
@@ -58,7 +59,7 @@ def sees(snapshot: Snapshot, limits: BlindLimits, was_active: bool) -> Finding:
     percent = 100.0 * sight.blind / sight.beams
     measured = Quantity(label="Without a return", value=percent, unit="%")
     text = f"{percent:.0f} % of {sight.beams} beams ahead without a usable return"
-    if percent > limits.blind_percent:
+    if percent > limits.blind_percent - (DEADBAND_PERCENT if was_active else 0.0):
         return fault(text, brief=f"{percent:.0f} % blind", measured=measured, limit=limit, causes=("scan",))
     return ok(text, measured=measured, limit=limit)
 

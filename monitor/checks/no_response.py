@@ -57,7 +57,7 @@ def find(snapshot: Snapshot, limits: ResponseLimits, was_active: bool) -> Findin
     if ordered_mps is None or not math.isfinite(ordered_mps) or not math.isfinite(speed_mps):
         return unknown("The command says no speed", short="no cmd")
     ordered_mps = max(0.0, ordered_mps)  # nobody is asked to reverse before standing
-    if speed_mps - ordered_mps <= limits.margin_mps:
+    if speed_mps - ordered_mps <= limits.margin_mps * (0.8 if was_active else 1.0):
         return ok(f"{ordered_mps:.1f} m/s ordered, {speed_mps:.1f} m/s driven: no braking ordered")
     slope_mps2 = snapshot.speed_slope_mps2
     if slope_mps2 is None:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import pytest
 
 from monitor.values import Level
 from tests.monitor.checks.known import LINK, ask, known
+from tests.monitor.drive import Drive
 
 
 @pytest.mark.parametrize(
@@ -29,8 +33,21 @@ def test_another_unit_is_not_judged() -> None:
 
 
 def test_published_but_silent_is_unknown() -> None:
-    from dataclasses import replace
-
     finding = ask("fuel_low", known(link=replace(LINK, published=frozenset({"fuel"}))))
     assert finding.verdict == "unknown"
     assert finding.applies
+
+
+@pytest.mark.parametrize("percent", [math.nan, math.inf, -math.inf], ids=str)
+def test_a_level_that_is_no_number_is_no_alarm(percent: float) -> None:
+    """Decoding refuses them; what comes through all the same is not taken for an empty tank, nor for a full one."""
+    assert ask("fuel_low", known(fuel=Level(value=percent, unit="%"))).verdict == "unknown"
+
+
+def test_it_is_told_once() -> None:
+    """fuel_low: the tank runs empty by a percent in ten seconds."""
+    car = Drive({"speed": 20.0}).open()
+    for second in range(100):
+        car.say("fuel", Level(value=14.0 - 0.1 * second, unit="%")).to(float(second))
+    assert car.announced == ["fuel_low"]
+    assert 45.0 <= car.happened[0].at_s <= 47.0
