@@ -7,6 +7,7 @@ import { field, html, listen, need, show, words } from './dom.js';
 import { gapWords } from './events.js';
 import { notices } from './notice.js';
 import { Page } from './page.js';
+import { Phone } from './phone.js';
 import { Screens } from './screens.js';
 import { mountSheets } from './sheet.js';
 import { Store } from './store.js';
@@ -37,7 +38,7 @@ const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.h
 
 const store = new Store(() => new WebSocket(address), deviceName(navigator.userAgent, keptHere()));
 const voice = new Voice();
-const arming = new Arming(voice);
+const arming = new Arming(voice, new Phone(store));
 const monitor = need(document, '#monitor');
 const say = notices(field(document, 'snacks'));
 const page = new Page(store, arming, say);

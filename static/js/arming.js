@@ -11,27 +11,17 @@ export class Arming {
   #isAsked = false;
   /** @type {Armed} */
   screen = 'wakeLock' in navigator ? 'asks' : 'missing';
-  /** @type {Armed} */
-  position = window.isSecureContext && 'geolocation' in navigator ? 'asks' : 'missing';
 
-  /** @param {import('./voice.js').Voice} voice */
-  constructor(voice) {
+  /** @param {import('./voice.js').Voice} voice @param {import('./phone.js').Phone} phone */
+  constructor(voice, phone) {
     this.voice = voice;
+    this.phone = phone;
     document.addEventListener('visibilitychange', () => this.#stayAwake());
-    // Browsers tell beforehand only what was answered before; this asks nothing of anybody.
-    navigator.permissions?.query({ name: 'geolocation' }).then((permission) => {
-      const note = () => {
-        if (this.position === 'missing') return;
-        this.position = permission.state === 'granted' ? 'ready' : permission.state === 'denied' ? 'refused' : 'asks';
-      };
-      note();
-      permission.onchange = note;
-    }, () => {});
   }
 
   /** @returns {Arms} */
   get arms() {
-    return { sound: this.#soundArm(), screen: this.screen, position: this.position };
+    return { sound: this.#soundArm(), screen: this.screen, position: this.phone.armed };
   }
 
   /** Within the tap. Nothing here is waited for: the vehicle is connected meanwhile. */
@@ -39,12 +29,7 @@ export class Arming {
     this.#isAsked = true;
     this.voice.arm();
     this.#stayAwake();
-    if (this.position === 'missing') return;
-    navigator.geolocation.getCurrentPosition(
-      () => { this.position = 'ready'; },
-      (error) => { this.position = error.code === error.PERMISSION_DENIED ? 'refused' : 'ready'; },
-      { enableHighAccuracy: true, timeout: 10000 },
-    );
+    this.phone.arm();
   }
 
   #soundArm() {

@@ -21,8 +21,6 @@ PHONE: dict[str, Any] = {
     "color_scheme": "dark",
     "has_touch": True,
     "is_mobile": True,
-    "permissions": ["geolocation"],
-    "geolocation": {"latitude": 32.2319, "longitude": -110.9501},
 }
 expect.set_options(timeout=8000)
 

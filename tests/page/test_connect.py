@@ -61,6 +61,8 @@ async def change_address(phone: Phone) -> None:
 
 
 async def test_from_the_address_to_a_live_car_and_back_by_stop(phone: Phone, idle: Process) -> None:
+    await phone.page.context.grant_permissions(["geolocation"])
+    await phone.page.context.set_geolocation({"latitude": 32.23, "longitude": -110.95, "accuracy": 50})
     async with running(*simulate()) as car:
         await phone.open(idle.address)
         await expect(phone.page.locator("#connect h1")).to_have_text("Connect to a car")
