@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -15,10 +17,11 @@ from monitor.check import (
     fault,
     ok,
     threshold,
+    unknown,
 )
 from monitor.state import Snapshot
 
-DEADBAND_PERCENT = 0.4  # one quantum of the car's own figures, 100/255
+DEADBAND_PERCENT = 1.0  # a foot that rests on a pedal is less still than one quantum of the car's figures, 100/255
 
 
 class PedalLimits(Limits):
@@ -36,6 +39,8 @@ class PedalLimits(Limits):
 def find(snapshot: Snapshot, limits: PedalLimits, was_active: bool) -> Finding:
     brake = snapshot.need("brake").percent
     accelerator = snapshot.need("accelerator").percent
+    if not (math.isfinite(brake) and math.isfinite(accelerator)):
+        return unknown("A pedal says no number", short="no data")
     pressed = max(0.0, limits.pressed_percent - (DEADBAND_PERCENT if was_active else 0.0))
     text = f"Brake {brake:.0f} %, accelerator {accelerator:.0f} %"
     measured = Quantity(label="Both at least", value=min(brake, accelerator), unit="%")

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from monitor import catalog
+from monitor.catalog import AllLimits
 from monitor.link import LinkFacts
+from monitor.phones import PhoneWord
 from monitor.runner import Monitor, Transition
 from monitor.state import State
+from monitor.values import PhoneFix
 from server import judging
 from server.profiles import GENERIC
 from server.reception import Reception
+from server.rehearsal.faults import Faults
 from server.simulator.car import SimulatedCar
+from server.simulator.scenarios import Planned
 from server.topics import map_signals
 
 
@@ -24,42 +30,60 @@ class Raised:
     text: str
 
 
-def judged(car: SimulatedCar, seconds: float) -> list[Raised]:
-    """Every alarm that a drive of so long raises. Faults of the bridge are not laid over: the link is always there."""
+def judged(
+    plan: Sequence[Planned],
+    seconds: float,
+    *,
+    seed: int = 1,
+    limits: Mapping[str, float] | None = None,
+    phone: bool = False,
+) -> list[Raised]:
+    """Every alarm that a drive of so long with these faults raises. `limits` are thresholds by their full names;
+    `phone`: there is one in the car, and it knows where it is.
+
+    A fault of the bridge is what a session would see of it: no messages, and the link lost when that is found out.
+    """
+    own = [one for one in plan if one.scenario.bridge is None]
+    bridge = Faults([one for one in plan if one.scenario.bridge is not None])
+    car = SimulatedCar(seed=seed, plan=own)
     sources = judging.by_topic(map_signals({p.topic: p.type for p in car.published}).values())
-    reception, state, monitor = Reception(), State(), Monitor()
+    monitor = Monitor(limits=catalog.changed(AllLimits(), limits or {}))
+    reception, state = Reception(), State()
     raised: list[Raised] = []
-    start_s, tick_s, last_s = car.now_s, 0.0, None
+    start_s, tick_s, last_s, phone_s = car.now_s, 0.0, None, 0.0
     published = judging.published(source for group in sources.values() for source in group)
 
     def note(transitions: Iterable[Transition]) -> None:
-        raised.extend(
-            Raised(at_s=t.at_s, alarm=t.alarm_id, text=t.text)
-            for t in transitions
-            if t.change in ("raised", "recaused")
-        )
+        raised.extend(Raised(at_s=t.at_s, alarm=t.alarm_id, text=t.text) for t in transitions if t.announces)
 
-    def link(now_s: float) -> None:
-        state.link(
-            LinkFacts(
-                phase="monitoring",
-                connected_s=0.0,
-                bridge_answers=True,
-                bridge_heard_s=now_s,
-                last_message_s=last_s,
-                topics_subscribed=len(sources),
-                published=published,
-            )
+    def link(now_s: float) -> LinkFacts:
+        facts = LinkFacts(
+            phase="monitoring",
+            connected_s=0.0,
+            bridge_answers=True,
+            bridge_heard_s=now_s,
+            last_message_s=last_s,
+            topics_subscribed=len(sources),
+            published=published,
+            wall_zero_s=start_s,
         )
+        return bridge.link(facts, now_s)
 
     for step in car.steps():
         now_s = step.at_s - start_s
         if now_s > seconds:
             return raised
         while tick_s <= now_s:
-            link(tick_s)
+            state.link(link(tick_s))
             note(judging.judge(monitor, state, tick_s))
             tick_s += judging.TICK_S
+        if any(one.from_s <= now_s < one.to_s for one in bridge.laid):
+            continue
+        if phone and now_s >= phone_s:
+            phone_s += 1.0
+            truth = car.state()["truth"]
+            fix = PhoneFix(lat_deg=truth["lat_deg"], lon_deg=truth["lon_deg"], accuracy_m=5.0)
+            state.hear_phone(PhoneWord(phone="in the car", is_handheld=True, fix=fix, measured_s=now_s), now_s)
         for message in step.messages:
             heard = sources.get(message.topic)
             if heard is None:
