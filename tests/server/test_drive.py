@@ -8,12 +8,16 @@ import re
 import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import numpy as np
 import pytest
 
 from server.config import Config, Vehicle
+from server.judging import TICK_S
+from server.recording.read import open_recording
+from server.rehearsal.rehearse import rehearse
 from tests.environment import users_own
 from tests.server.conftest import serving
 from tests.server.viewer import Viewer, viewer
@@ -29,6 +33,10 @@ MESSAGES = {
     "odometry": 560,
     "command": 263,
 }
+
+
+FILES = {1: "catvehicle_2016-06-01.bag", 2: "catvehicle_2016-06-01_mcap"}  # by the version of ROS
+JITTER_S = 0.05  # of a bridge and a server on a machine that is busy with tests
 
 
 @contextlib.asynccontextmanager
@@ -90,6 +98,8 @@ async def test_the_real_drive_of_2016_06_01_both_ways(recordings: Path) -> None:
             assert signals["command"]["value"]["tyre_angle_rad"] is None
             assert "angular.z is null" in signals["command"]["note"]
             _assert_seen_on_the_socket(one)
+            log = (await client.get(f"{server}/api/log", params={"vehicle": one.states[-1]["vehicle"]})).json()
+            _assert_as_rehearsed(recordings / FILES[version], log["events"], state)
 
 
 def _assert_seen_on_the_socket(one: Viewer) -> None:
@@ -104,6 +114,25 @@ def _assert_seen_on_the_socket(one: Viewer) -> None:
     done = next(index for index, state in enumerate(one.states) if state["session"]["received"] >= 14228)
     assert one.got_s[done] - one.got_s[heard[0]] == pytest.approx(55.9, abs=1.0)
     assert done - heard[0] > 400  # some ten a second
+
+
+def _assert_as_rehearsed(file: Path, events: list[dict[str, Any]], state: dict[str, Any]) -> None:
+    """`catgraph check` over the file says what the log of the live drive says, at the same times to a tick."""
+    with open_recording([file]) as recording:
+        run = rehearse(recording)
+    last_s = run.snapshot.readings["speed"].received_s
+    live_last_ms = state["server"]["time_ms"] - 1000 * state["signals"]["speed"]["age_s"]
+    live = {
+        (event["alarm"], event["change"], event["occurrence"]): (event["at_ms"] - live_last_ms) / 1000 + last_s
+        for event in events
+        if event["alarm"] is not None
+    }
+    rehearsed = {(one.alarm_id, one.change, one.occurrence): one.at_s for one in run.transitions}
+    during = {name for name, at_s in live.items() if at_s <= run.to_s}  # then the replay falls silent, and that is told
+    assert rehearsed
+    assert during == set(rehearsed)
+    for name, at_s in rehearsed.items():
+        assert live[name] == pytest.approx(at_s, abs=TICK_S + JITTER_S), name
 
 
 async def test_the_real_laser(recordings: Path) -> None:
