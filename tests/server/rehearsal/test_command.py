@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import pty
 import re
@@ -16,7 +15,6 @@ from server.simulator.scenarios import SCENARIOS
 from tests.environment import users_own
 from tests.server.recording.bags import Drive, write_ros1
 from tests.server.rehearsal.conftest import Checking, recorded
-
 
 # Faults for which the drive has no occasion: the car does not stand at 15 s, and no phone rides along.
 NOT_HERE = {"gps-drift", "phone-mismatch"}
@@ -208,8 +206,7 @@ def test_a_terminal_sees_how_far_it_is(tmp_path: Path, healthy: Path) -> None:
         while True:
             try:
                 part = os.read(ours, 4096)
-            except OSError as error:
-                assert error.errno == errno.EIO  # the other end is closed
+            except OSError:  # the other end is closed
                 break
             if not part:
                 break
