@@ -56,6 +56,8 @@ _SCENARIOS = (
         sentence="The car drives 12 m/s for some seconds, as soon as the lap allows it (at most half a minute).",
         duration_s=60.0,  # at most; it ends by itself after some seconds above the limit
         alarm="speed above limit",
+        # over a recording, where only the speed told is another: nobody ordered it, and nobody keeps distance for it
+        consequences=("command without response", "nearest object"),
         effect=Speeding,
         order=Order.HURRY,
         order_suffices=True,
