@@ -39,6 +39,7 @@ class PhoneWord:
 
     phone: str  # its own name for itself, the same over reconnections
     is_handheld: bool  # not a computer on a desk, of which no GPS is expected
+    label: str = ""  # what its operator calls it
     fix: PhoneFix | None = None
     measured_s: float = 0.0  # when it was there …
     uncertain_s: float = 0.0  # … give or take
@@ -59,6 +60,7 @@ class PhoneView:
     """The phone that is compared, at one moment."""
 
     phone: str | None = None  # None: none has spoken
+    label: str = ""
     count: int = 0  # phones heard within the last minute
     is_handheld: bool = False
     heard_s: float = -math.inf
@@ -95,6 +97,7 @@ class _Phone:
 
     name: str
     usable_s: float
+    label: str = ""
     is_handheld: bool = True
     heard_s: float = -math.inf
     fix: PhoneFix | None = None
@@ -141,7 +144,7 @@ class Phones:
         phone = self._phones.get(word.phone)
         if phone is None:
             phone = self._phones[word.phone] = _Phone(name=word.phone, usable_s=now_s)
-        phone.heard_s, phone.is_handheld, phone.why = now_s, word.is_handheld, word.why
+        phone.heard_s, phone.is_handheld, phone.why, phone.label = now_s, word.is_handheld, word.why, word.label
         if word.fix is None:
             return
         phone.fix, phone.measured_s = word.fix, word.measured_s
@@ -214,6 +217,7 @@ class Phones:
             return
         self.view = PhoneView(
             phone=phone.name,
+            label=phone.label,
             count=len(self._phones),
             is_handheld=phone.is_handheld,
             heard_s=phone.heard_s,

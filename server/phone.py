@@ -14,7 +14,7 @@ from server import commands, wire
 AHEAD_S = 0.25  # by so much the server's time of day may be set back between two frames; more, and nothing is known
 
 
-def word(command: commands.Position, now_s: float, wall_ms: float) -> PhoneWord:
+def word(command: commands.Position, now_s: float, wall_ms: float, label: str = "") -> PhoneWord:
     """What the phone said, its moment on the clock of `now_s`.
 
     Three durations, each between two readings of one clock: how old the fix was when the page sent it (the page's), how
@@ -23,12 +23,13 @@ def word(command: commands.Position, now_s: float, wall_ms: float) -> PhoneWord:
     """
     fix = command.fix
     if fix is None:
-        return PhoneWord(phone=command.phone, is_handheld=command.handheld, why=command.why)
+        return PhoneWord(phone=command.phone, is_handheld=command.handheld, label=label, why=command.why)
     way_s = (wall_ms - fix.heard_ms) / 1000 - fix.held_s
     half_s = max(0.0, way_s) / 2 if way_s >= -AHEAD_S else math.inf
     return PhoneWord(
         phone=command.phone,
         is_handheld=command.handheld,
+        label=label,
         fix=PhoneFix(
             lat_deg=fix.lat_deg,
             lon_deg=fix.lon_deg,
@@ -51,6 +52,7 @@ def as_json(view: PhoneView, now_s: float) -> dict[str, Any] | None:
     newest = view.comparisons[-1] if view.comparisons else None
     return {
         "id": view.phone,
+        "label": view.label or None,
         "count": view.count,
         "handheld": view.is_handheld,
         "lat_deg": wire.plain(fix.lat_deg, 8) if fix else None,

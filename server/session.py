@@ -293,7 +293,7 @@ class Session:
             case commands.Position():
                 if self._phase == "idle":
                     raise Refused("No car is monitored: no position is needed.")
-                self._state.hear_phone(phone.word(command, now_s, self._wall_ms()), now_s)
+                self._state.hear_phone(phone.word(command, now_s, self._wall_ms(), by), now_s)
                 return  # many phones may speak every second; the next tick judges and tells
         self._put_state(now_s)
 

@@ -94,7 +94,7 @@ def agree(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -> Find
     is_fault = len(apart) >= FAULTS
     newest = apart[-1] if is_fault else comparisons[-1]
     allowed_m = max(newest.gate_m, limits.least_m)
-    which = f" (one of {view.count} phones)" if view.count > 1 else ""
+    which = f" ({view.label or 'one'}, of {view.count} phones)" if view.count > 1 else ""
     text = f"The phone{which} is {newest.distance_m:.0f} m from the car; {allowed_m:.0f} m are explained"
     measured = Quantity(label="Apart", value=newest.distance_m, unit="m")
     limit = Quantity(label="Explained", value=allowed_m, unit="m")

@@ -109,6 +109,28 @@
  * @property {{state: string, for_s: number | null}} recording
  * @property {{state: string, why: string | null}} decelerate
  * @property {{holder: string | null}} control
+ * @property {PhoneShown | null} [phone] the operator's phone that is compared with the car
+ *
+ * @typedef {object} PhoneShown
+ * @property {string} id
+ * @property {string | null} label
+ * @property {number} count
+ * @property {boolean} handheld
+ * @property {number | null} lat_deg
+ * @property {number | null} lon_deg
+ * @property {number | null} accuracy_m
+ * @property {number | null} sigma_m
+ * @property {number | null} alt_m
+ * @property {number | null} speed_mps
+ * @property {number | null} heading_deg
+ * @property {number | null} at_ms
+ * @property {number | null} age_s
+ * @property {boolean} used
+ * @property {string | null} why
+ * @property {string | null} why_text
+ * @property {number | null} apart_m
+ * @property {number | null} explained_m
+ * @property {number | null} correlation
  *
  * @typedef {object} AlarmEvent
  * @property {number} n

@@ -136,11 +136,11 @@ def test_the_state_shows_it_without_a_number_that_is_none() -> None:
     for i in range(20):
         state.receive("position", GpsFix(lat_deg=32.23, lon_deg=-110.95, sigma_m=1.0), 101.0 + i / 10)
     fix = PhoneFix(lat_deg=32.2301, lon_deg=-110.95, accuracy_m=30.2, at_ms=1_700_000_000_000)
-    state.hear_phone(PhoneWord(phone="one-1", is_handheld=True, fix=fix, measured_s=102.5), 102.9)
+    state.hear_phone(PhoneWord(phone="one-1", is_handheld=True, label="Anna", fix=fix, measured_s=102.5), 102.9)
     shown = phone.as_json(state.snapshot(103.0).phone, 103.0)
     assert shown == {
-        "id": "one-1", "count": 1, "handheld": True, "lat_deg": 32.2301, "lon_deg": -110.95, "accuracy_m": 30.2,
-        "sigma_m": 20.0, "alt_m": None, "speed_mps": None, "heading_deg": None, "at_ms": 1_700_000_000_000,
+        "id": "one-1", "label": "Anna", "count": 1, "handheld": True, "lat_deg": 32.2301, "lon_deg": -110.95,
+        "accuracy_m": 30.2, "sigma_m": 20.0, "alt_m": None, "speed_mps": None, "heading_deg": None, "at_ms": 1_700_000_000_000,
         "age_s": 0.5, "used": True, "why": None, "why_text": None, "apart_m": 11.1, "explained_m": 74.6,
         "correlation": None,
     }  # fmt: skip

@@ -85,7 +85,8 @@ def test_what_the_operator_reads_of_it() -> None:
     assert finding.measured is not None
     assert finding.limit is not None
     assert (finding.measured.value, finding.limit.value) == (511.6, 14.0)
-    assert "(one of 3 phones)" in asked("phone_car", view(count=3)).text
+    assert asked("phone_car", view(count=3)).text.startswith("The phone (one, of 3 phones) is 2 m")
+    assert asked("phone_car", view(count=3, label="Anna")).text.startswith("The phone (Anna, of 3 phones) is 2 m")
 
 
 @pytest.mark.parametrize(("was_active", "verdict"), [(False, "ok"), (True, "fault")])
