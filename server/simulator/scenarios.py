@@ -180,7 +180,7 @@ _SCENARIOS = (
         sentence="The car drives on, but its positions repeat one place, with new stamps.",
         duration_s=10.0,
         alarm="signal frozen: position",
-        consequences=("phone and car disagree",),
+        consequences=("phone and car disagree", "GPS drift at standstill"),  # it ends with a leap
         effect=FrozenPosition,
     ),
     Scenario(

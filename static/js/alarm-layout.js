@@ -47,15 +47,16 @@ export function layOut(alarms) {
 }
 
 /**
- * The sound that must be heard now, or null. What is acknowledged, shelved or over is silent; a paused session is silent;
- * a server that fell silent while it watched a car is the loudest alarm of all, for nothing else can be announced.
+ * The sound that must be heard now, or null. What is acknowledged, shelved or over is silent. While paused the server
+ * tells only what a pause does not hide: a lost link, a pause that somebody forgot. A server that fell silent while it
+ * watched a car is the loudest alarm of all, for nothing else can be announced; a paused one watches nothing.
  * @param {State | null} frame
  * @param {{isServerLost: boolean, isLossAcknowledged: boolean}} page
  * @returns {SoundName | null}
  */
 export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
-  if (!frame || frame.session.paused) return null;
-  if (isServerLost) return isLossAcknowledged ? null : 'high';
+  if (!frame) return null;
+  if (isServerLost) return isLossAcknowledged || frame.session.paused ? null : 'high';
   const asking = frame.alarms.filter((alarm) => alarm.state === 'UNACKED').map((alarm) => alarm.sound);
   return LOUD.find((sound) => asking.includes(sound)) ?? null;
 }

@@ -9,7 +9,8 @@ import { field, html, icon, setAttribute, setIcon, setText, setWords } from './d
  */
 
 /**
- * What the tiles show. While paused, or while the values are not live, nothing is checked: whatever the frame says.
+ * What the tiles show. While the values are not live nothing is checked, whatever the frame says; nor while paused, but
+ * for the faults that the server finds all the same: those of the link, and a pause that lasts too long.
  * @param {State} frame
  * @param {string | null} why why nothing is checked, or null
  * @param {boolean} isFuelPublished
@@ -18,7 +19,7 @@ import { field, html, icon, setAttribute, setIcon, setText, setWords } from './d
 export function showTiles(frame, why, isFuelPublished) {
   const priorities = new Map(frame.alarms.map((alarm) => [alarm.id, alarm.priority]));
   const shown = tilesOf(frame.checks).map(({ label, verdict, brief, ids }) => {
-    if (why !== null) return tile(label, 'unk', `not checked: ${why}`);
+    if (why !== null && !(why === 'paused' && verdict === 'fault')) return tile(label, 'unk', `not checked: ${why}`);
     if (verdict === 'ok') return tile(label, 'ok', brief || 'OK');
     if (verdict === 'unknown') return tile(label, 'unk', brief || 'not checked');
     const found = ids.map((id) => priorities.get(id));

@@ -24,13 +24,15 @@ test('the loudest unacknowledged alarm is heard', () => {
   assert.equal(soundOf(state({ alarms: [warning(), alarm()] }), page), 'high');
   assert.equal(soundOf(state({ alarms: [warning(), alarm({ state: 'ACKED' })] }), page), 'medium');
   assert.equal(soundOf(state({ alarms: [alarm({ state: 'RTN_UNACKED' })] }), page), null);
-  assert.equal(soundOf(state({ alarms: [alarm()], session: { paused: true } }), page), null);
+  assert.equal(soundOf(state({ session: { paused: true } }), page), null);
+  assert.equal(soundOf(state({ alarms: [warning()], session: { paused: true } }), page), 'medium', 'what the server tells although paused');
   assert.equal(soundOf(state({ alarms: [alarm({ sound: 'none' })] }), page), null);
 });
 
 test('a server that fell silent is the loudest of all, until it is acknowledged', () => {
   assert.equal(soundOf(state(), { isServerLost: true, isLossAcknowledged: false }), 'high');
   assert.equal(soundOf(state(), { isServerLost: true, isLossAcknowledged: true }), null);
+  assert.equal(soundOf(state({ session: { paused: true } }), { isServerLost: true, isLossAcknowledged: false }), null);
 });
 
 const seen = { isSilent: false, silence_s: 0.1, isChoosing: false, isAnswered: false };
@@ -101,13 +103,16 @@ test('one tile for the checks that share it; the worst speaks', () => {
     [['Signals', 'fault', 'b'], ['Speed', 'ok', 'd']]);
 });
 
-test('tiles: paused means not checked, whatever the frame says; fuel is never 0', () => {
+test('tiles: paused means not checked, but for faults the server finds all the same; fuel is never 0', () => {
   const checks = /** @type {any} */ ([{ id: 'speed', label: 'Speed', verdict: 'ok', brief: 'OK', checks: ['speed_limit'] }]);
   const rows = (/** @type {string | null} */ why, frame = state({ checks })) => showTiles(frame, why, false).map(({ label, kind, lines }) => [label, kind, ...lines]);
   assert.deepEqual(rows(null), [['Speed', 'ok', 'OK'], ['Fuel', 'unk', 'not published']]);
   assert.deepEqual(rows('paused')[0], ['Speed', 'unk', 'not checked', 'paused']);
   const fault = state({ checks: [{ ...checks[0], verdict: 'fault', brief: 'FAULT 12.6 m/s' }], alarms: [alarm()] });
   assert.deepEqual(rows(null, fault)[0], ['Speed', 'crit', 'FAULT 12.6 m/s']);
+  const forgotten = state({ checks: [{ ...checks[0], label: 'Monitoring', verdict: 'fault', brief: 'FAULT 5 min' }] });
+  assert.deepEqual(rows('paused', forgotten)[0], ['Monitoring', 'warn', 'FAULT 5 min']);
+  assert.deepEqual(rows('stale', fault)[0], ['Speed', 'unk', 'not checked', 'stale']);
 });
 
 test('the log tells what happened', () => {

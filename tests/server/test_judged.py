@@ -65,6 +65,7 @@ QUICK_S = 20.0  # longer scenarios are for the long run
 # Documented consequences that depend on where the car is.
 MAY_FOLLOW = {
     "frozen-speed": {"no_response", "obstacle", "obstacle_nearest"},
+    "frozen-position": {"gps_drift"},  # it ends with a leap, and the car may stand by then
     "frozen-scan": {"obstacle"},
     "gps-jump": {"gps_drift", "phone_car"},
     "obstacle": {"obstacle_nearest"},
