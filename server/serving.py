@@ -17,6 +17,7 @@ import segno
 import uvicorn
 
 from server.app import create_app
+from server.compression import PageSocket
 from server.config import Config
 from server.web.assets import AssetsMissing
 
@@ -69,11 +70,10 @@ async def serve(config: Config) -> int:
     server = uvicorn.Server(
         uvicorn.Config(
             app,
-            ws="websockets-sansio",
+            ws=PageSocket,
             ws_max_size=64 * 1024,  # what a page may send at once
             ws_ping_interval=5.0,  # a phone that went out of range is let go
             ws_ping_timeout=10.0,
-            ws_per_message_deflate=True,  # a whole state shrinks to a fifth
             log_level="warning",
             access_log=False,
             lifespan="on",

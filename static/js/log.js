@@ -40,7 +40,7 @@ export function mount(root, store) {
   const standing = html('span', { class: 'n v' });
   const shelved = html('span', { class: 'n v' });
   const number = html('span');
-  const list = html('ul', { class: 'log' });
+  const list = html('ul', { class: 'log', 'data-f': 'happened' });
   const now = html('ul', { class: 'log', 'data-f': 'standing' });
   const load = html('span', { 'data-f': 'load' });
   const trouble = html('p', { class: 'sec', 'data-f': 'trouble', role: 'status' });

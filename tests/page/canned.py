@@ -19,6 +19,7 @@ from fastapi.responses import HTMLResponse
 from fastapi.staticfiles import StaticFiles
 from fastapi.templating import Jinja2Templates
 
+from server.compression import PageSocket
 from server.web.assets import static_dir, templates_dir
 
 Json = dict[str, Any]
@@ -217,7 +218,7 @@ class Canned:
     @contextlib.asynccontextmanager
     async def running(self) -> Any:
         """Serves while the block runs; gives the address."""
-        server = uvicorn.Server(uvicorn.Config(self.app, port=0, log_level="warning", ws="websockets-sansio"))
+        server = uvicorn.Server(uvicorn.Config(self.app, port=0, log_level="warning", ws=PageSocket))
         task = asyncio.create_task(server.serve())
         while not server.started:  # uvicorn has no event for it
             await asyncio.sleep(0.02)

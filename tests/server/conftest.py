@@ -12,6 +12,7 @@ import uvicorn
 
 from server.app import create_app
 from server.bridge.server import RosBridge
+from server.compression import PageSocket
 from server.config import Config, Vehicle
 
 
@@ -21,7 +22,7 @@ async def serving(config: Config) -> AsyncIterator[str]:
     listening = socket.socket()
     listening.bind(("127.0.0.1", 0))
     server = uvicorn.Server(
-        uvicorn.Config(create_app(config), ws="websockets-sansio", log_level="warning", lifespan="on", access_log=False)
+        uvicorn.Config(create_app(config), ws=PageSocket, log_level="warning", lifespan="on", access_log=False)
     )
     running = asyncio.create_task(server.serve(sockets=[listening]))
     while not server.started:
