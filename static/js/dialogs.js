@@ -4,6 +4,7 @@ import { isAboutLink, layOut } from './alarm-layout.js';
 import { drawBigChain } from './chain.js';
 import { field, html, listen, need, setIcon, setText, setWords, show, words } from './dom.js';
 import { isAsked } from './sheet.js';
+import { shownIn } from './units.js';
 import { age, counted, fixed, timeOfDay } from './words.js';
 
 /** A silent server is covered by the veil at once; the dialog waits for what a change of radio cell takes [s]. */
@@ -147,10 +148,11 @@ function fillAlarm(sheet, alarm) {
   const { measured, limit } = alarm;
   show(field(sheet, 'versus'), measured !== null && limit !== null);
   if (measured && limit) {
-    setText(field(sheet, 'measured'), fixed(measured.value));
-    setText(field(sheet, 'measured-unit'), measured.unit);
-    setText(field(sheet, 'limit'), fixed(limit.value));
-    setText(field(sheet, 'limit-unit'), limit.unit);
+    for (const [name, quantity] of /** @type {const} */ ([['measured', measured], ['limit', limit]])) {
+      const { value, unit } = shownIn(quantity.value, quantity.unit);
+      setText(field(sheet, name), fixed(value));
+      setText(field(sheet, `${name}-unit`), unit);
+    }
   }
   const lasting = alarm.active
     ? `Stands for ${age(alarm.for_s)} s, since ${timeOfDay(alarm.raised_ms)}.`

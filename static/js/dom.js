@@ -1,5 +1,6 @@
 // The few ways in which the page touches its document. Text goes in as text; nothing is written that is already there.
 
+import { inUnits } from './units.js';
 import { pieces } from './words.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
@@ -83,23 +84,24 @@ export function setText(element, text) {
 }
 
 /**
- * Write a sentence whose numbers stand in the face of numbers.
+ * Write a sentence whose numbers stand in the face of numbers, its speeds in the unit of this phone.
  * @param {Element} element
  * @param {string} sentence
  */
 export function setWords(element, sentence) {
-  if (written.get(element) === sentence) return;
-  written.set(element, sentence);
-  element.replaceChildren(...words(sentence));
+  const shown = inUnits(sentence);
+  if (written.get(element) === shown) return;
+  written.set(element, shown);
+  element.replaceChildren(...words(shown));
 }
 
 /**
- * A sentence as nodes, its numbers in spans of class n.
+ * A sentence as nodes, its numbers in spans of class n, its speeds in the unit of this phone.
  * @param {string} sentence
  * @returns {(HTMLElement | string)[]}
  */
 export function words(sentence) {
-  return pieces(sentence).map((piece) => (piece.isNumber ? html('span', { class: 'n' }, piece.text) : piece.text));
+  return pieces(inUnits(sentence)).map((piece) => (piece.isNumber ? html('span', { class: 'n' }, piece.text) : piece.text));
 }
 
 /**

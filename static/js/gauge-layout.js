@@ -4,9 +4,9 @@ export const CENTRE = /** @type {const} */ ({ x: 190, y: 214 });
 
 /**
  * @typedef {object} Scale
- * @property {number} speed_max_mps at the right end of the band
+ * @property {number} speed_max at the right end of the band, in the unit that is shown
  * @property {number} acceleration_max_mps2 at both ends of the inner arc
- * @property {number | null} limit_mps the operator's limit
+ * @property {number | null} limit the operator's limit, in the same unit
  *
  * @typedef {{d: string, isBig: boolean}} Tick
  * @typedef {{text: string, x: number, y: number}} Label
@@ -20,12 +20,12 @@ export const CENTRE = /** @type {const} */ ({ x: 190, y: 214 });
  */
 
 /**
- * Degrees on the speed band, 0 left and 180 right; what lies beyond the ends stays at the ends.
- * @param {number} speed_mps its size counts: reversing too fast is too fast
- * @param {number} speed_max_mps
+ * Degrees on the speed band, 0 left and 180 right; what lies beyond the ends stays at the ends. Both in one unit.
+ * @param {number} speed its size counts: reversing too fast is too fast
+ * @param {number} speed_max
  */
-export function speedAngle(speed_mps, speed_max_mps) {
-  return clamp((180 * Math.abs(speed_mps)) / speed_max_mps, 0, 180);
+export function speedAngle(speed, speed_max) {
+  return clamp((180 * Math.abs(speed)) / speed_max, 0, 180);
 }
 
 /**
@@ -42,22 +42,22 @@ export function accelerationAngle(acceleration_mps2, acceleration_max_mps2) {
  * @param {Scale} scale
  * @returns {Face}
  */
-export function faceOf({ speed_max_mps, acceleration_max_mps2, limit_mps }) {
-  const limit = limit_mps !== null && limit_mps > 0 ? speedAngle(limit_mps, speed_max_mps) : 180;
-  const step = tickStep(speed_max_mps);
+export function faceOf({ speed_max, acceleration_max_mps2, limit }) {
+  const end = limit !== null && limit > 0 ? speedAngle(limit, speed_max) : 180;
+  const step = tickStep(speed_max);
   /** @type {Tick[]} */
   const ticks = [];
   /** @type {(Label & {degrees: number})[]} */
   const labels = [];
-  for (let i = 0; i * step <= speed_max_mps + 1e-9; i += 1) {
-    const degrees = speedAngle(i * step, speed_max_mps);
+  for (let i = 0; i * step <= speed_max + 1e-9; i += 1) {
+    const degrees = speedAngle(i * step, speed_max);
     const isBig = i % 5 === 0;
     ticks.push({ d: ray(degrees, isBig ? 154 : 162, 168), isBig });
     if (isBig) labels.push(numberAt(degrees, i * step));
   }
-  if (speed_max_mps % (5 * step) > 1e-9) {
+  if (speed_max % (5 * step) > 1e-9) {
     ticks.push({ d: ray(180, 154, 168), isBig: true });
-    if (180 - (labels.at(-1)?.degrees ?? 0) > 9) labels.push(numberAt(180, speed_max_mps));
+    if (180 - (labels.at(-1)?.degrees ?? 0) > 9) labels.push(numberAt(180, speed_max));
   }
   for (const [degrees, isBig] of /** @type {[number, boolean][]} */ ([[90, true], [30, false], [60, false], [120, false], [150, false]])) {
     ticks.push({ d: isBig ? ray(90, 113, 130) : ray(degrees, 116, 120), isBig });
@@ -66,14 +66,14 @@ export function faceOf({ speed_max_mps, acceleration_max_mps2, limit_mps }) {
   labels.push({ degrees: 0, text: `−${ends}`, x: 57, y: 188 }, { degrees: 180, text: `+${ends}`, x: 323, y: 188 });
   return {
     tracks: [
-      `${arc(188, 0, limit)}${arc(172, 0, limit)}`,
-      limit < 180 ? arc(188, limit, 180) : '', limit < 180 ? arc(172, limit, 180) : '',
+      `${arc(188, 0, end)}${arc(172, 0, end)}`,
+      end < 180 ? arc(188, end, 180) : '', end < 180 ? arc(172, end, 180) : '',
       'M18 214L2 214', 'M362 214L378 214', arc(120, 0, 180),
     ].filter(Boolean),
-    rungs: rungs(limit),
+    rungs: rungs(end),
     ticks,
     labels: labels.map(({ text, x, y }) => ({ text, x, y })),
-    limit: limit_mps !== null && limit_mps > 0 ? limitMark(limit, limit_mps) : null,
+    limit: limit !== null && limit > 0 ? limitMark(end, limit) : null,
   };
 }
 
@@ -102,16 +102,16 @@ export function band(inner, outer, from, to) {
 
 /**
  * @param {number} degrees
- * @param {number} limit_mps
+ * @param {number} limit
  */
-function limitMark(degrees, limit_mps) {
+function limitMark(degrees, limit) {
   const [x, y] = polar(226, degrees);
   const isLeft = degrees < 90;
   const isTop = Math.abs(degrees - 90) < 26; // above the band there is no room: the words stand beside the wedge
   return {
     line: ray(degrees, 170, 191),
     wedge: `M${at(191, degrees)}L${at(205, degrees - 4)}L${at(205, degrees + 4)}Z`,
-    text: limit_mps.toFixed(1),
+    text: limit.toFixed(1),
     x: isTop ? polar(205, degrees)[0] + 20 : isLeft ? clamp(x - 37, 2, 378) : clamp(x + 37, 2, 378),
     y: isTop ? 18 : clamp(y + 1, 14, 60),
     anchor: /** @type {'start' | 'end'} */ (isTop || isLeft ? 'start' : 'end'),
@@ -144,7 +144,8 @@ function tickStep(max) {
 
 /** @param {number} value */
 function plain(value) {
-  return String(Math.round(value * 100) / 100);
+  const parts = Math.abs(value) < 10 ? 100 : 10;
+  return String(Math.round(value * parts) / parts);
 }
 
 /**

@@ -3,7 +3,8 @@
 import { html, setAttribute, setText, svg } from './dom.js';
 import { accelerationAngle, band, digitsBox, faceOf, speedAngle } from './gauge-layout.js';
 import { ABSENT } from './ink.js';
-import { age, fixed, signed } from './words.js';
+import { speedIn, speedUnit, speedWords, spokenSpeedUnit } from './units.js';
+import { age, signed } from './words.js';
 
 const VIEW = '0 0 380 250';
 
@@ -49,10 +50,12 @@ export function mount(root, store) {
 
   function drawFace() {
     const scale = scaleOf();
-    const key = JSON.stringify(scale);
+    const key = JSON.stringify([scale, speedUnit()]);
     if (key === drawnFace) return;
     drawnFace = key;
-    const { tracks, rungs, ticks, labels, limit } = faceOf(scale);
+    const { tracks, rungs, ticks, labels, limit } = faceOf({
+      speed_max: speedIn(scale.speed_max_mps), acceleration_max_mps2: scale.acceleration_max_mps2, limit: speedIn(scale.limit_mps),
+    });
     face.replaceChildren(
       ...tracks.map((d) => svg('path', { class: 'track', d })),
       ...rungs.map((d) => svg('path', { class: 'rung', d })),
@@ -88,7 +91,7 @@ export function mount(root, store) {
     const speed_mps = number(store.signal('speed')?.value?.speed_mps);
     const isSpeedKnown = speed_mps !== null && isValue(speedInk.ink);
     setAttribute(root, 'data-speed', isSpeedKnown ? speedInk.ink : 'never');
-    const digits = isSpeedKnown ? fixed(speed_mps) : '–';
+    const [digits, unitWord] = isSpeedKnown ? speedWords(speed_mps) : ['–', speedUnit()];
     const block = digitsBox(digits);
     const isOver = isSpeedKnown && speedInk.ink !== 'stale' && scale.limit_mps !== null && Math.abs(speed_mps) > scale.limit_mps;
     setText(speed, digits);
@@ -100,9 +103,9 @@ export function mount(root, store) {
     }
     const isBack = isSpeedKnown && speed_mps < 0 && digits.startsWith('−');
     setAttribute(unit, 'x', block.unitX);
-    setText(unit, isSpeedKnown ? (isBack ? 'm/s back' : 'm/s') : '');
+    setText(unit, isSpeedKnown ? (isBack ? `${unitWord} back` : unitWord) : '');
     setText(note, noteOf(speedInk, isSpeedKnown));
-    meter(speedMeter, isSpeedKnown && speedInk.ink !== 'stale' ? Math.abs(speed_mps) : null, scale.speed_max_mps, `${digits} metres a second`);
+    meter(speedMeter, isSpeedKnown && speedInk.ink !== 'stale' ? Math.abs(speedIn(speed_mps)) : null, speedIn(scale.speed_max_mps), `${digits} ${spokenSpeedUnit()}`);
 
     const pushInk = store.ink('acceleration');
     const push = number(store.signal('acceleration')?.value?.acceleration_mps2);
@@ -161,7 +164,7 @@ function rotate(element, degrees) {
  * @param {string} text
  */
 function meter(element, value, max, text) {
-  setAttribute(element, 'aria-valuemax', max);
+  setAttribute(element, 'aria-valuemax', Number(max.toFixed(1)));
   setAttribute(element, 'aria-valuenow', (value ?? 0).toFixed(1));
   setAttribute(element, 'aria-valuetext', value === null ? 'unknown' : text);
 }

@@ -2,6 +2,7 @@
 
 import { html, icon, setAttribute, setText, setWords, show } from './dom.js';
 import { ABSENT, write } from './ink.js';
+import { shownIn, speedWords } from './units.js';
 import { age, counted, fixed, NOTHING } from './words.js';
 
 /** @typedef {import('./protocol.js').Signal} Signal */
@@ -10,7 +11,7 @@ const LEVELS = ['OK', 'WARN', 'ERROR', 'STALE'];
 
 /** The headline of each signal's value, as a number with its unit or as a word. */
 const HEADLINES = /** @type {Record<string, (value: any) => [string, string]>} */ ({
-  speed: (value) => [fixed(value.speed_mps), 'm/s'],
+  speed: (value) => speedWords(value.speed_mps),
   acceleration: (value) => [fixed(value.acceleration_mps2), 'm/s²'],
   brake: (value) => [fixed(value.percent), '%'],
   accelerator: (value) => [fixed(value.percent), '%'],
@@ -18,11 +19,11 @@ const HEADLINES = /** @type {Record<string, (value: any) => [string, string]>} *
   distance: (value) => (value.none_in_range ? ['none', ''] : [fixed(value.distance_m), 'm']),
   bearing: (value) => [fixed(value.bearing_rad, 3), ''],
   position: (value) => (value.status < 0 ? ['no', 'fix'] : [value.alt_m === null ? '2D' : '3D', 'fix']),
-  odometry: (value) => [fixed(value.speed_mps, 2), 'm/s'],
+  odometry: (value) => speedWords(value.speed_mps, 2),
   heading: (value) => [value.heading_deg === null ? NOTHING : `${fixed(value.heading_deg, 0)}°`, ''],
   scan: (value) => [fixed(value.beams, 0), ''],
   diagnostics: (value) => [LEVELS[value.worst] ?? NOTHING, ''],
-  command: (value) => [fixed(value.speed_mps), 'm/s'],
+  command: (value) => speedWords(value.speed_mps),
 });
 
 /**
@@ -53,13 +54,20 @@ export function details(signal, name) {
     ['Repaired', signal.repaired ? `${signal.repaired}: ${signal.repaired_why ?? ''}` : null],
     ['Expected', signal.expected_hz ? `${fixed(signal.expected_hz)} Hz` : null],
     ['Stale after', signal.horizon_s ? `${fixed(signal.horizon_s)} s` : null],
-    ['Range so far', signal.lowest !== null && signal.highest !== null ? `${fixed(signal.lowest, 2)} to ${fixed(signal.highest, 2)}` : null],
+    ['Range so far', rangeWords(signal)],
     ['Derived from', typeof signal.value?.['source'] === 'string' && signal.value['source'] !== 'topic' ? signal.value['source'] : null],
     ['Frame', name === 'scan' ? signal.value?.['frame_id'] : null],
     ['Usable beams', name === 'scan' && signal.value ? `${signal.value['usable']} of ${signal.value['beams']}` : null],
     ['Components', name === 'diagnostics' ? componentWords(signal.value?.['components']) : null],
   ]);
   return rows.flatMap(([key, text]) => (text === null || text === undefined || text === '' ? [] : [[key, text]]));
+}
+
+/** Its lowest and highest value since connecting. @param {Signal} signal */
+function rangeWords({ lowest, highest, unit = '' }) {
+  if (lowest === null || highest === null) return null;
+  const [low, high] = [shownIn(lowest, unit), shownIn(highest, unit)];
+  return `${fixed(low.value, 2)} to ${fixed(high.value, 2)} ${low.unit}`.trim();
 }
 
 /** Where a signal comes from, in a word. @param {Signal} signal */

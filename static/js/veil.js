@@ -3,6 +3,7 @@
 
 import { drawBigChain } from './chain.js';
 import { field, html, setAttribute, setText, setWords, show, words } from './dom.js';
+import { speedWords } from './units.js';
 import { age, fixed, timeOfDay } from './words.js';
 
 /**
@@ -13,7 +14,7 @@ export function thenWords(frame) {
   const speed_mps = frame?.signals.speed?.value?.speed_mps;
   const distance_m = frame?.signals.distance?.value?.distance_m;
   const parts = [];
-  if (typeof speed_mps === 'number') parts.push(`${fixed(speed_mps)} m/s`);
+  if (typeof speed_mps === 'number') parts.push(speedWords(speed_mps).join(' '));
   if (typeof distance_m === 'number') parts.push(`object at ${fixed(distance_m)} m`);
   return parts.join(', ') || 'nothing';
 }

@@ -10,7 +10,7 @@ test('V_max is 180°, reversing counts by its size, beyond the end is the end', 
 });
 
 test('the face for 15 m/s with a limit of 11 is the drawn one', () => {
-  const face = faceOf({ speed_max_mps: 15, acceleration_max_mps2: 3, limit_mps: 11 });
+  const face = faceOf({ speed_max: 15, acceleration_max_mps2: 3, limit: 11 });
   assert.equal(face.tracks[0], 'M2.0 214.0A188 188 0 0 1 315.8 74.3M18.0 214.0A172 172 0 0 1 305.1 86.2');
   assert.equal(face.rungs.length, 7);
   assert.equal(face.rungs[0], 'M319.3 97.6L328.2 89.5');
@@ -24,7 +24,7 @@ test('the face for 15 m/s with a limit of 11 is the drawn one', () => {
 
 test('any scale has a readable number of ticks and its own end', () => {
   for (const max of [0.5, 1, 3, 8, 12.5, 15, 22, 40, 60, 100]) {
-    const { ticks, labels } = faceOf({ speed_max_mps: max, acceleration_max_mps2: 3, limit_mps: null });
+    const { ticks, labels } = faceOf({ speed_max: max, acceleration_max_mps2: 3, limit: null });
     assert.ok(ticks.length >= 10 && ticks.length <= 28, `${max}: ${ticks.length} ticks`);
     assert.ok(labels.length <= 9 && labels.some(({ text }) => Number(text) === max), `${max}: ${labels.map(({ text }) => text)}`);
   }
@@ -32,12 +32,18 @@ test('any scale has a readable number of ticks and its own end', () => {
 
 test('the words of the limit stay inside the picture', () => {
   for (let limit_mps = 0.5; limit_mps <= 20; limit_mps += 0.25) {
-    const { limit } = faceOf({ speed_max_mps: 15, acceleration_max_mps2: 3, limit_mps });
+    const { limit } = faceOf({ speed_max: 15, acceleration_max_mps2: 3, limit: limit_mps });
     assert.ok(limit && limit.y >= 14 && limit.y <= 61 && limit.x >= 2 && limit.x <= 378, JSON.stringify(limit));
     if (limit.anchor === 'start') assert.ok(limit.x + 68 <= 380);
     else assert.ok(limit.x - 68 >= 0);
   }
-  assert.equal(faceOf({ speed_max_mps: 15, acceleration_max_mps2: 3, limit_mps: null }).limit, null);
+  assert.equal(faceOf({ speed_max: 15, acceleration_max_mps2: 3, limit: null }).limit, null);
+});
+
+test('a scale in km/h or mph reads as round numbers, its odd end to one decimal', () => {
+  const words = (/** @type {number} */ max) => faceOf({ speed_max: max, acceleration_max_mps2: 3, limit: null }).labels.slice(0, -2).map(({ text }) => text);
+  assert.deepEqual(words(54), ['0', '25', '50', '54']);
+  assert.deepEqual(words(33.554), ['0', '10', '20', '30', '33.6']);
 });
 
 test('the digits shrink before they leave the arc', () => {
