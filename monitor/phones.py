@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from monitor.agreement import Pair, Tracks, correlate, gate_m, phone_sigma_m
-from monitor.geo import offset_m
+from monitor.geo import course_deg, offset_m
 from monitor.trail import Trail
 from monitor.values import GpsFix, PhoneFix
 
@@ -53,6 +53,7 @@ class Comparison:
     at_s: float
     distance_m: float
     gate_m: float  # what the errors of both explain in this direction
+    bearing_deg: float = 0.0  # compass bearing of the car as seen from the phone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,7 +190,12 @@ class Phones:
             velocity_mps=place.velocity_mps,
             uncertain_s=UNCERTAIN_S + word.uncertain_s,
         )
-        one = Comparison(at_s=at_s, distance_m=math.hypot(east_m, north_m), gate_m=gate)
+        one = Comparison(
+            at_s=at_s,
+            distance_m=math.hypot(east_m, north_m),
+            gate_m=gate,
+            bearing_deg=course_deg(-east_m, -north_m),
+        )
         self._compared_s = at_s
         self._comparisons.append(one)
         while self._comparisons[0].at_s < at_s - COMPARED_WITHIN_S:

@@ -34,6 +34,8 @@ class TrackPoint:
     lon_deg: float
     distance_m: float  # driven until here
     is_jump: bool = False  # the car did not drive from the point before to this one: draw no line
+    is_after_gap: bool = False  # for a while before it no position came: the way from the point before is not known
+    number: int = 0  # of this track, from 1 on; thinning leaves numbers out
 
 
 class Track:
@@ -54,6 +56,8 @@ class Track:
         self._shown_m: float | None = None
         self._moves: bool | None = None  # by the newest fix; None: too little seen to tell
         self._moved: bool | None = None  # by the one before
+        self._marked = 0
+        self._had_gap = False  # since the newest point
 
     @property
     def distance_m(self) -> float | None:
@@ -75,6 +79,7 @@ class Track:
             self._move_origin(east_m, north_m)
             east_m = north_m = 0.0
         self._plane = plane
+        self._had_gap = self._had_gap or (bool(self._fixes) and at_s - self._fixes[-1][0] > GAP_S)
         self._fixes.append((at_s, east_m, north_m))
         while self._fixes[0][0] < at_s - LOOK_BACK_S and len(self._fixes) > 2:
             self._fixes.popleft()
@@ -143,16 +148,24 @@ class Track:
             self._anchor = (self._anchor[0] - east_m, self._anchor[1] - north_m)
 
     def _mark(self, fix: GpsFix, at_s: float, is_jump: bool) -> None:
+        self._marked += 1
         points = self.points
         if len(points) >= POINTS:
             points = tuple(
                 point
                 for index, point in enumerate(points)
-                if index % 2 == 0 or point.is_jump or index == len(points) - 1
+                if index % 2 == 0 or point.is_jump or point.is_after_gap or index == len(points) - 1
             )[-POINTS + 1 :]
         point = TrackPoint(
-            at_s=at_s, lat_deg=fix.lat_deg, lon_deg=fix.lon_deg, distance_m=self._driven_m, is_jump=is_jump
+            at_s=at_s,
+            lat_deg=fix.lat_deg,
+            lon_deg=fix.lon_deg,
+            distance_m=self._driven_m,
+            is_jump=is_jump,
+            is_after_gap=self._had_gap,
+            number=self._marked,
         )
+        self._had_gap = False
         self.points = (*points, point)
 
 

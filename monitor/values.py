@@ -66,6 +66,7 @@ class GpsFix:
     status: int = 0  # NavSatStatus: −1 no fix, 0 fix, 1 satellite augmented, 2 ground augmented
     covariance_type: int = 0
     sigma_m: float | None = None  # None: quality unknown
+    covariance_m2: tuple[float, float, float] | None = None  # east, north, east-north; None: as `sigma_m` all around
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,11 +7,12 @@ from typing import Any
 
 from monitor.runner import Refused
 from monitor.signals import SIGNALS
-from monitor.state import Snapshot
+from monitor.state import Snapshot, TrackPoint
 from server import commands, problems, wire
 from server.address import BadAddress
 from server.reception import Reception
 from server.settings import BadSetting, Conflict
+from server.topics import candidates
 
 REFUSALS = (commands.NotUnderstood, BadAddress, Refused, BadSetting, Conflict, OSError)  # what `refusal` has words for
 
@@ -38,18 +39,45 @@ def refusal(why: Exception) -> dict[str, Any]:
 
 
 def track(snapshot: Snapshot) -> dict[str, Any]:
-    """The positions since connecting, thinned, as a GeoJSON LineString (longitude, latitude; WGS84)."""
-    points = [[round(p.lon_deg, 7), round(p.lat_deg, 7)] for p in snapshot.track]
+    """The positions since connecting, thinned, as a GeoJSON MultiLineString (longitude, latitude; WGS84).
+
+    A line ends where the way to the next point is not known: the position leapt, or none came for a while. A line has
+    two points at least (RFC 7946, 3.1.4), so a point alone is left out.
+    """
+    lines: list[list[list[float]]] = []
+    for point in snapshot.track:
+        if not lines or point.is_jump or point.is_after_gap:
+            lines.append([])
+        lines[-1].append([round(point.lon_deg, 7), round(point.lat_deg, 7)])
     return {
         "type": "Feature",
-        "geometry": {"type": "LineString", "coordinates": points},
+        "geometry": {"type": "MultiLineString", "coordinates": [line for line in lines if len(line) > 1]},
         "properties": {"length_m": wire.plain(snapshot.track_m, 1)},
     }
 
 
-def signals(unmapped: Mapping[str, str], reception: Reception) -> dict[str, Any]:
-    """Topics beyond the signals, and what came that was no message."""
+def track_points(snapshot: Snapshot, *, number: int, after: int) -> dict[str, Any]:
+    """The points of track `number` beyond point `after`, oldest first, as docs/protocol.md has them."""
+    rows = [
+        [p.number, round(p.lat_deg, 7), round(p.lon_deg, 7), round(p.at_s, 1), _joins(p)]
+        for p in snapshot.track
+        if p.number > after
+    ]
+    return {"number": number, "points": rows}
+
+
+def _joins(point: TrackPoint) -> int:
+    """How a point joins the one before it: 0 driven, 1 after a time without positions, 2 the position leapt."""
+    return 2 if point.is_jump else 1 if point.is_after_gap else 0
+
+
+def signals(
+    unmapped: Mapping[str, str], reception: Reception, offered: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Topics beyond the signals, what came that was no message, and which topics could carry each signal; `offered`
+    None: the bridge does not say what there is."""
     return {
+        "candidates": None if offered is None else candidates(offered),
         "topics": [{"topic": name, "type": kind} for name, kind in sorted(unmapped.items())],
         "rejected": {
             SIGNALS[name].label: dict(tally.reasons) for name, tally in reception.by_signal.items() if tally.rejected

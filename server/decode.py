@@ -213,25 +213,34 @@ def nav_sat_fix(message: Any) -> GpsFix:
         raise Rejected("latitude or longitude out of range")
     kind = number(message, "position_covariance_type")
     kind_is_known = kind in (1, 2, 3)
+    spread = _spread(message.get("position_covariance")) if kind_is_known else None
     return GpsFix(
         lat_deg=latitude,
         lon_deg=(longitude + 180) % 360 - 180 if abs(longitude) > 180 else longitude,
         alt_m=known(number(message, "altitude")),
         status=int(status),
         covariance_type=int(kind) if kind_is_known else 0,
-        sigma_m=_sigma(message.get("position_covariance")) if kind_is_known else None,
+        sigma_m=None if spread is None else known(math.sqrt(spread[0] / 2 + spread[1] / 2)),
+        covariance_m2=spread,
     )
 
 
-def _sigma(covariance: Any) -> float | None:
-    """Horizontal one-sigma error in m from the ENU covariance (row-major, m²); None where it is not to be trusted."""
+def _spread(covariance: Any) -> tuple[float, float, float] | None:
+    """East, north and east-north [m²] of the ENU covariance (row-major); None where it is not to be trusted."""
     if not isinstance(covariance, (list, tuple, np.ndarray)) or len(covariance) != 9:
         return None
     try:
         east, north = (number({"variance": covariance[at]}, "variance") for at in (0, 4))
     except Rejected:
         return None
-    return known(math.sqrt(east / 2 + north / 2)) if east > 0 and north > 0 else None  # false for NaN
+    if not (0 < east < math.inf and 0 < north < math.inf):  # false for NaN
+        return None
+    try:
+        both = number({"covariance": covariance[1]}, "covariance")
+    except Rejected:
+        both = 0.0
+    # Some drivers fill in for the mixed term what no covariance can be: then the axes are taken alone.
+    return east, north, both if abs(both) < math.sqrt(east) * math.sqrt(north) else 0.0
 
 
 def odometry(message: Any) -> Odometry:

@@ -57,6 +57,7 @@ class Facts:
     reception: Reception
     sources: Mapping[str, Source]
     topics_heard: int
+    track_number: int  # of this run of the server; another number is another track
 
 
 def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str, Any]:
@@ -96,6 +97,7 @@ def _session(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
         "paused_for_s": round(facts.now_s - facts.paused_since_s, 1) if facts.paused_since_s is not None else 0.0,
         "held": _held(facts.held),
         "track_m": wire.plain(snapshot.track_m, 1),
+        "track": {"number": facts.track_number, "last": snapshot.track[-1].number if snapshot.track else 0},
         "received": facts.reception.received,
         "rejected": facts.reception.rejected,
     }

@@ -68,6 +68,8 @@ def as_json(view: PhoneView, now_s: float) -> dict[str, Any] | None:
         "why": why,
         "why_text": why_words(why, view, now_s).sentence if why else None,
         "apart_m": wire.plain(newest.distance_m, 1) if newest else None,
+        "bearing_deg": wire.plain(newest.bearing_deg, 1) if newest else None,
+        "compared_age_s": wire.plain(max(0.0, now_s - newest.at_s), 2) if newest else None,
         "explained_m": wire.plain(newest.gate_m, 1) if newest else None,
         "correlation": wire.plain(view.tracks.correlation, 3) if view.tracks else None,
     }

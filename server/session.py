@@ -75,6 +75,7 @@ class Session:
         self._state_is_due = False
         self._paused_since_s: float | None = None
         self._paused_by: str | None = None
+        self._track_number = 0
         self._clear()
 
     def _clear(self) -> None:
@@ -91,6 +92,7 @@ class Session:
         self._proved = False
         self._reception = Reception()
         self._state = State(expected_rates(self._tuning.limits))
+        self._track_number += 1  # with the state begins another track
         self._scans = ScanFeed(self.vehicle.name, self._bus)
         self._conversation = self._begin(None)
 
@@ -251,6 +253,13 @@ class Session:
             return self._tuning.as_json() | {"toml": self._tuning.as_toml()}
         if message.get("kind") == "track":
             return answers.track(self._state.snapshot(self._now()))
+        if message.get("kind") == "track_points":
+            after = message.get("after")
+            return answers.track_points(
+                self._state.snapshot(self._now()),
+                number=self._track_number,
+                after=after if isinstance(after, int) else 0,
+            )
         try:
             self._obey(commands.read(dict(message)), by=label.clean(message.get("by")) or label.NAMELESS)
         except answers.REFUSALS as why:
@@ -543,6 +552,7 @@ class Session:
 
     def _put_state_soon(self) -> None:
         """Once the events have gone out: they must not wait until a state is made. Several changes make one state."""
+            track_number=self._track_number,
         if not self._state_is_due:
             self._state_is_due = True
             asyncio.get_running_loop().call_soon(self._put_due_state)

@@ -55,6 +55,7 @@ def value(reading: Any) -> dict[str, Any] | None:
         case values.Odometry():
             return {
                 "x_m": plain(reading.x_m, 3),
+                "covariance_m2": [plain(one, 4) for one in reading.covariance_m2] if reading.covariance_m2 else None,
                 "y_m": plain(reading.y_m, 3),
                 "yaw_rad": plain(reading.yaw_rad),
                 "speed_mps": plain(reading.speed_mps),

@@ -112,6 +112,15 @@ async def track(request: Request, vehicle: VehicleName = None) -> Response:
     return _json(await ask(request, vehicle, {"kind": "track"}))
 
 
+@router.get("/api/track/points", tags=["vehicle"], summary="The track's points beyond one, with their numbers")
+async def track_points(
+    request: Request,
+    vehicle: VehicleName = None,
+    after: Annotated[int, Query(ge=0, le=2**53, description="Only points with greater numbers")] = 0,
+) -> Response:
+    return _json(await ask(request, vehicle, {"kind": "track_points", "after": after}))
+
+
 @router.get("/api/events", tags=["alarms"], summary="The numbered log of what happened, oldest first")
 async def events(
     request: Request,

@@ -77,6 +77,7 @@
  * @property {{address: string | null, alarms: number, paused: boolean} | null} [held] what stood when the server ended
  * @property {number | null} track_m
  * @property {number} received
+ * @property {{number: number, last: number}} [track] which track, and its newest point
  * @property {number} rejected
  *
  * @typedef {object} Link
@@ -130,6 +131,8 @@
  * @property {string | null} why_text
  * @property {number | null} apart_m
  * @property {number | null} explained_m
+ * @property {number | null} [bearing_deg] of the car from the phone
+ * @property {number | null} [compared_age_s]
  * @property {number | null} correlation
  *
  * @typedef {object} AlarmEvent

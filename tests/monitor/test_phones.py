@@ -76,6 +76,12 @@ def test_the_car_is_looked_up_at_the_phone_s_own_time(age_s: float) -> None:
     assert one.at_s == pytest.approx(108.0 - age_s)
 
 
+@pytest.mark.parametrize(("aside_m", "bearing_deg"), [(40.0, 180.0), (-40.0, 0.0)])
+def test_the_bearing_of_the_car_from_the_phone(aside_m: float, bearing_deg: float) -> None:
+    (one,) = Road(10.0).drive(3.0).say(aside_m=aside_m).view.comparisons
+    assert one.bearing_deg % 360.0 == pytest.approx(bearing_deg, abs=0.1)
+
+
 def test_a_fix_newer_than_the_car_s_newest_position_waits_for_the_next() -> None:
     road = Road(10.0).drive(3.0).wait(0.05).say(age_s=0.0)
     assert road.view.comparisons == ()

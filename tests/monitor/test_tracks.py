@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 from pathlib import Path
@@ -155,6 +156,29 @@ def test_a_gap_in_the_positions_counts_as_the_straight_way() -> None:
     for n in [*range(100), *range(400, 500)]:
         track.receive(fix(0.5 * n, 0.0), n / 10, 5.0, False)
     assert track.distance_m == pytest.approx(249.5, abs=LAG_M)
+    (after,) = [point for point in track.points if point.is_after_gap]
+    assert after.at_s == pytest.approx(40.0, abs=1.0)
+    assert not any(point.is_jump for point in track.points)
+
+
+def test_a_car_that_stood_for_long_has_no_gap_in_its_track() -> None:
+    track = Track()
+    for n in range(1000):
+        moves = n < 100 or n >= 900
+        track.receive(fix(0.5 * min(n, 100) + 0.5 * max(0, n - 900), 0.0), n / 10, 5.0 * moves, not moves)
+    assert max(b.at_s - a.at_s for a, b in itertools.pairwise(track.points)) > 70.0
+    assert not any(point.is_after_gap or point.is_jump for point in track.points)
+
+
+def test_points_are_numbered_and_thinning_leaves_numbers_out() -> None:
+    track = Track()
+    for n in range(3 * POINTS):
+        track.receive(fix(2.0 * (n % 400), 0.001 * n), n / 5, 10.0, False)
+    numbers = [point.number for point in track.points]
+    assert len(numbers) <= POINTS
+    assert numbers == sorted(set(numbers))
+    assert numbers[0] == 1
+    assert numbers[-1] > POINTS
 
 
 @pytest.mark.parametrize(

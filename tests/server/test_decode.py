@@ -74,7 +74,15 @@ SHAPES: dict[str, tuple[str, str, Any]] = {
     "NavSatFix": (
         "position",
         "sensor_msgs/NavSatFix",
-        GpsFix(lat_deg=32.2186, lon_deg=-110.939, alt_m=716.1, status=0, covariance_type=2, sigma_m=math.sqrt(2.0)),
+        GpsFix(
+            lat_deg=32.2186,
+            lon_deg=-110.939,
+            alt_m=716.1,
+            status=0,
+            covariance_type=2,
+            sigma_m=math.sqrt(2.0),
+            covariance_m2=(2.25, 1.75, 0.0),
+        ),
     ),
     "NavSatFix.zeros": (
         "position",
@@ -413,6 +421,30 @@ SIGMAS: dict[str, tuple[Any, Any, float | None]] = {
 def test_covariance_is_trusted_only_where_it_can_be(kind: Any, numbers: Any, sigma_m: float | None) -> None:
     found = decode.nav_sat_fix(fix(position_covariance_type=kind, position_covariance=numbers))
     assert found.sigma_m == (None if sigma_m is None else pytest.approx(sigma_m))
+
+
+@pytest.mark.parametrize(
+    ("mixed", "kept"),
+    [
+        (1.5, 1.5),
+        (-1.9, -1.9),
+        (2.0, 0.0),  # as much as both: a line, not an ellipse
+        (-7.0, 0.0),
+        (None, 0.0),
+        (NAN, 0.0),
+        (INF, 0.0),
+        ("1.5", 0.0),
+    ],
+)
+def test_the_ellipse_of_a_fix(mixed: Any, kept: float) -> None:
+    numbers = [4.0, mixed, 0, mixed, 1.0, 0, 0, 0, 9.0]
+    found = decode.nav_sat_fix(fix(position_covariance_type=3, position_covariance=numbers))
+    assert found.covariance_m2 == (4.0, 1.0, kept)
+    assert found.sigma_m == pytest.approx(math.sqrt(2.5))
+
+
+def test_a_fix_of_unknown_quality_has_no_ellipse() -> None:
+    assert decode.nav_sat_fix(fix(position_covariance_type=0)).covariance_m2 is None
 
 
 STATUSES: dict[str, tuple[Any, int | str]] = {

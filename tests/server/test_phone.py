@@ -181,6 +181,8 @@ async def test_a_phone_far_from_the_car_is_told_on_every_page(bridge: RosBridge)
                 break
         assert found["phone"]["used"] is True
         assert found["phone"]["apart_m"] == pytest.approx(1108.8, abs=1.0)
+        assert found["phone"]["bearing_deg"] == 180.0  # the phone is north of the car
+        assert 0 <= found["phone"]["compared_age_s"] < 2.0
         (alarm,) = [alarm for alarm in found["alarms"] if alarm["id"] == "phone_car"]
         assert alarm["place"] == "dialog"
         assert alarm["text"].startswith("The phone is 1109 m from the car")
