@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any
@@ -69,11 +70,18 @@ def changed(limits: AllLimits, values: Mapping[str, Any]) -> AllLimits:
     return type(limits).model_validate(tree)
 
 
+@lru_cache(maxsize=1)
 def schema() -> dict[str, dict[str, Any]]:
-    """Every threshold by its full name with title, description, unit, default, minimum, maximum, for Settings."""
+    """Every threshold by its full name with title, description, unit, default, minimum, maximum and heading, in the
+    order of Settings: that of the tiles, then what belongs to no check."""
+    tiles: dict[str, str] = {}
+    for check in CHECKS:
+        tiles.setdefault(check.limits_group, check.tile_label)
+    places = {group: place for place, group in enumerate(tiles)}
+    groups = sorted(AllLimits(), key=lambda row: places.get(row[0], len(places)))
     return {
-        f"{group}.{name}": field
-        for group, limits in AllLimits()
+        f"{group}.{name}": {"heading": tiles.get(group, group)} | field
+        for group, limits in groups
         for name, field in limits.model_json_schema()["properties"].items()
     }
 

@@ -124,9 +124,15 @@ def threshold(
     high: float,
     help: str = "",
     step: float | None = None,
+    heading: str = "",
 ) -> Any:
-    """A field of `Limits`, in SI: what the settings page shows, what the server accepts and what the check reads."""
+    """A field of `Limits`, in SI: what the settings page shows, what the server accepts and what the check reads.
+
+    `heading`: where it stands in Settings, if not under the tile of its check.
+    """
     extra: dict[str, Any] = {"unit": unit}
+    if heading:
+        extra["heading"] = heading
     if step is not None:
         extra["step"] = step
     return Field(

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from monitor.check import Limits, threshold
 
+GAUGE, VEHICLE = "Gauge", "Vehicle"  # headings of Settings
+
 
 class GaugeLimits(Limits):
-    speed_max_mps: float = threshold(15.0, "Speed at 180°", unit="m/s", low=1.0, high=60.0, step=1.0)
-    acceleration_max_mps2: float = threshold(3.0, "Acceleration at 180°", unit="m/s²", low=0.5, high=15.0, step=0.5)
+    speed_max_mps: float = threshold(15.0, "Speed at 180°", unit="m/s", low=1.0, high=60.0, step=1.0, heading=GAUGE)
+    acceleration_max_mps2: float = threshold(
+        3.0, "Acceleration at 180°", unit="m/s²", low=0.5, high=15.0, step=0.5, heading=GAUGE
+    )
 
 
 class ObstacleLimits(Limits):
@@ -35,10 +39,19 @@ class ObstacleLimits(Limits):
         0.5, "Obstacle deadband", unit="m", low=0.0, high=5.0, step=0.1, help="It clears this much farther away."
     )
     half_width_m: float = threshold(
-        1.2, "Corridor half-width", unit="m", low=0.5, high=3.0, step=0.1, help="What is farther aside is passed by."
+        1.2,
+        "Corridor half-width",
+        unit="m",
+        low=0.5,
+        high=3.0,
+        step=0.1,
+        help="What is farther aside is passed by.",
+        heading=VEHICLE,
     )
-    wheelbase_m: float = threshold(2.62, "Wheelbase", unit="m", low=0.5, high=8.0, step=0.01)
-    laser_ahead_m: float = threshold(2.5, "Laser ahead of the rear axle", unit="m", low=-2.0, high=8.0, step=0.1)
+    wheelbase_m: float = threshold(2.62, "Wheelbase", unit="m", low=0.5, high=8.0, step=0.01, heading=VEHICLE)
+    laser_ahead_m: float = threshold(
+        2.5, "Laser ahead of the rear axle", unit="m", low=-2.0, high=8.0, step=0.1, heading=VEHICLE
+    )
 
 
 # By the name of the group; a check that judges by one of them names the same class.

@@ -47,6 +47,7 @@ _rates: dict[str, Any] = {
             high=1000.0,
             step=0.5,
             help="0: learn the car's own steady rate.",
+            heading="Expected rates",
         ),
     )
     for signal in SIGNALS.values()

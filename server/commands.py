@@ -111,6 +111,11 @@ Command = Connect | Retry | Disconnect | Pause | Resume | Acknowledge | Shelve |
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
 
 
+def is_of_settings(command: Command) -> bool:
+    """Whether it makes another version of the settings."""
+    return isinstance(command, (Set, Import))
+
+
 class NotUnderstood(ValueError):
     """The command does not fit its model; `str()` is one sentence."""
 

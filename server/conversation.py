@@ -69,6 +69,11 @@ class Conversation:
             self.ros_alive = alive if self.ros_answered_s is not None else None
             await asyncio.sleep(ALIVE_EVERY_S)
 
+    @property
+    def offered(self) -> Mapping[str, str] | None:
+        """Topic → type of all the car has, as its bridge spells them; None while the bridge does not say."""
+        return self._offer.topics if self._offer is not None else None
+
     def end(self) -> None:
         """Whatever is still answered is of no interest any more."""
         self._link = None
@@ -77,6 +82,8 @@ class Conversation:
         """After a change of settings."""
         if self._offer is not None:
             self._map(self._offer)
+        elif self._link is not None and self.by_topic:
+            self._subscribe_by_name(self._link)
 
     def bridge_complains(self, text: str) -> None:
         """An error the bridge states: an old one has no CBOR, and scans come as JSON from now on."""
@@ -142,10 +149,11 @@ class Conversation:
             link.subscribe(subscription)
 
     def _subscribe_by_name(self, link: RosLink) -> None:
-        """Without rosapi: every name of the table, its type left to the bridge."""
+        """Without rosapi: what the operator picked, else every name of the table, its type left to the bridge."""
         by_topic: dict[str, tuple[Source, ...]] = {}
+        picked = self._tuning.settings.topics
         for row in TOPICS:
-            for name in row.names:
+            for name in (picked[row.signal],) if row.signal in picked else row.names:
                 source = Source(
                     signal=row.signal,
                     topic=name,
@@ -153,6 +161,9 @@ class Conversation:
                     decode=row.types[row.expected_type],
                     note="subscribed by name: the bridge has no rosapi",
                 )
-                by_topic[name] = (source,)
+                by_topic[name] = (*by_topic.get(name, ()), source)
                 link.subscribe(Subscription(topic=name, type=None, queue_length=row.queue_length))
+        for subscription in link.subscriptions:
+            if subscription.topic not in by_topic:
+                link.unsubscribe(subscription.topic)
         self.by_topic = by_topic

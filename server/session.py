@@ -248,7 +248,7 @@ class Session:
             self._put_state(self._now())
             return {"ok": True}
         if message.get("kind") == "signals":
-            return answers.signals(self._conversation.unmapped, self._reception)
+            return answers.signals(self._conversation.unmapped, self._reception, self._conversation.offered)
         if message.get("kind") == "settings":
             return self._tuning.as_json() | {"toml": self._tuning.as_toml()}
         if message.get("kind") == "track":
@@ -261,13 +261,14 @@ class Session:
                 after=after if isinstance(after, int) else 0,
             )
         try:
-            self._obey(commands.read(dict(message)), by=label.clean(message.get("by")) or label.NAMELESS)
+            command = commands.read(dict(message))
+            self._obey(command, by=label.clean(message.get("by")) or label.NAMELESS)
         except answers.REFUSALS as why:
             if isinstance(why, BadAddress) and self._phase in ("idle", "failed"):
                 self._phase, self._problem = "failed", problems.of_bad_address(why)
                 self._put_state(self._now())
             return answers.refusal(why)
-        return {"ok": True}
+        return {"ok": True} | ({"version": self._tuning.settings.version} if commands.is_of_settings(command) else {})
 
     def _obey(self, command: commands.Command, *, by: str) -> None:
         now_s = self._now()
@@ -547,12 +548,12 @@ class Session:
             reception=self._reception,
             sources=self._conversation.sources,
             topics_heard=len(self._heard),
+            track_number=self._track_number,
         )
         return state_frame(facts, self._state.snapshot(now_s), self._monitor)
 
     def _put_state_soon(self) -> None:
         """Once the events have gone out: they must not wait until a state is made. Several changes make one state."""
-            track_number=self._track_number,
         if not self._state_is_due:
             self._state_is_due = True
             asyncio.get_running_loop().call_soon(self._put_due_state)

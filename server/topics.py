@@ -154,6 +154,19 @@ class Source:
     note: str | None = None  # what the operator should know of the choice
 
 
+def candidates(found: Mapping[str, str]) -> dict[str, list[dict[str, str]]]:
+    """Signal → the topics of a car (topic → type) whose type can be read as that signal, those of the expected type
+    first."""
+    fitting = {}
+    for row in TOPICS:
+        order = list(row.types)
+        rows = [
+            (order.index(plain_type(kind)), name, kind) for name, kind in found.items() if plain_type(kind) in order
+        ]
+        fitting[row.signal] = [{"topic": name, "type": kind} for _, name, kind in sorted(rows)]
+    return fitting
+
+
 def map_signals(found: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> dict[str, Source]:
     """Signal → Source for the topics a car has (topic → type). `chosen` are the operator's picks, signal → topic."""
     lower = {name.lower(): name for name in sorted(found, reverse=True)}

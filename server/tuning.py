@@ -29,7 +29,7 @@ class Tuning:
     @property
     def profile(self) -> Profile:
         """The kind of car: what the operator chose, else what was recognised."""
-        return self._recognised if self.settings.profile == AUTO else self._profiles[self.settings.profile]
+        return self._profile_named(self.settings.profile)
 
     @property
     def limits(self) -> AllLimits:
@@ -53,7 +53,7 @@ class Tuning:
         self._demand(version)
         new = change(
             self.settings,
-            self.profile,
+            self._profile_named(profile or self.settings.profile),  # a default of the new kind of car is not kept
             values=values,
             topics=topics,
             profile_name=profile,
@@ -63,7 +63,7 @@ class Tuning:
 
     def replace(self, toml: str) -> list[str]:
         """As `change`, with all settings from a file."""
-        read = from_toml(toml, self.profile, self._profiles)
+        read = from_toml(toml, self._recognised, self._profiles)
         return self._adopt(
             Settings(version=self.settings.version + 1, profile=read.profile, values=read.values, topics=read.topics)
         )
@@ -94,7 +94,12 @@ class Tuning:
         """What `GET /api/settings` answers; `schema` says what may be set, `defaults` what the profile gives."""
         return {
             "version": self.settings.version,
-            "profile": {"name": self.profile.name, "title": self.profile.title, "chosen": self.settings.profile},
+            "profile": {
+                "name": self.profile.name,
+                "title": self.profile.title,
+                "chosen": self.settings.profile,
+                "recognised": self._recognised.title,
+            },
             "profiles": [{"name": p.name, "title": p.title} for p in self._profiles.values()],
             "values": catalog.flat(self.limits),
             "defaults": catalog.flat(catalog.changed(catalog.AllLimits(), self.profile.limits)),
@@ -103,8 +108,11 @@ class Tuning:
             "schema": catalog.schema(),
         }
 
+    def _profile_named(self, name: str) -> Profile:
+        return self._recognised if name == AUTO else self._profiles.get(name, self._recognised)
+
     def _adopt(self, new: Settings) -> list[str]:
-        lines = differences(self.settings, new, self.profile)
+        lines = differences(self.settings, new, self.profile, self._profile_named(new.profile))
         if lines:
             self._file.write(new)  # first kept, then in force: what is in force is what a restart finds
             self.settings = new

@@ -102,7 +102,7 @@ async def state(request: Request, vehicle: VehicleName = None) -> Response:
     return _json(await ask(request, vehicle, {"kind": "state"}))
 
 
-@router.get("/api/signals", tags=["vehicle"], summary="Topics beyond the signals, and what was rejected and why")
+@router.get("/api/signals", tags=["vehicle"], summary="Topics for each signal and beyond, what was rejected and why")
 async def signals(request: Request, vehicle: VehicleName = None) -> Response:
     return _json(await ask(request, vehicle, {"kind": "signals"}))
 
@@ -171,7 +171,7 @@ async def resume(request: Request, vehicle: VehicleName = None) -> Done:
 
 
 class SettingsChange(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", strict=True)
     values: dict[str, float | None] = Field(
         default_factory=dict,
         examples=[{"speed_limit.max_mps": 9.0}],

@@ -85,12 +85,22 @@ def test_a_threshold_has_all_that_settings_need(name: str, field: dict[str, obje
     assert field["type"] == "number"
     assert isinstance(field["unit"], str)
     assert field["unit"]
+    assert field["heading"]
     low, default, high = field["minimum"], field["default"], field["maximum"]
     assert isinstance(low, float)
     assert isinstance(default, float)
     assert isinstance(high, float)
     assert low <= default <= high
     assert low < high
+
+
+def test_settings_begin_with_the_first_tile_and_headings_stand_together() -> None:
+    headings = [field["heading"] for field in catalog.schema().values()]
+    assert headings[:2] == ["Speed", "Speed"]
+    assert headings[-1] == "Gauge"
+    assert {name for name, field in catalog.schema().items() if field["heading"] == "Vehicle"} == {
+        "obstacle.half_width_m", "obstacle.wheelbase_m", "obstacle.laser_ahead_m",
+    }  # fmt: skip
 
 
 def test_no_two_thresholds_read_alike() -> None:

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
+import signal
+import time
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
 
 from server import profiles
+from server.answers import refusal
 from server.bridge.server import RosBridge
 from server.config import Config, Vehicle
 from server.profiles import GENERIC
-from server.settings import BadSetting, Settings, SettingsFile, change, differences, from_toml, to_toml
+from server.settings import BadSetting, Settings, SettingsFile, change, differences, from_toml, salvage, to_toml
+from server.topics import candidates
+from server.tuning import Tuning
 from tests.server.cars import driving, twist
 from tests.server.conftest import serving
 from tests.server.viewer import viewer
@@ -28,6 +36,9 @@ LIMIT = "speed_limit.max_mps"
         {LIMIT: float("inf")},
         {LIMIT: "9"},
         {LIMIT: True},
+        {LIMIT: 10**400},
+        {LIMIT: -1e308},
+        {LIMIT: [9.0]},
         {"speed_limit": 1.0},
         {"nothing.here": 1.0},
         {"": 1.0},
@@ -75,8 +86,25 @@ def test_toml_there_and_back() -> None:
         "[surprise]\nx = 1",
         "x = 1\n" * 20000,
         "\x00",
+        "[limits.speed_limit]\nmax_mps = nan",
+        "[limits.speed_limit]\nmax_mps = -inf",
+        "[limits.speed_limit]\nmax_mps = " + "9" * 5000,
+        "[limits.speed_limit]\nmax_mps = " + "9" * 400,
+        "[limits.speed_limit]\nmax_mps = 2026-01-02",
+        "[limits.speed_limit]\nmax_mps = {x = 1}",
+        "[limits.speed_limit]\nfrom_a_newer_version = 1.0",
+        "version = 99999999999999999999999",
+        "version = true",
+        "version = -1",
+        'profile = ["x"]',
+        '[topics]\nscan = ""',
+        '[topics]\nscan = "a\\nb"',
+        '[topics]\nscan = "' + "x" * 301 + '"',
+        "x = " + "[" * 30000,
+        '"a.b" = 1',
+        "limits = []",
     ],
-    ids=range(13),
+    ids=range(30),
 )
 def test_a_file_that_cannot_be_used_says_why_in_one_sentence(text: str) -> None:
     with pytest.raises(BadSetting) as refused:
@@ -99,6 +127,143 @@ def test_a_broken_file_is_set_aside_and_the_defaults_hold(tmp_path: Path) -> Non
     assert file.read() == Settings()
     assert file.complaint
     assert (tmp_path / "car.unusable.toml").exists()
+
+
+def test_of_a_file_of_another_version_the_rest_is_in_force_and_nothing_is_lost(tmp_path: Path) -> None:
+    """Unknown keys of a newer version, ranges that changed, a kind of car that is gone: the other limits hold."""
+    path = tmp_path / "car.toml"
+    text = (
+        'version = 7\nprofile = "no such car"\nfrom_tomorrow = 1\n[topics]\nscan = "/other"\nsonar = "/x"\n'
+        "[limits.speed_limit]\nmax_mps = 9.0\nboost_mps = 3.0\n[limits.obstacle]\nstandoff_m = 4000.0\n"
+    )
+    path.write_text(text)
+    file = SettingsFile(path)
+    found = file.read()
+    assert found == Settings(version=7, values={LIMIT: 9.0}, topics={"scan": "/other"})
+    assert file.complaint is not None
+    for word in ("car.unusable.toml", "no such car", "from_tomorrow", "sonar", "boost_mps", "Obstacle distance"):
+        assert word in file.complaint
+    assert (tmp_path / "car.unusable.toml").read_text() == text
+    again = SettingsFile(path)
+    assert again.read() == found
+    assert again.complaint is None
+
+
+def test_many_things_left_out_make_a_short_complaint(tmp_path: Path) -> None:
+    rows = "\n".join(f"unknown_{i} = 1.0" for i in range(200))
+    (tmp_path / "car.toml").write_text(f"[limits.speed_limit]\n{rows}\nmax_mps = 9.0")
+    file = SettingsFile(tmp_path / "car.toml")
+    assert file.read().values == {LIMIT: 9.0}
+    assert file.complaint is not None
+    assert "195 more" in file.complaint
+    assert len(file.complaint) < 600
+
+
+@pytest.mark.parametrize(
+    "text", ["[limits", "limits = 3", "\x00", "x = " + "[" * 30000, 'version = "one"', "topics = 1"]
+)
+def test_where_nothing_can_be_saved_the_defaults_hold(text: str) -> None:
+    assert salvage(text, profiles.load())[0] == Settings()
+
+
+def test_bytes_that_are_no_text_are_set_aside(tmp_path: Path) -> None:
+    (tmp_path / "car.toml").write_bytes(b"\xff\xfe\x00")
+    file = SettingsFile(tmp_path / "car.toml")
+    assert file.read() == Settings()
+    assert (tmp_path / "car.unusable.toml").read_bytes() == b"\xff\xfe\x00"
+    assert file.complaint
+
+
+def test_a_file_far_too_large_is_not_read_whole(tmp_path: Path) -> None:
+    with open(tmp_path / "car.toml", "wb") as file:
+        file.truncate(2**33)  # 8 GiB, sparse
+    began_s = time.monotonic()
+    assert SettingsFile(tmp_path / "car.toml").read() == Settings()
+    assert time.monotonic() - began_s < 2.0
+
+
+def _a_file_in_the_way(tmp_path: Path) -> Path:
+    (tmp_path / "settings").write_text("no folder")
+    return tmp_path / "settings" / "car.toml"
+
+
+def _read_only(tmp_path: Path) -> Path:
+    return Path("/sys/catgraph/car.toml")
+
+
+@pytest.mark.parametrize("place", [_a_file_in_the_way, _read_only])
+def test_a_folder_that_takes_nothing_is_told_and_nothing_is_in_force(tmp_path: Path, place: Any) -> None:
+    tuning = Tuning(SettingsFile(place(tmp_path)))
+    with pytest.raises(OSError, match=r"\w") as refused:
+        tuning.change(values={LIMIT: 9.0}, topics={}, profile=None, version=None)
+    assert tuning.limits.speed_limit.max_mps == 11.0
+    assert tuning.settings == Settings()
+    answer = refusal(refused.value)
+    assert answer["ok"] is False
+    assert answer["reason"].startswith("The settings cannot be kept: ")
+
+
+def test_a_name_that_no_disk_takes_stops_no_start(tmp_path: Path) -> None:
+    file = SettingsFile(tmp_path / ("x" * 300 + ".toml"))
+    assert file.read() == Settings()
+    assert file.complaint
+    assert "cannot be read" in file.complaint
+
+
+def test_killed_while_writing_the_old_or_the_new_is_found_never_a_broken_one(tmp_path: Path) -> None:
+    path = tmp_path / "car.toml"
+    whole = [
+        Settings(version=n, values={LIMIT: 5.0 + n}, topics=dict.fromkeys(("scan", "speed"), f"/topic/{n}" * 20))
+        for n in range(1, 5)
+    ]
+    for delay_ms in range(30):
+        child = os.fork()
+        if child == 0:
+            try:
+                file = SettingsFile(path)
+                while True:
+                    for settings in whole:
+                        file.write(settings)
+            finally:
+                os._exit(1)
+        while delay_ms == 0 and not path.exists():
+            time.sleep(0.001)
+        time.sleep(0.003 + delay_ms / 1000)
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        found = SettingsFile(path)
+        assert found.read() in whole
+        assert found.complaint is None
+        assert not (tmp_path / "car.unusable.toml").exists()
+    SettingsFile(path).write(whole[0])  # what the killed one left is no hindrance
+    assert SettingsFile(path).read() == whole[0]
+
+
+def test_a_default_of_the_new_kind_of_car_is_not_kept() -> None:
+    tuning = Tuning(SettingsFile(None))
+    lines = tuning.change(values={LIMIT: 9.0}, topics={}, profile="catvehicle", version=0)
+    assert lines == ["Speed limit: 11 → 9 m/s", "Profile: catvehicle"]
+    assert tuning.as_json()["profile"] == {
+        "name": "catvehicle", "title": "CATVehicle", "chosen": "catvehicle", "recognised": "Any car",
+    }  # fmt: skip
+    with pytest.raises(BadSetting) as refused:
+        tuning.change(values={}, topics={}, profile="\ud800", version=None)
+    assert str(refused.value) == "There is no profile named ?."
+
+
+def test_the_topics_that_can_carry_a_signal_are_those_of_a_type_it_reads() -> None:
+    found = candidates(
+        {
+            "/odom": "nav_msgs/msg/Odometry",
+            "/b": "geometry_msgs/msg/Twist",
+            "/a": "geometry_msgs/msg/Twist",
+            "/text": "std_msgs/msg/String",
+            "/unknown": "",
+        }
+    )
+    assert [row["topic"] for row in found["speed"]] == ["/a", "/b", "/odom"]
+    assert found["odometry"] == [{"topic": "/odom", "type": "nav_msgs/msg/Odometry"}]
+    assert found["scan"] == []
 
 
 def test_differences_are_told_in_the_operators_words() -> None:
@@ -153,6 +318,72 @@ async def test_a_change_counts_at_once_is_logged_and_survives_a_restart(bridge: 
         assert (await client.put("/api/settings.toml", content=toml)).json()["values"][LIMIT] == 4.0
         assert (await client.put("/api/settings.toml", content=b"\xff\xfe")).status_code == 422
         assert (await client.put("/api/settings.toml", content=b"x" * 70_000)).status_code == 413
+
+
+async def test_of_two_pages_that_change_at_once_one_is_told_to_look_again(server: str) -> None:
+    async with viewer(server) as one, viewer(server) as two:
+        version = (await one.state())["session"]["settings_version"]
+        answers = await asyncio.gather(
+            one.ask(kind="set", values={LIMIT: 8.0}, version=version),
+            two.ask(kind="set", values={LIMIT: 7.0}, version=version),
+        )
+        assert sorted(answer["ok"] for answer in answers) == [False, True]
+        won = next(answer for answer in answers if answer["ok"])
+        lost = next(answer for answer in answers if not answer["ok"])
+        assert won["version"] == version + 1
+        assert lost["conflict"] is True
+        assert lost["reason"].endswith("Look at them again.")
+        limit = 8.0 if answers[0]["ok"] else 7.0
+        for page in (one, two):
+            state = await page.state(lambda s: s["session"]["settings_version"] == version + 1)
+            assert state["limits"][LIMIT] == limit
+        again = await two.ask(kind="set", values={LIMIT: 7.0}, version=version + 1)
+        assert (again["ok"], again["version"]) == (True, version + 2)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        '{"values": {"speed_limit.max_mps": NaN}}',
+        '{"values": {"speed_limit.max_mps": 1e999}}',
+        '{"values": {"speed_limit.max_mps": "9"}}',
+        '{"values": {"speed_limit.max_mps": true}}',
+        '{"values": {"speed_limit.max_mps": [9]}}',
+        '{"values": {"\\ud800": 9}}',
+        '{"values": [9]}',
+        '{"topics": {"speed": "\\ud800"}}',
+        '{"topics": {"speed": 7}}',
+        '{"topics": {"\\ud800": "/x"}}',
+        '{"profile": "\\ud800"}',
+        '{"profile": 7}',
+        '{"version": "1"}',
+        '{"from_a_newer_version": 1}',
+        "[]",
+        "{",
+    ],
+)
+async def test_hostile_changes_are_refused_in_words_and_the_state_goes_on(server: str, body: str) -> None:
+    async with httpx.AsyncClient(base_url=server) as client:
+        answer = await client.patch("/api/settings", content=body, headers={"content-type": "application/json"})
+        assert answer.status_code in (409, 422)
+        assert answer.json()["detail"]
+        after = (await client.get("/api/settings")).json()
+        assert (after["version"], after["changed"], after["topics"]) == (0, [], {})
+        assert (await client.get("/api/state")).status_code == 200
+
+
+async def test_candidates_come_from_what_the_car_offers(bridge: RosBridge, server: str) -> None:
+    async with driving(bridge), viewer(server) as one, httpx.AsyncClient(base_url=server) as client:
+        await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
+        found = (await client.get("/api/signals")).json()["candidates"]
+        assert found["speed"] == [{"topic": "/catvehicle/vel", "type": "geometry_msgs/Twist"}]
+        assert found["scan"] == [{"topic": "/scan", "type": "sensor_msgs/LaserScan"}]
+        assert found["fuel"] == []
+
+
+async def test_before_a_car_is_connected_no_topic_is_known() -> None:
+    async with serving(Config(vehicles=(Vehicle(name="car"),))) as server, httpx.AsyncClient(base_url=server) as client:
+        assert (await client.get("/api/signals")).json()["candidates"] is None
 
 
 async def test_a_picked_topic_replaces_the_found_one(bridge: RosBridge, server: str) -> None:
