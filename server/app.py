@@ -21,7 +21,7 @@ from server.journal import Journal
 from server.session import Session
 from server.settings import SettingsFile
 from server.version import catgraph_version
-from server.web import api, docs, errors, metrics, pages
+from server.web import api, docs, errors, metrics, notices, pages
 from server.web import log as alarm_log
 from server.web.headers import SecurityHeaders
 
@@ -127,6 +127,7 @@ def create_app(
     app.include_router(api.router)
     app.include_router(alarm_log.router)
     app.include_router(metrics.router)
+    app.include_router(notices.router)
     app.include_router(docs.router)
     pages.install(app)
     return app

@@ -10,9 +10,10 @@ from datetime import UTC, datetime
 from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import Response, StreamingResponse
 
+from monitor.alarm_spec import Priority
 from server.bus import LocalBus
 from server.web.api import VehicleName, running, vehicle_of
 
@@ -24,76 +25,22 @@ COLUMNS = (
 _TOLD = frozenset((*COLUMNS, "at_ms", "place", "sound", "announces"))  # the rest stands in `details`, as JSON
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet runs a cell that begins so
 _PAGE = 500
+_LOOKED_THROUGH = 2000  # events for one page of those that fit: the loop must not stand still for a rare word
 
 Text = Annotated[str | None, Query(max_length=120)]
+Urgency = Annotated[Priority | None, Query(description="Only of alarms of this priority")]
+Words = Annotated[str | None, Query(max_length=120, description="In title, text, by whom or name of the alarm")]
 Milliseconds = Annotated[int | None, Query(ge=0, le=2**53)]
-
-
-@router.get("/api/log", tags=["alarms"], summary="The alarm log, newest first, a page at a time")
-async def log_page(
-    request: Request,
-    vehicle: VehicleName = None,
-    before: Annotated[int | None, Query(ge=1, le=2**53, description="Only numbers below this")] = None,
-    limit: Annotated[int, Query(ge=1, le=500)] = 100,
-    alarm: Text = None,
-    change: Text = None,
-    since_ms: Milliseconds = None,
-    until_ms: Milliseconds = None,
-) -> Response:
-    app = running(request)
-    name = vehicle_of(app, vehicle)
-    events = app.bus.find_events(
-        name, before=before, limit=limit, alarm=alarm, change=change, since_ms=since_ms, until_ms=until_ms
-    )
-    more = events[-1]["n"] if len(events) == limit and events[-1]["n"] > 1 else None
-    body = {"events": events, "next_before": more, "last": app.bus.last_event(name)}
-    return Response(orjson.dumps(body), media_type="application/json")
-
-
-@router.get("/api/log.csv", tags=["alarms"], summary="The whole alarm log as CSV, oldest first")
-async def log_csv(
-    request: Request,
-    vehicle: VehicleName = None,
-    alarm: Text = None,
-    change: Text = None,
-    since_ms: Milliseconds = None,
-    until_ms: Milliseconds = None,
-) -> StreamingResponse:
-    app = running(request)
-    name = vehicle_of(app, vehicle)
-    events = _all(app.bus, name, Which(alarm=alarm, change=change, since_ms=since_ms, until_ms=until_ms))
-    return StreamingResponse(
-        _csv(events), media_type="text/csv; charset=utf-8", headers=_attachment(f"catgraph-log-{name}.csv")
-    )
-
-
-@router.get("/api/log.json", tags=["alarms"], summary="The whole alarm log as JSON, oldest first")
-async def log_json(
-    request: Request,
-    vehicle: VehicleName = None,
-    alarm: Text = None,
-    change: Text = None,
-    since_ms: Milliseconds = None,
-    until_ms: Milliseconds = None,
-) -> StreamingResponse:
-    app = running(request)
-    name = vehicle_of(app, vehicle)
-    events = _all(app.bus, name, Which(alarm=alarm, change=change, since_ms=since_ms, until_ms=until_ms))
-    return StreamingResponse(
-        _json(events), media_type="application/json", headers=_attachment(f"catgraph-log-{name}.json")
-    )
-
-
-def _attachment(name: str) -> dict[str, str]:
-    return {"Content-Disposition": f'attachment; filename="{name}"'}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Which:
     """Which events are wanted; None: all."""
 
-    alarm: str | None = None
+    alarm: str | None = None  # "": those of no alarm
     change: str | None = None
+    priority: str | None = None
+    text: str | None = None
     since_ms: int | None = None
     until_ms: int | None = None
 
@@ -101,9 +48,99 @@ class Which:
         return (
             (self.alarm is None or (event.get("alarm") or "") == self.alarm)
             and (self.change is None or event["change"] == self.change)
+            and (self.priority is None or event.get("priority") == self.priority)
+            and (self.text is None or self.text.casefold() in _words_of(event))
             and (self.since_ms is None or event["at_ms"] >= self.since_ms)
             and (self.until_ms is None or event["at_ms"] < self.until_ms)
         )
+
+
+def wanted(
+    alarm: Text = None,
+    change: Text = None,
+    priority: Urgency = None,
+    text: Words = None,
+    since_ms: Milliseconds = None,
+    until_ms: Milliseconds = None,
+) -> Which:
+    """The filters of a request, the same for pages and exports."""
+    return Which(alarm=alarm, change=change, priority=priority, text=text or None, since_ms=since_ms, until_ms=until_ms)
+
+
+Wanted = Annotated[Which, Depends(wanted)]
+
+
+def _words_of(event: Mapping[str, Any]) -> str:
+    return " ".join(str(event.get(name) or "") for name in ("title", "text", "by", "alarm", "change")).casefold()
+
+
+@router.get("/api/log", tags=["alarms"], summary="The alarm log, newest first, a page at a time")
+async def log_page(
+    request: Request,
+    which: Wanted,
+    vehicle: VehicleName = None,
+    before: Annotated[int | None, Query(ge=1, le=2**53, description="Only numbers below this")] = None,
+    limit: Annotated[int, Query(ge=1, le=500)] = 100,
+) -> Response:
+    """`next_before` asks for the page after this one; null: there is none. A page may be short, even empty, with more
+    to come: after 2000 events that do not fit, looking further is another request."""
+    app = running(request)
+    name = vehicle_of(app, vehicle)
+    events, more = _page(app.bus, name, which, before, limit)
+    body = {"events": events, "next_before": more, "last": app.bus.last_event(name)}
+    return Response(orjson.dumps(body), media_type="application/json")
+
+
+@router.get("/api/log.csv", tags=["alarms"], summary="The alarm log as CSV, oldest first")
+async def log_csv(request: Request, which: Wanted, vehicle: VehicleName = None) -> StreamingResponse:
+    app = running(request)
+    name = vehicle_of(app, vehicle)
+    return StreamingResponse(
+        _csv(_all(app.bus, name, which)),
+        media_type="text/csv; charset=utf-8",
+        headers=_attachment(f"catgraph-log-{name}.csv"),
+    )
+
+
+@router.get("/api/log.json", tags=["alarms"], summary="The alarm log as JSON, oldest first")
+async def log_json(request: Request, which: Wanted, vehicle: VehicleName = None) -> StreamingResponse:
+    app = running(request)
+    name = vehicle_of(app, vehicle)
+    return StreamingResponse(
+        _json(_all(app.bus, name, which)),
+        media_type="application/json",
+        headers=_attachment(f"catgraph-log-{name}.json"),
+    )
+
+
+def _page(
+    bus: LocalBus, vehicle: str, which: Which, before: int | None, limit: int
+) -> tuple[list[dict[str, Any]], int | None]:
+    """Newest first, and where the next page begins."""
+    found: list[dict[str, Any]] = []
+    for _ in range(_LOOKED_THROUGH // _PAGE):
+        portion = bus.find_events(
+            vehicle,
+            before=before,
+            limit=_PAGE,
+            alarm=which.alarm,
+            change=which.change,
+            since_ms=which.since_ms,
+            until_ms=which.until_ms,
+        )
+        for event in portion:
+            if len(found) == limit:
+                return found, before
+            before = event["n"]
+            if which.has(event):
+                found.append(event)
+        if len(portion) < _PAGE:
+            return found, None
+    return found, before if before and before > 1 else None
+
+
+def _attachment(name: str) -> dict[str, str]:
+    return {"Content-Disposition": f'attachment; filename="{name}"'}
 
 
 def _all(bus: LocalBus, vehicle: str, which: Which) -> Iterator[list[dict[str, Any]]]:

@@ -15,6 +15,7 @@ import { Tabs } from './tabs.js';
 import { Voice } from './voice.js';
 import { fixed } from './words.js';
 import { lossKey, mount as mountDialogs } from './dialogs.js';
+import { mount as mountBadge } from './badge.js';
 import { mount as mountChecks } from './checks.js';
 import { mount as mountConnect } from './connect.js';
 import { mount as mountGauge } from './gauge.js';
@@ -66,6 +67,7 @@ mountPreferences();
 mountRail(monitor, store, page);
 mountSnackbar(field(document, 'snacks'), store, say);
 mountDialogs(store, page);
+mountBadge(store);
 
 /** The scan is sent and drawn only while its tab is in front and nothing lies over it. */
 function front() {

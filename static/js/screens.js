@@ -1,11 +1,11 @@
 // The screens behind the menu: each slides over the tabs and keeps bar, strip and rail in their places.
 
+import { mountAbout, mountLicense } from './about.js';
 import { mount as mountLog } from './log.js';
 import { mount as mountSignals } from './signals.js';
 import { openPreferences } from './preferences.js';
 import { closeSheet, openSheet } from './sheet.js';
 import { field, html, listen, need, setText, show, words } from './dom.js';
-import { fixed } from './words.js';
 
 /**
  * @typedef {import('./store.js').Store} Store
@@ -16,8 +16,8 @@ const SCREENS = /** @type {Record<string, {title: string, mount: Mount}>} */ ({
   saved: { title: 'Saved data', mount: still(['Nothing is recorded yet: this version has no recorder.', 'What you see now is not kept.']) },
   log: { title: 'Alarm log', mount: mountLog },
   signals: { title: 'Signals', mount: mountSignals },
-  license: { title: 'License', mount: license },
-  about: { title: 'About', mount: about },
+  license: { title: 'License', mount: mountLicense },
+  about: { title: 'About', mount: mountAbout },
 });
 
 export class Screens {
@@ -98,53 +98,5 @@ function still(sentences) {
   return (root) => {
     root.replaceChildren(html('div', { class: 'prose' }, ...sentences.map((sentence) => html('p', {}, ...words(sentence)))));
     return () => root.replaceChildren();
-  };
-}
-
-/** @type {Mount} */
-function license(root) {
-  const text = html('pre', { class: 'license', tabindex: 0 }, 'The full text is being fetched from the server.');
-  root.replaceChildren(html('div', { class: 'prose' },
-    html('p', {}, html('b', {}, 'catgraph is free software under the Apache License, version 2.0.'), ' It comes without any warranty.'),
-    html('p', {}, 'Its numerals and icons are its own drawing, under the same licence. The page also uses Leaflet (BSD, 2 clauses) and uPlot (MIT).')), text);
-  let isShown = true;
-  fetch('/static/license.txt').then((answer) => (answer.ok ? answer.text() : Promise.reject())).then(
-    (found) => { if (isShown) text.textContent = found; },
-    () => { if (isShown) text.textContent = 'The full text could not be fetched; it lies in the file LICENSE of the project.'; },
-  );
-  return () => {
-    isShown = false;
-    root.replaceChildren();
-  };
-}
-
-/** @type {Mount} */
-function about(root, store) {
-  const facts = html('dl', { class: 'facts' });
-  root.replaceChildren(html('div', { class: 'prose' },
-    html('p', {}, html('b', {}, 'catgraph watches an autonomous test car and tells you what is wrong.')),
-    html('p', {}, 'It is monitoring with an aid to slow down. It is not an emergency stop: the safety driver stops the car.'),
-    html('p', {}, 'The numbers are those of the car; a value that is old, unknown or not checked looks so.')), facts);
-
-  function draw() {
-    const { frame } = store;
-    if (!frame) return;
-    const rows = [
-      ['Version', frame.server.version], ['Server', location.host], ['Vehicle', frame.vehicle ?? '–'],
-      ['Address', frame.session.address ?? 'none'], ['ROS', frame.session.ros_version === null ? 'unknown' : String(frame.session.ros_version)],
-      ['Pages', String(frame.server.pages)], ['Frames skipped', String(frame.server.frames_skipped)],
-      ['Server behind', `${fixed(frame.server.loop_lag_ms, 1)} ms`], ['Run', frame.server.boot.slice(0, 8)],
-    ];
-    const key = JSON.stringify(rows);
-    if (facts.dataset['key'] === key) return;
-    facts.dataset['key'] = key;
-    facts.replaceChildren(...rows.flatMap(([term = '', text = '']) => [html('dt', {}, term), html('dd', {}, ...words(text))]));
-  }
-
-  draw();
-  const stop = store.on('draw', draw);
-  return () => {
-    stop();
-    root.replaceChildren();
   };
 }

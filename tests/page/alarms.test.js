@@ -4,7 +4,7 @@ import { layOut, soundOf, stripOf, tilesOf } from '../../static/js/alarm-layout.
 import { showTiles } from '../../static/js/checks.js';
 import { dialogOf, linkWords, lossKey } from '../../static/js/dialogs.js';
 import { chainOf } from '../../static/js/link.js';
-import { eventWords } from '../../static/js/log.js';
+import { eventWords } from '../../static/js/log-layout.js';
 import { alarm, state } from './frames.js';
 
 const link = (more = {}) => alarm({ id: 'link_lost', title: 'Connection lost', actions: ['reconnect', 'change_address', 'exit'], ...more });

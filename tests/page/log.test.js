@@ -1,6 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { heldWords } from '../../static/js/connect.js';
+import { asked, dayWords, joined, lowest, tookWords } from '../../static/js/log-layout.js';
 import { loadWords, standingWords } from '../../static/js/standing.js';
 
 const ALARM = /** @type {any} */ ({ text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
@@ -29,4 +30,46 @@ test('what stood when the server ended is said where a car is chosen', () => {
   assert.equal(heldWords(held), 'The server was restarted while it watched 192.168.4.1:9090: 2 alarms stood. Connect to it to go on.');
   assert.match(heldWords({ ...held, alarms: 1, paused: true }), /1 alarm stood and monitoring was paused/);
   for (const none of [null, undefined, { ...held, alarms: 0 }, { ...held, address: null }]) assert.equal(heldWords(none), '');
+});
+
+/** @param {number} n @param {object} [more] */
+const event = (n, more = {}) => /** @type {any} */ ({ n, at_ms: noon_ms + n * 1000, alarm: 'speed_limit', occurrence: 1, change: 'raised', title: 'Speed above limit', priority: 'critical', text: '12.6 m/s', by: null, ...more });
+const row = (/** @type {any} */ one) => ({ event: one, gap: null });
+const GAP = { event: null, gap: { blind_s: 14, raised: 1, cleared: 0, at_ms: noon_ms } };
+
+test('what is here and what was fetched make one list; a blind time is never filtered away', () => {
+  const here = [row(event(9)), GAP, row(event(8, { alarm: null, change: 'paused', title: null, priority: null, text: 'Paused', by: 'Ann' }))];
+  const older = [event(8), event(7, { priority: 'warning', title: 'GPS jump', alarm: 'gps_jump' }), event(6)];
+  const numbers = (/** @type {any} */ filter) => joined(/** @type {any} */ (here), older, filter).map(({ event: one }) => one?.n ?? 'gap');
+  assert.deepEqual(numbers({ kind: 'all', text: '' }), [9, 'gap', 8, 7, 6]);
+  assert.deepEqual(numbers({ kind: 'critical', text: '' }), [9, 'gap', 6]);
+  assert.deepEqual(numbers({ kind: 'other', text: '' }), ['gap', 8]);
+  assert.deepEqual(numbers({ kind: 'all', text: ' gps JUMP ' }), ['gap', 7]);
+  assert.deepEqual(numbers({ kind: 'all', text: 'ann' }), ['gap', 8]);
+  assert.deepEqual(numbers({ kind: 'warning', text: 'speed' }), ['gap']);
+  assert.equal(lowest(/** @type {any} */ (here)), 8);
+  assert.equal(lowest(/** @type {any} */ ([GAP])), null);
+});
+
+test('a filter is asked of the server as the page means it', () => {
+  assert.deepEqual(asked({ kind: 'all', text: '  ' }), {});
+  assert.deepEqual(asked({ kind: 'other', text: 'a&b ' }), { alarm: '', text: 'a&b' });
+  assert.deepEqual(asked({ kind: 'advisory', text: '' }), { priority: 'advisory' });
+});
+
+test('days are told as people tell them', () => {
+  const now_ms = new Date(2026, 10, 21, 0, 0, 5).getTime();
+  const day = (/** @type {[number, number, number, number?]} */ ...at) => dayWords(new Date(at[0], at[1], at[2], at[3] ?? 12).getTime(), now_ms);
+  assert.equal(day(2026, 10, 21, 0), 'Today');
+  assert.equal(day(2026, 10, 20, 23), 'Yesterday');
+  assert.equal(day(2026, 10, 20, 0), 'Yesterday');
+  assert.equal(day(2026, 10, 19), 'Thursday, 19 November');
+  assert.equal(day(2025, 11, 31), 'Wednesday, 31 December 2025');
+});
+
+test('an acknowledgement tells how long the alarm waited for it', () => {
+  const rows = /** @type {any} */ ([row(event(12, { change: 'acknowledged' })), GAP, row(event(10, { occurrence: 2 })), row(event(9))]);
+  assert.equal(tookWords(event(12, { change: 'acknowledged' }), rows), 'in 3.0 s');
+  assert.equal(tookWords(event(12, { change: 'acknowledged', occurrence: 3 }), rows), '');
+  assert.equal(tookWords(event(12, { change: 'cleared' }), rows), '');
 });

@@ -190,7 +190,17 @@ async def test_every_transition_has_its_values_and_limits_in_every_export(speedi
 
 @pytest.mark.parametrize(
     "query",
-    ["limit=0", "limit=501", "before=0", "since_ms=-1", "since_ms=x", "alarm=" + "x" * 200, "until_ms=1e400"],
+    [
+        "limit=0",
+        "limit=501",
+        "before=0",
+        "since_ms=-1",
+        "since_ms=x",
+        "alarm=" + "x" * 200,
+        "until_ms=1e400",
+        "priority=red",
+        "text=" + "x" * 121,
+    ],
 )
 async def test_a_query_that_makes_no_sense_is_refused(server: str, query: str) -> None:
     async with httpx.AsyncClient(base_url=server) as client:
