@@ -22,7 +22,9 @@ from server.session import Session
 from server.settings import SettingsFile
 from server.version import catgraph_version
 from server.web import api, docs, errors, metrics, notices, pages
+from server.web import ground as web_ground
 from server.web import log as alarm_log
+from server.web.ground import Ground
 from server.web.headers import SecurityHeaders
 
 log = logging.getLogger("catgraph.app")
@@ -41,6 +43,7 @@ class Running:
     boot: str
     version: str
     started_s: float
+    ground: Ground
 
     def server_facts(self) -> dict[str, Any]:
         """The `server` part of a state."""
@@ -74,8 +77,10 @@ def create_app(
 ) -> FastAPI:
     """The ASGI application; its sessions run from its start-up to its shut-down. `checks` None: all there are.
 
-    Raises OSError when the data folder cannot be used, AssetsMissing when the page's files are not there.
+    Raises OSError when the data folder cannot be used, AssetsMissing when the page's files are not there,
+    MapRefused when a map file cannot be shown.
     """
+    ground = Ground(config.maps, config.site_image)
     if config.data is not None:
         config.data.mkdir(parents=True, exist_ok=True)
     journal = Journal(config.data / "events.sqlite" if config.data is not None else None)
@@ -90,6 +95,7 @@ def create_app(
         boot=secrets.token_hex(8),
         version=catgraph_version(),
         started_s=now(),
+        ground=ground,
     )
     for vehicle in config.vehicles:
         running.sessions[vehicle.name] = Session(
@@ -112,6 +118,7 @@ def create_app(
         finally:
             await asyncio.gather(*(session.stop() for session in running.sessions.values()))
             journal.close()
+            ground.close()
 
     app = FastAPI(
         title="catgraph",
@@ -127,6 +134,7 @@ def create_app(
     app.include_router(api.router)
     app.include_router(alarm_log.router)
     app.include_router(metrics.router)
+    app.include_router(web_ground.router)
     app.include_router(notices.router)
     app.include_router(docs.router)
     pages.install(app)

@@ -24,6 +24,8 @@ class Config:
     port: int = 8000
     allowed_hosts: tuple[str, ...] = ()  # non-empty: no other car is ever dialled
     found: tuple[Vehicle, ...] = field(default=())  # offered on the connect screen
+    maps: tuple[Path, ...] = ()  # MBTiles under the map, the last on top
+    site_image: Path | None = None  # above them; its corners stand in a .toml beside it
 
 
 def vehicle_from_text(text: str, *, index: int) -> Vehicle:

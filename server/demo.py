@@ -38,6 +38,8 @@ async def _demo(args: argparse.Namespace) -> int:
         host=args.host,
         port=args.port,
         found=(Vehicle(name="Simulated car", address=address),),
+        maps=tuple(args.map),
+        site_image=args.site_image,
     )
     try:
         return await serve(config)

@@ -40,6 +40,8 @@ def run(args: argparse.Namespace) -> int:
             host=args.host,
             port=args.port,
             allowed_hosts=tuple(args.only),
+            maps=tuple(args.map),
+            site_image=args.site_image,
         )
         return run_server(serve(config))
     except (CannotServe, ValueError) as why:

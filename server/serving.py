@@ -20,6 +20,7 @@ from server.app import create_app
 from server.compression import PageSocket
 from server.config import Config
 from server.web.assets import AssetsMissing
+from server.web.mbtiles import MapRefused
 
 
 class CannotServe(Exception):
@@ -33,6 +34,20 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", type=int, default=8000, help="port to listen on, 0 for a free one (default 8000)")
     parser.add_argument(
         "--data", type=Path, default=_default_data(), help="folder for what is kept (default %(default)s)"
+    )
+    parser.add_argument(
+        "--map",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE.mbtiles",
+        help="a map to draw under the car: raster MBTiles; several lie on each other, the last on top",
+    )
+    parser.add_argument(
+        "--site-image",
+        type=Path,
+        metavar="FILE",
+        help="a picture of the site to draw above the maps; its corners stand in FILE.toml beside it, see README",
     )
 
 
@@ -61,7 +76,7 @@ async def serve(config: Config) -> int:
     """Serves until it is ended. Raises CannotServe."""
     try:
         app = create_app(config)
-    except AssetsMissing as why:
+    except (AssetsMissing, MapRefused) as why:
         raise CannotServe(str(why)) from None
     except OSError as why:
         raise CannotServe(f"The data folder {config.data} cannot be used: {why.strerror or why}.") from None
