@@ -6,6 +6,8 @@ explains. Jump: between each of the last four fixes the position ran faster than
 
 from __future__ import annotations
 
+import math
+
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -88,6 +90,8 @@ def jumps(snapshot: Snapshot, limits: JumpLimits, was_active: bool) -> Finding:
     if why_not is not None:
         return why_not
     speed_mps = abs(snapshot.need("speed").speed_mps)
+    if not math.isfinite(speed_mps):
+        return unknown("Speed is not a number", short="no data")
     watch = snapshot.gps
     if len(watch.over_ground_mps) < FIXES or watch.net_mps is None:
         return unknown("Waiting for positions", short="waiting")

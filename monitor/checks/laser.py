@@ -26,6 +26,7 @@ from monitor.check import (
 )
 from monitor.corridor import Corridor, look
 from monitor.state import Snapshot
+from monitor.values import LaserScan
 
 CORRIDOR = Corridor(half_width_m=1.2, wheelbase_m=2.62, laser_ahead_m=2.5)
 LOOK_AHEAD_M = 5.0  # where the beams of the corridor are counted
@@ -77,13 +78,17 @@ def plainly_agrees(snapshot: Snapshot, limits: Limits) -> bool:
     if reading is None:
         return True
     scan = reading.value
-    if not scan.angle_increment_rad:
-        return False
-    steps = (scan.angle_max_rad - scan.angle_min_rad) / scan.angle_increment_rad
-    beams = scan.beams
+    steps, beams = _steps(scan), scan.beams
     if not (0.0 <= steps < math.inf) or round(steps) + 1 != beams:
         return False
     return scan.scan_time_s <= 0.0 or (beams - 1) * scan.time_increment_s <= SWEEP_SLACK * scan.scan_time_s
+
+
+def _steps(scan: LaserScan) -> float:
+    """From the first beam to the last; NaN, infinite or negative where the angles contradict each other."""
+    if scan.angle_increment_rad == 0.0:
+        return math.nan
+    return (scan.angle_max_rad - scan.angle_min_rad) / scan.angle_increment_rad
 
 
 def agrees(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
@@ -91,12 +96,12 @@ def agrees(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     if _laser_is_absent(snapshot):
         return absent("The laser is not published")
     scan = snapshot.need("scan")
-    span_rad = scan.angle_max_rad - scan.angle_min_rad
-    if not math.isfinite(span_rad) or scan.angle_increment_rad == 0.0 or span_rad * scan.angle_increment_rad < 0.0:
+    steps = _steps(scan)
+    if not 0.0 <= steps < math.inf:
         if scan.beams > 1:
             return fault("The scan's angles contradict each other", brief="angles", causes=("angles",), level=2)
         return unknown("One beam or none: nothing to compare", short="1 beam")
-    expected = round(span_rad / scan.angle_increment_rad) + 1
+    expected = round(steps) + 1
     measured = Quantity(label="Beams", value=scan.beams, unit="")
     limit = Quantity(label="Expected", value=expected, unit="")
     text = f"{scan.beams} beams, {expected} expected"

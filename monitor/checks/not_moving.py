@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -15,6 +17,7 @@ from monitor.check import (
     fault,
     ok,
     threshold,
+    unknown,
 )
 from monitor.state import Snapshot
 
@@ -25,6 +28,8 @@ class NotMovingLimits(Limits):
 
 def find(snapshot: Snapshot, limits: NotMovingLimits, was_active: bool) -> Finding:
     speed_mps = snapshot.need("speed").speed_mps
+    if not math.isfinite(speed_mps):
+        return unknown("Speed is not a number", short="no data")
     since_s = snapshot.standing_since_s
     if since_s is None:
         return ok(f"The car moves, {speed_mps:.1f} m/s")
