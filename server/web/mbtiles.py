@@ -10,6 +10,7 @@ import threading
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from server.web.pictures import media_type, plain_text
 
@@ -106,6 +107,8 @@ class MapFile:
         )
 
     def _zoom(self, told: dict[str, str]) -> tuple[int, int]:
+        least: Any
+        deepest: Any
         try:
             least, deepest = int(told["minzoom"]), int(told["maxzoom"])
         except (KeyError, ValueError):
