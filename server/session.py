@@ -33,6 +33,8 @@ from server.tuning import Tuning
 log = logging.getLogger("catgraph.session")
 
 SAVE_AGAIN_S = 1.0  # the log is asked so often whether it is kept
+READ_UP_S = 0.1  # to read what waits after the loop stood still
+TELL_STALL_S = 2.0  # a page that was covered for so long is told why
 SICK_LOOP_S = 0.25  # a loop later than this lets one heartbeat fall: a sign of life from a sick server is a lie
 PROOF_WITHIN_S = 4.0  # something that speaks WebSocket and no rosbridge is told apart by then
 BRIDGE_SILENT_S = 1.4  # the bridge answers a ping every 0.5 s
@@ -138,12 +140,22 @@ class Session:
         due_s = loop.time()
         while True:
             self._lag_s = max(0.0, loop.time() - due_s)
+            if self._lag_s > SICK_LOOP_S and self._phase == "monitoring":
+                await self._catch_up()
             try:
                 self.tick(put=self._lag_s <= SICK_LOOP_S)
             except Exception:  # the one net: a fault in a tick must not end the ticking
                 log.exception("a tick of %s failed", self.vehicle.name)
             due_s = max(due_s + TICK_S, loop.time())
             await asyncio.sleep(due_s - loop.time())
+
+    async def _catch_up(self) -> None:
+        """After we stood still ourselves: what the car said meanwhile waits to be read, and its silence was ours."""
+        if self._lag_s > TELL_STALL_S:
+            self._logbook.note(
+                "stalled", f"The server stood still for {self._lag_s:.1f} s: nothing was judged meanwhile."
+            )
+        await asyncio.sleep(READ_UP_S)
 
     @property
     def phase(self) -> str:
@@ -435,7 +447,11 @@ class Session:
         if "scan" in changed:
             self._scans.count()
             if self._scans.is_due(now_s):
-                self._scans.put(self._state.snapshot(now_s), kinds_kept=not isinstance(message["ranges"], list))
+                self._scans.put(
+                    self._state.snapshot(now_s),
+                    self._monitor.limits.obstacle,
+                    kinds_kept=not isinstance(message["ranges"], list),
+                )
 
     # -- is it a rosbridge? ------------------------------------------------------------------------------------------
 

@@ -25,7 +25,7 @@ const MONTHS = ['January', 'February', 'March', 'April', 'May', 'June', 'July', 
  * @param {AlarmEvent} event
  */
 export function eventWords(event) {
-  if (event.alarm === null) return { icon: event.change === 'lost' ? 'link-off' : 'info', kind: '', title: event.text || event.change, text: event.by ? `by ${event.by}` : '' };
+  if (event.alarm === null) return { icon: event.change === 'lost' || event.change === 'stalled' ? 'link-off' : 'info', kind: '', title: event.text || event.change, text: event.by ? `by ${event.by}` : '' };
   const change = CHANGES[event.change] ?? event.change;
   const isRise = event.change === 'raised' || event.change === 'recaused' || event.change === 'unsuppressed';
   const [mark, kind] = isRise ? MARKS[event.priority ?? 'advisory'] : ['ok', ''];
