@@ -1,0 +1,175 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { distance_m, offsetOf, placeAt } from '../../static/js/geodesy.js';
+import {
+  CLOSEST, FIRST, WIDEST, between, bounded, ellipseOf, fitted, gridPaths, gridStep_m, groundMatrix, metresOf, panned, pictureMatrix, pixelOf, scaleBar_m, tileScale,
+  upOf, zoomed,
+} from '../../static/js/map-layout.js';
+
+const HERE = { lat_deg: 32.2319, lon_deg: -110.9501 };
+const SIZE = { width: 412, height: 470 };
+const PLACES = [HERE, { lat_deg: 0, lon_deg: 180 }, { lat_deg: -17, lon_deg: -179.99999 }, { lat_deg: 89.99999, lon_deg: 40 }, { lat_deg: -90, lon_deg: 0 }, { lat_deg: 70, lon_deg: 25 }];
+const view = (more = {}) => ({ centre: HERE, mpp: 0.1, up_deg: 0, ...more });
+/** @param {number} a @param {number} b @param {number} by */
+const near = (a, b, by) => assert.ok(Math.abs(a - b) <= by, `${a} is not within ${by} of ${b}`);
+/** @param {number[]} a @param {number[]} b @param {number} by */
+const nearAll = (a, b, by) => { assert.equal(a.length, b.length); a.forEach((one, i) => near(one, b[i] ?? NaN, by)); };
+
+test('the middle is in the middle, north is up and east is right', () => {
+  assert.deepEqual(pixelOf(HERE, view(), SIZE), [206, 235]);
+  nearAll(pixelOf(placeAt(HERE, { east_m: 10, north_m: 0 }), view(), SIZE), [306, 235], 0.01);
+  nearAll(pixelOf(placeAt(HERE, { east_m: 0, north_m: 10 }), view(), SIZE), [206, 135], 0.01);
+});
+
+test('with the heading up, what lies ahead is above', () => {
+  for (const up_deg of [0, 37, 90, 180, 271.5]) {
+    const ahead = placeAt(HERE, { east_m: 10 * Math.sin((up_deg * Math.PI) / 180), north_m: 10 * Math.cos((up_deg * Math.PI) / 180) });
+    nearAll(pixelOf(ahead, view({ up_deg }), SIZE), [206, 135], 0.01);
+  }
+  nearAll(pixelOf(placeAt(HERE, { east_m: 0, north_m: 10 }), view({ up_deg: 90 }), SIZE), [106, 235], 0.01); // north is left
+});
+
+test('what is under the finger stays under it, turned or not, anywhere on Earth', () => {
+  for (const centre of PLACES) {
+    for (const up_deg of [0, 123]) {
+      const before = view({ centre, up_deg });
+      for (const number of Object.values(panned(before, 1e4, 1e4).centre)) assert.ok(Number.isFinite(number));
+      if (Math.abs(centre.lat_deg) > 80) continue; // there north turns with every step
+      const under = placeAt(centre, metresOf(60, -80, before));
+      nearAll(pixelOf(under, before, SIZE), [266, 155], 0.1);
+      nearAll(pixelOf(under, zoomed(before, 2.5, 60, -80), SIZE), [266, 155], 0.1);
+      nearAll(pixelOf(under, panned(before, 15, 25), SIZE), [281, 180], 0.1);
+    }
+  }
+});
+
+test('a scale has its bounds', () => {
+  assert.deepEqual([bounded(1e9), bounded(0), bounded(-1), bounded(NaN), bounded(0.3)], [WIDEST, CLOSEST, CLOSEST, FIRST, 0.3]);
+  assert.equal(zoomed(view(), 1e9).mpp, CLOSEST);
+  assert.deepEqual(zoomed(view(), 2).centre, HERE);
+});
+
+test('the grid is of 10 and 50 m at the first look, and never crowded', () => {
+  assert.equal(gridStep_m(FIRST), 10);
+  assert.equal(scaleBar_m(FIRST), 20);
+  for (let mpp = CLOSEST; mpp <= WIDEST; mpp *= 1.13) {
+    assert.ok(gridStep_m(mpp) / mpp >= 40 && gridStep_m(mpp) / mpp <= 101);
+    assert.ok(scaleBar_m(mpp) / mpp <= 150 && scaleBar_m(mpp) / mpp > 59);
+  }
+});
+
+test('the grid lies still on the ground: lines at whole steps from its origin, every fifth strong', () => {
+  const { weak, strong } = gridPaths({ east_m: 3, north_m: -4 }, view(), { width: 200, height: 200 });
+  // 5 m a line at 0.1 m/px: x of the lines is 100 + (n·5 − 3)·10
+  const upright = [...(weak + strong).matchAll(/M(-?[\d.]+) [\d.-]+L\1 /g)].map((match) => Number(match[1])).sort((a, b) => a - b);
+  assert.deepEqual(upright, [-30, 20, 70, 120, 170, 220]);
+  const strongAt = [...strong.matchAll(/M(-?[\d.]+) (-?[\d.]+)L(-?[\d.]+) (-?[\d.]+)/g)].map((match) => match.slice(1).map(Number));
+  assert.deepEqual(strongAt, [[70, 241.4, 70, -41.4], [-41.4, 60, 241.4, 60]]); // 0 east of the origin, 0 north of it
+});
+
+test('the grid is turned with the map and stays bounded', () => {
+  const { strong } = gridPaths({ east_m: 0, north_m: 0 }, view({ up_deg: 90 }), { width: 200, height: 200 });
+  assert.ok(strong.includes('M241.4 100L-41.4 100')); // along the north axis, which lies to the left
+  for (const mpp of [CLOSEST, 1, WIDEST]) {
+    const { weak, strong: fifths } = gridPaths({ east_m: 19_000, north_m: -7 }, view({ mpp, up_deg: 33 }), { width: 1400, height: 1000 });
+    assert.ok((weak + fifths).split('M').length < 100);
+  }
+});
+
+test('the matrix of the ground says the same as a pixel', () => {
+  for (const anchor of PLACES.slice(0, 3)) {
+    for (const up_deg of [0, 77, 200]) {
+      const now = view({ centre: placeAt(anchor, { east_m: 120, north_m: -80 }), up_deg, mpp: 0.5 });
+      const [a, b, c, d, e, f] = groundMatrix(offsetOf(anchor, now.centre), now, SIZE);
+      const spot = { east_m: 150, north_m: -20 };
+      nearAll([a * spot.east_m + c * spot.north_m + e, b * spot.east_m + d * spot.north_m + f], pixelOf(placeAt(anchor, spot), now, SIZE), 0.05);
+    }
+  }
+});
+
+test('the ellipse of a covariance', () => {
+  assert.deepEqual(ellipseOf([4, 4, 0], 2), { major_m: 2, minor_m: 2, bearing_deg: 0 });
+  assert.deepEqual(ellipseOf([9, 4, 0], 2.5), { major_m: 3, minor_m: 2, bearing_deg: 90 }); // long to the east
+  assert.deepEqual(ellipseOf([4, 9, 0], 2.5), { major_m: 3, minor_m: 2, bearing_deg: 0 }); // long to the north
+  const skew = ellipseOf([5, 5, 4], 2.2);
+  nearAll([skew?.major_m ?? 0, skew?.minor_m ?? 0, skew?.bearing_deg ?? 0], [3, 1, 45], 1e-9); // long to the north-east
+  nearAll([ellipseOf([5, 5, -4], 2.2)?.bearing_deg ?? 0], [135], 1e-9);
+});
+
+test('without a covariance there is a circle, and without anything nothing', () => {
+  assert.deepEqual(ellipseOf(null, 5), { major_m: 5, minor_m: 5, bearing_deg: 0 });
+  assert.deepEqual(ellipseOf([1, 1, 7], 5), { major_m: 5, minor_m: 5, bearing_deg: 0 }); // no covariance can be so
+  for (const sigma of [null, undefined, 0, -1, NaN, Infinity]) assert.equal(ellipseOf(undefined, sigma), null);
+});
+
+test('both are to be seen, with room for keys and names', () => {
+  for (const up_deg of [0, 60]) {
+    for (const [east_m, north_m] of /** @type {[number, number][]} */ ([[0, 0], [3, 1], [400, -30], [-20, 900], [20_000, 5_000]])) {
+      const [car, phone] = [HERE, placeAt(HERE, { east_m, north_m })];
+      const found = fitted(view({ up_deg, mpp: FIRST }), SIZE, car, phone, 5);
+      assert.ok(found.fits);
+      for (const [x, y] of [pixelOf(car, found, SIZE), pixelOf(phone, found, SIZE)]) {
+        assert.ok(x >= 83 && x <= 412 - 83 && y >= 75 && y <= 470 - 75, `${x}, ${y} for ${east_m}, ${north_m}`);
+      }
+    }
+  }
+});
+
+test('the scale stays while it is good enough, lest the map breathe', () => {
+  const phone = placeAt(HERE, { east_m: 40, north_m: 0 });
+  const first = fitted(view({ mpp: 50 }), SIZE, HERE, phone);
+  assert.ok(first.mpp < 1);
+  assert.equal(fitted(first, SIZE, HERE, placeAt(HERE, { east_m: 46, north_m: 3 })).mpp, first.mpp);
+  assert.equal(fitted(first, SIZE, HERE, placeAt(HERE, { east_m: 20, north_m: 0 })).mpp, first.mpp);
+  assert.ok(fitted(first, SIZE, HERE, placeAt(HERE, { east_m: 60, north_m: 0 })).mpp > first.mpp);
+});
+
+test('a phone on another continent is not squeezed into one picture', () => {
+  const found = fitted(view(), SIZE, HERE, { lat_deg: 50, lon_deg: 8 });
+  assert.equal(found.fits, false);
+  assert.deepEqual([found.centre, found.mpp], [HERE, 0.1]);
+});
+
+test('which way is up', () => {
+  assert.equal(upOf(80, false, 123), 0);
+  assert.equal(upOf(80, true, 123), 123);
+  assert.equal(upOf(80, true, 82), 80); // trembling
+  assert.equal(upOf(359, true, 1), 359);
+  assert.equal(upOf(359, true, 5), 5);
+  assert.equal(upOf(80, true, null), 80); // standing, stale, unknown: nobody turned
+  assert.equal(upOf(80, true, NaN), 80);
+});
+
+test('from one view to the next by the shorter turn', () => {
+  const to = { centre: placeAt(HERE, { east_m: 10, north_m: 0 }), mpp: 0.4, up_deg: 20 };
+  const half = between(view({ up_deg: 340 }), to, 0.5);
+  near(half.up_deg, 0, 1e-9);
+  near(half.mpp, 0.2, 1e-12);
+  near(distance_m(HERE, half.centre), 5, 0.01);
+  assert.equal(between(view(), to, 1), to);
+});
+
+test('tiles are stretched to true metres', () => {
+  const { zoom, x, y } = tileScale(view({ mpp: FIRST }));
+  assert.equal(zoom, 20);
+  near((40_075_016.686 / 256 / 2 ** 20) * 0.84625 / FIRST, x, 0.001); // cos φ / √(1 − e² sin² φ)
+  near(x / y, 1.0048, 0.0002);
+  for (const mpp of [CLOSEST, 0.2, 3, WIDEST]) {
+    for (const lat_deg of [0, 50, 84]) {
+      const found = tileScale({ centre: { lat_deg, lon_deg: 0 }, mpp, up_deg: 0 });
+      assert.ok(found.zoom >= 0 && found.zoom <= 24);
+      if (found.zoom < 24) assert.ok(found.x > 0.7 && found.x < 1.42);
+    }
+  }
+  assert.ok(Number.isFinite(tileScale({ centre: { lat_deg: 90, lon_deg: 0 }, mpp: 1, up_deg: 0 }).zoom));
+});
+
+test('a picture lies with its corners on theirs', () => {
+  const corners = [{ east_m: -50, north_m: 30 }, { east_m: 60, north_m: 50 }, { east_m: -60, north_m: -40 }].map((offset) => placeAt(HERE, offset));
+  const now = view({ up_deg: 25, mpp: 0.4 });
+  const [a = 0, b = 0, c = 0, d = 0, e = 0, f = 0] = pictureMatrix(corners, { width: 800, height: 600 }, now, SIZE);
+  const put = (/** @type {number} */ x, /** @type {number} */ y) => [a * x + c * y + e, b * x + d * y + f];
+  nearAll(put(0, 0), pixelOf(corners[0] ?? HERE, now, SIZE), 1e-6);
+  nearAll(put(800, 0), pixelOf(corners[1] ?? HERE, now, SIZE), 1e-6);
+  nearAll(put(0, 600), pixelOf(corners[2] ?? HERE, now, SIZE), 1e-6);
+});
