@@ -1,5 +1,5 @@
-"""Whatever the numbers are, no check fails, and nobody reads "nan": decoding keeps most of these out, and the judge does
-not rely on it."""
+"""Whatever the numbers are, no check fails, and nobody reads "nan": decoding keeps most of these out, and the judge
+does not rely on it."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def scans(draw: st.DrawFn) -> LaserScan:
         angle_min_rad=draw(angle),
         angle_max_rad=draw(angle),
         angle_increment_rad=draw(angle),
-        time_increment_s=draw(number),
-        scan_time_s=draw(number),
+        time_increment_s=draw(st.floats(0, 10)),
+        scan_time_s=draw(st.floats(0, 10)),
         range_min_m=draw(range_m),
         range_max_m=draw(range_m),
         frame_id="laser",
