@@ -48,7 +48,9 @@ async def test_the_real_drive_as_the_operator_sees_it(phone: Phone, tmp_path: Pa
         rows = await phone.page.evaluate("window.seen")
         state = await phone.page.evaluate("fetch('/api/state').then((r) => r.json())")
     read = {name: [n for row in rows if (n := number(row[name])) is not None] for name in rows[0] if name != "side"}
-    assert max(read["speed"]) == pytest.approx(4.2, abs=0.051)
+    # The fastest moment lasts a quarter of a second: a machine that stood still for longer did not draw it.
+    assert max(read["speed"]) == pytest.approx(4.2, abs=0.051 if phone.stutter_s < 0.2 else 0.151)
+    assert state["signals"]["speed"]["highest"] == pytest.approx(4.228, abs=0.001)
     assert max(read["brake"]) == pytest.approx(22, abs=0.5)
     assert set(read["accelerator"]) == {0.0}
     left = [number(row["steering"]) for row in rows if "left" in row["side"]]

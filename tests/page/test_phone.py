@@ -107,7 +107,8 @@ async def test_case_07_a_permission_taken_away_is_told_with_its_name_and_given_b
         await expect(tile(phone, "Phone–car")).to_contain_text("denied")
         await expect(phone.f("strip")).to_contain_text("Phone position missing", timeout=14_000)
         await expect(tile(phone, "Phone–car")).to_contain_text("permission")
-        (alarm,) = [one for one in ride.state["alarms"] if one["id"] == "phone_missing"]
+        state = await ride.until(lambda s: any(one["id"] == "phone_missing" for one in s["alarms"]))
+        (alarm,) = [one for one in state["alarms"] if one["id"] == "phone_missing"]
         assert alarm["text"].startswith("The phone was not allowed to tell it; none for 1")
         await context.grant_permissions(["geolocation"])
         await ride.until(uses_it)
