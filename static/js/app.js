@@ -3,17 +3,17 @@
 import { soundOf } from './alarm-layout.js';
 import { Arming } from './arming.js';
 import { deviceName, keptHere } from './device.js';
-import { field, html, listen, need, show, words } from './dom.js';
+import { field, listen, need, show } from './dom.js';
 import { gapWords } from './events.js';
 import { notices } from './notice.js';
 import { Page } from './page.js';
 import { Phone } from './phone.js';
 import { Screens } from './screens.js';
+import { SettingsTab } from './settings-tab.js';
 import { mountSheets } from './sheet.js';
 import { Store } from './store.js';
 import { Tabs } from './tabs.js';
 import { Voice } from './voice.js';
-import { fixed } from './words.js';
 import { lossKey, mount as mountDialogs } from './dialogs.js';
 import { mount as mountBadge } from './badge.js';
 import { mount as mountChecks } from './checks.js';
@@ -31,9 +31,6 @@ import { mount as mountStrip } from './strip.js';
 import { mount as mountTopbar } from './topbar.js';
 import { mount as mountVeil } from './veil.js';
 
-/** The limits shown until Settings is built: name in the frame, label, unit. */
-const LIMITS = /** @type {const} */ ([['speed_limit.max_mps', 'Speed', 'm/s'], ['obstacle.standoff_m', 'Nearest object', 'm']]);
-
 const vehicle = document.documentElement.dataset['vehicle'];
 const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
 
@@ -45,6 +42,7 @@ const say = notices(field(document, 'snacks'));
 const page = new Page(store, arming, say);
 
 const scan = mountScan(need(monitor, '[data-panel="scan"]'), store);
+const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
 const screens = new Screens(monitor, store, front);
 const tabs = new Tabs(monitor, front);
 page.onShown = () => {
@@ -63,20 +61,22 @@ mountPedals(need(monitor, '[data-part="pedals"]'), store);
 mountPosition(need(monitor, '[data-part="position"]'), store);
 mountChecks(need(monitor, '[data-part="checks"]'), store);
 mountSheets();
-mountPreferences();
+mountPreferences(voice);
 mountRail(monitor, store, page);
 mountSnackbar(field(document, 'snacks'), store, say);
 mountDialogs(store, page);
 mountBadge(store);
 
-/** The scan is sent and drawn only while its tab is in front and nothing lies over it. */
+/** The scan is sent and drawn only while its tab is in front and nothing lies over it; Settings is loaded once it is. */
 function front() {
-  queueMicrotask(() => scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null));
+  queueMicrotask(() => {
+    scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null);
+    settings.look();
+  });
 }
 
 function draw() {
   page.draw();
-  drawLimits();
   show(field(monitor, 'sound-off'), voice.isPossible ? !voice.isRunning : false);
 }
 
@@ -94,16 +94,6 @@ for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.
 listen(document, 'keydown', () => { document.documentElement.dataset['keys'] = ''; }, { capture: true });
 listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
 listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
-
-/** The limits in force, until they can be set here. */
-function drawLimits() {
-  const list = field(monitor, 'limits');
-  const limits = LIMITS.flatMap(([name, label, unit]) => (store.limit(name) === null ? [] : [[label, `${fixed(store.limit(name))} ${unit}`]]));
-  const key = JSON.stringify(limits);
-  if (list.dataset['key'] === key) return;
-  list.dataset['key'] = key;
-  list.replaceChildren(...limits.flatMap(([label = '', value = '']) => [html('dt', {}, label), html('dd', {}, ...words(value))]));
-}
 
 store.start();
 draw();

@@ -53,7 +53,8 @@ export function faceOf({ speed_max, acceleration_max_mps2, limit }) {
     const degrees = speedAngle(i * step, speed_max);
     const isBig = i % 5 === 0;
     ticks.push({ d: ray(degrees, isBig ? 154 : 162, 168), isBig });
-    if (isBig) labels.push(numberAt(degrees, i * step));
+    const label = numberAt(degrees, i * step);
+    if (isBig && !isInTheWay(label)) labels.push(label);
   }
   if (speed_max % (5 * step) > 1e-9) {
     ticks.push({ d: ray(180, 154, 168), isBig: true });
@@ -135,6 +136,11 @@ function numberAt(degrees, value) {
   if (degrees === 180) return { degrees, text, x: 325, y: 214 };
   const [x, y] = polar(141, degrees);
   return { degrees, text, x, y: y + 6 };
+}
+
+/** Would it stand on an end of the inner arc? @param {Label} label */
+function isInTheWay({ x, y }) {
+  return [57, 323].some((end) => Math.abs(x - end) < 27 && Math.abs(y - 188) < 17);
 }
 
 /** Ticks each 1 m/s about 15; elsewhere so that there are at most 20. @param {number} max */

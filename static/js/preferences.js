@@ -1,7 +1,15 @@
-// Preferences of this phone: so far the theme. They change nothing on the server.
+// Preferences of this phone: theme, unit of speeds, the hand of the slow-down, and a trial of the alarm sounds. They change nothing on the server.
 
-import { listen, need } from './dom.js';
+import { field, listen, need, setText } from './dom.js';
 import { openSheet } from './sheet.js';
+import { chooseSpeedUnit, speedUnit } from './units.js';
+
+/**
+ * @typedef {import('./voice.js').Voice} Voice
+ * @typedef {import('./voice.js').Loud} Loud
+ */
+
+const PULSES = /** @type {Record<Loud, string>} */ ({ high: 'ten quick pulses', medium: 'three rising pulses', low: 'two falling pulses' });
 
 const sheet = () => /** @type {HTMLDialogElement} */ (need(document, '#sheet-preferences'));
 
@@ -9,29 +17,80 @@ export function openPreferences() {
   openSheet(sheet());
 }
 
-/** @returns {() => void} */
-export function mount() {
-  const keys = /** @type {HTMLElement[]} */ ([...sheet().querySelectorAll('[data-theme-key]')]);
+/**
+ * What is said after a trial of a sound: plainly, where this phone cannot sound.
+ * @param {Awaited<ReturnType<Voice['test']>>} result
+ * @param {Loud} sound
+ */
+export function trialWords(result, sound) {
+  if (result === 'missing') return 'This browser cannot sound: no alarm will be heard on this phone. Use another browser.';
+  if (result === 'blocked') return 'This phone does not let the page sound: no alarm will be heard. Allow sound for this page, then try again.';
+  if (result === 'busy') return 'An alarm sounds now: acknowledge it first.';
+  return `Sounding now: ${PULSES[sound]}. If you hear nothing, turn the phone’s media volume up and silent mode off.`;
+}
+
+/**
+ * @param {Voice} voice
+ * @returns {() => void}
+ */
+export function mount(voice) {
+  const root = document.documentElement;
+  const choices = [
+    ...keys('themeKey', () => root.dataset['theme'] ?? 'phone', choose),
+    ...keys('unitKey', speedUnit, (unit) => chooseSpeedUnit(/** @type {import('./units.js').SpeedUnit} */ (unit))),
+    ...keys('handKey', () => root.dataset['hand'] ?? 'right', (hand) => keep('hand', hand, 'right')),
+  ];
+  const says = field(sheet(), 'sound-says');
   const draw = () => {
-    const now = document.documentElement.dataset['theme'] ?? 'phone';
-    for (const key of keys) key.setAttribute('aria-pressed', String(key.dataset['themeKey'] === now));
+    for (const { key, value, now } of choices) key.setAttribute('aria-pressed', String(value === now()));
   };
   draw();
-  const stops = keys.map((key) => listen(key, 'click', () => {
-    choose(key.dataset['themeKey'] ?? 'phone');
-    draw();
-  }));
+  const stops = [
+    ...choices.map(({ key, value, act }) => listen(key, 'click', () => {
+      act(value);
+      draw();
+    })),
+    ...all('soundKey').map((key) => listen(key, 'click', async () => {
+      const sound = /** @type {Loud} */ (key.dataset['soundKey']);
+      setText(says, trialWords(await voice.test(sound), sound));
+    })),
+    listen(sheet(), 'close', () => setText(says, '')),
+  ];
   return () => stops.forEach((stop) => stop());
+}
+
+/** @param {string} name of the data attribute */
+function all(name) {
+  return /** @type {HTMLElement[]} */ ([...sheet().querySelectorAll('button')].filter((key) => key.dataset[name] !== undefined));
+}
+
+/**
+ * @param {string} name
+ * @param {() => string} now what is chosen
+ * @param {(value: string) => void} act
+ */
+function keys(name, now, act) {
+  return all(name).map((key) => ({ key, value: key.dataset[name] ?? '', now, act }));
 }
 
 /** @param {string} theme */
 function choose(theme) {
-  if (theme === 'phone') delete document.documentElement.dataset['theme'];
-  else document.documentElement.dataset['theme'] = theme;
+  keep('theme', theme, 'phone');
+  window.dispatchEvent(new Event('catgraph-theme'));
+}
+
+/**
+ * Kept on this phone; theme.js puts it in force before the page is painted.
+ * @param {string} name
+ * @param {string} value
+ * @param {string} usual what holds without a choice
+ */
+function keep(name, value, usual) {
+  if (value === usual) delete document.documentElement.dataset[name];
+  else document.documentElement.dataset[name] = value;
   try {
-    localStorage.setItem('catgraph.theme', theme);
+    localStorage.setItem(`catgraph.${name}`, value);
   } catch {
     // no storage: it holds until the page is loaded again
   }
-  window.dispatchEvent(new Event('catgraph-theme'));
 }

@@ -70,6 +70,8 @@
  * @property {string | null} address
  * @property {string | null} name
  * @property {number | null} ros_version
+ * @property {number} [settings_version]
+ * @property {string | null} [profile] the kind of car it is taken for
  * @property {number | null} connected_for_s
  * @property {boolean} paused
  * @property {number} paused_for_s
@@ -150,7 +152,8 @@
  *   last_event: number, veil_after_s: number}} Hello
  * @typedef {{kind: 'offer', seq: number, of: string[]}} Offer
  * @typedef {{kind: 'events', events: AlarmEvent[], last: number}} Events
- * @typedef {{kind: 'reply', id: string, ok: boolean, reason?: string, problem?: Problem & {suggestion: string | null}}} Reply
+ * @typedef {{kind: 'reply', id: string, ok: boolean, reason?: string, problem?: Problem & {suggestion: string | null},
+ *   version?: number, conflict?: boolean, field?: string}} Reply
  * @typedef {{kind: 'problem', reason: string}} Refusal
  * @typedef {Hello | Offer | State | Events | Reply | Refusal} Message
  */

@@ -21,7 +21,8 @@ const REPLY_MS = 4000;
  * @typedef {'move' | 'draw' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open'} Topic
  *   move: a fresh frame is to be drawn · draw: five times a second, seen or not by a frame · scan: a new scan ·
  *   beat: a fresh frame came (also while the page is hidden) · tick: time passed (seldom while it is hidden) · log: new events · gap: a blind time is over · open: connected
- * @typedef {{ok: boolean, reason?: string, suggestion?: string}} Answer suggestion: an address that would do
+ * @typedef {{ok: boolean, reason?: string, suggestion?: string, version?: number, isConflict?: boolean}} Answer suggestion: an address
+ *   that would do; version: of the settings, once changed; isConflict: somebody else changed them in between
  */
 
 export class Store {
@@ -328,8 +329,11 @@ export class Store {
  * @param {import('./protocol.js').Reply} reply
  * @returns {Answer}
  */
-function answerOf({ ok, reason, problem }) {
-  return { ok, ...(reason ? { reason } : {}), ...(problem?.suggestion ? { suggestion: problem.suggestion } : {}) };
+function answerOf({ ok, reason, problem, version, conflict }) {
+  return {
+    ok, ...(reason ? { reason } : {}), ...(problem?.suggestion ? { suggestion: problem.suggestion } : {}),
+    ...(version === undefined ? {} : { version }), ...(conflict ? { isConflict: true } : {}),
+  };
 }
 
 /**

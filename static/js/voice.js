@@ -46,6 +46,26 @@ export class Voice {
     if (this.#context && this.isRunning) this.#play(this.#context, sound);
   }
 
+  /**
+   * One burst, within a tap, to hear whether this phone sounds. An alarm that comes meanwhile takes its place.
+   * @param {Loud} sound
+   * @returns {Promise<'sounding' | 'missing' | 'blocked' | 'busy'>} busy: an alarm sounds
+   */
+  async test(sound) {
+    if (!this.isPossible) return 'missing';
+    if (this.#sound !== null) return 'busy';
+    this.arm();
+    const until_ms = performance.now() + 1000;
+    while (!this.isRunning && performance.now() < until_ms) await new Promise((resolve) => { setTimeout(resolve, 50); });
+    if (!this.#context || !this.isRunning) return 'blocked';
+    if (this.#sound !== null) return 'busy';
+    this.#hush();
+    this.#play(this.#context, sound, false);
+    const { vibration } = burstOf(sound);
+    if (vibration.length && typeof navigator.vibrate === 'function') navigator.vibrate(vibration);
+    return 'sounding';
+  }
+
   /** What sounds now, heard or not. */
   get saying() {
     return this.#sound;
@@ -54,14 +74,15 @@ export class Voice {
   /**
    * @param {AudioContext} context
    * @param {Loud} sound
+   * @param {boolean} [isAgain] over and over, until it is hushed
    */
-  #play(context, sound) {
+  #play(context, sound, isAgain = sound !== 'low') {
     const samples = samplesOf(sound, context.sampleRate);
     const buffer = context.createBuffer(1, samples.length, context.sampleRate);
     buffer.copyToChannel(samples, 0);
     const source = context.createBufferSource();
     source.buffer = buffer;
-    source.loop = sound !== 'low';
+    source.loop = isAgain;
     source.connect(context.destination);
     source.start();
     this.#source = source;
