@@ -5,6 +5,9 @@ import {
   CLOSEST, FIRST, WIDEST, between, bounded, ellipseOf, fitted, gridPaths, gridStep_m, groundMatrix, metresOf, panned, pictureMatrix, pixelOf, scaleBar_m, tileScale,
   upOf, zoomed,
 } from '../../static/js/map-layout.js';
+import { MOST, Track, trackPaths } from '../../static/js/map-track.js';
+import { apartOf, bearingWords, carOf, distanceWords, phoneOf, pictureWords } from '../../static/js/map-words.js';
+import { state } from './frames.js';
 
 const HERE = { lat_deg: 32.2319, lon_deg: -110.9501 };
 const SIZE = { width: 412, height: 470 };
@@ -172,4 +175,139 @@ test('a picture lies with its corners on theirs', () => {
   nearAll(put(0, 0), pixelOf(corners[0] ?? HERE, now, SIZE), 1e-6);
   nearAll(put(800, 0), pixelOf(corners[1] ?? HERE, now, SIZE), 1e-6);
   nearAll(put(0, 600), pixelOf(corners[2] ?? HERE, now, SIZE), 1e-6);
+});
+
+// -- what is said ------------------------------------------------------------------------------------------------------
+
+const FIX = { lat_deg: 32.2319, lon_deg: -110.9501, status: 0, sigma_m: 5, covariance_m2: [25, 25, 0] };
+const PHONE = {
+  id: 'a', label: 'Pixel 7 · a3f2', count: 1, handheld: true, ...placeAt(HERE, { east_m: 6, north_m: -8 }), accuracy_m: 5, sigma_m: 3.3, alt_m: null, speed_mps: null,
+  heading_deg: null, at_ms: 0, age_s: 0.8, used: true, why: null, why_text: null, apart_m: 10.4, bearing_deg: 323.4, compared_age_s: 0.9, explained_m: 14, correlation: null,
+};
+/** @param {any} value @param {any} [phone] @param {any} [turn] */
+const frameOf = (value, phone = null, turn = { heading_deg: 87 }) => state({ signals: { position: { value }, heading: { value: turn } }, phone, limits: { 'phone_car.least_m': 10 } });
+/** @param {any} ink @param {any} [turn] */
+const inked = (ink, turn = 'fresh') => (/** @type {string} */ name) => ({ ink: name === 'heading' ? turn : ink, age_s: 3.4 });
+
+test('a car of now, with its ellipse', () => {
+  const car = carOf(frameOf(FIX), inked('fresh'));
+  assert.deepEqual([car.isLive, car.label, car.says, car.heading_deg, car.isHeadingLive], [true, 'Car ±5 m', '', 87, true]);
+  assert.equal(carOf(frameOf({ ...FIX, covariance_m2: [100, 17.64, 0] }), inked('ageing')).label, 'Car ±10 m');
+  assert.equal(carOf(frameOf({ ...FIX, covariance_m2: null, sigma_m: 4.2 }), inked('fresh')).label, 'Car ±4.2 m');
+});
+
+test('a car that is not known to be there is never shown as live, and why is said', () => {
+  for (const [value, ink, words] of /** @type {[any, string, RegExp][]} */ ([
+    [FIX, 'stale', /^The car’s position is 3\.4 s old: it may be elsewhere by now\.$/],
+    [null, 'never', /^No position has come/],
+    [null, 'not_published', /^The car publishes no position/],
+    [{ ...FIX, status: -1 }, 'fresh', /^The car’s receiver has no fix/],
+    [{ ...FIX, lat_deg: null, status: -1 }, 'fresh', /^The car’s receiver has no fix/],
+  ])) {
+    const car = carOf(frameOf(value), inked(ink));
+    assert.equal(car.isLive, false);
+    assert.match(car.says, words);
+  }
+  assert.deepEqual(carOf(frameOf(FIX), inked('stale')).label, 'Car STALE 3.4 s');
+  assert.equal(carOf(frameOf({ ...FIX, status: -1 }), inked('fresh')).place, null); // coordinates without a fix are none
+});
+
+test('unknown quality and unknown heading are said and drawn as that', () => {
+  const car = carOf(frameOf({ ...FIX, sigma_m: null, covariance_m2: null }, null, null), inked('fresh', 'not_published'));
+  assert.deepEqual([car.ellipse, car.label, car.heading_deg], [null, 'Car, accuracy unknown', null]);
+  assert.match(car.says, /does not say how accurate/);
+  assert.equal(carOf(frameOf(FIX), inked('fresh', 'stale')).isHeadingLive, false);
+});
+
+test('every reason of a phone is said; a coarse fix is still one of now', () => {
+  const live = phoneOf(frameOf(FIX, PHONE), 0.1);
+  assert.deepEqual([live.isLive, live.label, live.says], [true, 'Phone ±5 m', '']);
+  near(live.age_s ?? 0, 0.9, 1e-9);
+  assert.match(phoneOf(frameOf(FIX), 0).says, /^No phone tells its position/);
+  for (const why of ['denied', 'unavailable', 'timeout', 'insecure', 'hidden', 'old', 'late', 'silent']) {
+    const found = phoneOf(frameOf(FIX, { ...PHONE, used: false, why, why_text: `Because of ${why}` }), 0);
+    assert.deepEqual([found.isLive, found.says, found.label], [false, `Because of ${why}.`, 'Phone STALE 0.8 s']);
+  }
+  const coarse = phoneOf(frameOf(FIX, { ...PHONE, accuracy_m: 80, used: false, why: 'coarse', why_text: 'To 80 m only' }), 0);
+  assert.deepEqual([coarse.isLive, coarse.label, coarse.says], [true, 'Phone ±80 m', 'To 80 m only.']);
+  assert.equal(phoneOf(frameOf(FIX, { ...PHONE, lat_deg: null, lon_deg: null, age_s: null, used: false, why: 'denied', why_text: 'No' }), 0).place, null);
+  assert.equal(phoneOf(frameOf(FIX, PHONE), 4.5).isLive, false); // the page itself has heard nothing for so long
+  assert.match(phoneOf(frameOf(FIX, { ...PHONE, count: 3 }), 0).says, /^It is of Pixel 7 · a3f2, one of 3 phones\.$/);
+});
+
+test('apart is as the server compared them at one moment; where it did not, as the two fixes have it', () => {
+  const frame = frameOf(FIX, PHONE);
+  const [car, phone] = [carOf(frame, inked('fresh')), phoneOf(frame, 0)];
+  assert.deepEqual(apartOf(frame, 0, car, phone), { distance_m: 10.4, bearing_deg: 323.4, allowed_m: 14 });
+  assert.equal(apartOf(frameOf(FIX, { ...PHONE, explained_m: 3 }), 0, car, phone)?.allowed_m, 10);
+  for (const told of [{ ...PHONE, used: false, why: 'coarse' }, { ...PHONE, apart_m: null }, { ...PHONE, compared_age_s: 5.1 }]) {
+    const found = apartOf(frameOf(FIX, told), 0, car, phone);
+    near(found?.distance_m ?? 0, 10, 0.01);
+    near(found?.bearing_deg ?? 0, 323.13, 0.01); // the phone is 6 m east and 8 m south of the car
+    assert.equal(found?.allowed_m, null);
+  }
+  assert.equal(apartOf(frame, 0, { ...car, isLive: false }, phone), null);
+  assert.equal(apartOf(frame, 0, car, { ...phone, isLive: false }), null);
+});
+
+test('distances, bearings and the picture in words', () => {
+  assert.deepEqual([0, 10.44, 99.96, 320.4, 1234, 99_960, 9_099_076].map((one) => distanceWords(one).join(' ')), ['0.0 m', '10.4 m', '100 m', '320 m', '1.2 km', '100 km', '9099 km']);
+  assert.equal(bearingWords(323.4), '323° NW');
+  const frame = frameOf(FIX, PHONE);
+  const [car, phone] = [carOf(frame, inked('fresh')), phoneOf(frame, 0)];
+  assert.equal(pictureWords(car, phone, apartOf(frame, 0, car, phone)), 'Map: the car is 10.4 m from the phone, at 323° NW of it');
+  assert.equal(pictureWords(car, { ...phone, isLive: false }, null), 'Map: the car');
+  assert.equal(pictureWords({ ...car, isLive: false }, { ...phone, isLive: false }, null), 'Map: nothing that is of now');
+  assert.equal(pictureWords({ ...car, place: null, isLive: false }, { ...phone, place: null, isLive: false }, null), 'Map: no position');
+});
+
+// -- the track ---------------------------------------------------------------------------------------------------------
+
+/** @param {number} number @param {number} east_m @param {number} [at_s] @param {number} [joins] */
+const row = (number, east_m, at_s = number, joins = 0) => {
+  const { lat_deg, lon_deg } = placeAt(HERE, { east_m, north_m: 0 });
+  return [number, lat_deg, lon_deg, at_s, joins];
+};
+
+test('a page that comes late asks for all of the track, and then for what is new', () => {
+  const track = new Track();
+  assert.equal(track.lacks('a 1', 0), null);
+  assert.equal(track.lacks('a 1', 7), 0);
+  track.take('a 1', [row(1, 0), row(4, 2), row(7, 4)]);
+  assert.equal(track.lacks('a 1', 7), null);
+  assert.equal(track.lacks('a 1', 9), 7);
+  track.take('a 1', [row(7, 4), row(8, 5), row(9, 6)]); // answered twice: nothing is there twice
+  assert.deepEqual(track.points.map((point) => point.number), [1, 4, 7, 8, 9]);
+});
+
+test('another number or another run of the server is another track', () => {
+  const track = new Track();
+  track.lacks('a 1', 2);
+  track.take('a 1', [row(1, 0), row(2, 1)]);
+  assert.equal(track.lacks('a 2', 0), null);
+  assert.deepEqual(track.points, []);
+  track.take('a 1', [row(1, 0)]); // an answer that was under way
+  assert.deepEqual(track.points, []);
+  assert.equal(track.lacks('b 2', 5), 0);
+});
+
+test('rows that are none are left out, and a track is bounded', () => {
+  const track = new Track();
+  track.lacks('a 1', 1);
+  for (const rows of [null, 'x', {}, [null, [1], [1, 2, 3, 4], [NaN, 1, 1, 1, 0], [1, 91, 0, 0, 0], ['1', 1, 1, 1, 0]]]) track.take('a 1', rows);
+  assert.deepEqual(track.points, []);
+  track.take('a 1', Array.from({ length: 3 * MOST }, (_, i) => row(i + 1, i)));
+  assert.ok(track.points.length <= MOST && track.last === 3 * MOST);
+});
+
+test('lines end where the way is not known; what was not seen is told apart; a dot each ten seconds', () => {
+  const track = new Track();
+  track.lacks('a 1', 9);
+  track.take('a 1', [row(1, 0, 101), row(2, 5, 104), row(3, 10, 111), row(4, 20, 140, 1), row(5, 25, 149), row(6, 900, 150, 2), row(7, 905, 161)]);
+  const { driven, unseen, dots } = trackPaths(track.points, HERE);
+  const flat = (/** @type {string} */ path) => path.replaceAll(/([\d.-]+) -?0\.0\d/g, (_, east) => String(Math.round(east)));
+  assert.equal(flat(driven), 'M0L5L10M20L25M900L905');
+  assert.equal(flat(unseen), 'M10L20');
+  assert.equal(flat(dots), 'M10h0M905h0');
+  assert.deepEqual(trackPaths([], HERE), { driven: '', unseen: '', dots: '' });
 });
