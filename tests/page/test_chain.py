@@ -49,7 +49,7 @@ async def cut_between(phone: Phone, root: str, a: str, b: str) -> None:
     )
 
 
-async def test_case_06_a_silent_car(phone: Phone, tmp_path: Path) -> None:
+async def test_a_silent_car(phone: Phone, tmp_path: Path) -> None:
     async with driving(phone, tmp_path) as (car, _):
         await car.type("all-silent 60")
         began_s = time.monotonic()
@@ -292,7 +292,7 @@ async def test_a_radio_gap_hides_old_values_and_its_events_come_exactly_once(pho
             await expect(phone.page.locator(".log .gap")).to_have_count(1)
 
 
-async def test_case_04_connected_but_no_message(phone: Phone, tmp_path: Path) -> None:
+async def test_case_03_connected_but_no_message(phone: Phone, tmp_path: Path) -> None:
     """Topics are there, nothing is said on them: what a bridge looks like after a restart of roscore."""
     drive = steady(tmp_path / "steady.bag", 4.2)
     async with (

@@ -72,7 +72,7 @@ def uses_it(state: dict[str, Any]) -> bool:
 
 
 @pytest.mark.timeout(90)
-async def test_case_08_a_phone_in_the_car_agrees_and_one_500_m_away_is_told(phone: Phone, tmp_path: Path) -> None:
+async def test_a_phone_in_the_car_agrees_and_one_500_m_away_is_told(phone: Phone, tmp_path: Path) -> None:
     await phone.page.context.grant_permissions(["geolocation"])
     async with running(*simulate()) as car, running(*server(tmp_path)) as watch, riding(phone, watch) as ride:
         await connect(phone, watch, car)

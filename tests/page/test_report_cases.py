@@ -1,0 +1,135 @@
+"""The cases of the design report, 7.5 and 7.6, that no other file drives: each named by its number.
+
+Elsewhere: 3 and 12–14 in test_chain.py, 5 in test_scan.py, 7 in test_phone.py, 11 in test_connect.py, 17–18 in
+test_alarms.py, 7.6.1 in test_tabs.py.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Page, expect
+
+from tests.page.conftest import PHONE, Phone
+from tests.page.processes import Process, free_port, running, server, simulate
+
+TABS = ("home", "map", "scan", "files", "settings")
+LONG = 45_000  # ms: the car must first stop, or come to where the other one pulls out
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def drive(tmp_path: Path) -> AsyncIterator[tuple[Process, Process]]:
+    """A simulated car and a server that watches it."""
+    async with running(*simulate()) as car, running(*server(tmp_path / "watch", car.address)) as watch:
+        yield car, watch
+
+
+@contextlib.asynccontextmanager
+async def a_phone_on_each_tab(browser: Browser, address: str) -> AsyncIterator[dict[str, Page]]:
+    """Five operators, each with another tab in front, live."""
+    contexts = [await browser.new_context(**PHONE) for _ in TABS]
+    try:
+        pages = {}
+        for tab, context in zip(TABS, contexts, strict=True):
+            pages[tab] = await context.new_page()
+            await pages[tab].goto(f"{address}/#{tab}")
+            await expect(pages[tab].locator('#monitor [data-f="word"]')).to_have_text("Live", timeout=15_000)
+        yield pages
+    finally:
+        for context in contexts:
+            await context.close()
+
+
+async def dialog_on_each_tab(
+    browser: Browser, drive: tuple[Process, Process], fault: str, title: str, words: str
+) -> None:
+    """The dialog stands on every tab; one OK closes it on all, and each page is where it was."""
+    car, watch = drive
+    async with a_phone_on_each_tab(browser, watch.address) as pages:
+        await car.type(fault)
+        for page in pages.values():
+            sheet = page.locator("#sheet-alarm")
+            await expect(sheet).to_be_visible(timeout=LONG)
+            await expect(sheet.locator("[data-f=title]")).to_have_text(title)
+            await expect(sheet).to_contain_text(re.compile(words))
+        await pages["map"].locator("#sheet-alarm [data-f=acknowledge]").tap()
+        for tab, page in pages.items():
+            await expect(page.locator("#sheet-alarm")).to_be_hidden()
+            await expect(page.locator("#monitor")).to_be_visible()
+            await expect(page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
+            await expect(page.locator('#monitor [data-f="word"]')).to_have_text("Live")
+        await car.type("stop")
+
+
+async def test_case_01_an_address_without_a_car_opens_no_home(phone: Phone, tmp_path: Path) -> None:
+    async with running(*server(tmp_path)) as watch:
+        await phone.open(watch.address)
+        await phone.page.fill("#address", f"127.0.0.1:{free_port()}")
+        await phone.f("go", "#connect").tap()
+        await expect(phone.page.locator("#sheet-failed")).to_be_visible()
+        await expect(phone.page.locator("#monitor")).to_be_hidden()
+        # case 10: Exit of that dialog leads to the connect screen
+        await phone.page.locator("#sheet-failed [data-f=change]").tap()
+        await expect(phone.page.locator("#sheet-failed")).to_be_hidden()
+        await expect(phone.page.locator("#connect h1")).to_be_visible()
+        await expect(phone.page.locator("#monitor")).to_be_hidden()
+
+
+async def test_case_02_the_right_address_opens_home(
+    phone: Phone, drive: tuple[Process, Process], tmp_path: Path
+) -> None:
+    car, _ = drive
+    async with running(*server(tmp_path)) as watch:
+        await phone.open(watch.address)
+        await phone.page.fill("#address", car.shown)
+        await phone.page.keyboard.press("Enter")
+        await phone.live()
+        await expect(phone.page.locator("#connect")).to_be_hidden()
+        await expect(phone.page.locator("#tab-home")).to_have_attribute("aria-selected", "true")
+        assert float(await phone.speed()) >= 0.0
+
+
+async def test_case_06_no_position_is_told(phone: Phone, drive: tuple[Process, Process]) -> None:
+    car, watch = drive
+    await phone.open(watch.address)
+    await phone.live()
+    await car.type("stale-gps 60")
+    snack = phone.page.locator(".snack", has_text="Position silent")
+    await expect(snack).to_be_visible()
+    await expect(phone.f("strip")).to_contain_text("Position silent")
+    await expect(phone.f("latitude")).to_have_attribute("data-ink", "stale")
+    await snack.get_by_role("button", name="Acknowledge").tap()
+    await car.type("stop")
+    await expect(phone.f("strip")).not_to_contain_text("Position silent", timeout=15_000)
+
+
+@pytest.mark.timeout(120)
+async def test_case_08_a_car_that_stands_is_told(phone: Phone, drive: tuple[Process, Process]) -> None:
+    car, watch = drive
+    await phone.open(watch.address)
+    await phone.live()
+    await car.type("standing 40")
+    snack = phone.page.locator(".snack", has_text="not moving")
+    await expect(snack).to_contain_text(re.compile(r"standing|stood|stands", re.IGNORECASE), timeout=LONG)
+    await expect(phone.page.locator("#panel-home .checks li", has_text="Moving")).to_contain_text("FAULT")
+    await car.type("stop")
+    await expect(snack).to_be_hidden(timeout=30_000)
+
+
+@pytest.mark.timeout(150)
+async def test_case_09_and_19_and_20_an_obstacle_on_each_of_the_five_tabs(
+    browser: Browser, drive: tuple[Process, Process]
+) -> None:
+    await dialog_on_each_tab(browser, drive, "near-object 60", "Object too near", r"3\.5")
+
+
+@pytest.mark.timeout(150)
+async def test_case_15_and_16_an_errant_gps_on_each_of_the_five_tabs(
+    browser: Browser, drive: tuple[Process, Process]
+) -> None:
+    await dialog_on_each_tab(browser, drive, "gps-drift 60", "GPS drift at standstill", r"m from where it stopped")
