@@ -5,6 +5,7 @@ import { Arming } from './arming.js';
 import { deviceName, keptHere } from './device.js';
 import { field, listen, need, show } from './dom.js';
 import { gapWords } from './events.js';
+import { MapTab } from './map-tab.js';
 import { notices } from './notice.js';
 import { Page } from './page.js';
 import { Phone } from './phone.js';
@@ -42,6 +43,7 @@ const say = notices(field(document, 'snacks'));
 const page = new Page(store, arming, say);
 
 const scan = mountScan(need(monitor, '[data-panel="scan"]'), store);
+const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null);
 const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
 const screens = new Screens(monitor, store, front);
 const tabs = new Tabs(monitor, front);
@@ -71,6 +73,7 @@ mountBadge(store);
 function front() {
   queueMicrotask(() => {
     scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null);
+    map.look();
     settings.look();
   });
 }

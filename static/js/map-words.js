@@ -55,17 +55,17 @@ export function carOf(frame, inkOf) {
     heading_deg: typeof heading_deg === 'number' && Number.isFinite(heading_deg) ? heading_deg : null,
     isHeadingLive: turn.ink === 'fresh' || turn.ink === 'ageing',
     label: !isLive ? `Car STALE ${age(age_s)} s` : ellipse ? `Car ±${metres(ellipse.major_m)}` : 'Car, accuracy unknown',
-    says: carSays(ink, age_s, fix !== null && !hasFix, isLive && !ellipse),
+    says: carSays(ink, age_s, fix !== null && !hasFix),
   };
 }
 
-/** @param {Freshness} ink @param {number | null} age_s @param {boolean} isLost @param {boolean} isVague */
-function carSays(ink, age_s, isLost, isVague) {
+/** @param {Freshness} ink @param {number | null} age_s @param {boolean} isLost */
+function carSays(ink, age_s, isLost) {
   if (ink === 'not_published') return 'The car publishes no position.';
   if (ink === 'never') return 'No position has come from the car yet.';
   if (ink === 'stale') return `The car’s position is ${age(age_s)} s old: it may be elsewhere by now.`;
   if (isLost) return 'The car’s receiver has no fix: where the car is is not known.';
-  return isVague ? 'The car’s receiver does not say how accurate it is.' : '';
+  return '';
 }
 
 /**
@@ -76,7 +76,7 @@ function carSays(ink, age_s, isLost, isVague) {
  */
 export function phoneOf(frame, lag_s) {
   const phone = frame.phone ?? null;
-  if (!phone) return { place: null, isLive: false, age_s: null, accuracy_m: null, label: '', says: 'No phone tells its position: a phone is asked when it connects.' };
+  if (!phone) return { place: null, isLive: false, age_s: null, accuracy_m: null, label: '', says: 'No phone tells its position.' };
   const age_s = phone.age_s === null ? null : phone.age_s + lag_s;
   const place = placeOf(phone);
   // A coarse fix is one of now all the same; every other reason says that there is none of now.

@@ -11,10 +11,11 @@ import copy
 import math
 import struct
 import time
+from collections.abc import Callable
 from typing import Any
 
 import uvicorn
-from fastapi import FastAPI, Request, WebSocket, WebSocketDisconnect
+from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 from fastapi.responses import HTMLResponse
 from fastapi.staticfiles import StaticFiles
 from fastapi.templating import Jinja2Templates
@@ -53,7 +54,7 @@ def live() -> Json:
         "session": {
             "phase": "monitoring", "address": "ws://192.168.4.1:9090", "name": "192.168.4.1:9090", "ros_version": 1,
             "connected_for_s": 252.3, "paused": False, "paused_for_s": 0.0, "track_m": 76.1, "received": 14228,
-            "rejected": 0,
+            "rejected": 0, "track": {"number": 1, "last": 7},
         },
         "link": {
             "cut": None, "since_ms": None, "bridge_age_s": 0.05, "car_age_s": 0.05, "problem": None, "attempts": 0,
@@ -70,7 +71,8 @@ def live() -> Json:
             "odometry": signal("Odometry", "nav_msgs/Odometry", {"speed_mps": 4.19}),
             "position": signal(
                 "Position", "sensor_msgs/NavSatFix",
-                {"lat_deg": 32.231904, "lon_deg": -110.950116, "alt_m": 748.3, "status": 0, "sigma_m": 5.0}, hz=10.0,
+                {"lat_deg": 32.231904, "lon_deg": -110.950116, "alt_m": 748.3, "status": 0, "sigma_m": 5.0},
+                hz=10.0,
             ),
             "heading": signal("Heading", "nav_msgs/Odometry", {"heading_deg": 87.0, "source": "odometry"}),
             "scan": signal(
@@ -97,6 +99,12 @@ def live() -> Json:
         "decelerate": {"state": "not_available", "why": "not configured"},
         "control": {"holder": "You"},
     }  # fmt: skip
+        "phone": {
+            "id": "9c0f", "label": "Pixel 7", "count": 1, "handheld": True, "lat_deg": 32.231828, "lon_deg": -110.95005,
+            "accuracy_m": 5.0, "sigma_m": 3.3, "alt_m": None, "speed_mps": None, "heading_deg": None, "at_ms": 0,
+            "age_s": 0.8, "used": True, "why": None, "why_text": None, "apart_m": 10.4, "bearing_deg": 323.6,
+            "compared_age_s": 0.8, "explained_m": 14.0, "correlation": None,
+        },
 
 
 def idle(phase: str = "idle") -> Json:
@@ -122,6 +130,26 @@ def alarm(name: str, title: str, **more: Any) -> Json:
 
 
 def scan(number: int) -> bytes:
+# Metres east and north of the car and seconds: the way the pictures of the design show.
+WAY = (
+    (-20.3, -25.7, 0),
+    (-22.4, -16.2, 10),
+    (-22.2, -8.1, 14),
+    (-20.3, -3.5, 16),
+    (-16.2, -1.1, 20),
+    (-9.5, -0.3, 24),
+    (-4, -0.1, 27),
+)
+
+
+def track() -> list[list[float]]:
+    """The rows of GET /api/track/points."""
+    return [
+        [n, 32.231904 + north / 110_890, -110.950116 + east / 94_274, float(at_s), 0]
+        for n, (east, north, at_s) in enumerate(WAY, 1)
+    ]
+
+
     """A wall on the left, a parked car on the right, a person ahead and one blind sector; 181 beams."""
     beams = [_cast(math.radians(i - 90), i) for i in range(181)]
     scale = 81.0 / 65000
@@ -170,6 +198,8 @@ class Canned:
         ]
         self.app = FastAPI()
         self._watching = False
+        self.ground: Json = {"layers": [], "image": None}
+        self.tile: Callable[[int, int, int], bytes] = lambda z, x, y: b""
         templates = Jinja2Templates(directory=templates_dir())
         templates.env.globals["asset"] = lambda name: f"/static/{name}"
         self.app.mount("/static", StaticFiles(directory=static_dir()))
@@ -184,6 +214,18 @@ class Canned:
 
         @self.app.websocket("/ws")
         async def socket(socket: WebSocket) -> None:
+        @self.app.get("/api/map")
+        async def ground() -> Json:
+            return self.ground
+
+        @self.app.get("/map/{z}/{x}/{y}")
+        async def tile(z: int, x: int, y: int) -> Response:
+            return Response(self.tile(z, x, y), media_type="image/png")
+
+        @self.app.get("/api/track/points")
+        async def points(after: int = 0) -> Json:
+            return {"number": 1, "points": [row for row in track() if row[0] > after]}
+
             await socket.accept()
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await self._serve(socket)

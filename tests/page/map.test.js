@@ -5,6 +5,7 @@ import {
   CLOSEST, FIRST, WIDEST, between, bounded, ellipseOf, fitted, gridPaths, gridStep_m, groundMatrix, metresOf, panned, pictureMatrix, pixelOf, scaleBar_m, tileScale,
   upOf, zoomed,
 } from '../../static/js/map-layout.js';
+import { besideWay, inside } from '../../static/js/map-figure.js';
 import { MOST, Track, trackPaths } from '../../static/js/map-track.js';
 import { apartOf, bearingWords, carOf, distanceWords, phoneOf, pictureWords } from '../../static/js/map-words.js';
 import { state } from './frames.js';
@@ -215,7 +216,6 @@ test('a car that is not known to be there is never shown as live, and why is sai
 test('unknown quality and unknown heading are said and drawn as that', () => {
   const car = carOf(frameOf({ ...FIX, sigma_m: null, covariance_m2: null }, null, null), inked('fresh', 'not_published'));
   assert.deepEqual([car.ellipse, car.label, car.heading_deg], [null, 'Car, accuracy unknown', null]);
-  assert.match(car.says, /does not say how accurate/);
   assert.equal(carOf(frameOf(FIX), inked('fresh', 'stale')).isHeadingLive, false);
 });
 
@@ -310,4 +310,30 @@ test('lines end where the way is not known; what was not seen is told apart; a d
   assert.equal(flat(unseen), 'M10L20');
   assert.equal(flat(dots), 'M10h0M905h0');
   assert.deepEqual(trackPaths([], HERE), { driven: '', unseen: '', dots: '' });
+});
+
+// -- the figure's places -------------------------------------------------------------------------------------------------
+
+test('the part of a way that is on the map', () => {
+  assert.deepEqual(inside([10, 10], [100, 200], SIZE), [[10, 10], [100, 200]]);
+  assert.deepEqual(inside([206, 235], [206, -235], SIZE), [[206, 235], [206, 0]]);
+  assert.deepEqual(inside([-100, 100], [500, 100], SIZE), [[0, 100], [412, 100]]);
+  assert.equal(inside([-10, 0], [-10, 400], SIZE), null);
+  assert.equal(inside([-50, -10], [500, -300], SIZE), null);
+  assert.deepEqual(inside([1e7, 235], [206, 235], SIZE)?.[0], [412, 235]);
+});
+
+test('the number stands beside its way and never on it', () => {
+  for (let turn = 0; turn < 360; turn += 15) {
+    for (const middle of /** @type {[number, number][]} */ ([[206, 235], [30, 60], [380, 420], [206, 20]])) {
+      const [dx, dy] = [50 * Math.cos((turn * Math.PI) / 180), 50 * Math.sin((turn * Math.PI) / 180)];
+      const [x, y] = besideWay([[middle[0] - dx, middle[1] - dy], [middle[0] + dx, middle[1] + dy]], SIZE);
+      assert.ok(x >= 36 && x <= 412 - 36 && y >= 20 && y <= 470 - 60, `${x}, ${y}`);
+      if (middle[0] === 206 && middle[1] === 235) {
+        const off = Math.abs((x - middle[0]) * dy - (y - middle[1]) * dx) / 50; // from the way
+        assert.ok(off >= 8 + (Math.abs(dy) * 36 + Math.abs(dx) * 20) / 50 - 1e-6);
+      }
+    }
+  }
+  assert.ok(besideWay([[252, 312], [206, 250]], SIZE)[0] < 206); // as the pictures of the design have it: at the left
 });

@@ -15,6 +15,7 @@ from playwright.async_api import Browser, Page, async_playwright
 
 from tests.chromium import FLAGS, find_chromium
 from tests.page.canned import Canned, alarm, idle, live
+from tests.server.web.maps import png
 
 OUT = Path(__file__).resolve().parents[2] / "out" / "screenshots"
 PHONE: dict[str, Any] = {
@@ -215,6 +216,62 @@ async def stop(server: Canned, page: Page) -> None:
 @scene("map")
 async def map_(server: Canned, page: Page) -> None:
     server.state = live()
+    await page.tap("[data-tab=map]")
+    await page.wait_for_timeout(1500)  # the track is asked for once a second
+
+
+@scene("map-heading-up")
+async def map_heading_up(server: Canned, page: Page) -> None:
+    await map_(server, page)
+    await page.tap("#panel-map [data-f=north]")
+    await page.tap("#panel-map [data-f=fit]")
+
+
+@scene("map-tiles")
+async def map_tiles(server: Canned, page: Page) -> None:
+    server.ground["layers"] = [
+        {"title": "Plan", "tiles": "/map/{z}/{x}/{y}", "min_zoom": 0, "max_zoom": 19, "attribution": "Plan: test track",
+         "bounds": [-180, -85, 180, 85]}
+    ]  # fmt: skip
+    server.tile = lambda z, x, y: png(*((176, 190, 168) if (x + y) % 2 else (198, 205, 186)))
+    await map_(server, page)
+    await page.wait_for_timeout(800)
+
+
+@scene("map-stale")
+async def map_stale(server: Canned, page: Page) -> None:
+    await map_(server, page)
+    server.state["signals"]["position"] |= {"freshness": "stale", "age_s": 3.35}
+    server.state["signals"]["heading"] |= {"freshness": "stale", "age_s": 3.35}
+    server.state["phone"] |= {
+        "used": False, "why": "hidden", "why_text": "The page is in the background, where phones give no position",
+        "age_s": 12.4,
+    }  # fmt: skip
+    server.state["checks"][5] |= {"verdict": "unknown", "brief": "not checked: hidden"}
+    await page.wait_for_timeout(500)
+
+
+@scene("map-coarse")
+async def map_coarse(server: Canned, page: Page) -> None:
+    """A car whose heading and accuracy nobody knows, and a phone that knows its place to 60 m."""
+    await map_(server, page)
+    server.state["signals"]["position"]["value"] |= {"sigma_m": None}
+    server.state["signals"]["heading"] |= {"freshness": "stale", "age_s": 12.0}
+    server.state["phone"] |= {
+        "accuracy_m": 60.0, "used": False, "why": "coarse",
+        "why_text": "The phone knows it to 60 m only, 50 m are needed",
+    }  # fmt: skip
+    server.state["checks"][5] |= {"verdict": "unknown", "brief": "not checked: coarse"}
+
+
+@scene("map-none")
+async def map_none(server: Canned, page: Page) -> None:
+    state = live()
+    state["signals"]["position"] |= {"freshness": "never", "value": None, "age_s": None}
+    state["signals"]["heading"] |= {"freshness": "never", "value": None, "age_s": None}
+    state["phone"], state["session"]["track"] = None, {"number": 1, "last": 0}
+    state["checks"][5] |= {"verdict": "unknown", "brief": "not checked: no phone"}
+    server.state = state
     await page.tap("[data-tab=map]")
 
 

@@ -86,7 +86,7 @@ async def test_keys_links_and_memory(phone: Phone, watch: Process) -> None:
     await in_front(phone, "files")
 
 
-@pytest.mark.parametrize("tab", ["map", "files"])
+@pytest.mark.parametrize("tab", ["files"])
 async def test_what_is_not_built_yet_says_so(phone: Phone, watch: Process, tab: str) -> None:
     await phone.open(f"{watch.address}/#{tab}")
     await phone.live()

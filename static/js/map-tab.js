@@ -1,0 +1,46 @@
+// The Map tab's place: what fills it is fetched when the tab first comes near, so that the page begins without it.
+
+import { field, setText, show } from './dom.js';
+
+export class MapTab {
+  /** @type {Promise<void> | null} */
+  #loading = null;
+
+  /**
+   * @param {HTMLElement} panel
+   * @param {import('./store.js').Store} store
+   * @param {() => boolean} isShown
+   */
+  constructor(panel, store, isShown) {
+    this.panel = panel;
+    this.store = store;
+    this.isShown = isShown;
+    // A swipe brings the tab's edge into sight before the tab is in front.
+    const near = new IntersectionObserver((seen) => {
+      if (!seen.some(({ isIntersecting }) => isIntersecting)) return;
+      this.#fetch();
+    });
+    near.observe(panel);
+  }
+
+  /** Called whenever another tab comes in front. */
+  look() {
+    if (this.isShown()) this.#fetch();
+  }
+
+  #fetch() {
+    this.#loading ??= this.#load();
+  }
+
+  async #load() {
+    try {
+      const { mount } = await import('./map.js');
+      mount(this.panel, this.store, this.isShown);
+    } catch (error) {
+      console.warn('The map could not be fetched:', error);
+      setText(field(this.panel, 'none-words'), 'The map could not be fetched: the server does not answer. Open this tab again.');
+      show(field(this.panel, 'none'), true);
+      this.#loading = null;
+    }
+  }
+}
