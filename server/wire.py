@@ -51,11 +51,11 @@ def value(reading: Any) -> dict[str, Any] | None:
                 "alt_m": plain(reading.alt_m, 2),
                 "status": reading.status,
                 "sigma_m": plain(reading.sigma_m, 2),
+                "covariance_m2": [plain(one, 4) for one in reading.covariance_m2] if reading.covariance_m2 else None,
             }
         case values.Odometry():
             return {
                 "x_m": plain(reading.x_m, 3),
-                "covariance_m2": [plain(one, 4) for one in reading.covariance_m2] if reading.covariance_m2 else None,
                 "y_m": plain(reading.y_m, 3),
                 "yaw_rad": plain(reading.yaw_rad),
                 "speed_mps": plain(reading.speed_mps),

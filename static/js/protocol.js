@@ -78,8 +78,8 @@
  * @property {string | null} [paused_by]
  * @property {{address: string | null, alarms: number, paused: boolean} | null} [held] what stood when the server ended
  * @property {number | null} track_m
- * @property {number} received
  * @property {{number: number, last: number}} [track] which track, and its newest point
+ * @property {number} received
  * @property {number} rejected
  *
  * @typedef {object} Link
@@ -132,9 +132,9 @@
  * @property {string | null} why
  * @property {string | null} why_text
  * @property {number | null} apart_m
- * @property {number | null} explained_m
  * @property {number | null} [bearing_deg] of the car from the phone
  * @property {number | null} [compared_age_s]
+ * @property {number | null} explained_m
  * @property {number | null} correlation
  *
  * @typedef {object} AlarmEvent

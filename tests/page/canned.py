@@ -98,13 +98,13 @@ def live() -> Json:
         "recording": {"state": "on", "for_s": 252.0},
         "decelerate": {"state": "not_available", "why": "not configured"},
         "control": {"holder": "You"},
-    }  # fmt: skip
         "phone": {
             "id": "9c0f", "label": "Pixel 7", "count": 1, "handheld": True, "lat_deg": 32.231828, "lon_deg": -110.95005,
             "accuracy_m": 5.0, "sigma_m": 3.3, "alt_m": None, "speed_mps": None, "heading_deg": None, "at_ms": 0,
             "age_s": 0.8, "used": True, "why": None, "why_text": None, "apart_m": 10.4, "bearing_deg": 323.6,
             "compared_age_s": 0.8, "explained_m": 14.0, "correlation": None,
         },
+    }  # fmt: skip
 
 
 def idle(phase: str = "idle") -> Json:
@@ -129,7 +129,6 @@ def alarm(name: str, title: str, **more: Any) -> Json:
     }  # fmt: skip
 
 
-def scan(number: int) -> bytes:
 # Metres east and north of the car and seconds: the way the pictures of the design show.
 WAY = (
     (-20.3, -25.7, 0),
@@ -150,6 +149,7 @@ def track() -> list[list[float]]:
     ]
 
 
+def scan(number: int) -> bytes:
     """A wall on the left, a parked car on the right, a person ahead and one blind sector; 181 beams."""
     beams = [_cast(math.radians(i - 90), i) for i in range(181)]
     scale = 81.0 / 65000
@@ -196,10 +196,10 @@ class Canned:
             {"name": "CATVehicle", "address": "ws://192.168.4.1:9090"},
             {"name": "Simulated car", "address": "ws://127.0.0.1:9091"},
         ]
-        self.app = FastAPI()
-        self._watching = False
         self.ground: Json = {"layers": [], "image": None}
         self.tile: Callable[[int, int, int], bytes] = lambda z, x, y: b""
+        self.app = FastAPI()
+        self._watching = False
         templates = Jinja2Templates(directory=templates_dir())
         templates.env.globals["asset"] = lambda name: f"/static/{name}"
         self.app.mount("/static", StaticFiles(directory=static_dir()))
@@ -212,8 +212,6 @@ class Canned:
         async def vehicles() -> Json:
             return {"vehicles": [], "found": self.found}
 
-        @self.app.websocket("/ws")
-        async def socket(socket: WebSocket) -> None:
         @self.app.get("/api/map")
         async def ground() -> Json:
             return self.ground
@@ -226,6 +224,8 @@ class Canned:
         async def points(after: int = 0) -> Json:
             return {"number": 1, "points": [row for row in track() if row[0] > after]}
 
+        @self.app.websocket("/ws")
+        async def socket(socket: WebSocket) -> None:
             await socket.accept()
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await self._serve(socket)
