@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
+from monitor.ahead import corridor_ahead, is_blind, look_ahead
+from monitor.instruments import ObstacleLimits, stopping_m
 from monitor.state import Snapshot
-from monitor.values import LaserScan
+from monitor.values import LaserScan, Twist
 from server import wire
 from server.bus import LocalBus
 
@@ -30,8 +34,9 @@ class ScanFeed:
     def is_due(self, now_s: float) -> bool:
         return now_s - self._put_s >= SCAN_FRAME_S and self._bus.wanted(self._vehicle, "scan")
 
-    def put(self, snapshot: Snapshot, *, kinds_kept: bool) -> None:
-        """Offers the newest scan. `kinds_kept`: the transport told NaN and ±Inf apart."""
+    def put(self, snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bool, kinds_kept: bool) -> None:
+        """Offers the newest scan, and how it is judged. `was_active`: an obstacle is alarmed; `kinds_kept`: the
+        transport told NaN and ±Inf apart."""
         reading = snapshot.get("scan")
         if reading is not None and isinstance(reading.value, LaserScan):
             self._put_s = snapshot.now_s
@@ -40,5 +45,23 @@ class ScanFeed:
                 number=self._number,
                 age_s=snapshot.now_s - reading.received_s,
                 kinds_kept=kinds_kept,
+                judged=judged(reading.value, snapshot, limits, was_active=was_active),
             )
             self._bus.put(self._vehicle, "scan", frame)
+
+
+def judged(scan: LaserScan, snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bool) -> wire.Judged:
+    """The geometry by which the obstacle check judges this scan at this moment, and what it sees."""
+    corridor = corridor_ahead(snapshot, limits, was_active=was_active)
+    sight = look_ahead(scan, corridor)
+    speed = snapshot.get("speed")
+    twist = speed.value if speed is not None and speed.is_fresh(snapshot.now_s) else None
+    is_known = isinstance(twist, Twist) and math.isfinite(twist.speed_mps)
+    return wire.Judged(
+        wider_m=corridor.half_width_m - limits.half_width_m,
+        tyre_angle_rad=corridor.tyre_angle_rad,
+        gap_m=sight.gap_m,
+        bearing_rad=sight.bearing_rad,
+        is_blind=is_blind(sight),
+        stopping_m=stopping_m(twist.speed_mps, limits) if twist is not None and is_known else None,
+    )

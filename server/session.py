@@ -450,6 +450,7 @@ class Session:
                 self._scans.put(
                     self._state.snapshot(now_s),
                     self._monitor.limits.obstacle,
+                    was_active="obstacle" in self._monitor.alarms and self._monitor.alarms["obstacle"].active,
                     kinds_kept=not isinstance(message["ranges"], list),
                 )
 

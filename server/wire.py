@@ -5,21 +5,25 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from monitor import values
+from monitor.ahead import ANGLE_STEP_RAD
 from monitor.alarm import Alarm, Transition
 from monitor.alarm_spec import AlarmSpec
 from monitor.check import Quantity
 from monitor.load import AlarmLoad
 from monitor.runner import Tile
+from monitor.scan import usable
 
 SCAN_MAGIC = 0x53
-SCAN_VERSION = 1
-SCAN_HEADER = struct.Struct("<BBHIfffff")  # 28 bytes, so that the ranges that follow are aligned
+SCAN_VERSION = 2
+SCAN_HEADER = struct.Struct("<BBHIHHffffbBH")  # 32 bytes, so that the ranges that follow are aligned
+NO_BEAM, BLIND = 65535, 65534  # in the place of the nearest beam: nothing in the corridor; it could not be seen
+STOPPING_UNKNOWN = 65535
 UNUSABLE, TOO_CLOSE, NOTHING, INVALID = 0, 65535, 65534, 65533
 _STEPS = 65000  # units from 0 to range_max: 1.2 mm for a range of 81 m
 _OPEN_RANGE_M = 200.0  # the scale's end for a sensor that states none
@@ -75,13 +79,8 @@ def value(reading: Any) -> dict[str, Any] | None:
     return None
 
 
-def usable(scan: values.LaserScan) -> npt.NDArray[np.bool_]:
-    """Which beams carry a range inside [range_min, range_max]; shape (beams,). NaN falls out."""
-    return (scan.ranges_m >= scan.range_min_m) & (scan.ranges_m <= scan.range_max_m)
-
-
 def _scan_summary(scan: values.LaserScan) -> dict[str, Any]:
-    good = usable(scan)
+    good = usable(scan.ranges_m, scan.range_min_m, scan.range_max_m)
     nearest = bearing = None
     if good.any():
         at = int(np.argmin(np.where(good, scan.ranges_m, np.inf)))
@@ -100,7 +99,19 @@ def _scan_summary(scan: values.LaserScan) -> dict[str, Any]:
     }
 
 
-def scan_frame(scan: values.LaserScan, *, number: int, age_s: float, kinds_kept: bool) -> bytes:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """What the obstacle check made of a scan."""
+
+    wider_m: float  # than its half-width by the settings: while an obstacle in it is alarmed
+    tyre_angle_rad: float  # of the corridor; 0: straight, also where the steering is not known
+    gap_m: float | None  # along the corridor to the nearest thing; None: nothing seen
+    bearing_rad: float | None  # of it
+    is_blind: bool  # too little of the corridor was seen to say anything
+    stopping_m: float | None  # None: the speed is not known
+
+
+def scan_frame(scan: values.LaserScan, *, number: int, age_s: float, kinds_kept: bool, judged: Judged) -> bytes:
     """The scan's binary frame. `kinds_kept`: the transport told NaN and ±Inf apart; else they are all one code.
 
     Source of the meaning of ±Inf and NaN: REP-117.
@@ -109,7 +120,7 @@ def scan_frame(scan: values.LaserScan, *, number: int, age_s: float, kinds_kept:
     end_m = scan.range_max_m if math.isfinite(scan.range_max_m) else _OPEN_RANGE_M
     scale = max(end_m, 0.1) / _STEPS
     codes = np.zeros(ranges.size, dtype="<u2")
-    good = usable(scan)
+    good = usable(scan.ranges_m, scan.range_min_m, scan.range_max_m)
     codes[good] = np.clip(np.rint(ranges[good] / scale), 1, _STEPS)
     with np.errstate(invalid="ignore"):
         codes[(ranges > 0) & (ranges < scan.range_min_m)] = TOO_CLOSE
@@ -123,13 +134,25 @@ def scan_frame(scan: values.LaserScan, *, number: int, age_s: float, kinds_kept:
         SCAN_VERSION,
         ranges.size,
         number & 0xFFFFFFFF,
-        min(age_s, 1e9),
+        max(0, min(65535, round(age_s * 1000))),
+        STOPPING_UNKNOWN if judged.stopping_m is None else min(STOPPING_UNKNOWN - 1, round(judged.stopping_m * 100)),
         scan.angle_min_rad,
         scan.angle_increment_rad,
         end_m,
-        scale,
+        0.0 if judged.is_blind or judged.gap_m is None else judged.gap_m,
+        round(judged.tyre_angle_rad / ANGLE_STEP_RAD),
+        round(judged.wider_m * 100),
+        _nearest_beam(scan, judged),
     )
     return header + codes.tobytes()
+
+
+def _nearest_beam(scan: values.LaserScan, judged: Judged) -> int:
+    if judged.is_blind:
+        return BLIND
+    if judged.bearing_rad is None or not scan.angle_increment_rad:
+        return NO_BEAM
+    return round((judged.bearing_rad - scan.angle_min_rad) / scan.angle_increment_rad)
 
 
 def tile(tile: Tile) -> dict[str, Any]:

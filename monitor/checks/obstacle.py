@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from monitor.ahead import corridor_ahead, is_blind, look_ahead
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -22,14 +23,11 @@ from monitor.check import (
     ok,
     unknown,
 )
-from monitor.corridor import TYRE_RAD_A_PERCENT, Corridor, look
 from monitor.instruments import ObstacleLimits, stopping_m
 from monitor.state import NotFresh, Snapshot
 
 CLOSING_AT_LEAST_MPS = 0.3  # slower is noise of two distances
 APPROACH_AT_MOST_MPS = 10.0  # what comes towards us faster is not on a test site
-BLIND_AT_M = 5.0  # where the beams of the corridor are counted
-ANGLE_STEP_RAD = 0.005  # 10 cm aside at 10 m: what was reckoned for a bend serves the next scan too
 STEADY_WITHIN_M = 3.0  # a gap that shrank more than the car can drive in between is another object's
 
 
@@ -38,14 +36,14 @@ def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Fi
         return absent("The laser is not published")
     scan = snapshot.need("scan")
     speed_mps = _speed(snapshot)
-    corridor = _corridor(snapshot, limits)
-    sight = look(scan, corridor, BLIND_AT_M)
-    if sight.beams and sight.blind > 0.9 * sight.beams:
+    corridor = corridor_ahead(snapshot, limits, was_active=was_active)
+    sight = look_ahead(scan, corridor)
+    if is_blind(sight):
         return unknown("The laser sees nothing in the corridor", short="blind")
     before = snapshot.scan_before
     closing_mps = None
     if sight.gap_m is not None and sight.gap_m < _soon_m(speed_mps, limits):
-        gap_before_m = look(before.value, corridor, BLIND_AT_M).gap_m if before is not None else None
+        gap_before_m = look_ahead(before.value, corridor).gap_m if before is not None else None
         span_s = snapshot.readings["scan"].received_s - before.received_s if before is not None else 0.0
         closing_mps = _closing(sight.gap_m, gap_before_m, span_s, speed_mps)
     return _judge(sight.gap_m, sight.bearing_rad, speed_mps, closing_mps, limits, was_active, cause="scan")
@@ -56,6 +54,8 @@ def by_estimator(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -
         return absent("The nearest object is not published")
     distance = snapshot.need("distance")
     speed_mps = _speed(snapshot)
+    if distance.distance_m is not None and not math.isfinite(distance.distance_m):
+        return unknown("The distance is not a number", short="no data")
     if distance.distance_m is None:
         return _judge(None, None, speed_mps, None, limits, was_active, cause="distance")
     bearing = snapshot.get("bearing")
@@ -72,12 +72,12 @@ def laser_is_clear(snapshot: Snapshot, limits: ObstacleLimits) -> bool:
     scan = snapshot.get("scan")
     if scan is None:
         return True
-    corridor = _corridor(snapshot, limits)
-    gap_m = look(scan.value, corridor, BLIND_AT_M).gap_m
+    corridor = corridor_ahead(snapshot, limits)
+    gap_m = look_ahead(scan.value, corridor).gap_m
     if gap_m is None or _is_far(gap_m, snapshot, limits):
         return True
     before = snapshot.scan_before
-    before_m = None if before is None else look(before.value, corridor, BLIND_AT_M).gap_m
+    before_m = None if before is None else look_ahead(before.value, corridor).gap_m
     span_s = 0.0 if before is None else scan.received_s - before.received_s
     return _is_clear(gap_m, before_m, span_s, snapshot, limits)
 
@@ -112,20 +112,6 @@ def _newest_speed(snapshot: Snapshot) -> float:
     """Whatever its age: a stale one counts for nothing in the checks, so it may only make them be asked."""
     speed = snapshot.get("speed")
     return 0.0 if speed is None else abs(speed.value.speed_mps)
-
-
-def _corridor(snapshot: Snapshot, limits: ObstacleLimits) -> Corridor:
-    steering = snapshot.get("steering")
-    angle_rad = 0.0
-    if steering is not None and steering.is_fresh(snapshot.now_s) and math.isfinite(steering.value.percent):
-        angle_rad = max(-0.6, min(0.6, steering.value.percent * TYRE_RAD_A_PERCENT))
-        angle_rad = round(angle_rad / ANGLE_STEP_RAD) * ANGLE_STEP_RAD
-    return Corridor(
-        half_width_m=limits.half_width_m,
-        wheelbase_m=limits.wheelbase_m,
-        laser_ahead_m=limits.laser_ahead_m,
-        tyre_angle_rad=angle_rad,
-    )
 
 
 def _speed(snapshot: Snapshot) -> float | None:
@@ -182,6 +168,8 @@ def _judge(
 
 
 def _side(bearing_rad: float) -> str:
+    if not math.isfinite(bearing_rad):
+        return ""
     return f", {abs(math.degrees(bearing_rad)):.0f}° {'left' if bearing_rad > 0 else 'right'}"
 
 

@@ -1,13 +1,21 @@
 // The binary scan frame of docs/protocol.md, decoded.
 
 const MAGIC = 0x53;
-const HEADER_BYTES = 28;
+const VERSION = 2;
+const HEADER_BYTES = 32;
+/** Units from 0 to range_max. */
+const STEPS = 65000;
+const ANGLE_STEP_RAD = 0.005;
+const STOPPING_UNKNOWN = 65535;
 
 /** What a beam without a range says. */
 export const NO_RETURN = 0;
 export const TOO_CLOSE = 65535;
 export const NOTHING_IN_RANGE = 65534;
 export const INVALID = 65533;
+
+/** In the place of the nearest beam: too little of the corridor was seen; 65535, as any beam there is not: nothing stands in it. */
+const BLIND = 65534;
 
 /**
  * @typedef {object} Scan
@@ -17,7 +25,16 @@ export const INVALID = 65533;
  * @property {number} angle_increment_rad may be negative
  * @property {number} range_max_m
  * @property {number} scale_m metres a unit
+ * @property {Judged} judged
  * @property {Uint16Array} codes range / scale, or one of the codes above
+ *
+ * @typedef {object} Judged what the obstacle check made of it
+ * @property {number} tyre_angle_rad of the corridor, positive = left
+ * @property {number} wider_m than its half-width by the settings
+ * @property {number | null} gap_m along the corridor to the nearest thing
+ * @property {number | null} beam that saw it
+ * @property {boolean} isBlind too little of the corridor was seen to tell whether something stands in it
+ * @property {number | null} stopping_m null: the speed is not known
  */
 
 /**
@@ -28,19 +45,31 @@ export const INVALID = 65533;
 export function readScan(bytes) {
   if (bytes.byteLength < HEADER_BYTES) return null;
   const view = new DataView(bytes);
-  if (view.getUint8(0) !== MAGIC || view.getUint8(1) !== 1) return null;
+  if (view.getUint8(0) !== MAGIC || view.getUint8(1) !== VERSION) return null;
   const beams = view.getUint16(2, true);
   if (bytes.byteLength < HEADER_BYTES + 2 * beams) return null;
+  const range_max_m = view.getFloat32(20, true);
+  const stopping_cm = view.getUint16(10, true);
+  const beam = view.getUint16(30, true);
+  const gap_m = view.getFloat32(24, true);
   const scan = {
     number: view.getUint32(4, true),
-    age_s: view.getFloat32(8, true),
+    age_s: view.getUint16(8, true) / 1000,
     angle_min_rad: view.getFloat32(12, true),
     angle_increment_rad: view.getFloat32(16, true),
-    range_max_m: view.getFloat32(20, true),
-    scale_m: view.getFloat32(24, true),
+    range_max_m,
+    scale_m: Math.max(range_max_m, 0.1) / STEPS,
+    judged: {
+      tyre_angle_rad: view.getInt8(28) * ANGLE_STEP_RAD,
+      wider_m: view.getUint8(29) / 100,
+      gap_m: beam < beams && gap_m > 0 ? gap_m : null,
+      beam: beam < beams && gap_m > 0 ? beam : null,
+      isBlind: beam === BLIND,
+      stopping_m: stopping_cm === STOPPING_UNKNOWN ? null : stopping_cm / 100,
+    },
     codes: littleEndian(bytes, beams),
   };
-  const isSound = [scan.angle_min_rad, scan.angle_increment_rad, scan.range_max_m, scan.scale_m].every(Number.isFinite);
+  const isSound = [scan.angle_min_rad, scan.angle_increment_rad, scan.range_max_m, gap_m].every(Number.isFinite);
   return isSound ? scan : null;
 }
 
@@ -55,10 +84,22 @@ export function rangeOf(scan, beam) {
 }
 
 /**
+ * Bearing of a beam, counter-clockwise, 0 ahead.
+ * @param {Scan} scan
+ * @param {number} beam
+ */
+export function bearingOf(scan, beam) {
+  return scan.angle_min_rad + beam * scan.angle_increment_rad;
+}
+
+const IS_LITTLE_ENDIAN = new Uint8Array(Uint16Array.of(1).buffer)[0] === 1;
+
+/**
  * @param {ArrayBuffer} bytes
  * @param {number} beams
  */
 function littleEndian(bytes, beams) {
+  if (IS_LITTLE_ENDIAN) return new Uint16Array(bytes, HEADER_BYTES, beams);
   const view = new DataView(bytes, HEADER_BYTES);
   return Uint16Array.from({ length: beams }, (_, i) => view.getUint16(2 * i, true));
 }

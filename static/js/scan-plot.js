@@ -1,16 +1,23 @@
 // Draws the scan from above on a canvas. What stands still is drawn once and kept; a scan adds hatching and points.
 
-import { CORRIDOR_M, codeWords, namedSectors, nearestInCorridor, plotScale, pointsOf, ringsOf, sectorsOf } from './scan-layout.js';
+import { edgesOf, endOf } from './scan-corridor.js';
+import { bearingOf, rangeOf } from './scan-frame.js';
+import { codeWords, namedSectors, plotScale, pointsOf, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
 import { fixed } from './words.js';
 
 const COLOURS = /** @type {const} */ (['panel', 'line', 'ink', 'ink2', 'you', 'hatch', 'raise']);
 const NAMES_SHOWN = 4;
+const HATCH = { apart_px: 10, width_px: 2.5 };
 
 /**
+ * @typedef {import('./scan-corridor.js').Point} Point
+ * @typedef {ReturnType<typeof plotScale>} Scale
+ *
  * @typedef {object} Around what is drawn beside the scan
  * @property {number} reach_m
- * @property {number | null} stopping_m
+ * @property {Omit<import('./scan-corridor.js').Corridor, 'tyre_angle_rad'> | null} car null: its measures are not known yet
  * @property {number | null} limit_m
+ * @property {{x_m: number, y_m: number, isSeen: boolean} | null} mark the return that the operator marked
  */
 
 export class ScanPlot {
@@ -19,6 +26,9 @@ export class ScanPlot {
   /** @type {Record<typeof COLOURS[number], string>} */
   #colour = /** @type {any} */ ({});
   #font = '';
+  /** @type {CanvasPattern | null} */
+  #hatching = null;
+  #hatchingKey = '';
 
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
@@ -37,7 +47,7 @@ export class ScanPlot {
     }
     probe.remove();
     this.#font = style.getPropertyValue('--digits').trim() || 'sans-serif';
-    this.#groundKey = '';
+    this.#groundKey = this.#hatchingKey = '';
   }
 
   /**
@@ -57,25 +67,30 @@ export class ScanPlot {
         this.#groundKey = '';
       }
     }
-    const g = this.canvas.getContext('2d');
+    const g = this.canvas.getContext('2d', { alpha: false });
     if (!g) return;
-    this.#drawGround(width, height, dpr, around);
+    const { reach_m } = around;
+    this.#drawGround(width, height, dpr, reach_m);
     g.setTransform(1, 0, 0, 1, 0, 0);
     g.drawImage(this.#ground, 0, 0);
     g.setTransform(dpr, 0, 0, dpr, 0, 0);
-    const scale = plotScale(width, height, around.reach_m);
-    const sectors = sectorsOf(scan);
-    this.#hatch(g, scale, sectors, width, height);
-    this.#corridor(g, scale, around);
-    this.#rings(g, scale, around.reach_m);
-    this.#names(g, scale, around.reach_m, sectors, width);
-    this.#points(g, scale, pointsOf(scan, around.reach_m * 1.05));
-    this.#nearest(g, scale, nearestInCorridor(scan), around.reach_m);
+    const scale = plotScale(width, height, reach_m);
+    const sectors = [...sectorsOf(scan), ...unseenOf(scan)];
+    const { tyre_angle_rad, wider_m } = scan.judged;
+    const corridor = around.car ? { ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad } : null;
+    if (corridor) this.#stoppingStrip(g, scale, corridor, scan.judged.stopping_m);
+    this.#hatch(g, scale, sectors, width + height, dpr);
+    if (corridor) this.#corridor(g, scale, corridor, reach_m, scan.judged.stopping_m, around.limit_m);
+    this.#rings(g, scale, reach_m);
+    this.#names(g, scale, reach_m, sectors, width);
+    this.#points(g, scale, pointsOf(scan, reach_m * 1.05, 1 / scale.k));
+    this.#nearest(g, scale, scan, reach_m);
+    if (around.mark) this.#mark(g, scale, around.mark);
     this.#car(g, scale, height);
   }
 
-  /** Rings and spokes. @param {number} width @param {number} height @param {number} dpr @param {Around} around */
-  #drawGround(width, height, dpr, { reach_m }) {
+  /** Rings and spokes. @param {number} width @param {number} height @param {number} dpr @param {number} reach_m */
+  #drawGround(width, height, dpr, reach_m) {
     const key = `${width} ${height} ${dpr} ${reach_m}`;
     if (key === this.#groundKey) return;
     this.#groundKey = key;
@@ -88,98 +103,128 @@ export class ScanPlot {
     g.strokeStyle = this.#colour.line;
     g.lineWidth = 1.5;
     g.beginPath();
-    for (const r of ringsOf(reach_m)) {
+    const rings = ringsOf(reach_m);
+    for (const r of rings) {
       g.moveTo(cx - r * k, cy);
       g.arc(cx, cy, r * k, Math.PI, 0);
     }
+    const inner = rings[0] ?? reach_m / 4;
     for (const degrees of [-90, -60, -30, 30, 60, 90]) {
       const a = (degrees * Math.PI) / 180;
-      g.moveTo(...at((reach_m / 4) * Math.cos(a), (reach_m / 4) * Math.sin(a)));
+      g.moveTo(...at(inner * Math.cos(a), inner * Math.sin(a)));
       g.lineTo(...at(reach_m * Math.cos(a), reach_m * Math.sin(a)));
     }
     g.stroke();
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {ReturnType<typeof plotScale>} scale @param {import('./scan-layout.js').Sector[]} sectors @param {number} width @param {number} height */
-  #hatch(g, { cx, cy }, sectors, width, height) {
+  /** The part of the corridor that the car needs to stop. @param {CanvasRenderingContext2D} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number | null} stopping_m */
+  #stoppingStrip(g, scale, corridor, stopping_m) {
+    if (!stopping_m) return;
+    const { left, right } = edgesOf(corridor, 0, Math.min(stopping_m, endOf(corridor, scale.far_m)));
+    g.beginPath();
+    trace(g, scale, [...left, ...right.reverse()]);
+    g.closePath();
+    g.fillStyle = this.#colour.raise;
+    g.fill();
+  }
+
+  /** @param {CanvasRenderingContext2D} g @param {Scale} scale @param {import('./scan-layout.js').Sector[]} sectors @param {number} far @param {number} dpr */
+  #hatch(g, { cx, cy }, sectors, far, dpr) {
     if (!sectors.length) return;
-    const far = width + height;
-    g.save();
     g.beginPath();
     for (const { from_rad, to_rad } of sectors) {
       g.moveTo(cx, cy);
-      g.arc(cx, cy, far, -Math.PI / 2 - to_rad, -Math.PI / 2 - from_rad);
+      if (to_rad - from_rad > 0.3) g.arc(cx, cy, far, -Math.PI / 2 - to_rad, -Math.PI / 2 - from_rad);
+      else for (const a of [to_rad, from_rad]) g.lineTo(cx - far * Math.sin(a), cy - far * Math.cos(a));
       g.closePath();
     }
-    g.clip();
     g.fillStyle = this.#colour.panel;
-    g.fillRect(0, 0, width, height);
-    g.strokeStyle = this.#colour.hatch;
-    g.lineWidth = 2.5;
-    g.beginPath();
-    for (let x = -height; x < width + height; x += 10) {
-      g.moveTo(x, height);
-      g.lineTo(x + height, 0);
-    }
-    g.stroke();
-    g.restore();
+    g.fill();
+    const hatching = this.#hatchingOf(g, dpr);
+    if (hatching) g.fillStyle = hatching;
+    g.fill();
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {ReturnType<typeof plotScale>} scale @param {Around} around */
-  #corridor(g, { cy, k, at }, { stopping_m, limit_m }) {
+  /** Diagonal lines as a pattern, made once a theme. @param {CanvasRenderingContext2D} g @param {number} dpr */
+  #hatchingOf(g, dpr) {
+    const key = String(dpr);
+    if (key === this.#hatchingKey) return this.#hatching;
+    const side = Math.round(HATCH.apart_px * dpr);
+    const tile = document.createElement('canvas');
+    tile.width = tile.height = side;
+    const t = tile.getContext('2d');
+    if (!t) return null;
+    t.strokeStyle = this.#colour.hatch;
+    t.lineWidth = HATCH.width_px * dpr;
+    t.beginPath();
+    for (const shift of [-side, 0, side]) {
+      t.moveTo(shift - side, side * 2);
+      t.lineTo(shift + side * 2, -side);
+    }
+    t.stroke();
+    this.#hatching = g.createPattern(tile, 'repeat');
+    this.#hatching?.setTransform(new DOMMatrix().scale(1 / dpr));
+    this.#hatchingKey = key;
+    return this.#hatching;
+  }
+
+  /** @param {CanvasRenderingContext2D} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number} reach_m @param {number | null} stopping_m @param {number | null} limit_m */
+  #corridor(g, scale, corridor, reach_m, stopping_m, limit_m) {
     const colour = this.#colour;
-    const [left] = at(0, CORRIDOR_M);
-    const [right] = at(0, -CORRIDOR_M);
-    const stop = Math.max(8, cy - (stopping_m ?? 0) * k);
-    g.fillStyle = colour.raise;
-    g.fillRect(left, stop, right - left, cy - stop);
+    const end_m = endOf(corridor, scale.far_m);
+    const stop_m = Math.min(stopping_m ?? 0, end_m);
     g.strokeStyle = colour.ink2;
     g.lineWidth = 2;
-    g.setLineDash([7, 5]);
-    g.beginPath();
-    for (const x of [left, right]) {
-      g.moveTo(x, stop);
-      g.lineTo(x, 8);
+    for (const [from_m, to_m, dashes] of /** @type {[number, number, number[]][]} */ ([[0, stop_m, []], [stop_m, end_m, [7, 5]]])) {
+      if (to_m <= from_m) continue;
+      const { left, right } = edgesOf(corridor, from_m, to_m);
+      g.setLineDash(dashes);
+      g.beginPath();
+      trace(g, scale, left);
+      trace(g, scale, right);
+      g.stroke();
     }
-    g.stroke();
     g.setLineDash([]);
-    g.beginPath();
-    for (const x of [left, right]) {
-      g.moveTo(x, cy);
-      g.lineTo(x, stop);
+    if (stopping_m !== null && stopping_m > 0 && stopping_m <= end_m) {
+      const [left] = this.#across(g, scale, corridor, stopping_m, colour.ink, 5, 5);
+      if (left && left[1] > 0) this.#words(g, `stop ${fixed(stopping_m)} m`, Math.max(100, left[0] - 7), left[1], colour.ink, 'right');
     }
-    g.stroke();
-    if (stopping_m !== null && stopping_m > 0) {
-      g.strokeStyle = colour.ink;
-      g.lineWidth = 5;
-      g.beginPath();
-      g.moveTo(left - 5, stop);
-      g.lineTo(right + 5, stop);
-      g.stroke();
-      this.#words(g, `stop ${fixed(stopping_m)} m`, left - 12, stop, colour.ink, 'right');
-    }
-    if (limit_m !== null) {
-      const y = cy - limit_m * k;
-      g.strokeStyle = colour.you;
-      g.lineWidth = 3;
-      g.beginPath();
-      g.moveTo(left, y);
-      g.lineTo(right, y);
-      g.stroke();
-      this.#words(g, `limit ${fixed(limit_m)} m`, right + 12, y, colour.you, 'left', 14, 700);
+    if (limit_m !== null && limit_m > 0 && limit_m <= end_m) {
+      const [, right] = this.#across(g, scale, corridor, limit_m, colour.you, 3, 0);
+      if (right && right[1] > 0) this.#words(g, `limit ${fixed(limit_m)} m`, Math.min(scale.width - 92, right[0] + 12), right[1], colour.you, 'left', 14, 700);
     }
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {ReturnType<typeof plotScale>} scale @param {number} reach_m */
+  /**
+   * A line across the corridor; gives its ends on the plot.
+   * @param {CanvasRenderingContext2D} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number} way_m @param {string} colour @param {number} width @param {number} beyond_px
+   */
+  #across(g, scale, corridor, way_m, colour, width, beyond_px) {
+    const { left, right } = edgesOf(corridor, way_m, way_m);
+    if (!left[0] || !right[0]) return [];
+    const [a, b] = [scale.at(...left[0]), scale.at(...right[0])];
+    const long = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
+    const [dx, dy] = [((b[0] - a[0]) / long) * beyond_px, ((b[1] - a[1]) / long) * beyond_px];
+    g.strokeStyle = colour;
+    g.lineWidth = width;
+    g.beginPath();
+    g.moveTo(a[0] - dx, a[1] - dy);
+    g.lineTo(b[0] + dx, b[1] + dy);
+    g.stroke();
+    return [[a[0] - dx, a[1] - dy], b];
+  }
+
+  /** @param {CanvasRenderingContext2D} g @param {Scale} scale @param {number} reach_m */
   #rings(g, { at }, reach_m) {
     const a = (19 * Math.PI) / 180;
     for (const r of ringsOf(reach_m)) this.#words(g, String(r), ...at(r * Math.cos(a), r * Math.sin(a)), this.#colour.ink2, 'center');
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {ReturnType<typeof plotScale>} scale @param {number} reach_m @param {import('./scan-layout.js').Sector[]} sectors @param {number} width */
+  /** @param {CanvasRenderingContext2D} g @param {Scale} scale @param {number} reach_m @param {import('./scan-layout.js').Sector[]} sectors @param {number} width */
   #names(g, { cx, k, at }, reach_m, sectors, width) {
     for (const sector of namedSectors(sectors, NAMES_SHOWN)) {
       const a = (sector.from_rad + sector.to_rad) / 2;
+      if (Math.cos(a) < 0) continue; // behind: not in the picture
       const aside = Math.abs(Math.sin(a));
       // As far out as the edge allows, so that the word stands where its sector is wide.
       const r = Math.min(reach_m * 0.36, aside > 0.05 ? (cx - 44) / (k * aside) : reach_m);
@@ -188,7 +233,7 @@ export class ScanPlot {
     }
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {ReturnType<typeof plotScale>} scale @param {Float32Array} points */
+  /** @param {CanvasRenderingContext2D} g @param {Scale} scale @param {Float32Array} points */
   #points(g, { cx, cy, k }, points) {
     g.fillStyle = this.#colour.ink;
     g.beginPath();
@@ -196,21 +241,39 @@ export class ScanPlot {
     g.fill();
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {ReturnType<typeof plotScale>} scale @param {{range_m: number, bearing_rad: number} | null} nearest @param {number} reach_m */
-  #nearest(g, { at }, nearest, reach_m) {
-    if (!nearest || nearest.range_m > reach_m) return;
-    const [x, y] = at(nearest.range_m * Math.cos(nearest.bearing_rad), nearest.range_m * Math.sin(nearest.bearing_rad));
-    g.strokeStyle = this.#colour.ink;
+  /** What the obstacle check found. @param {CanvasRenderingContext2D} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {number} reach_m */
+  #nearest(g, { at }, scan, reach_m) {
+    const { beam, gap_m } = scan.judged;
+    const range_m = beam === null ? null : rangeOf(scan, beam);
+    if (beam === null || range_m === null || range_m > reach_m) return;
+    const bearing_rad = bearingOf(scan, beam);
+    const [x, y] = at(range_m * Math.cos(bearing_rad), range_m * Math.sin(bearing_rad));
+    this.#ring(g, x, y, this.#colour.ink);
+    const way = x + 120 > this.canvas.clientWidth ? -1 : 1;
+    g.beginPath();
+    g.moveTo(x + 15 * way, y);
+    g.lineTo(x + 36 * way, y);
+    g.stroke();
+    this.#words(g, `${fixed(gap_m)} m`, x + 44 * way, y - 1, this.#colour.ink, way > 0 ? 'left' : 'right', 22, 700);
+  }
+
+  /** Its words stand under the plot: here they would hide other returns. @param {CanvasRenderingContext2D} g @param {Scale} scale @param {NonNullable<Around['mark']>} mark */
+  #mark(g, { at }, mark) {
+    if (!mark.isSeen) g.setLineDash([4, 4]);
+    this.#ring(g, ...at(mark.x_m, mark.y_m), this.#colour.you);
+    g.setLineDash([]);
+  }
+
+  /** @param {CanvasRenderingContext2D} g @param {number} x @param {number} y @param {string} colour */
+  #ring(g, x, y, colour) {
+    g.strokeStyle = colour;
     g.lineWidth = 3;
     g.beginPath();
     g.arc(x, y, 15, 0, 7);
-    g.moveTo(x + 15, y);
-    g.lineTo(x + 36, y);
     g.stroke();
-    this.#words(g, `${fixed(nearest.range_m)} m`, x + 44, y - 1, this.#colour.ink, 'left', 22, 700);
   }
 
-  /** The car, its nose at the laser. @param {CanvasRenderingContext2D} g @param {ReturnType<typeof plotScale>} scale @param {number} height */
+  /** The car, its nose at the laser. @param {CanvasRenderingContext2D} g @param {Scale} scale @param {number} height */
   #car(g, { cx, cy, k }, height) {
     const half = Math.min(60, Math.max(7, 0.9 * k));
     g.strokeStyle = this.#colour.ink;
@@ -244,5 +307,16 @@ export class ScanPlot {
     g.fillRect(left, y - size * 0.72, width, size * 1.44);
     g.fillStyle = css;
     g.fillText(text, x, y);
+  }
+}
+
+/** A line through points of the plane, its part behind the laser left out. @param {CanvasRenderingContext2D} g @param {Scale} scale @param {Point[]} points */
+function trace(g, { at }, points) {
+  let isFirst = true;
+  for (const [x_m, y_m] of points) {
+    if (x_m < -0.01) continue;
+    if (isFirst) g.moveTo(...at(x_m, y_m));
+    else g.lineTo(...at(x_m, y_m));
+    isFirst = false;
   }
 }

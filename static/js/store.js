@@ -30,8 +30,9 @@ export class Store {
   frame = null;
   /** @type {import('./scan-frame.js').Scan | null} */
   scan = null;
-  /** When the newest scan came [ms, monotonic]. */
+  /** When the newest scan was asked for [ms, monotonic]: it cannot be older than its own age and that. */
   scanAt_ms = -Infinity;
+  #took_ms = -Infinity;
   /** Wall clock of the last fresh frame. @type {number | null} */
   heard_ms = null;
   /** Frames and scans that could not be read. */
@@ -201,6 +202,7 @@ export class Store {
         this.#greeted(message);
         break;
       case 'offer':
+        this.#took_ms = this.now();
         this.wire.send({ kind: 'take', seq: message.seq });
         break;
       case 'state':
@@ -262,7 +264,7 @@ export class Store {
       return;
     }
     this.scan = scan;
-    this.scanAt_ms = this.now();
+    this.scanAt_ms = this.#took_ms;
     this.#emit('scan');
   }
 

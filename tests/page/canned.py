@@ -93,7 +93,8 @@ def live() -> Json:
         "alarms": [],
         "limits": {
             "speed_limit.max_mps": 11.0, "gauge.speed_max_mps": 15.0, "gauge.acceleration_max_mps2": 3.0,
-            "obstacle.standoff_m": 5.0,
+            "obstacle.standoff_m": 5.0, "obstacle.half_width_m": 1.2, "obstacle.wheelbase_m": 2.62,
+            "obstacle.laser_ahead_m": 2.5,
         },
         "recording": {"state": "on", "for_s": 252.0},
         "decelerate": {"state": "not_available", "why": "not configured"},
@@ -154,7 +155,8 @@ def scan(number: int) -> bytes:
     beams = [_cast(math.radians(i - 90), i) for i in range(181)]
     scale = 81.0 / 65000
     codes = [0 if r is None else 65534 if r > 79 else round(r / scale) for r in beams]
-    header = struct.pack("<BBHIfffff", 0x53, 1, 181, number, 0.01, -math.pi / 2, math.radians(1), 81.0, scale)
+    degree = math.radians(1)
+    header = struct.pack("<BBHIHHffffbBH", 0x53, 2, 181, number, 10, 710, -math.pi / 2, degree, 81.0, 12.4, 0, 0, 87)
     return header + struct.pack(f"<{len(codes)}H", *codes)
 
 
@@ -252,6 +254,7 @@ class Canned:
                 number += 1
                 state = copy.deepcopy(self.state)
                 state["server"]["time_ms"] = _now_ms()
+                await socket.send_json({"kind": "offer", "seq": number, "of": ["state"]})
                 await socket.send_json(state)
                 if self._watching:
                     await socket.send_bytes(scan(number))

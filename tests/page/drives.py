@@ -17,6 +17,8 @@ TOPICS = {
     "speed": ("/catvehicle/vel", "geometry_msgs/msg/Twist", 20),
     "distance": ("/catvehicle/distanceEstimator/dist", "std_msgs/msg/Float32", 20),
     "bearing": ("/catvehicle/distanceEstimator/angle", "std_msgs/msg/Float32", 20),
+    "steering": ("/catvehicle/steering", "geometry_msgs/msg/Wrench", 20),
+    "scan": ("/catvehicle/front_laser_points", "sensor_msgs/msg/LaserScan", 20),
     "diagnostics": ("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 2),
 }
 
@@ -31,6 +33,43 @@ def twist(speed_mps: float) -> Any:
 
 def number(value: float) -> Any:
     return T["std_msgs/msg/Float32"](data=value)
+
+
+def steering(tyre_rad: float) -> Any:
+    """As the simulated car says it, for which a drive with these topics is taken: the tyres' angle, positive = left."""
+    return T["geometry_msgs/msg/Wrench"](
+        force=vector(0.0), torque=T["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=tyre_rad)
+    )
+
+
+def laser(at_s: float, ranges_m: Any, angle_min: float = -np.pi / 2, increment: float | None = None) -> Any:
+    """A scan `at_s` after the start; its beams stand evenly over half a turn from the right, unless told otherwise."""
+    ranges = np.asarray(ranges_m, dtype=np.float32)
+    step = np.pi / max(ranges.size - 1, 1) if increment is None else increment
+    sec, nanosec = divmod(BEGAN_NS + round(at_s * 1e9), 10**9)
+    stamp = T["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec)
+    return T["sensor_msgs/msg/LaserScan"](
+        header=T["std_msgs/msg/Header"](seq=0, stamp=stamp, frame_id="laser"),
+        angle_min=angle_min,
+        angle_max=angle_min + step * (ranges.size - 1),
+        angle_increment=step,
+        time_increment=0.0,
+        scan_time=0.0,
+        range_min=0.1,
+        range_max=81.0,
+        ranges=ranges,
+        intensities=np.empty(0, dtype=np.float32),
+    )
+
+
+def street(at_s: float, beams: int = 181, *, gap_m: float = 12.0) -> Any:
+    """Two walls 6 m aside, something 1 m wide `gap_m` ahead, one sector without a return, whatever the beams."""
+    angles = np.linspace(-np.pi / 2, np.pi / 2, beams)
+    with np.errstate(divide="ignore"):
+        ranges = np.minimum(6.0 / np.abs(np.sin(angles)), 60.0)
+    ranges[np.abs(gap_m * np.tan(angles)) < 0.5] = gap_m
+    ranges[(angles < -1.0) & (angles > -1.25)] = np.nan
+    return laser(at_s, ranges + 0.02 * np.sin(37 * angles + at_s))
 
 
 def diagnostics(*components: tuple[str, int, str]) -> Any:

@@ -1,34 +1,55 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, readScan } from '../../static/js/scan-frame.js';
-import { beamWords, namedSectors, nearestInCorridor, plotScale, pointsOf, ringsOf, sectorsOf } from '../../static/js/scan-layout.js';
+import { NOT_IN_VIEW, beamWords, behind, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan-layout.js';
+import { edgesOf, endOf } from '../../static/js/scan-corridor.js';
+import { beside, follow, nearestShown, nearestTo } from '../../static/js/scan-pick.js';
+import { ScanMark } from '../../static/js/scan-mark.js';
+
+const DEGREE = Math.PI / 180;
+const NOTHING_JUDGED = { tyre_angle_rad: 0, wider_m: 0, gap_m: null, beam: null, isBlind: false, stopping_m: null };
 
 /**
- * @param {number[]} codes
+ * @param {ArrayLike<number>} codes
  * @param {Partial<import('../../static/js/scan-frame.js').Scan>} [more]
  */
-const scan = (codes, more = {}) => ({ number: 1, age_s: 0, angle_min_rad: -Math.PI / 2, angle_increment_rad: Math.PI / 180, range_max_m: 81, scale_m: 0.01, codes: Uint16Array.from(codes), ...more });
+const scan = (codes, more = {}) => ({ number: 1, age_s: 0, angle_min_rad: -Math.PI / 2, angle_increment_rad: DEGREE, range_max_m: 81, scale_m: 0.01, judged: NOTHING_JUDGED, codes: Uint16Array.from(codes), ...more });
+
+/** @param {number} actual @param {number} wanted */
+const near = (actual, wanted, within = 1e-6) => assert.ok(Math.abs(actual - wanted) <= within, `${actual} is not ${wanted}`);
 
 /** @param {number[]} codes */
-function frame(codes, { magic = 0x53, version = 1, increment = Math.PI / 180, scale = 0.01, beams = codes.length } = {}) {
-  const bytes = new ArrayBuffer(28 + 2 * codes.length);
+function frame(codes, { magic = 0x53, version = 2, increment = DEGREE, range_max = 650, gap = 12.4, beam = 1, tyre = -10, stopping = 714, beams = codes.length } = {}) {
+  const bytes = new ArrayBuffer(32 + 2 * codes.length);
   const view = new DataView(bytes);
   view.setUint8(0, magic);
   view.setUint8(1, version);
   view.setUint16(2, beams, true);
   view.setUint32(4, 4_000_000_000, true);
-  [0.01, -Math.PI / 2, increment, 81, scale].forEach((value, i) => view.setFloat32(8 + 4 * i, value, true));
-  codes.forEach((code, i) => view.setUint16(28 + 2 * i, code, true));
+  view.setUint16(8, 10, true);
+  view.setUint16(10, stopping, true);
+  [-Math.PI / 2, increment, range_max, gap].forEach((value, i) => view.setFloat32(12 + 4 * i, value, true));
+  view.setInt8(28, tyre);
+  view.setUint8(29, 20);
+  view.setUint16(30, beam, true);
+  codes.forEach((code, i) => view.setUint16(32 + 2 * i, code, true));
   return bytes;
 }
 
 test('a frame is read as it is written', () => {
   const read = readScan(frame([0, 65535, 1234]));
-  assert.deepEqual([read?.number, read?.range_max_m, [...(read?.codes ?? [])]], [4_000_000_000, 81, [0, 65535, 1234]]);
+  assert.deepEqual([read?.number, read?.age_s, read?.range_max_m, read?.scale_m, [...(read?.codes ?? [])]], [4_000_000_000, 0.01, 650, 0.01, [0, 65535, 1234]]);
+  assert.deepEqual({ ...read?.judged, gap_m: Math.fround(12.4) }, { tyre_angle_rad: -0.05, wider_m: 0.2, gap_m: Math.fround(12.4), beam: 1, isBlind: false, stopping_m: 7.14 });
+});
+
+test('nothing in the corridor, a corridor not seen and a speed not known are three things', () => {
+  assert.deepEqual(readScan(frame([1, 2], { gap: 0, beam: 65535 }))?.judged, { tyre_angle_rad: -0.05, wider_m: 0.2, gap_m: null, beam: null, isBlind: false, stopping_m: 7.14 });
+  assert.deepEqual(readScan(frame([1, 2], { gap: 0, beam: 65534, stopping: 65535 }))?.judged, { tyre_angle_rad: -0.05, wider_m: 0.2, gap_m: null, beam: null, isBlind: true, stopping_m: null });
+  assert.equal(readScan(frame([1, 2], { beam: 2 }))?.judged.beam, null); // a beam there is not
 });
 
 test('what is no scan is refused', () => {
-  for (const bytes of [new ArrayBuffer(0), new ArrayBuffer(27), frame([1], { magic: 1 }), frame([1], { version: 2 }), frame([1], { beams: 2 }), frame([1], { scale: NaN }), frame([1], { increment: Infinity })]) {
+  for (const bytes of [new ArrayBuffer(0), new ArrayBuffer(31), frame([1], { magic: 1 }), frame([1], { version: 1 }), frame([1], { beams: 2 }), frame([1], { range_max: NaN }), frame([1], { gap: Infinity }), frame([1], { increment: Infinity })]) {
     assert.equal(readScan(bytes), null);
   }
   assert.notEqual(readScan(frame([])), null);
@@ -42,18 +63,6 @@ test('only beams with a range are drawn: nothing below range_min, nothing beyond
 test('a beam stands at angle_min + i·increment, also where the increment is negative', () => {
   const [x, y] = pointsOf(scan([0, 1000], { angle_min_rad: Math.PI / 2, angle_increment_rad: -Math.PI / 2 }), 20);
   assert.ok(Math.abs((x ?? 0) - 10) < 1e-5 && Math.abs(y ?? 1) < 1e-5);
-});
-
-test('the nearest in the corridor, not the nearest of all', () => {
-  const codes = Array(181).fill(NOTHING_IN_RANGE);
-  codes[0] = 300; // right beside the car
-  codes[90] = 1300;
-  codes[88] = 1240;
-  codes[80] = 900; // ahead, but 1.56 m to the right
-  const nearest = nearestInCorridor(scan(codes));
-  assert.ok(Math.abs((nearest?.range_m ?? 0) - 12.4) < 1e-9 && Math.abs((nearest?.bearing_rad ?? 0) + 0.0349) < 1e-3);
-  assert.equal(nearestInCorridor(scan(Array(181).fill(NO_RETURN))), null);
-  assert.equal(nearestInCorridor(scan([500], { angle_min_rad: Math.PI, angle_increment_rad: 0 })), null); // behind
 });
 
 test('neighbours that tell nothing make a sector by what they say; nothing in range is told, not hatched', () => {
@@ -74,9 +83,121 @@ test('the count of beams', () => {
 });
 
 test('the car stands at the foot, ahead is up, left is left', () => {
-  const { at, cx, cy } = plotScale(412, 470, 20);
+  const scale = plotScale(412, 470, 20);
+  const { at, cx, cy } = scale;
   assert.deepEqual(at(0, 0), [cx, cy]);
   assert.deepEqual(at(20, 0).map(Math.round), [206, 14]);
   assert.ok(at(0, 1)[0] < cx);
-  assert.deepEqual(ringsOf(20), [5, 10, 15, 20]);
+  const { x_m, y_m } = placeOf(scale, ...at(7, -3));
+  near(x_m, 7);
+  near(y_m, -3);
+  assert.ok(at(scale.far_m, 0)[1] < 0);
+});
+
+test('rings stand at round metres', () => {
+  assert.deepEqual([10, 20, 40, 80, 13.7, 4].map(ringsOf), [[2, 4, 6, 8, 10], [5, 10, 15, 20], [10, 20, 30, 40], [20, 40, 60, 80], [5, 10], [1, 2, 3, 4]]);
+});
+
+test('zoom halts at the ranges of the keys and ends where the plot ends', () => {
+  assert.deepEqual([zoomed(20, 1), zoomed(zoomed(20, 1), 1), zoomed(15, 1), zoomed(15, -1)].map((one) => Math.round(one * 10) / 10), [14.1, 10, 10.6, 20]);
+  assert.deepEqual([zoomed(4, 1), zoomed(120, -1), reachWithin(1e9), reachWithin(NaN), reachWithin(-3)], [4, 120, 120, 20, 4]);
+  assert.deepEqual([pinched(20, 100, 200), pinched(20, 200, 100), pinched(20, 0, 0), pinched(20, 1e9, 1)], [10, 40, 20, 120]);
+});
+
+test('what no beam looks at is not in view, whichever way the laser counts', () => {
+  const words = (/** @type {any} */ one) => unseenOf(one).map(({ from_rad, to_rad, code }) => [Math.round((10 * from_rad) / DEGREE) / 10, Math.round((10 * to_rad) / DEGREE) / 10, code]);
+  assert.deepEqual(words(scan(Array(181).fill(500))), []); // ±90°
+  assert.deepEqual(words(scan(Array(180).fill(500), { angle_min_rad: -89.5 * DEGREE })), []); // its other half
+  assert.deepEqual(words(scan(Array(360).fill(500), { angle_min_rad: 0 })), []); // all round from the front
+  assert.deepEqual(words(scan(Array(61).fill(500), { angle_min_rad: -30 * DEGREE })), [[-90, -30.5, NOT_IN_VIEW], [30.5, 90, NOT_IN_VIEW]]);
+  assert.deepEqual(words(scan([])), [[-90, 90, NOT_IN_VIEW]]);
+  assert.deepEqual(words(scan(Array(91).fill(500), { angle_min_rad: 135 * DEGREE })), [[-90, 90, NOT_IN_VIEW]]); // it looks back
+  assert.equal(unseenOf(scan([500], { angle_min_rad: 0, angle_increment_rad: 0 })).length, 2); // one beam without a width
+  assert.deepEqual(words(scan(Array(61).fill(500), { angle_min_rad: 30 * DEGREE, angle_increment_rad: -DEGREE })), words(scan(Array(61).fill(500), { angle_min_rad: -30 * DEGREE })));
+});
+
+test('a laser that looks back says how much of it is not drawn', () => {
+  const back = scan(Array(91).fill(500), { angle_min_rad: 135 * DEGREE });
+  assert.equal(behind(back), 91);
+  assert.equal(beamWords(back), '91 of 91 beams usable · 91 behind, not drawn');
+});
+
+test('the sectors in words, widest first', () => {
+  const codes = Array.from({ length: 91 }, (_, i) => (i >= 5 && i < 10 ? TOO_CLOSE : i >= 40 && i < 50 ? NO_RETURN : i === 70 ? INVALID : 500));
+  assert.deepEqual(sectorSentences(sectorsOf(scan(codes, { angle_increment_rad: 2 * DEGREE })), 4), ['no return from 9° left to 11° right', 'too close from 71° right to 81° right']);
+});
+
+test('10 000 beams are drawn once a pixel, 1440 all', () => {
+  const wall = scan(Array(10_000).fill(500), { angle_increment_rad: Math.PI / 10_000 });
+  assert.ok(pointsOf(wall, 20, 1 / 22).length / 2 < 1000);
+  assert.equal(pointsOf(scan(Array(1440).fill(500), { angle_increment_rad: Math.PI / 1440 }), 20, 1 / 22).length / 2, 1440);
+});
+
+const CAR = { half_width_m: 1.2, wheelbase_m: 2.62, laser_ahead_m: 2.5, tyre_angle_rad: 0 };
+
+test('a straight corridor', () => {
+  assert.deepEqual(edgesOf(CAR, 0, 7), { left: [[0, 1.2], [7, 1.2]], right: [[0, -1.2], [7, -1.2]] });
+  assert.equal(endOf(CAR, 20), 20);
+});
+
+for (const angle of [0.2, -0.2, 0.6, -0.6, 0.001]) {
+  test(`a corridor bent by ${angle} rad lies on the circles of the obstacle check`, () => {
+    const bent = { ...CAR, tyre_angle_rad: angle };
+    const centre = CAR.wheelbase_m / Math.tan(angle);
+    const [rear, nose] = [Math.abs(centre), Math.hypot(CAR.laser_ahead_m, centre)];
+    const { left, right } = edgesOf(bent, 0, endOf(bent, 20));
+    const [inner, outer] = angle > 0 ? [left, right] : [right, left];
+    for (const [x, y] of inner) near(Math.hypot(x + CAR.laser_ahead_m, y - centre), Math.max(0, rear - CAR.half_width_m), 1e-6 * nose);
+    for (const [x, y] of outer) near(Math.hypot(x + CAR.laser_ahead_m, y - centre), nose + CAR.half_width_m, 1e-6 * nose);
+    // The nose itself is where the way begins; the strip turns to the side the wheels do.
+    const [a, b] = [left[0] ?? [0, 0], right[0] ?? [0, 0]];
+    assert.ok(a[1] > b[1]);
+    const end = outer.at(-1) ?? [0, 0];
+    assert.ok(Math.abs(angle) < 0.01 || Math.sign(end[1]) === Math.sign(angle));
+  });
+}
+
+const ROOM = scan(Array.from({ length: 181 }, (_, i) => (i === 90 ? 830 : i === 76 ? 1240 : i === 60 ? NO_RETURN : 2500)));
+
+test('a touch means the nearest return within a thumb, or none', () => {
+  near(nearestTo(ROOM, 8.0, 0.2, 1)?.range_m ?? 0, 8.3);
+  assert.equal(nearestTo(ROOM, 4, 0, 1), null);
+  assert.equal(nearestTo(scan([]), 0, 0, 1e9), null);
+  assert.equal(nearestTo(scan([NO_RETURN, TOO_CLOSE, INVALID, NOTHING_IN_RANGE]), 0, 0, 1e9), null);
+});
+
+test('a marked return is followed as it moves, and lost when it jumps away', () => {
+  const one = nearestTo(ROOM, 8.3, 0, 0.5);
+  assert.ok(one);
+  near(follow(scan(ROOM.codes.map((code, i) => (i === 90 ? 775 : code))), one)?.range_m ?? 0, 7.75);
+  assert.equal(follow(scan(ROOM.codes.map((code, i) => (i === 90 ? 400 : code))), one), null);
+});
+
+test('the arrow keys begin at the nearest and step from return to return', () => {
+  const first = nearestShown(ROOM, 20);
+  assert.equal(first?.beam, 90);
+  assert.ok(first);
+  assert.equal(beside(ROOM, first, -1, 20)?.beam, 76); // to the right; what lies beyond the plot is passed over
+  assert.equal(beside(ROOM, first, 1, 20)?.beam, 90); // nothing farther left within 20 m
+  assert.equal(beside(ROOM, first, 1, 40)?.beam, 92);
+  assert.equal(nearestShown(scan([500], { angle_min_rad: Math.PI, angle_increment_rad: 0 }), 20), null); // behind
+});
+
+test('a mark stays through a gap of a second, then it is let go; touched again it is taken away', () => {
+  const mark = new ScanMark();
+  mark.touch(ROOM, 8.3, 0, 1, 0);
+  assert.equal(mark.words, '8.3 m, straight ahead');
+  assert.equal(mark.hear(scan([]), 900), true);
+  assert.equal(mark.isSeen, false);
+  assert.equal(mark.hear(ROOM, 950), true);
+  assert.equal(mark.isSeen, true);
+  assert.equal(mark.hear(scan([]), 1960), false);
+  assert.equal(mark.words, '');
+  mark.touch(ROOM, 8.3, 0, 1, 0);
+  mark.touch(ROOM, 8.3, 0, 1, 0);
+  assert.equal(mark.at, null);
+  mark.step(ROOM, -1, 20, 0);
+  assert.equal(mark.at === null ? null : mark.words, '8.3 m, straight ahead');
+  mark.step(ROOM, -1, 20, 0);
+  assert.equal(mark.words, '12.4 m, 14° right');
 });

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections.abc import AsyncIterator
 from pathlib import Path
 
+import httpx
 import numpy as np
+import pytest
+import pytest_asyncio
+from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import expect
 
+from tests.page import drives
 from tests.page.conftest import Phone
 from tests.page.processes import replay, running, server, simulate
+from tests.page.test_tabs import in_front, swipe
 
 # Counts what one drawing puts on the plot: every square is a return.
 LISTEN = """() => {
@@ -27,6 +34,26 @@ LISTEN = """() => {
     return begin.apply(this, all);
   };
 }"""
+
+# The corridor's edges beyond the stopping distance are the only dashed lines: the points of the newest drawing.
+LINES = """() => {
+  let points = [];
+  const prototype = CanvasRenderingContext2D.prototype;
+  for (const name of ['moveTo', 'lineTo']) {
+    const kept = prototype[name];
+    prototype[name] = function (x, y) {
+      if (this.getLineDash()[0] === 7) points.push([x, y]);
+      return kept.call(this, x, y);
+    };
+  }
+  const begin = prototype.drawImage;
+  prototype.drawImage = function (...all) {
+    if (points.length) window.dashed = points;
+    points = [];
+    return begin.apply(this, all);
+  };
+}"""
+PICTURE = "() => document.querySelector('.scanc').toDataURL()"
 
 
 async def test_681_beams_of_a_real_laser_with_those_below_range_min_not_drawn(
@@ -93,11 +120,214 @@ async def test_the_scan_is_sent_only_while_its_tab_is_in_front(phone: Phone, tmp
         assert scans == []
 
 
-async def test_a_laser_that_falls_silent_is_hatched_over(phone: Phone, tmp_path: Path) -> None:
+async def test_case_05_no_scan_being_published_the_boundary_scan_graph_does_not_change(
+    phone: Phone, tmp_path: Path
+) -> None:
+    """Frozen as it was, hatched over, with its age: never shown as live. It goes on by itself."""
     async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
         await phone.open(f"{watch.address}/#scan")
         await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
         await expect(phone.f("none", "#panel-scan")).to_be_hidden()
-        await car.type("silent-scan 60")
-        await expect(phone.f("none-words", "#panel-scan")).to_have_text(re.compile(r"STALE \d"))
-        await expect(phone.f("distance", "#panel-scan")).to_have_text("–")
+        await car.type("silent-scan 5")
+        stale = phone.f("none-words", "#panel-scan")
+        await expect(stale).to_have_text(re.compile(r"STALE \d"))
+        for name in ("distance", "bearing", "stops"):
+            await expect(phone.f(name, "#panel-scan")).to_have_text("–")
+        before, first = await phone.page.evaluate(PICTURE), await stale.text_content()
+        await phone.page.wait_for_timeout(900)
+        assert await phone.page.evaluate(PICTURE) == before
+        assert age(await stale.text_content()) > age(first)
+        assert await phone.page.locator(".scanc").get_attribute("aria-label") != ""
+        await expect(phone.page.locator(".scanc")).to_have_attribute("aria-label", re.compile("STALE"))
+        await phone.f("aim", "#panel-scan").tap(position={"x": 150, "y": 200})
+        await expect(phone.f("marked", "#panel-scan")).to_be_hidden()  # nothing is read off a dead picture
+        await expect(phone.f("none", "#panel-scan")).to_be_hidden(timeout=12_000)
+        await phone.page.wait_for_function(f"before => ({PICTURE})() !== before", arg=before)
+
+
+async def test_two_fingers_zoom_the_plot_and_leave_the_tab_where_it_is(phone: Phone, tmp_path: Path) -> None:
+    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
+        await phone.open(f"{watch.address}/#scan")
+        await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
+        await phone.acknowledge_all()
+        twenty = phone.page.locator("[data-range='20']")
+        await twenty.tap()
+        await expect(twenty).to_have_attribute("aria-pressed", "true")
+        await fingers(phone, [(206, 250, 206, 200), (206, 350, 206, 400)])  # 100 px apart, then 200
+        assert await reach(phone) == pytest.approx(10.0, rel=0.15)
+        await expect(twenty).to_have_attribute("aria-pressed", "false")
+        await in_front(phone, "scan")
+        await fingers(phone, [(100, 300, 150, 300), (320, 300, 260, 300)])  # across, where a swipe would go
+        assert await reach(phone) == pytest.approx(20.0, rel=0.3)
+        await in_front(phone, "scan")
+        await swipe(phone, -250)
+        await in_front(phone, "files")
+        await swipe(phone, 250)
+        await in_front(phone, "scan")
+        ten = phone.page.locator("[data-range='10']")
+        await ten.tap()
+        await phone.f("farther", "#panel-scan").tap()
+        assert await reach(phone) == pytest.approx(14.1, abs=0.1)
+        await phone.f("farther", "#panel-scan").tap()
+        await expect(twenty).to_have_attribute("aria-pressed", "true")
+        await phone.f("aim", "#panel-scan").focus()
+        await phone.page.keyboard.press("+")
+        await phone.page.keyboard.press("+")
+        await expect(ten).to_have_attribute("aria-pressed", "true")
+        await phone.page.keyboard.press("-")
+        await phone.page.reload()
+        await phone.live()
+        assert await reach(phone) == pytest.approx(14.1, abs=0.1)  # remembered
+
+
+@pytest_asyncio.fixture(loop_scope="module", scope="module")
+async def street(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[str]:
+    """A server that watches a car at 4.2 m/s in a street, its wheels turned to the left, something 12 m ahead."""
+    data = tmp_path_factory.mktemp("street")
+    drive = drives.write(
+        data / "street.bag",
+        {
+            "speed": lambda t: drives.twist(4.2 + 0.001 * np.sin(9 * t)),
+            "steering": lambda _: drives.steering(0.08),
+            "scan": lambda t: drives.street(t, 1440),
+        },
+        seconds=60.0,
+    )
+    async with running(*replay(drive)) as car, running(*server(data, car.address)) as watch:
+        yield watch.address
+
+
+async def test_a_tapped_return_is_told_in_words_and_stays_until_tapped_away(phone: Phone, street: str) -> None:
+    await phone.open(f"{street}/#scan")
+    await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile("of 1440"), timeout=12_000)
+    await phone.page.locator("[data-range='20']").tap()
+    aim, marked = phone.f("aim", "#panel-scan"), phone.f("marked", "#panel-scan")
+    # The wall stands 6 m to the left; touched beside it, a thumb's width away.
+    height = (await aim.bounding_box())["height"]
+    scale = (height - 34 - 14) / 20
+    place = {"x": 206 - 6 * scale + 15, "y": height - 34 - 6 * scale}
+    await aim.tap(position=place)
+    await expect(marked).to_have_text(re.compile(r"Marked: \d\.\d m, 4\d° left, 0\.\d\d s ago"))
+    said = await phone.f("said", "#panel-scan").text_content()
+    assert 7.5 < float(re.match(r"[\d.]+", said)[0]) < 9.5  # type: ignore[index]
+    await phone.page.wait_for_timeout(700)
+    await expect(marked).to_be_visible()  # it is followed from scan to scan
+    assert await phone.f("said", "#panel-scan").text_content() == said  # and told once
+    await aim.tap(position={"x": 206 + 60, "y": height - 34 - 9 * scale})  # where nothing is
+    await expect(marked).to_be_hidden()
+    await aim.focus()
+    await phone.page.keyboard.press("Enter")
+    await expect(aim).to_have_attribute("aria-valuetext", re.compile(r"6\.\d m, [89]\d° (left|right)"))
+    await phone.page.keyboard.press("ArrowRight")
+    first = await aim.get_attribute("aria-valuetext")
+    await phone.page.keyboard.press("ArrowRight")
+    assert await aim.get_attribute("aria-valuetext") != first
+    await in_front(phone, "scan")  # the arrows were the plot's
+    await phone.page.keyboard.press("Escape")
+    await expect(marked).to_be_hidden()
+    await expect(aim).to_have_attribute("aria-valuetext", "no return marked")
+
+
+async def test_corridor_gap_and_stopping_distance_are_those_of_the_judge(phone: Phone, street: str) -> None:
+    await phone.page.add_init_script(f"({LINES})()")
+    await phone.open(f"{street}/#scan")
+    await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile("of 1440"), timeout=12_000)
+    await expect(phone.f("stops", "#panel-scan")).to_have_text("7.1")  # 4.2·1 + 4.2²/6
+    async with httpx.AsyncClient() as client:
+        state = (await client.get(f"{street}/api/state")).json()
+    (obstacle,) = [one for one in state["checks"] if one["label"] == "Obstacle"]
+    gap = re.search(r"([\d.]+) m", obstacle["text"])
+    shown = float(await phone.f("distance", "#panel-scan").text_content())
+    assert gap is not None
+    assert shown == pytest.approx(float(gap[1]), abs=0.1)  # a scan later
+    # The strip turns about a centre 2.62 / tan(0.08) m to the left of the rear axle, 2.5 m behind the laser.
+    await phone.page.wait_for_function("window.dashed?.length > 10")
+    lines, height = await phone.page.evaluate("[window.dashed, document.querySelector('.scanc').clientHeight]")
+    scale = (height - 34 - 14) / 20
+    x_m, y_m = (height - 34 - np.array(lines)[:, 1]) / scale, (206 - np.array(lines)[:, 0]) / scale
+    centre_m = 2.62 / np.tan(0.08)
+    radius_m = np.hypot(x_m + 2.5, y_m - centre_m)
+    inner, outer = centre_m - 1.2, np.hypot(2.5, centre_m) + 1.2
+    assert np.minimum(np.abs(radius_m - inner), np.abs(radius_m - outer)).max() < 0.05
+    await expect(phone.f("straight", "#panel-scan")).to_be_hidden()
+    await expect(phone.page.locator("#scan-told")).to_have_text(re.compile(r"invalid from \d+° right to \d+° right"))
+
+
+ODD = {
+    "one beam": lambda t: drives.laser(t, [5.0 + 0.1 * np.sin(t)], angle_min=0.0, increment=0.0),
+    "no beams": lambda t: drives.laser(t, []),
+    "10 000 beams": lambda t: drives.street(t, 10_000),
+    "clockwise": lambda t: drives.laser(t, 7.0 + 0.1 * np.sin(np.arange(181) + t), np.pi / 2, -np.pi / 180),
+    "backwards": lambda t: drives.laser(t, 7.0 + 0.1 * np.sin(np.arange(91) + t), 0.75 * np.pi, np.pi / 180),
+    "blind": lambda t: drives.laser(t, np.full(181, np.nan)),
+    "narrow": lambda t: drives.laser(t, 7.0 + 0.1 * np.sin(np.arange(61) + t), -np.pi / 6, np.pi / 180),
+}
+SAYS = {
+    "one beam": ("none", "1 of 1 beams", "not in view"),
+    "no beams": ("none", "0 of 0 beams", "not in view"),
+    "10 000 beams": ("12.0", "of 10000 beams", "invalid"),
+    "clockwise": ("6.", "181 of 181 beams", ""),
+    "backwards": ("none", "91 behind, not drawn", "not in view"),
+    "blind": ("blind", "0 of 181 beams", "invalid"),
+    "narrow": ("6.", "61 of 61 beams", "not in view from 30° left to 90° left"),
+}
+
+
+@pytest.mark.parametrize("odd", ODD)
+async def test_no_scan_is_too_odd(phone: Phone, tmp_path: Path, odd: str) -> None:
+    """Whatever a laser says, the page draws it or says why not, and its console stays clean."""
+    says = {"speed": lambda t: drives.twist(1.0 + 0.001 * np.sin(9 * t)), "scan": ODD[odd]}
+    drive = drives.write(tmp_path / "odd.bag", says, seconds=4.0)
+    async with running(*replay(drive)) as car, running(*server(tmp_path, car.address)) as watch:
+        await phone.open(f"{watch.address}/#scan")
+        distance, beams, told = SAYS[odd]
+        await expect(phone.f("beams", "#panel-scan")).to_contain_text(beams, timeout=12_000)
+        await phone.acknowledge_all()
+        await expect(phone.f("distance", "#panel-scan")).to_contain_text(distance)
+        await expect(phone.page.locator("#scan-told")).to_contain_text(told)
+        await expect(phone.f("straight", "#panel-scan")).to_be_visible()
+        await phone.f("aim", "#panel-scan").tap(position={"x": 206, "y": 100})
+        await phone.f("aim", "#panel-scan").focus()
+        for key in ("Enter", "ArrowLeft", "ArrowRight", "+", "-", "Escape"):
+            await phone.page.keyboard.press(key)
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+async def test_the_tab_has_no_barrier(phone: Phone, street: str, scheme: str) -> None:
+    await phone.page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+    await phone.open(f"{street}/#scan")
+    await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile("of 1440"), timeout=12_000)
+    found = await Axe().run(phone.page, context="#panel-scan")
+    assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in found.response["violations"]] == []
+    for key in ("nearer", "farther"):
+        box = await phone.f(key, "#panel-scan").bounding_box()
+        assert min(box["width"], box["height"]) >= 56
+
+
+def age(words: str | None) -> float:
+    found = re.search(r"[\d.]+", words or "")
+    assert found is not None
+    return float(found[0])
+
+
+async def reach(phone: Phone) -> float:
+    return float(await phone.page.evaluate("localStorage.getItem('catgraph.range')"))
+
+
+async def fingers(phone: Phone, ways: list[tuple[float, float, float, float]]) -> None:
+    """Fingers that touch the plot together and move together, from x, y to x, y on the screen."""
+    cdp = await phone.page.context.new_cdp_session(phone.page)
+
+    def points(part: float) -> list[dict[str, float]]:
+        return [
+            {"x": x + (to_x - x) * part, "y": y + (to_y - y) * part, "id": i}
+            for i, (x, y, to_x, to_y) in enumerate(ways)
+        ]
+
+    await cdp.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": points(0)[:1]})
+    await cdp.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": points(0)})
+    for step in range(11):
+        await cdp.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": points(step / 10)})
+        await asyncio.sleep(0.016)
+    await cdp.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    await cdp.detach()

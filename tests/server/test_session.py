@@ -13,6 +13,7 @@ import pytest
 
 from server.bridge.server import RosBridge
 from server.config import Config, Vehicle
+from tests.server import scan_frames
 from tests.server.cars import driving, scan, twist
 from tests.server.conftest import serving
 from tests.server.viewer import viewer
@@ -138,8 +139,8 @@ async def test_beams_below_range_min_are_no_returns(bridge: RosBridge, server: s
             bridge.publish("/scan", scan(ranges, range_min=0.1))
             await asyncio.sleep(0.02)
         await one.until(lambda: one.scans)
-        codes = np.frombuffer(one.scans[-1][28:], dtype="<u2")
-        scale = np.frombuffer(one.scans[-1][24:28], dtype="<f4")[0]
+        frame = scan_frames.read(one.scans[-1])
+        codes, scale = frame.codes, frame.scale_m
         assert list(codes[[0, 2, 3, 4, 6]]) == [65535, 65533, 65534, 65534, 65535]
         assert np.allclose(codes[[1, 5]] * scale, [5.0, 10.0], atol=2e-3)
         state = await one.state(lambda s: s["signals"]["scan"]["value"])

@@ -1,0 +1,41 @@
+"""What the obstacle check looks at: the strip ahead as the car is steered now, and what the laser sees in it."""
+
+from __future__ import annotations
+
+import math
+
+from monitor.corridor import TYRE_RAD_A_PERCENT, Corridor, Sight, look
+from monitor.instruments import ObstacleLimits
+from monitor.state import Snapshot
+from monitor.values import LaserScan
+
+BLIND_AT_M = 5.0  # where the beams of the corridor are counted
+BLIND_SHARE = 0.9  # of them without a return: nothing can be said
+ANGLE_STEP_RAD = 0.005  # 10 cm aside at 10 m: what was reckoned for a bend serves the next scan too
+WIDEST_TYRE_RAD = 0.6  # no car turns its wheels farther
+ASIDE_DEADBAND_M = 0.2  # what stands at the corridor's very edge is in the way until it is so far out of it
+
+
+def corridor_ahead(snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bool = False) -> Corridor:
+    """Bent by the newest steering; straight where that is not known or too old. Wider while an obstacle is alarmed."""
+    steering = snapshot.get("steering")
+    angle_rad = 0.0
+    if steering is not None and steering.is_fresh(snapshot.now_s) and math.isfinite(steering.value.percent):
+        angle_rad = max(-WIDEST_TYRE_RAD, min(WIDEST_TYRE_RAD, steering.value.percent * TYRE_RAD_A_PERCENT))
+        angle_rad = round(angle_rad / ANGLE_STEP_RAD) * ANGLE_STEP_RAD
+    return Corridor(
+        half_width_m=limits.half_width_m + (ASIDE_DEADBAND_M if was_active else 0.0),
+        wheelbase_m=limits.wheelbase_m,
+        laser_ahead_m=limits.laser_ahead_m,
+        tyre_angle_rad=angle_rad,
+    )
+
+
+def look_ahead(scan: LaserScan, corridor: Corridor) -> Sight:
+    """What the scan shows of the corridor; blind beams are counted where it is BLIND_AT_M long."""
+    return look(scan, corridor, BLIND_AT_M)
+
+
+def is_blind(sight: Sight) -> bool:
+    """So few beams of the corridor measured anything that neither an obstacle nor its absence can be told."""
+    return sight.beams > 0 and sight.blind > BLIND_SHARE * sight.beams
