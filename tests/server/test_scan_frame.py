@@ -88,14 +88,15 @@ def test_what_is_too_old_does_not_bend_the_corridor_nor_stop_the_car() -> None:
     assert (judged.tyre_angle_rad, judged.stopping_m) == (0.0, None)
 
 
-@pytest.mark.parametrize(("was_active", "gap_m"), [(False, 0.0), (True, 8.0)])
+@pytest.mark.parametrize(("was_active", "gap_m"), [(False, 80.0), (True, 8.0)])
 def test_while_an_obstacle_is_alarmed_the_corridor_is_wider_as_the_judge_has_it(was_active: bool, gap_m: float) -> None:
     snapshot = seen(sweep([(8.0, 1.6, 0.3)], beams=721, nothing=80.0))
     frame = sent(snapshot, was_active=was_active)
     finding = ask("obstacle", snapshot, was_active=was_active)
     assert frame.gap_m == pytest.approx(gap_m, abs=0.2)
     assert frame.wider_m == (0.2 if was_active else 0.0)
-    assert (finding.measured is not None) == was_active
+    assert finding.measured is not None
+    assert finding.measured.value == pytest.approx(frame.gap_m, rel=1e-6)
 
 
 def test_nothing_in_the_corridor_and_a_corridor_not_seen_are_two_things() -> None:
