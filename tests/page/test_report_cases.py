@@ -132,4 +132,4 @@ async def test_case_09_and_19_and_20_an_obstacle_on_each_of_the_five_tabs(
 async def test_case_15_and_16_an_errant_gps_on_each_of_the_five_tabs(
     browser: Browser, drive: tuple[Process, Process]
 ) -> None:
-    await dialog_on_each_tab(browser, drive, "gps-drift 60", "GPS drift at standstill", r"m from where it stopped")
+    await dialog_on_each_tab(browser, drive, "gps-drift 60", "GPS drift at standstill", r"Do not trust the position")
