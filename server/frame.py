@@ -12,6 +12,7 @@ from monitor.load import AlarmLoad
 from monitor.runner import Monitor
 from monitor.signals import SIGNALS, Signal
 from monitor.state import Reading, Snapshot
+from monitor.trends import Piece
 from server import phone, problems, wire
 from server.address import Address
 from server.link import RosLink
@@ -57,6 +58,7 @@ class Facts:
     reception: Reception
     sources: Mapping[str, Source]
     topics_heard: int
+    trends: Piece
     track_number: int  # of this run of the server; another number is another track
 
 
@@ -74,6 +76,7 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str,
         "alarms": [wire.alarm(alarm, facts.now_s, facts.wall_ms) for alarm in monitor.standing()],
         "alarm_load": wire.load(facts.load, monitor.alarms),
         "log_trouble": facts.log_trouble,
+        "trends": wire.trends(facts.trends),
         "limits": catalog.flat(monitor.limits),
         "recording": {"state": "off", "for_s": None},
         "decelerate": {"state": "not_available", "why": "not configured"},

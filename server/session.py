@@ -14,7 +14,8 @@ from monitor.load import AlarmLoad, RecentLoad
 from monitor.runner import Monitor, Refused, Transition
 from monitor.signal_limits import expected_rates
 from monitor.state import LinkFacts, Phase, State
-from server import address, answers, commands, judging, label, past, phone, problems
+from monitor.trends import Trends
+from server import address, answers, commands, judging, label, past, phone, problems, wire
 from server.address import BadAddress
 from server.bus import LocalBus
 from server.config import Vehicle
@@ -36,6 +37,7 @@ SAVE_AGAIN_S = 1.0  # the log is asked so often whether it is kept
 READ_UP_S = 0.1  # to read what waits after the loop stood still
 TELL_STALL_S = 2.0  # a page that was covered for so long is told why
 SICK_LOOP_S = 0.25  # a loop later than this lets one heartbeat fall: a sign of life from a sick server is a lie
+TRENDS_A_FRAME = 4  # steps of the trends in each state: so many frames in a row may be lost without a gap
 PROOF_WITHIN_S = 4.0  # something that speaks WebSocket and no rosbridge is told apart by then
 BRIDGE_SILENT_S = 1.4  # the bridge answers a ping every 0.5 s
 
@@ -96,6 +98,7 @@ class Session:
         self._state = State(expected_rates(self._tuning.limits))
         self._track_number += 1  # with the state begins another track
         self._scans = ScanFeed(self.vehicle.name, self._bus)
+        self._trends = Trends(self._now())
         self._conversation = self._begin(None)
 
     def _begin(self, link: RosLink | None) -> Conversation:
@@ -263,6 +266,8 @@ class Session:
             return answers.signals(self._conversation.unmapped, self._reception, self._conversation.offered)
         if message.get("kind") == "settings":
             return self._tuning.as_json() | {"toml": self._tuning.as_toml()}
+        if message.get("kind") == "trends":
+            return wire.trends(self._trends.piece(self._now(), after=message.get("after")))
         if message.get("kind") == "track":
             return answers.track(self._state.snapshot(self._now()))
         if message.get("kind") == "track_points":
@@ -444,6 +449,7 @@ class Session:
         )
         if changed:
             self._judge(now_s, changed)
+            self._trends.hear(changed, self._state, now_s)
         if "scan" in changed:
             self._scans.count()
             if self._scans.is_due(now_s):
@@ -565,6 +571,7 @@ class Session:
             reception=self._reception,
             sources=self._conversation.sources,
             topics_heard=len(self._heard),
+            trends=self._trends.piece(now_s, at_most=TRENDS_A_FRAME),
             track_number=self._track_number,
         )
         return state_frame(facts, self._state.snapshot(now_s), self._monitor)

@@ -18,6 +18,7 @@ from monitor.check import Quantity
 from monitor.load import AlarmLoad
 from monitor.runner import Tile
 from monitor.scan import usable
+from monitor.trends import STEP_S, Piece
 
 SCAN_MAGIC = 0x53
 SCAN_VERSION = 2
@@ -208,6 +209,25 @@ def load(load: AlarmLoad, alarms: Mapping[str, Alarm]) -> dict[str, Any]:
     """What the alarms ask of the operator now."""
     titles = [alarms[name].spec.title for name in load.chattering if name in alarms]
     return {"in_10_min": load.in_10_min, "flood": load.is_flood, "bearable": load.is_bearable, "chattering": titles}
+
+
+def trends(piece: Piece) -> dict[str, Any]:
+    """Steps of the last minute: of each signal its lowest and highest in a step, "none" or null."""
+
+    def ends(which: int) -> dict[str, list[float | str | None]]:
+        return {
+            name: [plain(row[which], 3) if isinstance(row, tuple) else row for row in rows]
+            for name, rows in piece.rows.items()
+        }
+
+    return {
+        "step_s": STEP_S,
+        "since": piece.since,
+        "first": piece.first,
+        "now": round(piece.now, 2),
+        "lowest": ends(0),
+        "highest": ends(1),
+    }
 
 
 def event(

@@ -121,6 +121,15 @@ async def track_points(
     return _json(await ask(request, vehicle, {"kind": "track_points", "after": after}))
 
 
+@router.get("/api/trends", tags=["vehicle"], summary="The last minute of speed, pedals, steering and distance")
+async def trends(
+    request: Request,
+    vehicle: VehicleName = None,
+    after: Annotated[int | None, Query(ge=0, le=2**53, description="Only the steps after this one")] = None,
+) -> Response:
+    return _json(await ask(request, vehicle, {"kind": "trends", "after": after}))
+
+
 @router.get("/api/events", tags=["alarms"], summary="The numbered log of what happened, oldest first")
 async def events(
     request: Request,

@@ -108,11 +108,15 @@
  * @property {Alarm[]} alarms
  * @property {AlarmLoad} [alarm_load]
  * @property {string | null} [log_trouble] why the log is not kept on the server's disk
+ * @property {Trends} [trends]
  * @property {Record<string, number>} limits
  * @property {{state: string, for_s: number | null}} recording
  * @property {{state: string, why: string | null}} decelerate
  * @property {{holder: string | null}} control
  * @property {PhoneShown | null} [phone] the operator's phone that is compared with the car
+ *
+ * @typedef {number | 'none' | null} Step none: messages came and had no number to give; null: none came
+ * @typedef {{step_s: number, since: number, first: number, now: number, lowest: Record<string, Step[]>, highest: Record<string, Step[]>}} Trends
  *
  * @typedef {object} PhoneShown
  * @property {string} id
