@@ -11,6 +11,7 @@ from monitor.state import Reading, Snapshot
 OVERDUE_PERIODS = 3
 OVERDUE_S = 0.3  # later than this nothing of Wi-Fi's usual bunching explains
 FAST_HORIZON_S = 2.0  # signals that would be missed within the 2 s in which silence is to be named
+FALTERS_AT = 0.5  # of its horizon: a silence that was told is over when no gap comes near another
 CROWD = 3  # so many fast signals do not die at one moment by themselves
 BRIDGE_WITHIN_S = 2.6  # a half-open link is found within 2.5 s: then it has been called lost, or the bridge is alive
 
@@ -23,6 +24,7 @@ class Silence:
     fresh: int  # of those, the ones still fresh
     is_quiet: bool  # nothing where several things ought to have come: too early to blame one signal
     is_silent: bool  # all that comes fast is stale at once
+    falters: bool  # nothing fast for half as long: after a silence it is not over yet
     silent_s: float  # since the newest fast message
     is_bridge_proved: bool  # the bridge has been heard from since
 
@@ -53,6 +55,7 @@ def silence(snapshot: Snapshot) -> Silence | None:
         fresh=fresh,
         is_quiet=all_overdue and (len(fast) >= CROWD or now_s - newest_of_all_s > margin_s),
         is_silent=not any(reading.is_fresh(now_s) for reading in fast) and (len(fast) >= CROWD or nothing_since),
+        falters=all(now_s - reading.received_s > FALTERS_AT * reading.horizon_s for reading in fast),
         silent_s=max(0.0, now_s - newest_s),
         is_bridge_proved=bridge_s - newest_s > margin_s,
     )

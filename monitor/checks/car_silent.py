@@ -28,12 +28,17 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     found = silence(snapshot)
     if found is None:
         return unknown("Nothing received since connecting", short="no data")
-    if not found.is_silent:
+    if not found.is_silent and not (was_active and found.falters):
         return ok(f"{found.fresh} of {found.heard} signals are fresh")
     if not (found.is_bridge_proved or was_active or found.silent_s > BRIDGE_WITHIN_S):
         # Car or link? Wait for the bridge's next sign of life: a lost link has its own words.
         return unknown(f"No message for {found.silent_s:.1f} s, asking the bridge", short="silent")
-    proof = "the bridge answers, the car says nothing" if found.is_bridge_proved else "neither car nor bridge answers"
+    if not found.is_silent:
+        proof = "messages come with gaps"
+    elif found.is_bridge_proved:
+        proof = "the bridge answers, the car says nothing"
+    else:
+        proof = "neither car nor bridge answers"
     return fault(
         f"No message for {found.silent_s:.1f} s: {proof}",
         brief=f"{found.silent_s:.0f} s",

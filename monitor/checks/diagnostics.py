@@ -74,7 +74,7 @@ def _check(id: str, label: str, title: str, levels: Collection[int], priority: P
             place=Place.SNACKBAR if is_warning else Place.LIST,
             sound=Sound.MEDIUM if is_warning else Sound.LOW,
             needs_ack=is_warning,
-            off_delay_s=3.0,  # three reports of a 1 Hz publisher
+            off_delay_s=10.0,  # ten reports of a 1 Hz publisher: a part at its own limit comes and goes
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
             advice="The car says so of itself: look at the component named.",
         ),

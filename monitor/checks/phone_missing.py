@@ -23,7 +23,7 @@ from monitor.check import (
     unknown,
 )
 from monitor.phone_words import why_words
-from monitor.phones import NO_PHONE
+from monitor.phones import FIX_LIVES_S, NO_PHONE
 from monitor.state import Snapshot
 
 
@@ -75,7 +75,7 @@ CHECKS = (
             place=Place.SNACKBAR,
             sound=Sound.LOW,
             needs_ack=False,
-            off_delay_s=2.0,
+            off_delay_s=FIX_LIVES_S + 1.0,  # longer than one fix lives: now and then one is not a position
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
             advice="Allow this page the location and keep it open: without it nobody checks the car's position.",
         ),

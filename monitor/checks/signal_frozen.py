@@ -38,6 +38,7 @@ BY_NOISE = frozenset({"speed", "acceleration", "heading"})
 LEAST_WAY_M = 3.0  # a position in whole metres, or of a receiver that holds it at a crawl, has changed by then
 LEAST_REPEATS = 3  # two messages of one stamp are a driver's way of correcting itself
 LIVELY = 0.8  # share of messages with a new value: 0.97 on the real car; below, a held value proves nothing
+HOLDS = 0.5  # of the limits: what moves on once in a while is not clear until it moves on twice as often
 RETURNS = 20  # a scan with fewer may see nothing but parts of the car itself
 
 
@@ -49,22 +50,23 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
     repeats = reading.repeats
     if repeats is None:
         return absent(f"{signal.label} may rest, and its messages carry no stamp", brief="may rest")
-    if repeats.stamp_n >= LEAST_REPEATS and repeats.stamp_s >= limits.frozen_after_s:
+    share = HOLDS if was_active else 1.0
+    if repeats.stamp_n >= LEAST_REPEATS and repeats.stamp_s >= share * limits.frozen_after_s:
         return _frozen(signal, "one stamp", repeats.stamp_s, limits)
     if signal.name in BY_MOTION | BY_NOISE:
-        return _value(signal, reading, repeats, snapshot, limits)
+        return _value(signal, reading, repeats, snapshot, limits, share)
     return ok(f"{signal.label}: its stamps go on")
 
 
 def _value(
-    signal: Signal, reading: Reading[object], repeats: Repeats, snapshot: Snapshot, limits: SlowLimits
+    signal: Signal, reading: Reading[object], repeats: Repeats, snapshot: Snapshot, limits: SlowLimits, share: float
 ) -> Finding:
     if repeats.value_n == 0:
         return ok(f"{signal.label}: its values go on")
     held_s = repeats.value_s
-    is_long = repeats.value_n >= LEAST_REPEATS and held_s >= limits.frozen_after_s
+    is_long = repeats.value_n >= LEAST_REPEATS and held_s >= share * limits.frozen_after_s
     if is_long:
-        why_not = _why_not(signal, reading, repeats)
+        why_not = _why_not(signal, reading, repeats, share)
         return _frozen(signal, "one value", held_s, limits) if why_not is None else why_not
     if abs(snapshot.need("speed").speed_mps) > MOVES_ABOVE_MPS:
         return ok(f"{signal.label}: the same value for {held_s:.1f} s of driving")
@@ -73,7 +75,7 @@ def _value(
     return unknown(f"{signal.label}: the car stands, where a value may rest", short="stands")
 
 
-def _why_not(signal: Signal, reading: Reading[object], repeats: Repeats) -> Finding | None:
+def _why_not(signal: Signal, reading: Reading[object], repeats: Repeats, share: float) -> Finding | None:
     """Why a value that was held so long proves nothing, None where it does."""
     if signal.name in BY_NOISE:
         if repeats.liveliness is None:
@@ -81,7 +83,7 @@ def _why_not(signal: Signal, reading: Reading[object], repeats: Repeats) -> Find
         if repeats.liveliness < LIVELY:
             return absent(f"{signal.label} often repeats a value: it proves nothing", brief="often repeats")
         return None
-    if repeats.value_m < LEAST_WAY_M:
+    if repeats.value_m < share * LEAST_WAY_M:
         return ok(f"{signal.label}: the same value for {repeats.value_m:.1f} m of driving")
     match reading.value:
         case GpsFix(status=status) if status < 0:

@@ -23,7 +23,7 @@ from monitor.check import (
 from monitor.inhibition import GRACE_S
 from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
 from monitor.signals import SIGNALS, Signal
-from monitor.silence import silence
+from monitor.silence import FALTERS_AT, silence
 from monitor.state import Snapshot
 
 NEVER_AFTER_S = 5.0  # as long as the whole car is given for its first message
@@ -37,7 +37,7 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
     text = f"{signal.label}: newest message {age_s:.1f} s old"
     if _is_event_like(signal, limits):
         return ok(text)
-    if reading.is_fresh(snapshot.now_s):
+    if reading.is_fresh(snapshot.now_s) and not (was_active and age_s > FALTERS_AT * reading.horizon_s):
         return ok(text)
     if reading.received_s > snapshot.now_s:
         return unknown(f"{signal.label}: the clock went back", short="waiting")

@@ -16,9 +16,23 @@ import pytest
 from monitor import catalog
 from monitor.catalog import CHECKS, AllLimits
 from monitor.link import LinkFacts
+from monitor.phones import PhoneWord
 from monitor.runner import Monitor
+from monitor.signals import SIGNALS
 from monitor.state import State
-from monitor.values import Bearing, Distance, Effort, GpsFix, Level, MotionCommand, Twist, Value
+from monitor.values import (
+    Bearing,
+    Component,
+    Diagnostics,
+    Distance,
+    Effort,
+    GpsFix,
+    Level,
+    MotionCommand,
+    PhoneFix,
+    Twist,
+    Value,
+)
 from tests.monitor.drive import Drive
 from tests.monitor.test_corridor import sweep
 
@@ -93,6 +107,14 @@ def drift(dice: random.Random, now_s: float) -> dict[str, Value]:
     return {"speed": Twist(speed_mps=0.0), "position": north(gauss(dice, 4.3 * 2.5, 0.2, now_s))}
 
 
+def drift_of_a_good_receiver(dice: random.Random, now_s: float) -> dict[str, Value]:
+    return {"speed": Twist(speed_mps=0.0), "position": north(gauss(dice, 2.0, 0.05, now_s), 0.2)}
+
+
+def stops_with_a_good_receiver(dice: random.Random, now_s: float) -> dict[str, Value]:
+    return {"speed": Twist(speed_mps=0.0), "position": north(dice.gauss(0.0, 0.02), 0.2)}
+
+
 def runs_ahead(dice: random.Random, now_s: float) -> dict[str, Value]:
     """The position makes 3 m/s more than the wheels, give or take."""
     return {"speed": Twist(speed_mps=5.0), "position": north(8.0 * now_s + 2.0 * swing(now_s) + dice.gauss(0.0, 0.01))}
@@ -121,6 +143,29 @@ def ordered(dice: random.Random, now_s: float) -> dict[str, Value]:
     }
 
 
+def hardly_brakes(dice: random.Random, now_s: float) -> dict[str, Value]:
+    """From any speed, at 0.3 m/s², give or take 0.03; braking is ordered all the while."""
+    speed_mps = 190.0 - 0.3 * now_s + 0.19 * swing(now_s) + dice.gauss(0.0, 0.012)
+    return {"speed": Twist(speed_mps=speed_mps), "command": MotionCommand(speed_mps=0.0, tyre_angle_rad=None)}
+
+
+def at_the_edge(dice: random.Random, now_s: float) -> dict[str, Value]:
+    """What stands on the edge of the corridor, beside a standing car."""
+    aside_m = gauss(dice, 1.2 + 0.3, 0.02, now_s)
+    return {"speed": Twist(speed_mps=0.0), "scan": sweep([(4.0, aside_m, 0.3), (60.0, 0.0, 50.0)])}
+
+
+def warm(dice: random.Random, now_s: float) -> dict[str, Value]:
+    """A part of the car that reports its own limit, one second so, one second so."""
+    level = int(dice.random() < 0.5)
+    return {"diagnostics": Diagnostics(components=(Component(name="motor", level=level, message="hot"),))}
+
+
+def hot(dice: random.Random, now_s: float) -> dict[str, Value]:
+    level = 2 * int(dice.random() < 0.5)
+    return {"diagnostics": Diagnostics(components=(Component(name="motor", level=level, message="hot"),))}
+
+
 def creeps(dice: random.Random, now_s: float) -> dict[str, Value]:
     """The wheels' noise where standing begins."""
     return {"speed": Twist(speed_mps=abs(gauss(dice, 0.10, 0.02, now_s)))}
@@ -134,14 +179,26 @@ CASES = {
     "speed": Case("speed_limit", {"speed": 20.0}, speed, {}),
     "pedals": Case("pedals", {"brake": 20.0, "accelerator": 20.0}, pedals, {}),
     "obstacle": Case("obstacle", {"speed": 20.0, "scan": 25.0}, obstacle, {}),
+    "edge of the corridor": Case("obstacle", {"speed": 20.0, "scan": 25.0}, at_the_edge, {}),
     "nearest object": Case("obstacle_nearest", {"speed": 20.0, "distance": 30.0, "bearing": 30.0}, nearest, {}),
     "stopping distance": Case("obstacle_nearest", {"speed": 20.0, "distance": 30.0, "bearing": 30.0}, stopping, {}),
     "GPS drift": Case("gps_drift", {"speed": 20.0, "position": 10.0}, drift, {}, begins_s=8.0, rest=stops),
+    "GPS drift, a good receiver": Case(
+        "gps_drift",
+        {"speed": 20.0, "position": 10.0},
+        drift_of_a_good_receiver,
+        {},
+        begins_s=8.0,
+        rest=stops_with_a_good_receiver,
+    ),
     "GPS jump": Case("gps_jump", {"speed": 20.0, "position": 10.0}, runs_ahead, {}),
     "GPS error": Case("gps_fix", {"position": 10.0}, stated_error, {}),
     "blind laser": Case("laser_blind", {"scan": 25.0}, half_blind, {}),
     "fuel": Case("fuel_low", {"speed": 20.0, "fuel": 1.0}, sloshing, {}),
     "braking ordered": Case("no_response", {"speed": 20.0, "command": 20.0}, ordered, {}),
+    "braking answers": Case("no_response", {"speed": 20.0, "command": 20.0}, hardly_brakes, {}),
+    "a part that warns": Case("diagnostics_warn", {"speed": 20.0, "diagnostics": 1.0}, warm, {}),
+    "a part that fails": Case("diagnostics_error", {"speed": 20.0, "diagnostics": 1.0}, hot, {}),
     "standing": Case("not_moving", {"speed": 20.0}, creeps, {}),
     "rate": Case(
         "signal_slow.brake",
@@ -161,33 +218,80 @@ CASES = {
     ),
 }
 
-# Checks without a threshold that a noisy measurement could hover about, each with the reason.
+# Hovering that has a test of its own below, as its time matters and not its value.
+BY_TIME = {
+    "signal_stale": "gaps of a signal",
+    "car_silent": "gaps of all signals",
+    "signal_frozen": "a value that moves on now and then",
+    "clock_offset": "a clock",
+    "phone_car": "a phone apart",
+    "phone_tracks": "a phone on its own way",
+    "phone_missing": "a phone with a fix now and then",
+}
+
+# Checks without a limit that a noisy measurement could hover about, each with the reason.
 WITHOUT = {
-    "signal_stale": "a message comes or it does not",
-    "signal_frozen": "a value is the same or it is not",
     "scan_shape": "whole beams",
     "gps_quality": "known or not",
-    "diagnostics_error": "levels",
-    "diagnostics_warn": "levels",
-    "car_silent": "messages come or not",
     "connect_failed": "the link's own word",
     "link_lost": "the link's own word",
-    "no_message": "messages come or not",
+    "no_message": "time only grows",
     "log_not_kept": "the disk's own word",
     "paused_long": "time only grows",
     "clock_jump": "steps, told for ten seconds each",
-    "clock_offset": "tests/monitor/test_hovering.py::test_a_clock_about_its_limit",
-    "phone_car": "tests/monitor/checks/test_phone.py",
-    "phone_missing": "tests/monitor/checks/test_phone.py",
-    "phone_tracks": "tests/monitor/checks/test_phone.py",
+}
+
+# Every threshold there is: what hovers about it, or why nothing can.
+THRESHOLDS = {
+    "speed_limit.max_mps": "speed",
+    "speed_limit.deadband_mps": "speed",
+    "obstacle.standoff_m": "obstacle",
+    "obstacle.reaction_s": "stopping distance",
+    "obstacle.deceleration_mps2": "stopping distance",
+    "obstacle.deadband_m": "obstacle",
+    "obstacle.half_width_m": "edge of the corridor",
+    "no_response.margin_mps": "braking ordered",
+    "no_response.least_mps2": "braking answers",
+    "pedals.pressed_percent": "pedals",
+    "gps_fix.worst_sigma_m": "GPS error",
+    "gps_drift.least_m": "GPS drift, a good receiver",
+    "gps_jump.margin_mps": "GPS jump",
+    "phone_car.least_m": "a phone apart",
+    "phone_car.least_correlation": "a phone on its own way",
+    "phone_missing.after_s": "a phone with a fix now and then",
+    "laser_blind.blind_percent": "blind laser",
+    "signals.slow_below_percent": "rate",
+    "signals.frozen_after_s": "a value that moves on now and then",
+    "clock.late_s": "a clock",
+    "clock.offset_s": "a clock",
+    "fuel_low.low_percent": "fuel",
+    "fuel_low.deadband_percent": "fuel",
+    **{f"signals.{name}_hz": "rate" for name in SIGNALS},
+}
+NO_LIMIT = {
+    "obstacle.time_to_collision_s": "a gap that closes is soon met or opens: it cannot hover",
+    "obstacle.wheelbase_m": "a measure of the car",
+    "obstacle.laser_ahead_m": "a measure of the car",
+    "gps_fix.strict": "a switch",
+    "not_moving.after_s": "each stop is one of its own; the speed at which standing begins has its case",
+    "clock.jump_s": "each step is one of its own",
+    "paused_long.after_min": "time only grows",
+    "gauge.speed_max_mps": "drawn, not judged",
+    "gauge.acceleration_max_mps2": "drawn, not judged",
 }
 
 
 def test_every_check_hovers_or_cannot() -> None:
     there = {check.id.partition(".")[0] for check in CHECKS}
     hovering = {case.alarm.partition(".")[0] for case in CASES.values()}
-    assert hovering | WITHOUT.keys() == there
-    assert not hovering & WITHOUT.keys()
+    assert hovering | BY_TIME.keys() | WITHOUT.keys() == there
+    assert not (hovering | BY_TIME.keys()) & WITHOUT.keys()
+
+
+def test_every_threshold_is_hovered_about_or_cannot_be() -> None:
+    assert THRESHOLDS.keys() | NO_LIMIT.keys() == catalog.schema().keys()
+    assert not THRESHOLDS.keys() & NO_LIMIT.keys()
+    assert set(THRESHOLDS.values()) <= CASES.keys() | set(BY_TIME.values())
 
 
 class Hover(Drive):
@@ -239,3 +343,102 @@ def test_a_clock_about_its_limit(seconds: float, late: bool) -> None:
         told += [t.alarm_id for t in monitor.step(state.snapshot(now_s)) if t.announces]
     assert set(told) == {"clock_offset"}
     assert len(told) <= AT_MOST
+
+
+LONG = pytest.mark.parametrize("seconds", [60.0, pytest.param(600.0, marks=pytest.mark.soak)])
+SPOKEN = ("speed", "brake", "accelerator", "position")
+
+
+def few(car: Drive, alarm: str) -> bool:
+    """Told, at most three times, and no other alarm beside it but for the rates that fall with the gaps."""
+    told = [name for name in car.announced if not name.startswith(("signal_slow", "all_slow"))]
+    return set(told) == {alarm} and len(told) <= AT_MOST
+
+
+@LONG
+@pytest.mark.parametrize(
+    ("silent", "gap_s", "alarm"),
+    [
+        pytest.param(("brake",), 0.95, "signal_stale.brake", id="of a signal"),
+        pytest.param(SPOKEN, 1.0, "car_silent", id="of all signals"),
+        pytest.param(SPOKEN, 1.35, "car_silent", id="of all signals, longer"),
+    ],
+)
+def test_gaps_about_as_long_as_is_allowed(silent: tuple[str, ...], gap_s: float, alarm: str, seconds: float) -> None:
+    dice, car = random.Random(1), Drive(dict.fromkeys(SPOKEN, 20.0)).open().to(12.0)
+    while car.now_s < 12.0 + seconds:
+        car.silent = set(silent)
+        car.to(car.now_s + gap_s * (1.0 + 0.05 * swing(car.now_s)) + abs(dice.gauss(0.0, 0.03)))
+        car.silent = set()
+        car.to(car.now_s + 0.12)
+    assert few(car, alarm)
+
+
+@LONG
+@pytest.mark.parametrize("held_s", [2.0, 2.5, 4.0])
+def test_a_position_that_moves_on_now_and_then(held_s: float, seconds: float) -> None:
+    dice, car, fix, until_s = random.Random(1), Drive({"speed": 20.0, "position": 10.0}).open().to(10.0), None, 0.0
+    car.silent = {"position"}  # it speaks out of turn, below
+    while car.now_s < 10.0 + seconds:
+        if fix is None or car.now_s >= until_s:
+            fix = north(4.0 * car.now_s)
+            until_s = car.now_s + held_s + dice.gauss(0.0, 0.1)
+        car.say("position", fix).to(car.now_s + 0.1)
+    assert few(car, "signal_frozen.position")
+
+
+def ride(car: Drive, phone: Callable[[float, GpsFix], PhoneFix | None], seconds: float, every_s: float = 1.0) -> Drive:
+    """A phone in a car that speaks as often; a receiver that says how good it is."""
+    car.values["position"] = north(0.0, 1.0)
+    while car.now_s < seconds:
+        car.to(car.now_s + every_s)
+        reading = car.state.get("position")
+        fix = None if reading is None else phone(car.now_s, reading.value)
+        if fix is not None:
+            car.state.hear_phone(PhoneWord(phone="one", is_handheld=True, fix=fix, measured_s=car.now_s), car.now_s)
+        elif (
+            car.now_s - (car.state.snapshot(car.now_s).phone.heard_s) >= 4.0
+        ):  # a page speaks more often than every 5 s
+            car.state.hear_phone(PhoneWord(phone="one", is_handheld=True, why="unavailable"), car.now_s)
+    return car
+
+
+def east_of(place: GpsFix, metres: float) -> PhoneFix:
+    return PhoneFix(lat_deg=place.lat_deg, lon_deg=place.lon_deg + metres / 94_400, accuracy_m=5.0)
+
+
+@pytest.mark.parametrize("seconds", [120.0, pytest.param(600.0, marks=pytest.mark.soak)])
+def test_a_phone_about_as_far_as_is_explained(seconds: float) -> None:
+    dice, car = random.Random(1), Drive({"speed": 20.0, "position": 10.0}).open()
+    ride(car, lambda now_s, place: east_of(place, gauss(dice, 13.9, 0.5, now_s)), seconds)
+    assert few(car, "phone_car")
+
+
+@pytest.mark.parametrize("seconds", [180.0, pytest.param(600.0, marks=pytest.mark.soak)])
+def test_a_phone_that_goes_almost_its_own_way(seconds: float) -> None:
+    """At a crawl the car's minute of track is hardly longer than the phone swings to and fro beside it."""
+    limits = catalog.changed(AllLimits(), {"phone_car.least_correlation": 0.77})
+    car = Drive({"speed": 20.0, "position": 10.0}, Monitor(limits=limits)).open()
+    car.values["speed"] = Twist(speed_mps=0.62)
+
+    def to_and_fro(now_s: float, place: GpsFix) -> PhoneFix:
+        return east_of(place, (12.5 + 0.9 * swing(now_s, 150.0)) * math.sin(0.9 * now_s))
+
+    ride(car, to_and_fro, seconds)
+    assert few(car, "phone_tracks")
+
+
+@LONG
+def test_a_phone_with_a_fix_now_and_then(seconds: float) -> None:
+    """One every ten seconds and a bit, between words that it has none."""
+    car, next_s = Drive({"speed": 20.0, "position": 10.0}).open(), 1.0
+
+    def now_and_then(now_s: float, place: GpsFix) -> PhoneFix | None:
+        nonlocal next_s
+        if now_s < next_s:
+            return None
+        next_s = now_s + 10.5 + 0.5 * swing(now_s)
+        return east_of(place, 1.0)
+
+    ride(car, now_and_then, seconds, every_s=0.25)
+    assert few(car, "phone_missing")
