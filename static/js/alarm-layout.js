@@ -84,7 +84,7 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
     const among = isOne ? `${fixed(worst.for_s)} s` : `${1} of ${standing.length}`;
     return {
       kind: worst.priority === 'critical' ? 'crit' : 'warn', icon: worst.priority === 'critical' ? 'crit' : 'warn',
-      text: worst.title, end: shelved ? `${standing.length} standing, ${shelved} shelved` : among, opens: 'log',
+      text: worst.active ? worst.title : `${worst.title}: over`, end: shelved ? `${standing.length} standing, ${shelved} shelved` : among, opens: 'log',
     };
   }
   if (chain.cut === 2) {

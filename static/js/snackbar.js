@@ -3,6 +3,7 @@
 import { layOut } from './alarm-layout.js';
 import { html, icon, setText, setWords, show } from './dom.js';
 import { openShelve } from './shelve.js';
+import { snackWords } from './standing.js';
 
 /**
  * @param {HTMLElement} root
@@ -33,7 +34,7 @@ export function mount(root, store, say) {
     show(bar, shown !== null);
     if (!shown) return;
     setWords(title, waiting.length > 1 ? `${shown.title} (1 of ${waiting.length})` : shown.title);
-    setWords(text, shown.text);
+    setWords(text, snackWords(shown));
     show(shelve, shown.priority !== 'critical' && shown.actions.includes('shelve'));
     setText(acknowledge, 'Acknowledge');
   }

@@ -10,6 +10,14 @@ export function standingWords(alarm) {
   return [alarm.text || alarm.trip_text, said(alarm)].filter(Boolean).join(' · ');
 }
 
+/**
+ * What the snackbar tells: what is wrong now; of what is over, what it was.
+ * @param {import('./protocol.js').Alarm} alarm
+ */
+export function snackWords(alarm) {
+  return alarm.active ? alarm.text || alarm.trip_text : `Over. It was: ${alarm.trip_text || alarm.title}`;
+}
+
 /** @param {import('./protocol.js').Alarm} alarm */
 function said(alarm) {
   const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
@@ -19,11 +27,11 @@ function said(alarm) {
 }
 
 /**
- * "Alarm load: 3 in 10 min", with the word "flood" when it is one.
+ * When there are too many alarms to work by: "Alarm flood: 12 in 10 min", and which chatter; else nothing.
  * @param {import('./protocol.js').AlarmLoad | undefined} load
  */
 export function loadWords(load) {
   if (!load) return '';
-  const chattering = load.chattering.length ? ` · chattering: ${load.chattering.join(', ')}` : '';
-  return `Alarm load: ${load.in_10_min} in 10 min${load.flood ? ': flood' : ''}${chattering}`;
+  const flood = load.flood ? `Alarm flood: ${load.in_10_min} in 10 min` : '';
+  return [flood, load.chattering.length ? `Chattering: ${load.chattering.join(', ')}` : ''].filter(Boolean).join(' · ');
 }

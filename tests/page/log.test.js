@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { heldWords } from '../../static/js/connect.js';
 import { asked, dayWords, joined, lowest, tookWords } from '../../static/js/log-layout.js';
-import { loadWords, standingWords } from '../../static/js/standing.js';
+import { loadWords, snackWords, standingWords } from '../../static/js/standing.js';
 
 const ALARM = /** @type {any} */ ({ text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
 const noon_ms = new Date(2026, 5, 1, 12, 0, 0).getTime();
@@ -17,11 +17,17 @@ test('who acknowledged stands where the alarm stands', () => {
   );
 });
 
-test('the alarm load in one line, and in one word when it is too much', () => {
+test('a snackbar never tells of what is over as if it stood', () => {
+  assert.equal(snackWords({ ...ALARM, active: true }), '12.6 m/s');
+  assert.equal(snackWords({ ...ALARM, active: false, state: 'RTN_UNACKED' }), 'Over. It was: 11.2 m/s');
+  assert.equal(snackWords({ ...ALARM, active: false, trip_text: '', title: 'GPS jump' }), 'Over. It was: GPS jump');
+});
+
+test('too many alarms are told in one line; what can be borne is a number only', () => {
   const load = { in_10_min: 0, flood: false, bearable: true, chattering: [] };
-  assert.equal(loadWords(load), 'Alarm load: 0 in 10 min');
-  assert.equal(loadWords({ ...load, in_10_min: 11, flood: true, bearable: false }), 'Alarm load: 11 in 10 min: flood');
-  assert.equal(loadWords({ ...load, in_10_min: 3, bearable: false, chattering: ['GPS jump'] }), 'Alarm load: 3 in 10 min · chattering: GPS jump');
+  assert.equal(loadWords(load), '');
+  assert.equal(loadWords({ ...load, in_10_min: 11, flood: true, bearable: false }), 'Alarm flood: 11 in 10 min');
+  assert.equal(loadWords({ ...load, in_10_min: 3, bearable: false, chattering: ['GPS jump'] }), 'Chattering: GPS jump');
   assert.equal(loadWords(undefined), '');
 });
 
