@@ -78,6 +78,8 @@ class Report:
         for topic, count in sorted(self._recording.rejected.items()):
             why = self._recording.why_rejected[topic]
             say(f"  Note: {_counted(count, 'message')} on {topic} left out: {why}")
+        for sentence in self._recording.damage:
+            say(f"  Note: {sentence}.")
 
 
 def say(text: str, end: str = "\n") -> None:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any, Literal, cast
 
+from mcap.data_stream import ReadDataStream
 from mcap.reader import McapReader, make_reader
+from mcap.records import Chunk, ChunkIndex, Message
+from mcap.stream_reader import breakup_chunk
 
 from server.recording.errors import RecordingUnreadable
-from server.recording.source import Channel, DefinitionFormat
+from server.recording.source import Channel, Damage, DefinitionFormat
 from server.source import RosVersion
 
 _FORMATS: dict[str, DefinitionFormat] = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
@@ -28,6 +32,7 @@ class McapFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.damage = Damage()
         self._file = path.open("rb")
         try:
             self._reader: McapReader = make_reader(self._file)
@@ -35,6 +40,9 @@ class McapFile:
             if summary is None or summary.statistics is None:
                 raise RecordingUnreadable(f"{path.name} ends too early: it has no index")
             statistics = summary.statistics
+            self._parts = sorted(
+                summary.chunk_indexes, key=lambda part: (part.message_start_time, part.message_end_time)
+            )
             self.start_ns, self.end_ns = statistics.message_start_time, statistics.message_end_time
             counts = statistics.channel_message_counts
             self.channels: Sequence[Channel] = [
@@ -48,9 +56,35 @@ class McapFile:
         self.ros_version: RosVersion = 2 if is_ros2 else 1
 
     def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-        for _, channel, message in self._reader.iter_messages(starting_at=start_ns):
-            if channel.id in numbers:
-                yield message.log_time, channel.id, message.data
+        self.damage = Damage()
+        if not self._parts:  # nothing but messages, without an index
+            for _, channel, message in self._reader.iter_messages(starting_at=start_ns):
+                if channel.id in numbers:
+                    yield message.log_time, channel.id, message.data
+            return
+        unread = [part for part in reversed(self._parts) if part.message_end_time >= start_ns]
+        self.damage.parts = len(unread)
+        heap: list[tuple[int, int, int, bytes]] = []  # time, place, channel, message: of the parts that overlap
+        place = 0
+        while unread or heap:
+            while unread and (not heap or unread[-1].message_start_time <= heap[0][0]):
+                for message in self._whole(unread.pop()):
+                    if message.log_time >= start_ns and message.channel_id in numbers:
+                        place += 1
+                        heapq.heappush(heap, (message.log_time, place, message.channel_id, message.data))
+            if heap:
+                time_ns, _, number, raw = heapq.heappop(heap)
+                yield time_ns, number, raw
+
+    def _whole(self, part: ChunkIndex) -> list[Message]:
+        """The messages of a part; none where it is damaged."""
+        try:
+            self._file.seek(part.chunk_start_offset + 1 + 8)
+            chunk = Chunk.read(ReadDataStream(self._file))
+            return [record for record in breakup_chunk(chunk, validate_crc=True) if isinstance(record, Message)]
+        except Exception:  # damage makes the readers fail in every way there is
+            self.damage.lost.append((part.message_start_time, part.message_end_time))
+            return []
 
     def close(self) -> None:
         self._file.close()

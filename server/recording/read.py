@@ -87,6 +87,13 @@ class Recording:
         self.duration_s = (end_ns - self._start_ns) / 1e9  # from the first message to the last
 
     @property
+    def damage(self) -> list[str]:
+        """What the newest reading had to leave out because it is damaged: a sentence for each file."""
+        return [
+            source.damage.sentence(source.path.name, self._start_ns) for source in self._sources if source.damage.lost
+        ]
+
+    @property
     def count(self) -> int:
         """Messages of all topics that can be read."""
         return sum(topic.count for topic in self.topics.values())
@@ -95,8 +102,8 @@ class Recording:
         """All messages in time order, from `start_s` after the beginning on, read as they are asked for.
 
         Where `topics` are given, those of other topics come too, but empty: unpacking is most of the work. What cannot
-        be decoded is left out and counted in `rejected`. Raises RecordingUnreadable where a file turns out
-        to be damaged.
+        be decoded is left out and counted in `rejected`, what is damaged is left out where the rest can be told from
+        it, and named in `damage`. Raises RecordingUnreadable where it cannot, or nothing is whole.
         """
         start_ns = self._start_ns + round(start_s * 1e9)
         streams = [
@@ -162,6 +169,8 @@ class Recording:
                     self.why_rejected.setdefault(topic, str(why))
                     continue
                 yield message_of(at_s=time_ns / 1e9, topic=topic, type=type, message=message)
+            if source.damage.is_total:
+                raise RecordingUnreadable(f"{source.path} is damaged: none of its {source.damage.parts} parts is whole")
         except RecordingUnreadable:
             raise
         except Exception as error:  # a damaged file makes the readers fail in every way there is

@@ -12,7 +12,7 @@ from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag1 import Reader
 
 from server.recording.errors import RecordingUnreadable
-from server.recording.source import Channel
+from server.recording.source import Channel, Damage
 from server.source import RosVersion
 
 CACHE_BYTES = 64_000_000  # unpacked chunks kept: chunks may overlap in time
@@ -30,6 +30,7 @@ class Bag1:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.damage = Damage()  # none that is left out: the format has no checksums
         self._reader = Reader(path)
         self._reader.open()
         self._file = cast("BinaryIO", self._reader.bio)

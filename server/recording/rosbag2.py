@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import heapq
+from collections.abc import Collection, Generator, Iterator, Mapping, Sequence
 from pathlib import Path, PosixPath
-from typing import Any, Literal
+from typing import Any, BinaryIO, Literal, cast
 from urllib.parse import quote
 
-from rosbags.interfaces import MessageDefinitionFormat, QosDurability
+from rosbags.interfaces import Connection, MessageDefinitionFormat, QosDurability
 from rosbags.rosbag2.reader import DirectoryReader
-from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.rosbag2.storage_mcap import McapReader, msgsrc
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from server.recording.errors import RecordingUnreadable
-from server.recording.source import Channel, DefinitionFormat
+from server.recording.source import Channel, Damage, DefinitionFormat
 from server.source import RosVersion
 
-_READERS: dict[str, Any] = {"directory": DirectoryReader, "mcap": McapReader, "db3": Sqlite3Reader}
 _FORMATS: dict[Any, DefinitionFormat] = {
     MessageDefinitionFormat.NONE: "none",
     MessageDefinitionFormat.MSG: "msg",
@@ -33,6 +33,49 @@ class _UriPath(PosixPath):
 
     def __fspath__(self) -> str:
         return super().__str__()
+
+
+class _WholeParts(McapReader):
+    """Reads the whole chunks of an MCAP file and leaves out the damaged ones; that of rosbags ends at the first."""
+
+    def __init__(self, path: Any) -> None:
+        super().__init__(path)
+        self.damage = Damage()
+
+    def messages(
+        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
+    ) -> Generator[tuple[Connection, int, bytes], None, None]:
+        self.damage = Damage()
+        if not self.chunks:  # nothing but messages, without an index
+            yield from super().messages(connections, start, stop)
+            return
+        wanted = {connection.id: connection for connection in connections}
+        from_ns, to_ns = start or 0, _LAST_NS if stop is None else stop
+        parts = [
+            part
+            for part in self.chunks
+            if part.message_end_time >= from_ns
+            and part.message_start_time < to_ns
+            and any(part.channel_count.get(number) for number in wanted)
+        ]
+        self.damage.parts = len(parts)
+        for message in heapq.merge(*(self._whole(part, wanted, from_ns, to_ns) for part in parts)):
+            if message.connection is not None and message.data is not None:  # else it says where its chunk begins
+                yield message.connection, message.timestamp, message.data
+
+    def _whole(self, part: Any, wanted: dict[int, Connection], from_ns: int, to_ns: int) -> Iterator[Any]:
+        try:
+            yield from msgsrc(part, wanted, from_ns, to_ns, cast("BinaryIO", self.bio))
+        except Exception:  # damage makes the reader fail in every way there is, and before it gives any message
+            self.damage.lost.append((part.message_start_time, part.message_end_time))
+
+
+class _Directory(DirectoryReader):
+    STORAGE_PLUGINS: Mapping[str, Any] = {"mcap": _WholeParts, "sqlite3": Sqlite3Reader}
+
+
+_READERS: dict[str, Any] = {"directory": _Directory, "mcap": _WholeParts, "db3": Sqlite3Reader}
+_LAST_NS = 2**63 - 1
 
 
 class Bag2:
@@ -59,6 +102,12 @@ class Bag2:
         number_of = {connection.id: number for number, connection in wanted.items()}
         for connection, time_ns, raw in self._reader.messages(list(wanted.values()), start_ns, None):
             yield time_ns, number_of[connection.id], raw
+
+    @property
+    def damage(self) -> Damage:
+        files = getattr(self._reader, "storages", None) or [self._reader]
+        found = [file.damage for file in files if isinstance(file, _WholeParts)]
+        return Damage(parts=sum(one.parts for one in found), lost=[part for one in found for part in one.lost])
 
     def close(self) -> None:
         self._reader.close()

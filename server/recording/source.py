@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
 
@@ -26,6 +26,28 @@ class Channel:
     is_latched: bool
 
 
+@dataclass(slots=True)
+class Damage:
+    """What of a file turned out to be damaged while it was read, in parts that each carry a checksum of their own."""
+
+    parts: int = 0  # that were to be read
+    lost: list[tuple[int, int]] = field(default_factory=list)  # first and last ns of each damaged one, by its index
+
+    @property
+    def is_total(self) -> bool:
+        return bool(self.parts) and len(self.lost) == self.parts
+
+    def sentence(self, name: str, origin_ns: int) -> str:
+        """What is missing and when, for a person."""
+        first_s = (min(start_ns for start_ns, _ in self.lost) - origin_ns) / 1e9
+        last_s = (max(end_ns for _, end_ns in self.lost) - origin_ns) / 1e9
+        which = "1 part" if len(self.lost) == 1 else f"{len(self.lost)} parts"
+        verb = "is" if len(self.lost) == 1 else "are"
+        return (
+            f"{name} is damaged: {which} of {self.parts}, between {first_s:.1f} s and {last_s:.1f} s, {verb} left out"
+        )
+
+
 class FileSource(Protocol):
     """One open recording: a file, or a directory that is one ROS 2 bag."""
 
@@ -36,8 +58,15 @@ class FileSource(Protocol):
     start_ns: int  # since 1970; of no meaning where there are no messages
     end_ns: int
 
+    @property
+    def damage(self) -> Damage:
+        """Of the newest reading."""
+        ...
+
     def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-        """(time in ns, number of the channel, raw message) in time order, from `start_ns` on."""
+        """(time in ns, number of the channel, raw message) in time order, from `start_ns` on.
+
+        Where the file has checksums of its parts, damaged ones are left out and noted in `damage`."""
         ...
 
     def close(self) -> None: ...

@@ -24,8 +24,9 @@ def as_json(report: Report) -> dict[str, Any]:
             "recorded": None if when is None else when.isoformat(),
             "duration_s": _number(recording.duration_s),
             "messages": recording.count,
-            "complete": run.broke_off is None,
+            "complete": run.broke_off is None and not run.damage,
             "broke_off": run.broke_off,
+            "damage": list(run.damage),
         },
         "judged": {
             "from_s": _number(run.from_s),

@@ -78,8 +78,10 @@ def run(args: argparse.Namespace) -> int:
     except (RecordingUnreadable, CannotInject, BadSetting, AssetsMissing, _Impossible) as error:
         _complain(str(error))
         return CANNOT
-    if report.run.broke_off is not None:
-        _complain(report.run.broke_off)
+    missing = [*report.run.damage, *([report.run.broke_off] if report.run.broke_off is not None else [])]
+    for sentence in missing:
+        _complain(sentence)
+    if missing:
         return CANNOT
     return CRITICAL if report.has_critical else NO_CRITICAL
 

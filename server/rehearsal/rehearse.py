@@ -66,6 +66,7 @@ class Rehearsed:
     traces: Traces | None
     notes: Sequence[str] = field(default_factory=list)
     broke_off: str | None = None  # why the recording could not be read to its end
+    damage: Sequence[str] = ()  # what within it could not be read
 
     @property
     def judged_s(self) -> float:
@@ -156,6 +157,7 @@ class _Run:
             traces=self._traces,
             notes=self.notes,
             broke_off=self._broke_off,
+            damage=self._recording.damage,
         )
 
     def _judge_all(self) -> tuple[int, float, float]:
@@ -282,6 +284,7 @@ class _Run:
     def _note_rejected(self) -> None:
         for topic, count in sorted(self._recording.rejected.items()):
             self.notes.append(f"{count} messages on {topic} left out: {self._recording.why_rejected[topic]}.")
+        self.notes += [f"{sentence}: a silence there is the file's." for sentence in self._recording.damage]
         for crash in self._crashes.values():
             self.notes.append(f"The check {crash.check_id} fails: {crash.error}.")
         for laid in self._faults.laid:

@@ -9,7 +9,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import orjson
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
 
 from server.simulator.scenarios import SCENARIOS
 from tests.environment import users_own
@@ -111,6 +114,43 @@ def test_a_recording_that_breaks_off_is_judged_up_to_there(check: Checking, tmp_
     assert "Broken off at" in ending.out
     assert "Speed above limit" in ending.out
     assert "cut.bag is damaged" in ending.err
+
+
+def with_checksums(bag: Path, path: Path) -> Path:
+    """The same bag with a checksum for each part, as recorders write it."""
+    (source,) = bag.glob("*.mcap")
+    with source.open("rb") as old, path.open("wb") as new:
+        writer, channels = Writer(new, chunk_size=100_000, compression=CompressionType.NONE), {}
+        writer.start(profile="ros2")
+        for schema, channel, message in make_reader(old).iter_messages():
+            assert schema is not None
+            if channel.id not in channels:
+                kind = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, kind)
+            writer.add_message(channels[channel.id], message.log_time, message.data, message.publish_time)
+        writer.finish()
+    return path
+
+
+def test_a_damaged_part_is_left_out_and_said(check: Checking, healthy: Path, tmp_path: Path) -> None:
+    """What is whole is judged; whether the rest held an alarm cannot be told."""
+    hurt = with_checksums(healthy, tmp_path / "hurt.mcap")
+    with hurt.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    part = summary.chunk_indexes[len(summary.chunk_indexes) // 2]
+    raw = bytearray(hurt.read_bytes())
+    raw[part.chunk_start_offset + part.chunk_length // 2] ^= 0x40
+    hurt.write_bytes(raw)
+    ending = check(hurt, "--json", tmp_path / "out.json")
+    assert ending.code == 2
+    assert ending.err.startswith("catgraph check: hurt.mcap is damaged: 1 part of ")
+    assert ending.err.count("\n") == 1
+    assert "Note: hurt.mcap is damaged" in ending.out
+    assert "Alarm load" in ending.out
+    found = orjson.loads((tmp_path / "out.json").read_bytes())["recording"]
+    assert not found["complete"]
+    assert len(found["damage"]) == 1
 
 
 def test_settings_of_a_file_count(check: Checking, healthy: Path, tmp_path: Path) -> None:

@@ -1,0 +1,161 @@
+"""MCAP files carry a checksum for each part: a damaged part is left out and named, the whole ones are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+
+from server.recording.read import RecordingUnreadable, open_recording
+
+MESSAGES = 400
+EVERY_NS = 10_000_000
+WORDS = "word " * 30
+
+
+def written(
+    path: Path,
+    *,
+    profile: str = "",
+    compression: CompressionType = CompressionType.NONE,
+    use_chunking: bool = True,
+    enable_crcs: bool = True,
+    times: Callable[[int], int] = lambda n: n * EVERY_NS,
+) -> Path:
+    """400 messages in some 15 parts; `profile` "ros2": a bag of std_msgs/String, else JSON."""
+    with path.open("wb") as file:
+        writer = Writer(
+            file, chunk_size=5_000, compression=compression, use_chunking=use_chunking, enable_crcs=enable_crcs
+        )
+        writer.start(profile=profile)
+        if profile == "ros2":
+            schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data\n")
+            channel = writer.register_channel("/text", "cdr", schema)
+        else:
+            schema = writer.register_schema("std_msgs/String", "jsonschema", b"{}")
+            channel = writer.register_channel("/text", "json", schema)
+        for n in range(MESSAGES):
+            text = f"{n:04d} {WORDS}".encode()
+            data = (
+                b"\0\1\0\0" + (len(text) + 1).to_bytes(4, "little") + text + b"\0"
+                if profile == "ros2"
+                else b'{"data": "' + text + b'"}'
+            )
+            writer.add_message(channel, times(n), data, times(n), n)
+        writer.finish()
+    return path
+
+
+def numbers(path: Path) -> tuple[list[int], list[str]]:
+    """Which messages come, and what is said to be damaged."""
+    with open_recording([path]) as recording:
+        came = [int(cast("Any", one.message)["data"][:4]) for one in recording.messages()]
+        return came, recording.damage
+
+
+def hurt(path: Path, number: int) -> None:
+    """One letter of one message becomes another: nothing about its shape is wrong."""
+    content = path.read_bytes()
+    mark = f"{number:04d} word".encode()
+    assert content.count(mark) == 1
+    path.write_bytes(content.replace(mark, f"{number:04d} ward".encode()))
+
+
+PROFILES = pytest.mark.parametrize("profile", ["", "ros2"], ids=["JSON", "ROS 2"])
+
+
+@PROFILES
+def test_a_whole_file_is_read_to_its_end(tmp_path: Path, profile: str) -> None:
+    assert numbers(written(tmp_path / "a.mcap", profile=profile)) == (list(range(MESSAGES)), [])
+
+
+@PROFILES
+def test_one_wrong_letter_costs_its_part_and_no_more(tmp_path: Path, profile: str) -> None:
+    path = written(tmp_path / "a.mcap", profile=profile)
+    hurt(path, 200)
+    came, damage = numbers(path)
+    lost = sorted(set(range(MESSAGES)) - set(came))
+    assert came == sorted(came)
+    assert 200 in lost
+    assert lost == list(range(lost[0], lost[-1] + 1))
+    assert len(lost) < 40
+    (sentence,) = damage
+    from_s, to_s = lost[0] / 100, lost[-1] / 100
+    assert sentence.startswith("a.mcap is damaged: 1 part of ")
+    assert sentence.endswith(f"between {from_s:.1f} s and {to_s:.1f} s, is left out")
+
+
+@PROFILES
+def test_several_damaged_parts_are_one_sentence(tmp_path: Path, profile: str) -> None:
+    path = written(tmp_path / "a.mcap", profile=profile)
+    for number in (50, 350):
+        hurt(path, number)
+    came, (sentence,) = numbers(path)
+    assert {50, 350}.isdisjoint(came)
+    assert 200 in came
+    assert "is damaged: 2 parts of " in sentence
+    assert sentence.endswith("are left out")
+
+
+@PROFILES
+@pytest.mark.parametrize("compression", [CompressionType.LZ4, CompressionType.ZSTD])
+def test_a_part_that_cannot_be_unpacked(tmp_path: Path, profile: str, compression: CompressionType) -> None:
+    path = written(tmp_path / "a.mcap", profile=profile, compression=compression)
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    part = summary.chunk_indexes[3]
+    content = bytearray(path.read_bytes())
+    middle = part.chunk_start_offset + part.chunk_length // 2
+    content[middle : middle + 8] = bytes(8)
+    path.write_bytes(content)
+    came, damage = numbers(path)
+    assert 0 < MESSAGES - len(came) < 200
+    assert came == sorted(came)
+    assert len(damage) == 1
+
+
+@PROFILES
+def test_without_checksums_nothing_can_be_told(tmp_path: Path, profile: str) -> None:
+    """The format allows it: zero says that there is none."""
+    path = written(tmp_path / "a.mcap", profile=profile, enable_crcs=False)
+    hurt(path, 200)
+    assert numbers(path) == (list(range(MESSAGES)), [])
+
+
+def test_a_file_without_parts_is_read(tmp_path: Path) -> None:
+    assert numbers(written(tmp_path / "a.mcap", use_chunking=False))[0] == list(range(MESSAGES))
+
+
+@PROFILES
+def test_parts_that_overlap_in_time_come_in_order(tmp_path: Path, profile: str) -> None:
+    path = written(tmp_path / "a.mcap", profile=profile, times=lambda n: (n * 7 % MESSAGES) * EVERY_NS)
+    hurt(path, 200)
+    with open_recording([path]) as recording:
+        times = [one.at_s for one in recording.messages()]
+        assert recording.damage
+    assert times == sorted(times)
+    assert len(times) > 350
+
+
+@PROFILES
+def test_a_file_of_which_nothing_is_whole(tmp_path: Path, profile: str) -> None:
+    path = written(tmp_path / "a.mcap", profile=profile)
+    path.write_bytes(path.read_bytes().replace(b" word word", b" ward word"))
+    with pytest.raises(RecordingUnreadable, match=r"a\.mcap is damaged: none of its \d+ parts is whole$"):
+        numbers(path)
+
+
+@PROFILES
+def test_each_reading_tells_of_itself(tmp_path: Path, profile: str) -> None:
+    path = written(tmp_path / "a.mcap", profile=profile)
+    hurt(path, 50)
+    with open_recording([path]) as recording:
+        first = len(list(recording.messages())), recording.damage
+        assert (len(list(recording.messages())), recording.damage) == first
+        list(recording.messages(start_s=2.0))
+        assert recording.damage == []  # what is damaged lies before it
