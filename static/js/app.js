@@ -30,6 +30,7 @@ import { mount as mountSnackbar } from './snackbar.js';
 import { mount as mountStart } from './start.js';
 import { mount as mountStrip } from './strip.js';
 import { mount as mountTopbar } from './topbar.js';
+import { mount as mountTrends } from './trends.js';
 import { mount as mountVeil } from './veil.js';
 
 const vehicle = document.documentElement.dataset['vehicle'];
@@ -62,6 +63,7 @@ mountNearest(need(monitor, '[data-part="nearest"]'), store);
 mountPedals(need(monitor, '[data-part="pedals"]'), store);
 mountPosition(need(monitor, '[data-part="position"]'), store);
 mountChecks(need(monitor, '[data-part="checks"]'), store);
+mountTrends(need(monitor, '[data-part="trends"]'), store);
 mountSheets();
 mountPreferences(voice);
 mountRail(monitor, store, page);

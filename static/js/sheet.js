@@ -16,7 +16,7 @@ export function closeSheet(sheet) {
 }
 
 /** Sheets opened by the operator, which give way to an alarm. */
-const ASKED = ['sheet-menu', 'sheet-history', 'sheet-shelve', 'sheet-stop', 'sheet-preferences', 'sheet-topic', 'sheet-profile', 'sheet-reset'];
+const ASKED = ['sheet-menu', 'sheet-history', 'sheet-shelve', 'sheet-stop', 'sheet-preferences', 'sheet-topic', 'sheet-profile', 'sheet-reset', 'sheet-chart'];
 
 /** @param {HTMLDialogElement} sheet */
 export function isAsked(sheet) {

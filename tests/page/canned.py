@@ -187,6 +187,30 @@ def _walls() -> list[tuple[float, float, float, float]]:
     ]  # fmt: skip
 
 
+def trends(now: float, begin: int, steps: int) -> Json:
+    """The last minute of a drive that speeds up and slows down, the distance unknown for 5 s of it."""
+    first = int(now) - steps
+
+    def at(name: str, n: int) -> float | None:
+        t = (n - begin) / 5
+        noise = math.sin(7.1 * t) * 0.6 + math.sin(3.3 * t) * 0.4
+        return {
+            "speed": 3.6 + 0.8 * math.sin(t / 9) + 0.12 * noise,
+            "acceleration": 0.3 + 0.25 * noise,
+            "distance": None if -24 < t < -19 else 12.4 + 2.2 * math.sin(t / 7) + 0.2 * noise,
+            "steering": -4 + 3.0 * math.sin(t / 11) + 0.7 * noise,
+            "brake": max(0.0, -30 * math.sin(t / 9 + 2) - 12),
+            "accelerator": max(0.0, 14 + 9 * math.sin(t / 6)),
+        }[name]
+
+    rows = {
+        name: [at(name, n) for n in range(first, int(now))]
+        for name in ("speed", "acceleration", "distance", "steering", "brake", "accelerator")
+    }
+    highest = {name: [None if v is None else v + 0.05 for v in row] for name, row in rows.items()}
+    return {"step_s": 0.2, "since": 0, "first": first, "now": now, "lowest": rows, "highest": highest}
+
+
 class Canned:
     """The server: `state` is what every page gets from now on, `silent` makes it hold its tongue."""
 
@@ -226,6 +250,13 @@ class Canned:
         async def points(after: int = 0) -> Json:
             return {"number": 1, "points": [row for row in track() if row[0] > after]}
 
+        begin = int(time.monotonic() * 5)
+        self._trends = lambda steps: trends(time.monotonic() * 5, begin, steps)
+
+        @self.app.get("/api/trends")
+        async def minute() -> Json:
+            return self._trends(299)
+
         @self.app.websocket("/ws")
         async def socket(socket: WebSocket) -> None:
             await socket.accept()
@@ -254,6 +285,7 @@ class Canned:
                 number += 1
                 state = copy.deepcopy(self.state)
                 state["server"]["time_ms"] = _now_ms()
+                state["trends"] = self._trends(4)
                 await socket.send_json({"kind": "offer", "seq": number, "of": ["state"]})
                 await socket.send_json(state)
                 if self._watching:

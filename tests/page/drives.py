@@ -83,7 +83,8 @@ def diagnostics(*components: tuple[str, int, str]) -> Any:
 
 
 def write(path: Path, says: dict[str, Callable[[float], Any]], *, seconds: float = 10.0) -> Path:
-    """A bag in which each named signal says what its function gives for the time since the start [s]."""
+    """A bag in which each named signal says what its function gives for the time since the start [s]; where it
+    gives None, the signal is silent."""
     with Writer(path) as bag:
         lines = {}
         for name in says:
@@ -92,7 +93,9 @@ def write(path: Path, says: dict[str, Callable[[float], Any]], *, seconds: float
         moments = sorted((i / hz, name) for name, (_, _, hz) in lines.items() for i in range(round(seconds * hz)))
         for at_s, name in moments:
             connection, kind, _ = lines[name]
-            bag.write(connection, BEGAN_NS + round(at_s * 1e9), bytes(STORE.serialize_ros1(says[name](at_s), kind)))
+            message = says[name](at_s)
+            if message is not None:
+                bag.write(connection, BEGAN_NS + round(at_s * 1e9), bytes(STORE.serialize_ros1(message, kind)))
     return path
 
 
