@@ -171,9 +171,9 @@ export const DEFAULTS = Object.freeze({ values: {}, changed: [], topics: {}, pro
  * @param {(signal: string) => string} label of a signal
  */
 export function changeLines(now, { values = {}, topics = {}, profile }, label) {
-  const lines = Object.entries(values).flatMap(([name, value]) => {
-    const field = now.schema[name];
-    if (!field) return [];
+  const lines = Object.entries(now.schema).flatMap(([name, field]) => {
+    const value = values[name];
+    if (value === undefined) return [];
     const from = textOf(now.values[name], field);
     return [`${field.title}: ${from} → ${textOf(value ?? now.defaults[name], field)} ${scaleOf(field).unit}`];
   });

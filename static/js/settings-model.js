@@ -43,6 +43,8 @@ export class SettingsModel {
   #fetched = '';
   /** @type {Promise<void> | null} */
   #loading = null;
+  /** The last change that was asked for, answered or not. @type {Promise<void>} */
+  #last = Promise.resolve();
   #tried_ms = -Infinity;
   #boot = '';
   /** The version that stands on the glass. */
@@ -107,24 +109,35 @@ export class SettingsModel {
    * @param {string} [of] what is changed; several changes of one thing in a row are taken back together
    * @returns {Promise<Outcome>}
    */
-  async set(change, of = '') {
-    if (!this.body || this.store.isSilent) return { ok: false, reason: GONE };
-    const base = this.body;
-    for (const [name, value] of Object.entries(change.values ?? {})) {
-      const wanted = value ?? base.defaults[name];
-      if (wanted !== undefined) this.#pending.set(name, { value: wanted, version: null });
+  set(change, of = '') {
+    /** @type {Map<string, Pending>} */
+    const wishes = new Map();
+    for (const [name, wanted] of Object.entries(change.values ?? {})) {
+      const value = wanted ?? this.body?.defaults[name];
+      if (value !== undefined) wishes.set(name, { value, version: null });
     }
+    for (const [name, wish] of wishes) this.#pending.set(name, wish);
+    // One after the other: the next names the version that this one makes.
+    const outcome = this.#last.then(() => this.#set(change, of));
+    this.#last = outcome.then(({ ok }) => {
+      for (const [name, wish] of wishes) {
+        wish.version = this.#seen;
+        if (!ok && this.#pending.get(name) === wish) this.#pending.delete(name);
+      }
+    });
+    return this.#last.then(() => outcome);
+  }
+
+  /** @param {Change} change @param {string} of @returns {Promise<Outcome>} */
+  async #set(change, of) {
+    const base = await this.#current();
+    if (!base) return { ok: false, reason: GONE };
     const answer = await this.store.ask('set', { ...change, version: this.#seen });
     if (!answer.ok) {
-      for (const name of Object.keys(change.values ?? {})) this.#pending.delete(name);
       if (answer.isConflict) await this.load();
       return { ok: false, reason: answer.reason ?? 'Refused.' };
     }
     this.#confirmed(answer.version ?? this.#seen, base, of);
-    for (const name of Object.keys(change.values ?? {})) {
-      const pending = this.#pending.get(name);
-      if (pending) pending.version = this.#seen;
-    }
     return { ok: true };
   }
 
@@ -134,8 +147,8 @@ export class SettingsModel {
    * @returns {Promise<Outcome>}
    */
   async replace(toml) {
-    if (!this.body || this.store.isSilent) return { ok: false, reason: GONE };
-    const base = this.body;
+    const base = await this.#current();
+    if (!base) return { ok: false, reason: GONE };
     try {
       const name = this.store.name.replace(/[^\u0020-\u00ff]/g, '');
       const body = await fetched(this.#path('/api/settings.toml'), { method: 'PUT', body: toml, headers: { 'X-Catgraph-Name': name } });
@@ -175,7 +188,7 @@ export class SettingsModel {
   async undo() {
     const undo = this.#undo;
     if (!undo || !this.body) return { ok: false, reason: 'There is nothing to take back.' };
-    if (this.body.version < undo.version) await this.load();
+    await this.#current();
     if (this.body.version < undo.version) return { ok: false, reason: this.problem ?? 'The server has not confirmed the change yet.' };
     this.#undo = null;
     if (this.#seen !== undo.version) return { ok: false, reason: 'Somebody else has changed the settings since. Look at them again.' };
@@ -197,6 +210,12 @@ export class SettingsModel {
   /** A change in words. @param {Change} change */
   lines(change) {
     return this.body ? changeLines(this.body, change, (signal) => this.store.signal(signal)?.label ?? signal) : [];
+  }
+
+  /** The settings as they are now, not as they were before the last change; null where the server does not answer. */
+  async #current() {
+    for (let tries = 0; tries < 2 && this.body && this.body.version < this.#seen && !this.store.isSilent; tries += 1) await this.load();
+    return this.store.isSilent ? null : this.body;
   }
 
   /**

@@ -21,6 +21,8 @@ export class SettingsRow {
   #moving = null;
   /** What was in force when the hand took it. @type {number | null} */
   #from = null;
+  /** What this page asked for last, which may come in force while the hand moves on. @type {number | null} */
+  #sent = null;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   #rest;
   #asked_ms = 0;
@@ -54,7 +56,7 @@ export class SettingsRow {
     this.low = html('span', { class: 'n low', 'aria-hidden': 'true' });
     this.high = html('span', { class: 'n high', 'aria-hidden': 'true' });
     this.toggle = html('button', { type: 'button', class: 'toggle', id, role: 'switch', 'aria-checked': 'false', 'aria-describedby': described },
-      html('span', { class: 'knob' }), html('span', { class: 'state' }));
+      html('span', { class: 'knob' }), html('span', { class: 'word' }));
     this.range = html('div', { class: 'range' }, html('span', { class: 'line' }), html('span', { class: 'on' }), html('span', { class: 'tick' }), this.low, this.high, this.usual, this.slider);
     this.element = html('div', { class: 'set', 'data-setting': name },
       html('div', { class: 'row' }, html('label', { class: 't', for: id }, field.title), ...(this.isSwitch ? [this.toggle] : [this.number, this.unit])),
@@ -125,6 +127,7 @@ export class SettingsRow {
     this.#asked_ms = performance.now();
     this.#say('');
     const asking = this.model.set({ values: { [this.name]: value } }, this.name);
+    this.#sent = this.model.pending(this.name);
     this.#moving = this.#from = null;
     this.draw();
     const outcome = await asking;
@@ -142,7 +145,7 @@ export class SettingsRow {
   draw() {
     const { model, name, field } = this;
     const inForce = model.inForce(name);
-    if (this.#moving !== null && (!model.isOpen || (this.#from !== null && inForce !== null && inForce !== this.#from))) {
+    if (this.#moving !== null && (!model.isOpen || (this.#from !== null && inForce !== null && inForce !== this.#from && inForce !== this.#sent))) {
       clearTimeout(this.#rest);
       this.#moving = this.#from = null;
       this.#say(model.isOpen ? `Another page set it to ${textOf(inForce, field)} ${scaleOf(field).unit} meanwhile.` : 'Not changed: the server does not answer.');

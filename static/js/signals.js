@@ -100,7 +100,7 @@ export function mount(root, store) {
     for (const [name, signal] of Object.entries(frame.signals)) {
       let found = rows.get(name);
       if (!found) {
-        found = row();
+        found = row(() => pick(store, name));
         rows.set(name, found);
         table.append(found.element, found.more);
       }
@@ -124,7 +124,8 @@ export function mount(root, store) {
   };
 }
 
-function row() {
+/** @param {() => void} choose */
+function row(choose) {
   const name = html('span');
   const kind = html('small');
   const value = html('span', { class: 'n' });
@@ -135,11 +136,13 @@ function row() {
   const element = html('button', { type: 'button', class: 'sig', 'aria-expanded': 'false' }, html('span', {}, name, kind), html('span', {}, value, unit), rate,
     html('span', { class: 'mini' }, clock, old));
   const more = html('dl', { class: 'sig-more', hidden: true });
+  const choice = html('button', { type: 'button', class: 'key wide' }, 'Choose another topic');
+  choice.addEventListener('click', choose);
   element.addEventListener('click', () => {
     show(more, more.hasAttribute('hidden'));
     setAttribute(element, 'aria-expanded', String(!more.hasAttribute('hidden')));
   });
-  return { element, more, name, kind, value, unit, rate, old, clock };
+  return { element, more, choice, name, kind, value, unit, rate, old, clock };
 }
 
 /**
@@ -167,5 +170,21 @@ function fill(at, name, signal, { ink, age_s }) {
     const description = html('dd');
     setWords(description, text);
     return [html('dt', {}, term), description];
-  }));
+  }), html('dt', {}, 'Choice'), html('dd', {}, at.choice));
+}
+
+/**
+ * Lets another topic be picked; what that takes is loaded now.
+ * @param {import('./store.js').Store} store
+ * @param {string} name
+ */
+async function pick(store, name) {
+  try {
+    const [{ openTopicPicker }, { settingsOf }] = await Promise.all([import('./topic-picker.js'), import('./settings-model.js')]);
+    const model = settingsOf(store);
+    model.look();
+    await openTopicPicker(store, model, name);
+  } catch {
+    console.warn('The list of topics could not be loaded: the server does not answer.');
+  }
 }
