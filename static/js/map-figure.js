@@ -24,7 +24,7 @@ import { bearingWords, distanceWords } from './map-words.js';
 /** The track's paths are in metres of a plane that is good so far around [m]; where meridians meet, less far. */
 const ANCHOR_M = 2000;
 /** The last piece, from the track's newest point to the car, is drawn up to this length [m]. */
-const TAIL_M = 30;
+const TAIL_M = 60;
 /** A letter of a name is about so wide [px]; a name is kept inside the map. */
 const LETTER_PX = 7.6;
 /** So wide is the column of keys at the right [px]. */

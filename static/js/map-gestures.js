@@ -84,7 +84,7 @@ export function mountGestures(box, { isFree, pan, zoom }) {
     if (step && isFree()) pan(step[0] * STEP_PX, step[1] * STEP_PX);
     else if (event.key === '+' || event.key === '=') zoom(1.5, 0, 0);
     else if (event.key === '-') zoom(1 / 1.5, 0, 0);
-    else return;
+    else if (!step?.[0]) return; // up and down scroll; sideways would leave for another tab
     event.preventDefault();
   }
 

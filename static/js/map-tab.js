@@ -17,9 +17,8 @@ export class MapTab {
     this.isShown = isShown;
     // A swipe brings the tab's edge into sight before the tab is in front.
     const near = new IntersectionObserver((seen) => {
-      if (!seen.some(({ isIntersecting }) => isIntersecting)) return;
-      this.#fetch();
-    });
+      if (seen.some(({ intersectionRect }) => intersectionRect.width > 0)) this.#fetch(); // beside it is not in sight
+    }, { threshold: [0, 0.01] });
     near.observe(panel);
   }
 
