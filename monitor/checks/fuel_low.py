@@ -20,6 +20,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
+from monitor.figures import beside
 from monitor.state import Snapshot
 
 
@@ -40,7 +41,7 @@ def find(snapshot: Snapshot, limits: FuelLimits, was_active: bool) -> Finding:
     if not math.isfinite(level.value):
         return unknown("The fuel level is not a number", short="no data")
     below = limits.low_percent + (limits.deadband_percent if was_active else 0.0)
-    text = f"{level.value:.0f} % left, low below {limits.low_percent:.0f} %"
+    text = f"{beside(level.value, limits.low_percent, 0)} % left, low below {limits.low_percent:.0f} %"
     measured = Quantity(label="Fuel", value=level.value, unit="%")
     limit = Quantity(label="Low below", value=limits.low_percent, unit="%")
     if level.value >= below:

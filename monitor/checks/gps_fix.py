@@ -23,6 +23,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
+from monitor.figures import beside
 from monitor.state import Snapshot
 
 
@@ -49,7 +50,7 @@ def has_fix(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
         return fault("The receiver has no fix; its coordinates mean nothing", brief="no fix", causes=("position",))
     if fix.sigma_m is None:
         return ok("A fix of unknown quality")
-    text = f"A fix with an error of {fix.sigma_m:.1f} m"
+    text = f"A fix with an error of {beside(fix.sigma_m, limits.worst_sigma_m)} m"
     measured = Quantity(label="Error", value=fix.sigma_m, unit="m")
     limit = Quantity(label="At most", value=limits.worst_sigma_m, unit="m")
     if fix.sigma_m > limits.worst_sigma_m * (0.9 if was_active else 1.0):

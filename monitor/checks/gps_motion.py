@@ -24,6 +24,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
+from monitor.figures import beside
 from monitor.gps_watch import FIXES
 from monitor.state import Snapshot
 
@@ -70,7 +71,7 @@ def drifts(snapshot: Snapshot, limits: DriftLimits, was_active: bool) -> Finding
         return unknown("Taking the place where the car stopped", short="waiting")
     allowed_m = max(limits.least_m, DRIFT_SIGMAS * (SIGMA_UNKNOWN_M if watch.sigma_m is None else watch.sigma_m))
     drift_m, stood_s = watch.drift_m[-1], snapshot.now_s - watch.anchored_s
-    text = f"{drift_m:.1f} m from where it stopped {stood_s:.0f} s ago; {allowed_m:.1f} m are allowed"
+    text = f"{beside(drift_m, allowed_m)} m from where it stopped {stood_s:.0f} s ago; {allowed_m:.1f} m are allowed"
     measured = Quantity(label="Drift", value=drift_m, unit="m")
     limit = Quantity(label="Allowed", value=allowed_m, unit="m")
     if min(watch.drift_m) > allowed_m * (0.8 if was_active else 1.0):

@@ -23,6 +23,7 @@ from monitor.check import (
     ok,
     unknown,
 )
+from monitor.figures import beside
 from monitor.instruments import ObstacleLimits, stopping_m
 from monitor.state import NotFresh, Snapshot
 
@@ -151,7 +152,7 @@ def _judge(
         return ok("Nothing in the way", limit=limit)
     measured = Quantity(label="Gap", value=gap_m, unit="m")
     where = "" if bearing_rad is None or abs(bearing_rad) < math.radians(2) else _side(bearing_rad)
-    text = f"Obstacle {gap_m:.1f} m ahead{where}, {needed_m:.1f} m needed"
+    text = f"Obstacle {beside(gap_m, needed_m)} m ahead{where}, {needed_m:.1f} m needed"
     if gap_m < needed_m + (limits.deadband_m if was_active else 0.0):
         return fault(text, brief=f"{gap_m:.1f} m", measured=measured, limit=limit, causes=(cause,))
     if closing_mps is not None and closing_mps > CLOSING_AT_LEAST_MPS:

@@ -23,6 +23,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
+from monitor.figures import beside
 from monitor.motion import MOVES_ABOVE_MPS
 from monitor.phone_words import why_words
 from monitor.phones import FIX_LIVES_S, NO_PHONE
@@ -95,7 +96,9 @@ def agree(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -> Find
     newest = apart[-1] if is_fault else comparisons[-1]
     allowed_m = max(newest.gate_m, limits.least_m)
     which = f" ({view.label or 'one'}, of {view.count} phones)" if view.count > 1 else ""
-    text = f"The phone{which} is {newest.distance_m:.0f} m from the car; {allowed_m:.0f} m are explained"
+    text = (
+        f"The phone{which} is {beside(newest.distance_m, allowed_m, 0)} m from the car; {allowed_m:.0f} m are explained"
+    )
     measured = Quantity(label="Apart", value=newest.distance_m, unit="m")
     limit = Quantity(label="Explained", value=allowed_m, unit="m")
     if is_fault:
@@ -123,7 +126,8 @@ def move_as_one(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -
             return unknown(f"{text[0].upper()}{text[1:]}", short="near")
         return unknown(f"Standing: {text}", short="standing")
     r = 0.0 if tracks.correlation is None else tracks.correlation  # a phone that never moved moves with nothing
-    text = f"The tracks correlate with {r:.2f}; {limits.least_correlation:.2f} is the least"
+    least = limits.least_correlation
+    text = f"The tracks correlate with {beside(r, least, 2)}; {least:.2f} is the least"
     measured = Quantity(label="Correlation", value=r, unit="r")
     limit = Quantity(label="At least", value=limits.least_correlation, unit="r")
     if r < limits.least_correlation + (0.05 if was_active else 0.0):

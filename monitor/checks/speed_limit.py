@@ -19,6 +19,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
+from monitor.figures import beside
 from monitor.state import Snapshot
 
 
@@ -42,7 +43,7 @@ def find(snapshot: Snapshot, limits: SpeedLimits, was_active: bool) -> Finding:
     # A deadband as wide as the limit would never clear, so it takes at most half of it.
     clear_mps = max(limits.max_mps / 2, limits.max_mps - limits.deadband_mps)
     allowed_mps = clear_mps if was_active else limits.max_mps
-    text = f"{speed_mps:.1f} m/s, limit {limits.max_mps:.1f} m/s"
+    text = f"{beside(speed_mps, limits.max_mps)} m/s, limit {limits.max_mps:.1f} m/s"
     measured = Quantity(label="Speed", value=speed_mps, unit="m/s")
     limit = Quantity(label="Limit", value=limits.max_mps, unit="m/s")
     if speed_mps <= allowed_mps:

@@ -194,12 +194,23 @@ def _open(path: Path, kind: Kind) -> FileSource:
         raise RecordingUnreadable(_what_is_wrong(path, error)) from None
 
 
+# How the readers of others say that the end of a file, and so its index, is missing.
+_ENDS_EARLY = (
+    "File end magic is invalid",
+    "Header could not be read from file",
+    "Truncated record",
+    "Invalid MCAP footer",
+)
+
+
 def _what_is_wrong(path: Path, error: Exception) -> str:
     if isinstance(error, PermissionError) or isinstance(error.__cause__, PermissionError):
         return f"{path} may not be read by this user: permission denied"
     said = " ".join(str(error).split()).rstrip(".")
     if "not indexed" in said:
         return f"{path} was not closed properly and has no index: repair it with `rosbag reindex`"
+    if any(words in said for words in _ENDS_EARLY):
+        return f"{path} is not complete: it ends too early"
     if not said or len(said) > 200 or isinstance(error, KeyError | AssertionError | TypeError | IndexError):
         return f"{path} is damaged or not complete"
     return f"{path} is damaged or not complete: {said}"

@@ -138,6 +138,14 @@ def _write(report: Report, args: argparse.Namespace) -> None:
             _say(f"\nPage: {args.html}")
 
 
+def _demand_writable(path: Path) -> None:
+    """Before the work and not after it."""
+    if path.is_dir():
+        raise _Impossible(f"{path} cannot be written: it is a directory.")
+    if not path.parent.is_dir():
+        raise _Impossible(f"{path} cannot be written: {path.parent} is no directory.")
+
+
 def _keep(path: Path, content: bytes) -> None:
     """Whole or not at all."""
     new = path.with_name(f".{path.name}.{os.getpid()}.new")
@@ -153,6 +161,11 @@ def _keep(path: Path, content: bytes) -> None:
 def _demand_sense(args: argparse.Namespace) -> None:
     if args.compare and args.settings:
         raise _Impossible("--compare names both settings already: leave --settings out.")
+    for path in (args.json, args.html):
+        if path is not None and str(path) != "-":
+            _demand_writable(path)
+    if args.html is not None and str(args.html) == "-":
+        raise _Impossible("--html needs the name of a file.")
     Faults(args.inject)
 
 

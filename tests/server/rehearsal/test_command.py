@@ -76,7 +76,10 @@ def test_a_fault_of_motion_cannot_be_laid_over(check: Checking, healthy: Path) -
         (["--start", "-1"], "is not a number of seconds, 0 or more"),
         (["--settings", "/nowhere.toml"], "/nowhere.toml cannot be read"),
         (["--json", "/nowhere/out.json"], "/nowhere/out.json cannot be written"),
-        (["--html", "/nowhere/out.html"], "/nowhere/out.html cannot be written"),
+        (["--html", "/nowhere/out.html"], "/nowhere/out.html cannot be written: /nowhere is no directory"),
+        (["--html", "."], ". cannot be written: it is a directory"),
+        (["--json", "/"], "/ cannot be written: it is a directory"),
+        (["--html", "-"], "--html needs the name of a file"),
     ],
 )
 def test_what_cannot_be_done_is_exit_2_and_one_sentence(
@@ -84,6 +87,7 @@ def test_what_cannot_be_done_is_exit_2_and_one_sentence(
 ) -> None:
     ending = check(healthy, *arguments)
     assert ending.code == 2
+    assert ending.out == "", "it is said before the work"
     assert sentence in ending.err
     assert "Traceback" not in ending.err
 

@@ -1,0 +1,17 @@
+"""Numbers as the operator reads them: a value that passed its limit never reads the same as the limit."""
+
+from __future__ import annotations
+
+import math
+
+FINEST = 3  # digits after the point; what is nearer to its limit than that is at it
+
+
+def beside(value: float, limit: float, digits: int = 1) -> str:
+    """`value` with so many digits after the point, or as many more as tell it from `limit`: 4.97 beside 5.0."""
+    if math.isfinite(value) and value != limit:
+        for finer in range(digits, FINEST + 1):
+            text = f"{value:.{finer}f}"
+            if float(text) != round(limit, finer):
+                return text
+    return f"{value:.{digits}f}"
