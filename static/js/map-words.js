@@ -49,12 +49,14 @@ export function carOf(frame, inkOf) {
   const isLive = place !== null && (ink === 'fresh' || ink === 'ageing');
   const ellipse = hasFix ? ellipseOf(fix['covariance_m2'], fix['sigma_m']) : null;
   const turn = inkOf('heading');
-  const heading_deg = frame.signals['heading']?.value?.['heading_deg'];
+  const said_deg = frame.signals['heading']?.value?.['heading_deg'];
+  const heading_deg = typeof said_deg === 'number' && Number.isFinite(said_deg) ? said_deg : null;
+  const isHeadingLive = heading_deg !== null && (turn.ink === 'fresh' || turn.ink === 'ageing');
+  const whither = isHeadingLive ? '' : heading_deg === null ? ', heading unknown' : `, heading ${age(turn.age_s)} s old`;
   return {
     place, isLive, ink, age_s, ellipse,
-    heading_deg: typeof heading_deg === 'number' && Number.isFinite(heading_deg) ? heading_deg : null,
-    isHeadingLive: turn.ink === 'fresh' || turn.ink === 'ageing',
-    label: !isLive ? `Car STALE ${age(age_s)} s` : ellipse ? `Car ±${metres(ellipse.major_m)}` : 'Car, accuracy unknown',
+    heading_deg, isHeadingLive,
+    label: isLive ? `Car ${ellipse ? `±${metres(ellipse.major_m)}` : '±?'}${whither}` : `Car STALE ${age(age_s)} s`,
     says: carSays(ink, age_s, fix !== null && !hasFix),
   };
 }

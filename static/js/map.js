@@ -52,6 +52,7 @@ export function mount(root, store, isShown) {
   /** The last place of the car on the glass, and where it goes. @type {{from: Place, to: Place, view: View, began_ms: number} | null} */
   let step = null;
   let isDue = false;
+  let spoken = '';
   /** @type {number | null} */
   let trackNumber = null;
   let asked_ms = -Infinity;
@@ -179,6 +180,7 @@ export function mount(root, store, isShown) {
       show(at(name), says !== '');
     }
     show(at('says'), Boolean(car.says || phone.says || isTooFar));
+    speak(`${car.says} ${phone.says}`.trim());
     const [number, unit] = apart ? distanceWords(apart.distance_m) : ['–', ''];
     setText(at('apart'), number);
     setText(at('apart-unit'), unit);
@@ -188,6 +190,14 @@ export function mount(root, store, isShown) {
     readVerdict();
     setText(at('by'), ground.words(aim));
     figure.describe(pictureWords(car, phone, apart));
+  }
+
+  /** A reader hears what is wrong once, not again with every second that it grows older. @param {string} says */
+  function speak(says) {
+    const kind = says.replace(/\d+/g, '');
+    if (kind === spoken) return;
+    spoken = kind;
+    setText(at('spoken'), says);
   }
 
   function readVerdict() {

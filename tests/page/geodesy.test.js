@@ -61,6 +61,7 @@ test('turns', () => {
   assert.equal(turnTo(350, 10), 20);
   assert.equal(turnTo(10, 350), -20);
   assert.equal(turnTo(0, 180), 180);
+  assert.equal(turnTo(0, 190), -170);
 });
 
 test("a metre of Mercator's map on the ground", () => {

@@ -71,6 +71,12 @@ test('the grid lies still on the ground: lines at whole steps from its origin, e
   assert.deepEqual(strongAt, [[70, 241.4, 70, -41.4], [-41.4, 60, 241.4, 60]]); // 0 east of the origin, 0 north of it
 });
 
+test('two strong lines are five steps apart', () => {
+  const { strong } = gridPaths({ east_m: 0, north_m: 0 }, view(), { width: 800, height: 100 });
+  const upright = [...strong.matchAll(/M(-?[\d.]+) [\d.-]+L\1 /g)].map((match) => Number(match[1])).sort((a, b) => a - b);
+  assert.deepEqual(upright, [150, 400, 650]); // 25 m at 0.1 m/px
+});
+
 test('the grid is turned with the map and stays bounded', () => {
   const { strong } = gridPaths({ east_m: 0, north_m: 0 }, view({ up_deg: 90 }), { width: 200, height: 200 });
   assert.ok(strong.includes('M241.4 100L-41.4 100')); // along the north axis, which lies to the left
@@ -215,8 +221,9 @@ test('a car that is not known to be there is never shown as live, and why is sai
 
 test('unknown quality and unknown heading are said and drawn as that', () => {
   const car = carOf(frameOf({ ...FIX, sigma_m: null, covariance_m2: null }, null, null), inked('fresh', 'not_published'));
-  assert.deepEqual([car.ellipse, car.label, car.heading_deg], [null, 'Car, accuracy unknown', null]);
-  assert.equal(carOf(frameOf(FIX), inked('fresh', 'stale')).isHeadingLive, false);
+  assert.deepEqual([car.ellipse, car.label, car.heading_deg], [null, 'Car ±?, heading unknown', null]);
+  const standing = carOf(frameOf(FIX), inked('fresh', 'stale'));
+  assert.deepEqual([standing.isHeadingLive, standing.label], [false, 'Car ±5 m, heading 3.4 s old']);
 });
 
 test('every reason of a phone is said; a coarse fix is still one of now', () => {

@@ -132,7 +132,7 @@ async def test_car_and_phone_with_distance_bearing_and_their_errors(phone: Phone
         car.covariance_m2 = (9.0, 9.0, 6.0)  # long to the north-east
         await expect(it.svg(".acc")).to_have_attribute("transform", re.compile(r"rotate\(45\)"))
         car.covariance_m2 = None
-        await expect(it.svg(".name")).to_have_text("Car, accuracy unknown")
+        await expect(it.svg(".name")).to_have_text("Car ±?")
         await expect(it.svg(".acc")).to_be_hidden()
 
 
@@ -197,6 +197,10 @@ async def test_a_stale_car_loses_its_ink_and_its_line(phone: Phone) -> None:
         await expect(it.svg(".name")).to_have_text(re.compile(r"^Car STALE \d"))
         await expect(it.f("car-says")).to_have_text(re.compile(r"^The car’s position is \d+\.\d s old: it may be"))
         await expect(it.f("car-age")).to_have_text(re.compile(r"^STALE \d+\.\d s$"))
+        spoken = await it.f("spoken").text_content()
+        assert spoken.startswith("The car’s position is ")
+        await asyncio.sleep(1.5)
+        assert await it.f("spoken").text_content() == spoken  # said once, not with every second
         await expect(it.f("car-lat")).to_have_attribute("data-ink", "stale")
         for gone in (".dl", ".acc"):
             await expect(it.svg(gone)).to_be_hidden()
@@ -226,6 +230,7 @@ async def test_a_heading_that_is_not_known_points_nowhere(phone: Phone) -> None:
         await expect(diamond).to_be_visible()
         await expect(outline).to_be_visible()  # where it looked once
         await expect(outline).to_have_attribute("transform", "rotate(90)")
+        await expect(it.svg(".name")).to_have_text(re.compile(r"^Car ±3 m, heading \d+\.\d s old$"))
         await expect(it.svg(".car-mark")).to_have_attribute("data-ink", "fresh")
 
 
