@@ -109,7 +109,9 @@ export function mount(root, store, isShown) {
     const leap_px = from && to ? distance_m(from, to) / aim.mpp : 0;
     const isStill = matchMedia('(prefers-reduced-motion: reduce)').matches;
     const isFar = distance_m(view.centre, aim.centre) / aim.mpp > Math.max(LEAP_PX, size.height);
-    step = !from || !to || isStill || leap_px > LEAP_PX || isFar ? null : { from, to, view, began_ms: store.now() };
+    // Half a pixel is not seen to move: a car that stands costs no drawing.
+    const isHere = Math.max(leap_px, distance_m(view.centre, aim.centre) / aim.mpp) < 0.5 && view.mpp === aim.mpp && view.up_deg === aim.up_deg;
+    step = !from || !to || isStill || isHere || leap_px > LEAP_PX || isFar ? null : { from, to, view, began_ms: store.now() };
     if (!step) view = aim;
     drawSoon();
   }
