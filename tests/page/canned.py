@@ -21,6 +21,9 @@ from fastapi.staticfiles import StaticFiles
 from fastapi.templating import Jinja2Templates
 
 from server.compression import PageSocket
+from server.settings import SettingsFile
+from server.topics import candidates
+from server.tuning import Tuning
 from server.web.assets import static_dir, templates_dir
 
 Json = dict[str, Any]
@@ -239,6 +242,15 @@ class Canned:
             return {"vehicles": [], "found": self.found}
 
         @self.app.get("/api/map")
+        @self.app.get("/api/settings")
+        async def settings() -> Json:
+            return Tuning(SettingsFile(None)).as_json()
+
+        @self.app.get("/api/signals")
+        async def signals() -> Json:
+            offered = {one["topic"]: one["type"] for one in self.state["signals"].values() if one["topic"]}
+            return {"candidates": candidates(offered), "topics": [{"topic": "/rosout", "type": "rosgraph_msgs/Log"}]}
+
         async def ground() -> Json:
             return self.ground
 

@@ -279,6 +279,26 @@ async def map_none(server: Canned, page: Page) -> None:
 async def settings(server: Canned, page: Page) -> None:
     server.state = live()
     await page.tap("[data-tab=settings]")
+    await page.wait_for_selector(".set")
+
+
+@scene("settings-lower")
+async def settings_lower(server: Canned, page: Page) -> None:
+    await settings(server, page)
+    await page.evaluate("document.querySelector('.topics').scrollIntoView()")
+
+
+@scene("topic")
+async def topic(server: Canned, page: Page) -> None:
+    await settings(server, page)
+    await page.tap("[data-signal=speed]")
+
+
+@scene("preferences")
+async def preferences(server: Canned, page: Page) -> None:
+    server.state = live()
+    await page.tap("#monitor [data-f=menu]")
+    await page.tap("[data-screen=preferences]")
 
 
 async def take(browser: Browser, name: str, theme: str, size: dict[str, int] | None = None) -> Path:
