@@ -86,9 +86,10 @@ export function stepped(value, steps, field) {
  */
 export function textOf(value, field) {
   if (value === null || value === undefined || !Number.isFinite(value)) return fixed(null);
-  const { value: shown } = shownIn(value, field.unit);
+  const { value: shown, unit } = shownIn(value, field.unit);
+  const most = unit === field.unit ? 4 : 2; // a round number of m/s is none of mph
   let digits = decimals(scaleOf(field).step);
-  while (digits < 4 && Math.abs(Number(shown.toFixed(digits)) - shown) > 2e-5) digits += 1;
+  while (digits < most && Math.abs(Number(shown.toFixed(digits)) - shown) > 2e-5) digits += 1;
   return fixed(shown, digits);
 }
 

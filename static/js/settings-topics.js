@@ -3,7 +3,7 @@
 import { html, icon, setAttribute, setIcon, setText, setWords, show } from './dom.js';
 import { found } from './settings-layout.js';
 import { openTopicPicker } from './topic-picker.js';
-import { fixed, NOTHING } from './words.js';
+import { age, fixed, NOTHING } from './words.js';
 
 /**
  * @typedef {import('./protocol.js').Signal} Signal
@@ -30,7 +30,7 @@ export function topicWords(signal, picked, isLive) {
     `${label} · ${kind ?? 'type unknown'}${picked ? ' · picked by you' : ''}`,
     signal.note ?? '',
     signal.rejected ? `${signal.rejected} rejected: ${signal.rejected_why ?? 'no reason given'}` : '',
-    signal.freshness === 'never' ? 'no message yet' : '',
+    signal.freshness === 'never' ? 'no message yet' : signal.freshness === 'stale' ? `silent for ${age(signal.age_s)} s` : '',
   ];
   const isWell = !signal.note && !signal.rejected && (signal.freshness === 'fresh' || signal.freshness === 'ageing');
   return {

@@ -3,6 +3,10 @@ import { afterEach, test } from 'node:test';
 import {
   DEFAULTS, changeLines, changeTo, endText, found, groupsOf, readNumber, scaleOf, shareOf, stepped, textOf, valueAt,
 } from '../../static/js/settings-layout.js';
+import { fileProblem } from '../../static/js/settings-file.js';
+import { topicWords } from '../../static/js/settings-topics.js';
+import { optionsOf } from '../../static/js/topic-picker.js';
+import { trialWords } from '../../static/js/preferences.js';
 import { chooseSpeedUnit } from '../../static/js/units.js';
 
 afterEach(() => chooseSpeedUnit('m/s'));
@@ -70,6 +74,7 @@ test('in km/h the steps are round, what is typed is what is read, and the wire h
   assert.deepEqual(readNumber('1.8', speed), { value: 0.5 });
   assert.equal(textOf(2.62, base), '2.62');
   chooseSpeedUnit('mph');
+  assert.deepEqual([textOf(11, speed), textOf(11.176, speed)], ['24.61', '25.0']);
   assert.deepEqual(readNumber(endText(40, speed), speed), { value: 40 });
   assert.deepEqual(readNumber(endText(0.5, speed), speed), { value: 0.5 });
 });
@@ -126,4 +131,43 @@ test('a change in words', () => {
     'Speed limit: 9.0 → 11.0 m/s', 'Topic of Speed: /other → chosen automatically', 'Kind of car: as recognised → CATVehicle',
   ]);
   assert.deepEqual(changeLines(now, { values: { 'gone.x': 1 } }, () => ''), []);
+});
+
+/** @returns {import('../../static/js/protocol.js').Signal} */
+const signal = (more = {}) => ({
+  label: 'Speed', freshness: 'fresh', age_s: 0.1, horizon_s: 1, period_s: 0.05, expected_hz: 20, rate_hz: 20, topic: '/vel', type: 'geometry_msgs/Twist', note: null,
+  count: 9, rejected: 0, rejected_why: null, value: { speed_mps: 1 }, lowest: null, highest: null, ...more,
+});
+
+test('a topic says what it carries, how fast, and what is wrong with it', () => {
+  assert.deepEqual(topicWords(signal(), undefined, true), { topic: '/vel', says: 'speed · Twist', icon: 'ok', rate: '20.0' });
+  assert.deepEqual(topicWords(signal(), '/vel', true).says, 'speed · Twist · picked by you');
+  assert.deepEqual(topicWords(signal({ note: 'Float64, expected Float32' }), undefined, true), { topic: '/vel', says: 'speed · Twist\nFloat64, expected Float32', icon: 'warn', rate: '20.0' });
+  assert.match(topicWords(signal({ rejected: 3, rejected_why: 'x is NaN' }), undefined, true).says, /3 rejected: x is NaN/);
+  assert.match(topicWords(signal({ freshness: 'stale', age_s: 7.4 }), undefined, true).says, /silent for 7.4 s/);
+  assert.match(topicWords(signal({ freshness: 'never' }), undefined, true).says, /no message yet/);
+  assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null, freshness: 'not_published' }), undefined, true), { topic: 'Speed', says: 'not published', icon: 'unknown', rate: '–' });
+  assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null }), '/gone', true), { topic: '/gone', says: 'speed · picked by you, and the car does not have it', icon: 'warn', rate: '–' });
+  assert.deepEqual([topicWords(signal(), undefined, false).icon, topicWords(signal(), undefined, false).rate], ['unknown', '–']);
+});
+
+test('what can be picked: the own choice of the server, what is gone, what fits', () => {
+  const fits = [{ topic: '/vel', type: 'T' }, { topic: '/odom', type: 'O' }];
+  assert.deepEqual(optionsOf(fits, '/vel', undefined).map(({ topic, says, isChosen }) => [topic, says, isChosen]), [[null, 'now /vel', true], ['/vel', 'T · now', false], ['/odom', 'O', false]]);
+  assert.deepEqual(optionsOf(fits, null, '/gone').map(({ topic, isChosen }) => [topic, isChosen]), [[null, false], ['/gone', true], ['/vel', false], ['/odom', false]]);
+  assert.deepEqual(optionsOf(null, null, '/x').map(({ topic, says }) => [topic, says]), [[null, 'by name, then by type'], ['/x', 'picked']]);
+  assert.deepEqual(optionsOf([], null, undefined).map(({ says }) => says), ['now none fits']);
+});
+
+test('a file that cannot hold settings is not sent', () => {
+  assert.equal(fileProblem({ size: 10, name: 'a.toml' }), null);
+  assert.equal(fileProblem({ size: 0, name: 'a.toml' }), '“a.toml” is empty.');
+  assert.match(fileProblem({ size: 65537, name: 'x'.repeat(900) }) ?? '', /^“x{60}” is too large: .* 64 kB\.$/);
+});
+
+test('a trial of a sound says plainly where this phone cannot sound', () => {
+  assert.match(trialWords('missing', 'high'), /cannot sound: no alarm will be heard/);
+  assert.match(trialWords('blocked', 'high'), /no alarm will be heard/);
+  assert.match(trialWords('busy', 'low'), /An alarm sounds now/);
+  assert.match(trialWords('sounding', 'medium'), /three rising pulses/);
 });
