@@ -11,8 +11,8 @@ export const REACH_M = { least: 4, most: 120, first: 20 };
 const ZOOM_STEP = Math.SQRT2;
 /** Farther behind the laser than this a return is below the plot [m]. */
 const BEHIND_M = 0.5;
-/** Above this many beams, those that would fall on the pixel of their neighbour are drawn once. */
-const THINNED_BEAMS = 2000;
+/** Above this many beams, a return whose square of 5 px would cover its neighbour's but for this is not drawn again [px]. */
+const THINNED = { beams: 1000, px: 1.5 };
 
 /** @typedef {import('./scan-frame.js').Scan} Scan */
 
@@ -27,7 +27,7 @@ const THINNED_BEAMS = 2000;
 export function pointsOf(scan, reach_m, pixel_m = 0) {
   const points = new Float32Array(2 * scan.codes.length);
   const { codes, scale_m, angle_min_rad, angle_increment_rad } = scan;
-  const apart_m = codes.length > THINNED_BEAMS ? pixel_m / 2 : -1;
+  const apart_m = codes.length > THINNED.beams ? THINNED.px * pixel_m : -1;
   let used = 0;
   let [px, py] = [Infinity, Infinity];
   for (let i = 0; i < codes.length; i += 1) {

@@ -231,6 +231,7 @@ class Canned:
         self._watching = False
         templates = Jinja2Templates(directory=templates_dir())
         templates.env.globals["asset"] = lambda name: f"/static/{name}"
+        templates.env.globals["modules"] = list
         self.app.mount("/static", StaticFiles(directory=static_dir()))
 
         @self.app.get("/", response_class=HTMLResponse)
@@ -241,7 +242,6 @@ class Canned:
         async def vehicles() -> Json:
             return {"vehicles": [], "found": self.found}
 
-        @self.app.get("/api/map")
         @self.app.get("/api/settings")
         async def settings() -> Json:
             return Tuning(SettingsFile(None)).as_json()
@@ -251,6 +251,7 @@ class Canned:
             offered = {one["topic"]: one["type"] for one in self.state["signals"].values() if one["topic"]}
             return {"candidates": candidates(offered), "topics": [{"topic": "/rosout", "type": "rosgraph_msgs/Log"}]}
 
+        @self.app.get("/api/map")
         async def ground() -> Json:
             return self.ground
 

@@ -127,10 +127,19 @@ test('the sectors in words, widest first', () => {
   assert.deepEqual(sectorSentences(sectorsOf(scan(codes, { angle_increment_rad: 2 * DEGREE })), 4), ['no return from 9° left to 11° right', 'too close from 71° right to 81° right']);
 });
 
-test('10 000 beams are drawn once a pixel, 1440 all', () => {
+test('of many beams, those whose squares lie upon each other are drawn once, and no place is left out', () => {
   const wall = scan(Array(10_000).fill(500), { angle_increment_rad: Math.PI / 10_000 });
-  assert.ok(pointsOf(wall, 20, 1 / 22).length / 2 < 1000);
-  assert.equal(pointsOf(scan(Array(1440).fill(500), { angle_increment_rad: Math.PI / 1440 }), 20, 1 / 22).length / 2, 1440);
+  const drawn = pointsOf(wall, 20, 1 / 22);
+  assert.ok(drawn.length / 2 < 400);
+  for (let beam = 0; beam < 10_000; beam += 7) {
+    const [x, y] = [5 * Math.cos(-Math.PI / 2 + (beam * Math.PI) / 10_000), 5 * Math.sin(-Math.PI / 2 + (beam * Math.PI) / 10_000)];
+    let least = Infinity;
+    for (let i = 0; i < drawn.length; i += 2) least = Math.min(least, Math.max(Math.abs((drawn[i] ?? 0) - x), Math.abs((drawn[i + 1] ?? 0) - y)));
+    assert.ok(least * 22 <= 1.6);
+  }
+  const apart = Array.from({ length: 1440 }, (_, i) => 300 + 150 * (i % 9));
+  assert.equal(pointsOf(scan(apart, { angle_increment_rad: Math.PI / 1440 }), 20, 1 / 22).length / 2, 1440);
+  assert.equal(pointsOf(scan(Array(681).fill(500), { angle_increment_rad: Math.PI / 681 }), 20, 1 / 22).length / 2, 681);
 });
 
 const CAR = { half_width_m: 1.2, wheelbase_m: 2.62, laser_ahead_m: 2.5, tyre_angle_rad: 0 };
