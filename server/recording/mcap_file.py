@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal, cast
 
@@ -25,10 +26,23 @@ def profile_of(path: Path) -> str:
         return make_reader(cast("IO[bytes]", file)).get_header().profile
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Index:
+    """What a file holds and where."""
+
+    schemas: Mapping[int, Any]
+    channels: Mapping[int, Any]
+    counts: Mapping[int, int]  # of messages by channel
+    parts: Sequence[ChunkIndex]
+    span_ns: tuple[int, int] | None = None  # first and last message; None: that of the parts
+
+
 class McapFile:
     """An MCAP file of any profile."""
 
     distro: str | None = None
+
+    is_cut = False
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -36,27 +50,38 @@ class McapFile:
         self._file = path.open("rb")
         try:
             self._reader: McapReader = make_reader(self._file)
-            summary = self._reader.get_summary()
-            if summary is None or summary.statistics is None:
-                raise RecordingUnreadable(f"{path.name} ends too early: it has no index")
-            statistics = summary.statistics
-            self._parts = sorted(
-                summary.chunk_indexes, key=lambda part: (part.message_start_time, part.message_end_time)
-            )
-            self.start_ns, self.end_ns = statistics.message_start_time, statistics.message_end_time
-            counts = statistics.channel_message_counts
-            self.channels: Sequence[Channel] = [
-                _channel(channel, summary.schemas.get(channel.schema_id), counts.get(channel.id, 0))
-                for channel in summary.channels.values()
-            ]
+            index = self._read_index()
         except BaseException:
             self._file.close()
             raise
+        self._parts = sorted(index.parts, key=lambda part: (part.message_start_time, part.message_end_time))
+        if index.span_ns is not None:
+            self.start_ns, self.end_ns = index.span_ns
+        else:
+            self.start_ns = min(part.message_start_time for part in index.parts)
+            self.end_ns = max(part.message_end_time for part in index.parts)
+        self.channels: Sequence[Channel] = [
+            _channel(channel, index.schemas.get(channel.schema_id), index.counts.get(channel.id, 0))
+            for channel in index.channels.values()
+        ]
         is_ros2 = any(c.encoding == "cdr" or "/msg/" in c.type for c in self.channels if c.encoding != "ros1")
         self.ros_version: RosVersion = 2 if is_ros2 else 1
 
+    def _read_index(self) -> Index:
+        summary = self._reader.get_summary()
+        if summary is None or summary.statistics is None:
+            raise RecordingUnreadable(f"{self.path.name} ends too early: it has no index")
+        statistics = summary.statistics
+        return Index(
+            schemas=summary.schemas,
+            channels=summary.channels,
+            counts=statistics.channel_message_counts,
+            parts=summary.chunk_indexes,
+            span_ns=(statistics.message_start_time, statistics.message_end_time),
+        )
+
     def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-        self.damage = Damage()
+        self.damage = Damage(is_cut=self.is_cut)
         if not self._parts:  # nothing but messages, without an index
             for _, channel, message in self._reader.iter_messages(starting_at=start_ns):
                 if channel.id in numbers:

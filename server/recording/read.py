@@ -15,6 +15,7 @@ import orjson
 from server.recording.decode import Decode, compile_decoder
 from server.recording.definitions import definitions_of
 from server.recording.errors import RecordingUnreadable, Undecodable
+from server.recording.mcap_cut import CutMcapFile, is_cut
 from server.recording.mcap_file import McapFile, profile_of
 from server.recording.recognise import Kind, recognise
 from server.recording.rosbag1 import Bag1
@@ -88,9 +89,11 @@ class Recording:
 
     @property
     def damage(self) -> list[str]:
-        """What the newest reading had to leave out because it is damaged: a sentence for each file."""
+        """What the newest reading had to leave out because it is damaged or was never written, in sentences."""
         return [
-            source.damage.sentence(source.path.name, self._start_ns) for source in self._sources if source.damage.lost
+            sentence
+            for source in self._sources
+            for sentence in source.damage.sentences(source.path.name, self._start_ns, source.end_ns)
         ]
 
     @property
@@ -185,6 +188,8 @@ def _open(path: Path, kind: Kind) -> FileSource:
     try:
         if kind == "bag":
             return Bag1(path)
+        if kind == "mcap" and is_cut(path):
+            return CutMcapFile(path)
         if kind == "mcap" and profile_of(path) != "ros2":
             return McapFile(path)
         return Bag2(path, kind)

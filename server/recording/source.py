@@ -33,19 +33,28 @@ class Damage:
     parts: int = 0  # that were to be read
     lost: list[tuple[int, int]] = field(default_factory=list)  # first and last ns of each damaged one, by its index
 
+    is_cut: bool = False  # its end is missing besides, nobody knows how much
+
     @property
     def is_total(self) -> bool:
         return bool(self.parts) and len(self.lost) == self.parts
 
-    def sentence(self, name: str, origin_ns: int) -> str:
+    def sentences(self, name: str, origin_ns: int, end_ns: int) -> list[str]:
         """What is missing and when, for a person."""
-        first_s = (min(start_ns for start_ns, _ in self.lost) - origin_ns) / 1e9
-        last_s = (max(end_ns for _, end_ns in self.lost) - origin_ns) / 1e9
-        which = "1 part" if len(self.lost) == 1 else f"{len(self.lost)} parts"
-        verb = "is" if len(self.lost) == 1 else "are"
-        return (
-            f"{name} is damaged: {which} of {self.parts}, between {first_s:.1f} s and {last_s:.1f} s, {verb} left out"
-        )
+        said = []
+        if self.lost:
+            first_s = (min(start_ns for start_ns, _ in self.lost) - origin_ns) / 1e9
+            last_s = (max(end_ns for _, end_ns in self.lost) - origin_ns) / 1e9
+            which = "1 part" if len(self.lost) == 1 else f"{len(self.lost)} parts"
+            said.append(
+                f"{name} is damaged: {which} of {self.parts}, between {first_s:.1f} s and {last_s:.1f} s, "
+                f"{'is' if len(self.lost) == 1 else 'are'} left out"
+            )
+        if self.is_cut:
+            said.append(
+                f"{name} was never closed: it is read to its last whole part, {(end_ns - origin_ns) / 1e9:.1f} s"
+            )
+        return said
 
 
 class FileSource(Protocol):

@@ -284,7 +284,7 @@ class _Run:
     def _note_rejected(self) -> None:
         for topic, count in sorted(self._recording.rejected.items()):
             self.notes.append(f"{count} messages on {topic} left out: {self._recording.why_rejected[topic]}.")
-        self.notes += [f"{sentence}: a silence there is the file's." for sentence in self._recording.damage]
+        self.notes += [f"{sentence}." for sentence in self._recording.damage]
         for crash in self._crashes.values():
             self.notes.append(f"The check {crash.check_id} fails: {crash.error}.")
         for laid in self._faults.laid:

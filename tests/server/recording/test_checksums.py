@@ -159,3 +159,48 @@ def test_each_reading_tells_of_itself(tmp_path: Path, profile: str) -> None:
         assert (len(list(recording.messages())), recording.damage) == first
         list(recording.messages(start_s=2.0))
         assert recording.damage == []  # what is damaged lies before it
+
+
+# -- files that were never closed --------------------------------------------------------------------------------------
+
+
+@PROFILES
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9, 0.99])
+@pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.ZSTD])
+def test_a_file_that_was_never_closed_is_read_to_its_last_whole_part(
+    tmp_path: Path, profile: str, share: float, compression: CompressionType
+) -> None:
+    path = written(tmp_path / "a.mcap", profile=profile, compression=compression)
+    content = path.read_bytes()
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    cut_at = int(len(content) * share)
+    path.write_bytes(content[:cut_at])
+    whole = [part for part in summary.chunk_indexes if part.chunk_start_offset + part.chunk_length <= cut_at]
+    came, damage = numbers(path)
+    last_ns = max(part.message_end_time for part in whole)
+    assert came == list(range(last_ns // EVERY_NS + 1))
+    assert damage == [f"a.mcap was never closed: it is read to its last whole part, {last_ns / 1e9:.1f} s"]
+    with open_recording([path]) as recording:
+        assert recording.topics["/text"].count == len(came)
+        assert recording.duration_s == pytest.approx(last_ns / 1e9)
+
+
+@PROFILES
+def test_a_file_that_was_never_closed_and_is_damaged(tmp_path: Path, profile: str) -> None:
+    path = written(tmp_path / "a.mcap", profile=profile)
+    hurt(path, 50)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    came, damage = numbers(path)
+    assert 50 not in came
+    assert 0 in came
+    assert 100 in came
+    assert len(damage) == 2
+
+
+def test_a_file_cut_within_its_first_part(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.mcap")
+    path.write_bytes(path.read_bytes()[:2_000])
+    with pytest.raises(RecordingUnreadable, match=r"a\.mcap is not complete: it ends too early$"):
+        numbers(path)

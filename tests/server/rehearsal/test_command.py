@@ -146,7 +146,8 @@ def test_a_damaged_part_is_left_out_and_said(check: Checking, healthy: Path, tmp
     raw = bytearray(hurt.read_bytes())
     raw[part.chunk_start_offset + part.chunk_length // 2] ^= 0x40
     hurt.write_bytes(raw)
-    ending = check(hurt, "--json", tmp_path / "out.json")
+    ending = check(hurt, "--json", tmp_path / "out.json", "--html", tmp_path / "out.html")
+    assert "Not all of it" in (tmp_path / "out.html").read_text()
     assert ending.code == 2
     assert ending.err.startswith("catgraph check: hurt.mcap is damaged: 1 part of ")
     assert ending.err.count("\n") == 1
