@@ -1,6 +1,6 @@
 // The last minute on Home: one small picture a signal, in fixed places; pressed, it opens as a chart.
 
-import { field, html, listen, need, setAttribute, setText } from './dom.js';
+import { field, html, listen, setAttribute, setText } from './dom.js';
 import { ABSENT, write } from './ink.js';
 import { Minute, SPAN, SPECS, STEP_S } from './trends-layout.js';
 import { shownIn } from './units.js';
@@ -108,7 +108,10 @@ export function mount(root, store) {
     listen(window, 'resize', themed),
     // The chart and its library are fetched by the first press: most drives need neither.
     ...rows.map(({ spec, key }) => listen(key, 'click', () => {
-      import('./chart.js').then((chart) => chart.open(spec, trends, store), () => setText(need(root, '[data-f="sparks-says"]'), 'The chart could not be fetched.'));
+      import('./chart.js').then((chart) => {
+        setText(field(root, 'sparks-says'), 'now at the right');
+        return chart.open(spec, trends, store);
+      }).catch(() => setText(field(root, 'sparks-says'), 'the chart could not be fetched'));
     })),
   ];
 
