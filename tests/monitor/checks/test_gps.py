@@ -19,6 +19,7 @@ from tests.monitor.recorded import drive_fixes, drive_speeds, rows
 HERE = (32.2319, -110.9501)
 DATELINE = (10.0, 179.99999)
 POLAR = (84.0, 20.0)
+POLES = {"close by the north pole": (89.999, 179.9), "close by the south pole": (-89.999, -60.0)}  # 111 m from it
 GPS = ("gps_fix", "gps_quality", "gps_drift", "gps_jump")
 
 
@@ -54,7 +55,9 @@ class Walk:
         return str(ask(id, self.state.snapshot(self.now_s), was_active=was_active).verdict)
 
 
-@pytest.mark.parametrize("place", [HERE, DATELINE, POLAR], ids=["Tucson", "180° meridian", "far north"])
+@pytest.mark.parametrize(
+    "place", [HERE, DATELINE, POLAR, *POLES.values()], ids=["Tucson", "180° meridian", "far north", *POLES]
+)
 def test_drift_and_jump_anywhere_on_earth(place: tuple[float, float]) -> None:
     walk = Walk(place).go(6.0)
     assert (walk.ask("gps_drift"), walk.ask("gps_jump")) == ("ok", "ok")
@@ -62,6 +65,18 @@ def test_drift_and_jump_anywhere_on_earth(place: tuple[float, float]) -> None:
     assert (walk.ask("gps_drift"), walk.ask("gps_jump")) == ("fault", "ok")
     walk.go(0.5, gps_mps=23.0)
     assert walk.ask("gps_jump") == "fault"
+
+
+@pytest.mark.parametrize("lat_deg", [90.0, -90.0])
+def test_at_the_pole_itself_a_longitude_is_no_way_made(lat_deg: float) -> None:
+    """Every longitude is the same place there."""
+    walk = Walk((lat_deg, 0.0), sigma_m=0.2).go(6.0)
+    for n in range(20):
+        walk.now_s += 0.1
+        walk.state.receive("speed", Twist(speed_mps=0.0), walk.now_s)
+        fix = GpsFix(lat_deg=lat_deg, lon_deg=math.remainder(17.0 * n, 360.0), covariance_type=2, sigma_m=0.2)
+        walk.state.receive("position", fix, walk.now_s, 1e9 + walk.now_s)
+    assert (walk.ask("gps_drift"), walk.ask("gps_jump")) == ("ok", "ok")
 
 
 @pytest.mark.parametrize(
