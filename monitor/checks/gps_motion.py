@@ -26,6 +26,7 @@ from monitor.check import (
 )
 from monitor.figures import beside
 from monitor.gps_watch import FIXES
+from monitor.motion import STANDS_BELOW_MPS
 from monitor.state import Snapshot
 
 SIGMA_UNKNOWN_M = 2.5  # of a receiver that does not say
@@ -61,11 +62,13 @@ def drifts(snapshot: Snapshot, limits: DriftLimits, was_active: bool) -> Finding
     why_not = _why_not(snapshot)
     if why_not is not None:
         return why_not
-    snapshot.need("speed")
+    speed_mps = abs(snapshot.need("speed").speed_mps)
     watch = snapshot.gps
     if snapshot.standing_since_s is None:
         if was_active:
             return ok("The car moves: no drift at standstill any more")  # else it would stand until the next stop
+        if speed_mps < STANDS_BELOW_MPS:
+            return unknown("The car has only just come to rest", short="waiting")
         return unknown("The car moves", short="moving")
     if len(watch.drift_m) < FIXES or watch.anchored_s is None:
         return unknown("Taking the place where the car stopped", short="waiting")

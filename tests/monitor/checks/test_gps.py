@@ -109,6 +109,13 @@ def test_drift_is_not_checked_while_moving_and_the_anchor_is_taken_anew() -> Non
     assert walk.ask("gps_drift") == "ok"
 
 
+def test_a_car_that_has_only_just_stopped_is_not_said_to_move() -> None:
+    walk = Walk(sigma_m=0.2).go(5.0, speed_mps=3.0).go(1.0)
+    assert ask("gps_drift", walk.state.snapshot(walk.now_s)).text == "The car has only just come to rest"
+    walk.go(1.0, speed_mps=3.0)
+    assert ask("gps_drift", walk.state.snapshot(walk.now_s)).text == "The car moves"
+
+
 @pytest.mark.parametrize(("gps_mps", "verdict"), [(2.9, "ok"), (3.1, "fault"), (23.0, "fault")])
 def test_jump_margin_at_rest(gps_mps: float, verdict: str) -> None:
     assert Walk().go(6.0).go(1.0, gps_mps=gps_mps).ask("gps_jump") == verdict
