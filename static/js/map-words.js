@@ -66,7 +66,7 @@ function carSays(ink, age_s, isLost) {
   if (ink === 'not_published') return 'The car publishes no position.';
   if (ink === 'never') return 'No position has come from the car yet.';
   if (ink === 'stale') return `The car’s position is ${age(age_s)} s old: it may be elsewhere by now.`;
-  if (isLost) return 'The car’s receiver has no fix: where the car is is not known.';
+  if (isLost) return 'The car’s receiver has no fix: nobody knows where the car is.';
   return '';
 }
 

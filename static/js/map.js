@@ -72,14 +72,15 @@ export function mount(root, store, isShown) {
   /** @param {import('./protocol.js').State} frame */
   function learn(frame) {
     const lag_s = store.lag_s;
-    const before = frame.session.track?.number === trackNumber ? (known?.car.place ?? null) : null;
+    const isSame = frame.session.track?.number === trackNumber;
     trackNumber = frame.session.track?.number ?? null;
+    feed.look(frame, store.now());
+    const before = (isSame ? known?.car.place : null) ?? feed.track.points.at(-1) ?? null;
     let car = carOf(frame, (signal) => store.ink(signal));
     // A receiver that lost its fix tells no place any more; what is left is where the car was last.
     if (!car.place && before && car.ink !== 'not_published' && car.ink !== 'never') car = { ...car, place: before, isLive: false, label: 'Car was here' };
     const phone = phoneOf(frame, lag_s);
     known = { car, phone, apart: apartOf(frame, lag_s, car, phone) };
-    feed.look(frame, store.now());
     if (!isGroundThere && store.now() - asked_ms > AGAIN_MS) {
       asked_ms = store.now();
       ground.load().then(() => { isGroundThere = true; }, () => {});
@@ -166,11 +167,11 @@ export function mount(root, store, isShown) {
     drawSoon();
     if (!known) return;
     const { car, phone, apart } = known;
-    const ink = car.place || car.ink !== 'fresh' ? car.ink : 'stale';
     show(none, !isPlaced);
-    write(at('car-lat'), ink, car.isLive || car.ink === 'stale' ? degrees(car.place?.lat_deg) : '–');
-    write(at('car-lon'), ink, car.ink === 'never' || car.ink === 'not_published' ? '' : car.isLive || car.ink === 'stale' ? degrees(car.place?.lon_deg) : '–');
-    show(at('car-lon'), car.ink !== 'never' && car.ink !== 'not_published');
+    const hasDigits = car.isLive || (car.ink === 'stale' && car.place !== null);
+    write(at('car-lat'), car.ink, hasDigits ? degrees(car.place?.lat_deg) : '–');
+    write(at('car-lon'), car.ink, degrees(car.place?.lon_deg));
+    show(at('car-lon'), hasDigits);
     aged(at('car-age'), car.age_s, car.ink === 'ageing' ? 'ageing' : car.isLive ? 'fresh' : car.place || car.age_s !== null ? 'stale' : null, car.ink !== 'stale' && !car.isLive ? 'no fix' : '');
     const phoneInk = phone.isLive ? 'fresh' : 'stale';
     write(at('phone-lat'), phone.place ? phoneInk : 'fresh', phone.place ? degrees(phone.place.lat_deg) : '–');

@@ -213,11 +213,15 @@ async def test_a_stale_car_loses_its_ink_and_its_line(phone: Phone) -> None:
 async def test_without_a_fix_the_coordinates_are_no_position(phone: Phone) -> None:
     async with roaming() as car, looking(phone, car) as it:
         car.status = -1
-        await expect(it.f("car-says")).to_have_text("The car’s receiver has no fix: where the car is is not known.")
+        await expect(it.f("car-says")).to_have_text("The car’s receiver has no fix: nobody knows where the car is.")
         await expect(it.f("car-age")).to_have_text("no fix")
         await expect(it.f("car-lat")).to_have_text("–")
         await expect(it.svg(".name")).to_have_text("Car was here")
         await expect(it.svg(".car-mark")).to_have_attribute("data-ink", "stale")
+        await phone.page.reload()  # a page that comes only now knows it from the track
+        await phone.live()
+        await expect(it.svg(".name")).to_have_text("Car was here", timeout=12_000)
+        await it.stands(".car-mark", 0.0, 0.0)
 
 
 async def test_a_heading_that_is_not_known_points_nowhere(phone: Phone) -> None:
