@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import signal
 import time
@@ -11,6 +12,7 @@ from typing import Any
 
 import httpx
 import pytest
+import websockets
 
 from server import profiles
 from server.answers import refusal
@@ -399,6 +401,34 @@ async def test_a_picked_topic_replaces_the_found_one(bridge: RosBridge, server: 
         await one.state(lambda s: s["signals"]["speed"]["value"]["speed_mps"] == 7.5)
         assert (await one.ask(kind="set", topics={"speed": None}))["ok"]
         await one.state(lambda s: s["signals"]["speed"]["topic"] == "/catvehicle/vel")
+
+
+async def test_a_picked_topic_is_subscribed_though_the_bridge_tells_no_topics() -> None:
+    heard: list[dict[str, Any]] = []
+
+    async def bare(socket: websockets.ServerConnection) -> None:
+        """A rosbridge without rosapi: every service fails; the one topic it has is published once it is wanted."""
+        async for text in socket:
+            message = json.loads(text)
+            heard.append(message)
+            if message["op"] == "call_service":
+                answer = {"op": "service_response", "id": message["id"], "service": message["service"], "values": ""}
+                await socket.send(json.dumps(answer | {"result": False}))
+            if message["op"] == "subscribe" and message["topic"] == "/my/vel":
+                await socket.send(json.dumps({"op": "publish", "topic": "/my/vel", "msg": twist(7.5)}))
+
+    def topics(op: str) -> set[str]:
+        return {message["topic"] for message in heard if message["op"] == op}
+
+    async with websockets.serve(bare, "127.0.0.1", 0) as bridge:
+        port = next(iter(bridge.sockets)).getsockname()[1]
+        config = Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{port}"),))
+        async with serving(config) as server, viewer(server) as one:
+            await one.state(lambda s: "/catvehicle/vel" in topics("subscribe"), within_s=15)
+            assert (await one.ask(kind="set", topics={"speed": "/my/vel"}))["ok"]
+            await one.state(lambda s: (s["signals"]["speed"]["value"] or {}).get("speed_mps") == 7.5, within_s=15)
+            assert "/catvehicle/vel" in topics("unsubscribe")
+            assert "/gps_fix" not in topics("unsubscribe")
 
 
 async def test_the_log_is_paged_filtered_and_exported(bridge: RosBridge, server: str) -> None:
