@@ -8,6 +8,7 @@ import math
 import os
 import sys
 import time
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -77,6 +78,10 @@ def run(args: argparse.Namespace) -> int:
         return CANNOT
     except (RecordingUnreadable, CannotInject, BadSetting, AssetsMissing, _Impossible) as error:
         _complain(str(error))
+        return CANNOT
+    except Exception as error:  # the one net: 1 would say that a critical alarm was raised
+        traceback.print_exc()
+        _complain(f"a fault of catgraph itself, please report it: {type(error).__name__}: {error}")
         return CANNOT
     missing = [*report.run.damage, *([report.run.broke_off] if report.run.broke_off is not None else [])]
     for sentence in missing:
@@ -206,5 +211,9 @@ def _complain(sentence: str) -> None:
 
 
 def _say(text: str) -> None:
-    with contextlib.suppress(BrokenPipeError):  # who read the other end of a pipe has seen enough
+    try:
         print(text, flush=True)
+    except BrokenPipeError:  # who read the other end of a pipe has seen enough
+        pass
+    except OSError as error:
+        raise _Impossible(f"the report cannot be printed: {error.strerror or error}.") from None

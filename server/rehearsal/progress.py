@@ -18,7 +18,7 @@ class Progress:
         """From which to which second of the recording the job goes."""
         self._begin_s, self._end_s, self._what = begin_s, end_s, what
         self._stream = sys.stderr if stream is None else stream
-        self._is_terminal = self._stream.isatty()
+        self._is_terminal = self._stream is not None and self._stream.isatty()  # None: it was closed
         self._started_s = time.monotonic()
         self._next_s = self._started_s + FIRST_AFTER_S
         self._shown = False

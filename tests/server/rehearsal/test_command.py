@@ -14,10 +14,12 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from server.rehearsal import summary
 from server.simulator.scenarios import SCENARIOS
 from tests.environment import users_own
 from tests.server.recording.bags import Drive, write_ros1
 from tests.server.rehearsal.conftest import Checking, recorded
+from tests.tree import PROJECT
 
 # Faults for which the drive has no occasion: the car does not stand at 15 s, and no phone rides along.
 NOT_HERE = {"gps-drift", "phone-mismatch"}
@@ -266,6 +268,37 @@ def test_a_terminal_sees_how_far_it_is(tmp_path: Path, healthy: Path) -> None:
     assert text.endswith("\r\x1b[K")  # it wipes its line
     piped = subprocess.run(command, capture_output=True, env=users_own(), check=True)
     assert piped.stderr == b""
+
+
+SHELL_CASES = {
+    "nothing to read from": ("<&-", 0),
+    "nowhere to print": (">&-", 0),
+    "nowhere to complain": ("2>&-", 0),
+    "a terminal of plain letters": ("", 0),
+    "a full disk": ("> /dev/full", 2),
+    "a reader that has seen enough": ("| head -1 > /dev/null; exit ${PIPESTATUS[0]}", 0),
+}
+
+
+@pytest.mark.parametrize(("how", "code"), SHELL_CASES.values(), ids=SHELL_CASES)
+def test_whatever_the_shell_gives_it(healthy: Path, how: str, code: int) -> None:
+    """1 would say that a critical alarm was raised."""
+    command = f'{sys.executable} -m server check "{healthy}" --duration 2 {how}'
+    plain = {**users_own(), "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii"}
+    ended = subprocess.run(["bash", "-c", command], capture_output=True, env=plain, cwd=PROJECT)
+    assert ended.returncode == code
+    assert b"Traceback" not in ended.stderr
+
+
+def test_a_fault_of_its_own_is_not_taken_for_an_alarm(
+    check: Checking, healthy: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(summary, "text", lambda report: 1 / 0)
+    ending = check(healthy, "--duration", "2")
+    assert ending.code == 2
+    assert ending.err.endswith(
+        "catgraph check: a fault of catgraph itself, please report it: ZeroDivisionError: division by zero\n"
+    )
 
 
 # The command with a progress that is eager to speak: the drive is too short for one.
