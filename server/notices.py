@@ -86,7 +86,7 @@ def _part(distribution: metadata.Distribution) -> Part:
 
 
 def _license(about: metadata.PackageMetadata) -> str:
-    said = (about.get("License-Expression") or about.get("License") or "").strip()
+    said = next((about[name].strip() for name in ("License-Expression", "License") if name in about), "")
     if said and len(said) <= _LONGEST and "\n" not in said:
         return str(said)
     kinds = [one.rsplit("::", 1)[1].strip() for one in about.get_all("Classifier", []) if one.startswith("License ::")]

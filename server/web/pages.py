@@ -11,23 +11,10 @@ from fastapi.responses import HTMLResponse, Response
 from fastapi.templating import Jinja2Templates
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse
-from starlette.staticfiles import StaticFiles
-from starlette.types import Scope
 
 from server.web.api import running, vehicle_of
 from server.web.assets import check_vendor, static_dir, templates_dir
-
-_YEAR = "public, max-age=31536000, immutable"
-
-
-class StampedFiles(StaticFiles):
-    """Static files; those asked for with the hash of their content may be kept for ever."""
-
-    async def get_response(self, path: str, scope: Scope) -> Response:
-        response = await super().get_response(path, scope)
-        query = scope.get("query_string", b"")
-        response.headers["Cache-Control"] = _YEAR if query.startswith(b"v=") else "no-cache"
-        return response
+from server.web.static_files import StaticText, answer, modules_of, packed
 
 
 def install(app: FastAPI) -> None:
@@ -46,12 +33,14 @@ def install(app: FastAPI) -> None:
         return f"/static/{name}?v={digest(path, path.stat().st_mtime_ns)}"
 
     templates.env.globals["asset"] = asset
-    app.mount("/static", StampedFiles(directory=static), name="static")
+    templates.env.globals["modules"] = lambda: modules_of(static / "js" / "app.js")
+    app.mount("/static", StaticText(directory=static), name="static")
 
     @app.get("/", response_class=HTMLResponse, include_in_schema=False)
-    async def page(request: Request, vehicle: str | None = None) -> HTMLResponse:
+    async def page(request: Request, vehicle: str | None = None) -> Response:
         context = {"version": running(request).version, "vehicle": vehicle_of(running(request), vehicle)}
-        return templates.TemplateResponse(request, "page.html", context)
+        drawn = templates.TemplateResponse(request, "page.html", context)
+        return answer(packed(bytes(drawn.body)), request.headers, "text/html; charset=utf-8", "no-cache")
 
     @app.get("/manifest.webmanifest", include_in_schema=False)
     async def manifest() -> FileResponse:

@@ -9,6 +9,7 @@ import { MapTab } from './map-tab.js';
 import { notices } from './notice.js';
 import { Page } from './page.js';
 import { Phone } from './phone.js';
+import { ScanTab } from './scan-tab.js';
 import { Screens } from './screens.js';
 import { SettingsTab } from './settings-tab.js';
 import { mountSheets } from './sheet.js';
@@ -25,7 +26,6 @@ import { mount as mountPedals } from './pedals.js';
 import { mount as mountPosition } from './position.js';
 import { mount as mountPreferences } from './preferences.js';
 import { mount as mountRail } from './rail.js';
-import { mount as mountScan } from './scan.js';
 import { mount as mountSnackbar } from './snackbar.js';
 import { mount as mountStart } from './start.js';
 import { mount as mountStrip } from './strip.js';
@@ -43,7 +43,7 @@ const monitor = need(document, '#monitor');
 const say = notices(field(document, 'snacks'));
 const page = new Page(store, arming, say);
 
-const scan = mountScan(need(monitor, '[data-panel="scan"]'), store);
+const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
 const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null);
 const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
 const screens = new Screens(monitor, store, front);
@@ -102,3 +102,8 @@ listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
 
 store.start();
 draw();
+// The screens an operator may want when the server is gone are fetched while it is there, once the page has begun.
+setTimeout(prefetch, 10_000);
+function prefetch() {
+  for (const load of [() => import('./log.js'), () => import('./signals.js'), () => import('./scan.js')]) load().catch(() => {});
+}

@@ -1,8 +1,5 @@
 // The screens behind the menu: each slides over the tabs and keeps bar, strip and rail in their places.
 
-import { mountAbout, mountLicense } from './about.js';
-import { mount as mountLog } from './log.js';
-import { mount as mountSignals } from './signals.js';
 import { openPreferences } from './preferences.js';
 import { closeSheet, openSheet } from './sheet.js';
 import { field, html, listen, need, setText, show, words } from './dom.js';
@@ -12,13 +9,15 @@ import { field, html, listen, need, setText, show, words } from './dom.js';
  * @typedef {(root: HTMLElement, store: Store) => (() => void)} Mount
  */
 
-const SCREENS = /** @type {Record<string, {title: string, mount: Mount}>} */ ({
-  saved: { title: 'Saved data', mount: still(['Nothing is recorded yet: this version has no recorder.', 'What you see now is not kept.']) },
-  log: { title: 'Alarm log', mount: mountLog },
-  signals: { title: 'Signals', mount: mountSignals },
-  license: { title: 'License', mount: mountLicense },
-  about: { title: 'About', mount: mountAbout },
+// Each is fetched when it is first opened: a page that begins has enough to load.
+const SCREENS = /** @type {Record<string, {title: string, load: () => Promise<Mount>}>} */ ({
+  saved: { title: 'Saved data', load: async () => still(['Nothing is recorded yet: this version has no recorder.', 'What you see now is not kept.']) },
+  log: { title: 'Alarm log', load: async () => (await import('./log.js')).mount },
+  signals: { title: 'Signals', load: async () => (await import('./signals.js')).mount },
+  license: { title: 'License', load: async () => (await import('./about.js')).mountLicense },
+  about: { title: 'About', load: async () => (await import('./about.js')).mountAbout },
 });
+const NOT_HERE = still(['This screen could not be fetched from the server. Go back and open it again.']);
 
 export class Screens {
   /** @type {(() => void) | null} */
@@ -82,10 +81,21 @@ export class Screens {
     if (screen) {
       setText(field(this.root, 'title'), screen.title);
       place.scrollTop = 0;
-      this.#unmount = screen.mount(place, this.store);
+      this.#fill(place, screen.load);
       field(this.root, 'title').focus();
     }
     this.onChange(this.open);
+  }
+
+  /**
+   * @param {HTMLElement} place
+   * @param {() => Promise<Mount>} load
+   */
+  async #fill(place, load) {
+    const { open } = this;
+    place.replaceChildren();
+    const mount = await load().catch(() => NOT_HERE);
+    if (this.open === open && !this.#unmount) this.#unmount = mount(place, this.store);
   }
 }
 

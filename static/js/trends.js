@@ -80,7 +80,7 @@ export function mount(root, store) {
     const value = html('span', { class: 'n' });
     const label = html('span', {});
     const canvas = /** @type {HTMLCanvasElement} */ (html('canvas', { class: 'spark', 'aria-hidden': 'true' }));
-    const key = html('button', { type: 'button', 'aria-haspopup': 'dialog', 'data-trend': spec.name }, html('span', { class: 'row' }, label, value), canvas);
+    const key = html('button', { type: 'button', 'aria-haspopup': 'dialog', 'aria-label': `${spec.title}: open the chart of the last minute`, 'data-trend': spec.name }, html('span', { class: 'row' }, label, value), canvas);
     list.append(html('li', {}, key));
     return { spec, value, label, canvas, key };
   });

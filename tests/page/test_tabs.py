@@ -103,12 +103,13 @@ async def test_ui_report_fig_3_9_the_overflow_menu(phone: Phone, watch: Process)
         "View saved data", "Preferences", "Alarm log", "Signals", "License", "About",
     ]  # fmt: skip
     await menu.get_by_text("License").tap()
-    await expect(phone.page.locator(".license")).to_contain_text("TERMS AND CONDITIONS FOR USE")
+    await phone.page.locator(".notice summary", has_text="catgraph").tap()
+    await expect(phone.page.locator(".notice[open] .license")).to_contain_text("TERMS AND CONDITIONS FOR USE")
     await phone.page.go_back()  # the phone's back key
     await expect(phone.page.locator(".tabs")).to_be_visible()
     await phone.f("menu").tap()
     await menu.get_by_text("About").tap()
-    await expect(phone.page.locator(".prose")).to_contain_text("not an emergency stop")
+    await expect(phone.page.locator("[data-f=screen] .prose")).to_contain_text("not an emergency stop")
     await phone.f("back").tap()
     await phone.f("menu").tap()
     await menu.get_by_text("Preferences").tap()

@@ -1,0 +1,91 @@
+"""How soon the page is there: on an access point of 20 Mbit/s and 5 ms, with a processor a quarter as fast as this."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from statistics import median
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Page
+
+from tests.page.conftest import PHONE
+from tests.page.processes import Process, running, server, simulate
+
+COLD_S, WARM_S = 0.8, 0.4
+COLD_BYTES = 100_000
+ACCESS_POINT = {"offline": False, "latency": 5, "downloadThroughput": 20e6 / 8, "uploadThroughput": 20e6 / 8}
+# Live values stand on Home: the time of the page's own clock when they first did.
+WATCH = """() => {
+  const look = () => {
+    const word = document.querySelector('#monitor [data-f=word]')?.textContent;
+    const digits = document.querySelector('.gauge .speed')?.textContent ?? '';
+    const isCovered = document.querySelector('.veil')?.dataset.on;
+    if (word === 'Live' && /[0-9]/.test(digits) && !isCovered) window.thereAt = performance.now();
+    else requestAnimationFrame(look);
+  };
+  requestAnimationFrame(look);
+}"""
+
+
+@pytest_asyncio.fixture(loop_scope="module", scope="module")
+async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Process]:
+    async with running(*simulate()) as car, running(*server(tmp_path_factory.mktemp("data"), car.address)) as process:
+        yield process
+
+
+async def load(page: Page, address: str, slower: float) -> tuple[float, int, int]:
+    """Loads it; seconds until live values stand there, bytes on the wire and answers until the network is idle."""
+    cdp = await page.context.new_cdp_session(page)
+    sizes: list[float] = []
+    data: set[str] = set()  # answers that are the car's, not the page's
+    cdp.on(
+        "Network.responseReceived",
+        lambda told: data.add(told["requestId"]) if "/api/" in told["response"]["url"] else None,
+    )
+    cdp.on(
+        "Network.loadingFinished",
+        lambda told: sizes.append(told["encodedDataLength"]) if told["requestId"] not in data else None,
+    )
+    await cdp.send("Network.enable")
+    await cdp.send("Network.emulateNetworkConditions", ACCESS_POINT)
+    await cdp.send("Emulation.setCPUThrottlingRate", {"rate": slower})
+    await page.goto(address)
+    await page.wait_for_function("() => window.thereAt > 0", timeout=30_000)
+    took_ms: float = await page.evaluate("window.thereAt")
+    await page.wait_for_timeout(500)
+    await cdp.send("Emulation.setCPUThrottlingRate", {"rate": 1})
+    await cdp.detach()
+    return took_ms / 1000, round(sum(sizes)), len(sizes)
+
+
+async def cold_and_warm(browser: Browser, address: str, slower: float) -> tuple[Any, Any]:
+    context = await browser.new_context(**PHONE)
+    try:
+        page = await context.new_page()
+        await page.add_init_script(f"({WATCH})()")
+        cold = await load(page, address, slower)
+        await page.goto("about:blank")
+        warm = await load(page, address, slower)
+        return cold, warm
+    finally:
+        await context.close()
+
+
+async def test_the_page_is_small(browser: Browser, watch: Process) -> None:
+    cold, warm = await cold_and_warm(browser, watch.address, 1)
+    print(f"cold {cold[1]} B in {cold[2]} answers, warm {warm[1]} B")
+    assert cold[1] <= COLD_BYTES
+    assert warm[1] <= 0.4 * cold[1], "what has not changed is not sent again"
+    assert cold[0] <= 10 * COLD_S  # whatever else this machine does
+
+
+@pytest.mark.soak
+async def test_the_page_is_soon_there(browser: Browser, watch: Process) -> None:
+    """On a machine that does nothing else."""
+    rounds = [await cold_and_warm(browser, watch.address, 4) for _ in range(5)]
+    cold_s, warm_s = median(cold[0] for cold, _ in rounds), median(warm[0] for _, warm in rounds)
+    print(f"cold {cold_s:.2f} s, warm {warm_s:.2f} s")
+    assert cold_s <= COLD_S
+    assert warm_s <= WARM_S
