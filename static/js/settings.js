@@ -27,7 +27,7 @@ export function mount(panel, store, say, isShown) {
   const undo = html('button', { type: 'button', class: 'key wide undo', disabled: true }, icon('replay'), html('span', {}, 'Undo'));
   const state = html('p', { class: 'state', role: 'status' });
   const groups = html('div', { class: 'groups' });
-  const none = html('p', { class: 'prose none', hidden: true });
+  const none = html('p', { class: 'nothing', hidden: true });
   const topics = new SettingsTopics(store, model);
   const file = new SettingsFileKeys(store, model, say);
   const phone = html('button', { type: 'button', class: 'key wide' }, icon('phone'), 'Preferences of this phone');
