@@ -15,9 +15,10 @@ export function mountTouch(root, does) {
   /** @type {number | null} */
   let from_px = null;
   const moved = (/** @type {TouchEvent} */ event) => {
+    if (event.touches.length !== 2) return;
     // A scroll that has begun cannot be taken back: it was a swipe, and the fingers must be lifted first.
-    if (event.touches.length !== 2 || !event.cancelable) return;
-    event.preventDefault();
+    if (event.cancelable) event.preventDefault();
+    else if (from_px === null) return;
     const now_px = apart(event.touches);
     if (from_px === null) {
       from_px = now_px;

@@ -177,6 +177,7 @@ async def test_two_fingers_zoom_the_plot_and_leave_the_tab_where_it_is(phone: Ph
         await phone.page.keyboard.press("-")
         await phone.page.reload()
         await phone.live()
+        await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
         assert await reach(phone) == pytest.approx(14.1, abs=0.1)  # remembered
 
 
@@ -269,7 +270,7 @@ SAYS = {
     "clockwise": ("6.", "181 of 181 beams", ""),
     "backwards": ("none", "91 behind, not drawn", "not in view"),
     "blind": ("blind", "0 of 181 beams", "invalid"),
-    "narrow": ("6.", "61 of 61 beams", "not in view from 30° left to 90° left"),
+    "narrow": ("6.", "61 of 61 beams", "not in view from 90° left to 30° left"),
 }
 
 
