@@ -41,6 +41,7 @@ export class Screens {
       listen(field(root, 'link'), 'click', () => this.show('signals')),
       listen(field(root, 'strip'), 'click', () => this.show(field(root, 'strip').dataset['opens'] ?? 'log')),
       listen(window, 'popstate', () => this.#set(history.state?.screen ?? null)),
+      listen(window, 'catgraph-units', () => this.#again()), // what it told stands there in the unit of before
       listen(document, 'keydown', (event) => {
         if (event.key === 'Escape' && this.open && !document.querySelector('dialog[open]')) this.show(null);
       }),
@@ -85,6 +86,15 @@ export class Screens {
       field(this.root, 'title').focus();
     }
     this.onChange(this.open);
+  }
+
+  /** The open screen, written anew. */
+  #again() {
+    const screen = this.open === null ? undefined : SCREENS[this.open];
+    if (!screen) return;
+    this.#unmount?.();
+    this.#unmount = null;
+    this.#fill(field(this.root, 'screen'), screen.load);
   }
 
   /**

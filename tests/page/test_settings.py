@@ -327,6 +327,20 @@ async def test_units_follow_everywhere_and_the_wire_stays_si(
     await expect(phone.page.locator(".gauge .unit").last).to_contain_text("km/h")
 
 
+async def test_the_log_beneath_preferences_follows_the_unit(
+    phone: Phone, watch: Process, api: httpx.AsyncClient
+) -> None:
+    await api.patch("/api/settings", json={"values": {LIMIT: 20.0}})
+    await settings(phone, watch)
+    for screen in ("Alarm log", "Preferences"):
+        await phone.f("menu").tap()
+        await phone.page.locator("#sheet-menu").get_by_text(screen).tap()
+    log = phone.page.locator(".screen")
+    await expect(log).to_contain_text("→ 20 m/s")
+    await phone.page.locator('[data-unit-key="km/h"]').tap()
+    await expect(log).to_contain_text("→ 72 km/h")
+
+
 async def test_the_file_goes_out_and_comes_in_and_a_bad_one_is_refused_in_words(
     phone: Phone, watch: Process, api: httpx.AsyncClient, tmp_path: Path
 ) -> None:
