@@ -63,6 +63,15 @@ async def home_lower(server: Canned, page: Page) -> None:
     await page.evaluate("document.querySelector('[data-panel=home]').scrollTo(0, 9999)")
 
 
+@scene("chart")
+async def chart(server: Canned, page: Page) -> None:
+    await home_lower(server, page)
+    await page.tap("[data-trend=distance]")
+    box = await page.locator("#sheet-chart .u-over").bounding_box()
+    assert box is not None
+    await page.touchscreen.tap(box["x"] + 0.7 * box["width"], box["y"] + 80)
+
+
 @scene("home-fault")
 async def home_fault(server: Canned, page: Page) -> None:
     state = live()
