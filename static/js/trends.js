@@ -127,7 +127,7 @@ export function mount(root, store) {
   function drawWords({ spec, label, value, key }) {
     const { unit } = shownIn(0, spec.unit);
     const { text, ink } = nowOf(spec, store);
-    setText(label, `${spec.label} ${unit}`);
+    setText(label, spec.name === 'acceleration' ? spec.label : `${spec.label} ${unit}`); // its unit has no room beside it
     write(value, ink, text);
     setAttribute(key, 'aria-label', `${spec.title}: ${ink === 'stale' ? 'stale, last ' : ''}${text} ${unit}; open the chart of the last minute`);
   }
