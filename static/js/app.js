@@ -105,5 +105,5 @@ draw();
 // The screens an operator may want when the server is gone are fetched while it is there, once the page has begun.
 setTimeout(prefetch, 10_000);
 function prefetch() {
-  for (const load of [() => import('./log.js'), () => import('./signals.js'), () => import('./scan.js')]) load().catch(() => {});
+  for (const load of [() => import('./log.js'), () => import('./signals.js'), () => import('./scan.js'), () => import('./chart.js')]) load().catch(() => {});
 }

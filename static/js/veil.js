@@ -6,6 +6,9 @@ import { field, html, setAttribute, setText, setWords, show, words } from './dom
 import { speedWords } from './units.js';
 import { age, fixed, timeOfDay } from './words.js';
 
+/** Each rewinding costs a slow phone some milliseconds; a hung page is covered so much sooner than 2 s, never later. */
+const REWIND_EVERY_MS = 190;
+
 /**
  * The last values, told as what they are.
  * @param {import('./protocol.js').State | null} frame
@@ -42,10 +45,13 @@ export function mount(root, store) {
   const chain = field(veil, 'chain');
   if (!title || !sentence || !then || !recName || !rec) throw new Error('The template lacks the veil');
   let beat = 0;
+  let rewound_ms = -Infinity;
   let told = '';
 
   function rewind() {
-    if (store.deadMan.covered) return;
+    const now_ms = store.now();
+    if (store.deadMan.covered || now_ms - rewound_ms < REWIND_EVERY_MS) return;
+    rewound_ms = now_ms;
     beat = 1 - beat;
     document.documentElement.dataset.beat = String(beat);
   }

@@ -103,6 +103,7 @@ async def test_the_dialogs_about_the_chain_and_the_connect_screen(phone: Phone, 
         await expect(phone.page.locator("#sheet-failed")).to_be_visible()
         await no_barrier(phone, "failed")
         await phone.page.locator("#sheet-failed [data-f=change]").tap()
+        await expect(phone.page.locator("#sheet-failed")).to_be_hidden()
         await phone.page.fill("#address", car.shown)
         await phone.f("go", "#connect").tap()
         await phone.live()

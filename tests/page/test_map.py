@@ -44,7 +44,7 @@ class Map:
         return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", text)]
 
     async def until(self, script: str, arg: Any = None) -> None:
-        await self.page.wait_for_function(script, arg=arg, timeout=12_000)
+        await self.page.wait_for_function(script, arg=arg, timeout=25_000)
 
     async def stands(self, name: str, x: float, y: float, within: float = 0.6) -> None:
         """Waits until a mark stands so many pixels right of and below the middle."""

@@ -33,6 +33,10 @@ async def swipe(phone: Phone, dx: int, dy: int = 0) -> None:
         point = {"x": x + dx * step / 10, "y": y + dy * step / 10}
         await cdp.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [point]})
         await asyncio.sleep(0.016)
+    if abs(dx) < 100 and not dy:  # held for a moment: a slow machine must not take it for a flick
+        await asyncio.sleep(0.2)
+        await cdp.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [{"x": x + dx + 1, "y": y}]})
+        await asyncio.sleep(0.2)
     await cdp.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
     await cdp.detach()
 
@@ -65,7 +69,7 @@ async def test_a_short_touch_springs_back_and_a_swipe_up_scrolls(phone: Phone, w
     await asyncio.sleep(0.4)
     await in_front(phone, "home")
     await swipe(phone, 0, -250)
-    await phone.page.wait_for_function("document.querySelector('#panel-home').scrollTop > 50")
+    await phone.page.wait_for_function("() => document.querySelector('#panel-home').scrollTop > 50")
     await in_front(phone, "home")
 
 

@@ -102,7 +102,8 @@ async def test_a_page_that_opens_late_shows_what_it_missed_and_hatches_what_nobo
         "aria-label", re.compile(r"Speed: [45]\.\d m/s; open the chart")
     )
     assert not [url for url in fetched if "uPlot" in url or "chart.js" in url]  # most drives need neither
-    assert len([url for url in fetched if "/api/trends" in url]) == 1
+    # Once, and once more for each moment in which this machine was late; not again and again.
+    assert 1 <= len([url for url in fetched if "/api/trends" in url]) <= 3
 
 
 async def test_a_radio_gap_is_filled_with_what_the_server_heard_meanwhile(phone: Phone, watch: Process) -> None:
