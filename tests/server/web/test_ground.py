@@ -19,6 +19,7 @@ from server.config import Config
 from server.web.mbtiles import MapFile, MapRefused
 from server.web.pictures import media_type, plain_text
 from server.web.site_image import site_image
+from tests.environment import users_own
 from tests.server.web import maps
 from tests.server.web.maps import png
 
@@ -276,6 +277,7 @@ def test_the_command_ends_with_one_sentence(tmp_path: Path, command: str) -> Non
         text=True,
         timeout=60,
         check=False,
+        env=users_own(),
     )
     assert done.returncode == 2
     assert done.stderr.startswith(f"catgraph: {wrong} is no MBTiles file, or is damaged")
