@@ -14,7 +14,7 @@ from monitor import values
 from monitor.ahead import ANGLE_STEP_RAD
 from monitor.alarm import Alarm, Transition
 from monitor.alarm_spec import AlarmSpec
-from monitor.check import Quantity
+from monitor.check import Quantity, Verdict
 from monitor.load import AlarmLoad
 from monitor.runner import Tile
 from monitor.scan import usable
@@ -186,6 +186,7 @@ def alarm(alarm: Alarm, now_s: float, wall_ms: int) -> dict[str, Any]:
         "needs_ack": spec.needs_ack,
         "raised_ms": round(wall_ms - raised_for_s * 1000),
         "for_s": round(raised_for_s, 1),
+        "verdict": str(finding.verdict if finding else Verdict.UNKNOWN),
         "text": finding.text if finding else "",
         "trip_text": alarm.trip.text if alarm.trip else "",
         "measured": _quantity(finding.measured if finding else None),

@@ -51,6 +51,7 @@
  * @property {number} raised_ms
  * @property {number} for_s
  * @property {string} text
+ * @property {Verdict} [verdict] what its check says now
  * @property {string} trip_text
  * @property {Quantity | null} measured
  * @property {Quantity | null} limit

@@ -1,7 +1,7 @@
 // Warnings: one snackbar at a time over the rail, until it is acknowledged, shelved or over.
 
 import { layOut } from './alarm-layout.js';
-import { html, icon, setText, setWords, show } from './dom.js';
+import { html, icon, setAttribute, setIcon, setText, setWords, show } from './dom.js';
 import { openShelve } from './shelve.js';
 import { snackWords } from './standing.js';
 
@@ -15,7 +15,8 @@ export function mount(root, store, say) {
   const text = html('span');
   const shelve = html('button', { type: 'button', class: 'key' }, 'Shelve');
   const acknowledge = html('button', { type: 'button', class: 'key solid' }, 'Acknowledge');
-  const bar = html('div', { class: 'snack', role: 'status', hidden: true, 'data-f': 'warning' }, html('div', { class: 'side' }, icon('warn')),
+  const mark = icon('warn');
+  const bar = html('div', { class: 'snack', role: 'status', hidden: true, 'data-f': 'warning' }, html('div', { class: 'side' }, mark),
     html('div', { class: 'tx' }, title, text), html('div', { class: 'ac' }, shelve, acknowledge));
   root.append(bar);
   /** @type {import('./protocol.js').Alarm | null} */
@@ -33,6 +34,8 @@ export function mount(root, store, say) {
     shown = waiting[0] ?? null;
     show(bar, shown !== null);
     if (!shown) return;
+    setAttribute(bar, 'data-priority', shown.priority);
+    setIcon(mark, shown.priority === 'advisory' ? 'info' : 'warn');
     setWords(title, waiting.length > 1 ? `${shown.title} (1 of ${waiting.length})` : shown.title);
     setWords(text, snackWords(shown));
     show(shelve, shown.priority !== 'critical' && shown.actions.includes('shelve'));

@@ -7,7 +7,7 @@ import { timeOfDay } from './words.js';
  * @param {import('./protocol.js').Alarm} alarm
  */
 export function standingWords(alarm) {
-  return [alarm.text || alarm.trip_text, said(alarm)].filter(Boolean).join(' · ');
+  return [alarm.active ? snackWords(alarm) : alarm.text || alarm.trip_text, said(alarm)].filter(Boolean).join(' · ');
 }
 
 /**
@@ -15,7 +15,9 @@ export function standingWords(alarm) {
  * @param {import('./protocol.js').Alarm} alarm
  */
 export function snackWords(alarm) {
-  return alarm.active ? alarm.text || alarm.trip_text : `Over. It was: ${alarm.trip_text || alarm.title}`;
+  const was = alarm.trip_text || alarm.title;
+  if (!alarm.active) return `Over. It was: ${was}`;
+  return alarm.verdict === 'unknown' ? `Not checked now: ${alarm.text || 'unknown'}. It was: ${was}` : alarm.text || was;
 }
 
 /** @param {import('./protocol.js').Alarm} alarm */

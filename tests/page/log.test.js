@@ -19,6 +19,9 @@ test('who acknowledged stands where the alarm stands', () => {
 
 test('a snackbar never tells of what is over as if it stood', () => {
   assert.equal(snackWords({ ...ALARM, active: true }), '12.6 m/s');
+  assert.equal(
+    snackWords({ ...ALARM, active: true, verdict: 'unknown', text: 'No link to the car' }), 'Not checked now: No link to the car. It was: 11.2 m/s',
+  );
   assert.equal(snackWords({ ...ALARM, active: false, state: 'RTN_UNACKED' }), 'Over. It was: 11.2 m/s');
   assert.equal(snackWords({ ...ALARM, active: false, trip_text: '', title: 'GPS jump' }), 'Over. It was: GPS jump');
 });
