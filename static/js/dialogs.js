@@ -5,6 +5,7 @@ import { drawBigChain } from './chain.js';
 import { field, html, listen, need, setIcon, setText, setWords, show, words } from './dom.js';
 import { isAsked } from './sheet.js';
 import { shownIn } from './units.js';
+import { dialogWords } from './standing.js';
 import { age, counted, fixed, timeOfDay } from './words.js';
 
 /** A silent server is covered by the veil at once; the dialog waits for what a change of radio cell takes [s]. */
@@ -154,11 +155,7 @@ function fillAlarm(sheet, alarm) {
       setText(field(sheet, `${name}-unit`), unit);
     }
   }
-  const lasting = alarm.active
-    ? `Stands for ${age(alarm.for_s)} s, since ${timeOfDay(alarm.raised_ms)}.`
-    : `It is over; it began at ${timeOfDay(alarm.raised_ms)}.`;
-  const cause = measured && limit ? '' : `${alarm.text.replace(/[.!?]$/, '')}.`;
-  setWords(field(sheet, 'text'), [cause, lasting, alarm.advice].filter(Boolean).join(' '));
+  setWords(field(sheet, 'text'), dialogWords(alarm));
 }
 
 /**

@@ -1,6 +1,6 @@
 // How a standing alarm and the alarm load read: pure functions, no DOM.
 
-import { timeOfDay } from './words.js';
+import { age, timeOfDay } from './words.js';
 
 /**
  * What is wrong, and who has said what to it.
@@ -18,6 +18,24 @@ export function snackWords(alarm) {
   const was = alarm.trip_text || alarm.title;
   if (!alarm.active) return `Over. It was: ${was}`;
   return alarm.verdict === 'unknown' ? `Not checked now: ${alarm.text || 'unknown'}. It was: ${was}` : alarm.text || was;
+}
+
+/**
+ * The sentences of an alarm's dialog: what is wrong where no two numbers say it, since when and with what it began, what to do.
+ * @param {import('./protocol.js').Alarm} alarm
+ */
+export function dialogWords(alarm) {
+  const at = timeOfDay(alarm.raised_ms);
+  const began = alarm.trip_text && alarm.trip_text !== alarm.text ? ` with ${bare(alarm.trip_text)}` : '';
+  if (!alarm.active) return [`It is over; it began at ${at}${began}.`, alarm.advice].filter(Boolean).join(' ');
+  const isBlind = alarm.verdict === 'unknown';
+  const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
+  return [cause, `Stands for ${age(alarm.for_s)} s, since ${at}${began}.`, alarm.advice].filter(Boolean).join(' ');
+}
+
+/** A sentence without its end. @param {string} sentence */
+function bare(sentence) {
+  return sentence.replace(/[.!?]$/, '');
 }
 
 /** @param {import('./protocol.js').Alarm} alarm */

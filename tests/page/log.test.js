@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { heldWords } from '../../static/js/connect.js';
 import { asked, dayWords, joined, lowest, tookWords } from '../../static/js/log-layout.js';
-import { loadWords, snackWords, standingWords } from '../../static/js/standing.js';
+import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/standing.js';
 
 const ALARM = /** @type {any} */ ({ text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
 const noon_ms = new Date(2026, 5, 1, 12, 0, 0).getTime();
@@ -81,4 +81,13 @@ test('an acknowledgement tells how long the alarm waited for it', () => {
   assert.equal(tookWords(event(12, { change: 'acknowledged' }), rows), 'in 3.0 s');
   assert.equal(tookWords(event(12, { change: 'acknowledged', occurrence: 3 }), rows), '');
   assert.equal(tookWords(event(12, { change: 'cleared' }), rows), '');
+});
+
+test('a dialog tells with what it began, and never speaks in the present of what is over or not checked', () => {
+  const near = { ...ALARM, active: true, verdict: 'fault', text: '4.1 m', trip_text: '4.8 m', raised_ms: noon_ms, for_s: 3.5, advice: 'Brake.', measured: null, limit: null };
+  assert.equal(dialogWords(near), '4.1 m. Stands for 3.5 s, since 12:00:00 with 4.8 m. Brake.');
+  assert.equal(dialogWords({ ...near, measured: {}, limit: {}, trip_text: '4.1 m' }), 'Stands for 3.5 s, since 12:00:00. Brake.');
+  const lost = { ...near, verdict: 'unknown', text: 'No link to the car.' };
+  assert.equal(dialogWords(lost), 'Not checked now: No link to the car. Stands for 3.5 s, since 12:00:00 with 4.8 m. Brake.');
+  assert.equal(dialogWords({ ...lost, active: false }), 'It is over; it began at 12:00:00 with 4.8 m. Brake.');
 });
