@@ -97,6 +97,11 @@ class Recording:
         ]
 
     @property
+    def files(self) -> Sequence[FileSource]:
+        """What it lies in, for whoever copies messages as they are."""
+        return self._sources
+
+    @property
     def count(self) -> int:
         """Messages of all topics that can be read."""
         return sum(topic.count for topic in self.topics.values())
