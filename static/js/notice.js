@@ -3,19 +3,30 @@
 import { html, icon, words } from './dom.js';
 
 const STAYS_MS = 8000;
+const OFFERS_MS = 15_000; // what can be pressed must be found and reached first
+
+/** @typedef {{label: string, act: () => void}} Way what a notice offers, as one key */
 
 /**
  * @param {HTMLElement} root where snackbars stand
- * @returns {(sentence: string, title?: string) => void}
+ * @returns {(sentence: string, title?: string, way?: Way) => void}
  */
 export function notices(root) {
-  return (sentence, title = '') => {
+  return (sentence, title = '', way = undefined) => {
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close' }, icon('close'));
     const text = html('div', { class: 'tx' }, ...(title ? [html('b', {}, ...words(title))] : []), html('span', {}, ...words(sentence)));
     const note = html('div', { class: 'snack note', role: 'status' }, html('div', { class: 'side' }, icon('info')), text, close);
     const take = () => note.remove();
+    if (way) {
+      const key = html('button', { type: 'button', class: 'key' }, way.label);
+      key.addEventListener('click', () => {
+        take();
+        way.act();
+      });
+      note.append(html('div', { class: 'ac' }, key));
+    }
     close.addEventListener('click', take);
-    setTimeout(take, STAYS_MS);
+    setTimeout(take, way ? OFFERS_MS : STAYS_MS);
     for (const old of root.querySelectorAll('.note')) old.remove();
     root.append(note);
   };

@@ -20,17 +20,39 @@ const ASKED = ['sheet-menu', 'sheet-history', 'sheet-shelve', 'sheet-stop', 'she
 
 /** @param {HTMLDialogElement} sheet */
 export function isAsked(sheet) {
-  return ASKED.includes(sheet.id);
+  return sheet.dataset['asked'] !== undefined || ASKED.includes(sheet.id);
 }
 
-/** Each closes by its own key, by Escape or back (the browser's doing), and by a press outside of it. */
 export function mountSheets() {
-  const sheets = ASKED.map((id) => /** @type {HTMLDialogElement} */ (need(document, `#${id}`)));
-  const stops = sheets.flatMap((sheet) => [
+  const stops = ASKED.map((id) => mountSheet(/** @type {HTMLDialogElement} */ (need(document, `#${id}`))));
+  return () => stops.forEach((stop) => stop());
+}
+
+/**
+ * A sheet that was made when it was first wanted, with a key `data-f="no"` that closes it.
+ * @param {HTMLDialogElement} sheet
+ * @returns {() => void} takes it away again
+ */
+export function addSheet(sheet) {
+  sheet.dataset['asked'] = '';
+  document.body.append(sheet);
+  const stop = mountSheet(sheet);
+  return () => {
+    stop();
+    sheet.remove();
+  };
+}
+
+/**
+ * It closes by its own key, by Escape or back (the browser's doing), and by a press outside of it.
+ * @param {HTMLDialogElement} sheet
+ */
+function mountSheet(sheet) {
+  const stops = [
     listen(field(sheet, 'no'), 'click', () => sheet.close()),
     listen(sheet, 'click', (event) => {
       if (event.target === sheet && event.clientY < sheet.getBoundingClientRect().top) sheet.close();
     }),
-  ]);
+  ];
   return () => stops.forEach((stop) => stop());
 }
