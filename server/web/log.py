@@ -6,7 +6,6 @@ import csv
 import io
 from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Annotated, Any
 
 import orjson
@@ -15,15 +14,10 @@ from fastapi.responses import Response, StreamingResponse
 
 from monitor.alarm_spec import Priority
 from server.bus import LocalBus
+from server.event_rows import COLUMNS, event_row
 from server.web.api import VehicleName, running, vehicle_of
 
 router = APIRouter()
-COLUMNS = (
-    *("n", "time", "change", "alarm", "occurrence", "title", "priority", "state", "text", "by"),
-    *("measured", "limit", "unit", "causes", "settings_version", "details"),
-)
-_TOLD = frozenset((*COLUMNS, "at_ms", "place", "sound", "announces"))  # the rest stands in `details`, as JSON
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet runs a cell that begins so
 _PAGE = 500
 _LOOKED_THROUGH = 2000  # events for one page of those that fit: the loop must not stand still for a rare word
 
@@ -157,31 +151,11 @@ async def _csv(portions: Iterable[list[dict[str, Any]]]) -> AsyncIterator[str]:
     rows.writerow(COLUMNS)
     for events in portions:
         for event in events:
-            row = _row(event)
-            rows.writerow([_cell(row.get(column)) for column in COLUMNS])
+            rows.writerow(event_row(event))
         yield text.getvalue()
         text.seek(0)
         text.truncate()
     yield text.getvalue()  # the columns, where there is no event
-
-
-def _row(event: Mapping[str, Any]) -> dict[str, Any]:
-    """The columns of one event: the values at that moment as numbers, everything else it tells as JSON."""
-    measured, limit = event.get("measured") or {}, event.get("limit") or {}
-    details = {name: value for name, value in event.items() if name not in _TOLD and value not in (None, [])}
-    return {
-        **event,
-        "time": datetime.fromtimestamp(event["at_ms"] / 1000, UTC).isoformat(timespec="milliseconds"),
-        "measured": measured.get("value"),
-        "limit": limit.get("value"),
-        "unit": measured.get("unit") or limit.get("unit"),
-        "causes": "; ".join(event.get("causes") or ()),
-        "details": orjson.dumps(details).decode() if details else None,
-    }
-
-
-def _cell(value: Any) -> Any:
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 
 async def _json(portions: Iterable[list[dict[str, Any]]]) -> AsyncIterator[bytes]:

@@ -13,7 +13,7 @@ import pytest_asyncio
 from server import label
 from server.bridge.server import RosBridge
 from server.config import Config, Vehicle
-from server.web.log import COLUMNS
+from server.event_rows import COLUMNS
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.viewer import viewer

@@ -1,0 +1,24 @@
+"""What an export came to, and how it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+Progress = Callable[[float], None]  # told now and then, from 0 to 1
+
+
+class ExportRefused(Exception):
+    """There is nothing to export in this form, or it cannot be written. The text is one sentence for a person."""
+
+
+@dataclass(slots=True)
+class Outcome:
+    """A file was written."""
+
+    entries: int = 0  # messages, rows, points: whatever the format counts
+    notes: list[str] = field(default_factory=list)  # what is not in it, and why, in sentences for a person
+
+
+def nothing(part: float) -> None:
+    """Progress that nobody wants to hear of."""

@@ -1,0 +1,74 @@
+"""Messages of a recording as they lie in it, of all its files in the order of time."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from server.recording.errors import RecordingUnreadable
+from server.recording.read import Recording
+from server.recording.source import Channel, FileSource
+
+OWN = "/catgraph/"  # topics that catgraph itself wrote: alarms, phone, settings …
+TOLD_EVERY = 2000  # messages
+
+
+@dataclass(frozen=True, slots=True)
+class Raw:
+    """One message."""
+
+    time_ns: int
+    file: int  # which of the recording's files
+    channel: Channel
+    data: bytes
+
+
+def span_ns(recording: Recording) -> tuple[int, int]:
+    """First and last moment; (0, 0) where there is nothing."""
+    filled = [file for file in recording.files if any(channel.count for channel in file.channels)]
+    if not filled:
+        return 0, 0
+    return min(file.start_ns for file in filled), max(file.end_ns for file in filled)
+
+
+def raw_messages(
+    recording: Recording,
+    *,
+    wanted: Callable[[Channel], bool] = lambda channel: True,
+    start_ns: int | None = None,
+    end_ns: int | None = None,
+    progress: Callable[[float], None] = lambda part: None,
+) -> Iterator[Raw]:
+    """Messages of the wanted channels from `start_ns` to `end_ns`, both included.
+
+    Raises RecordingUnreadable where nothing of a file is whole; what of it is damaged is left out, see
+    `recording.damage`.
+    """
+    first_ns, last_ns = span_ns(recording)
+    begin_ns = first_ns if start_ns is None else start_ns
+    until_ns = last_ns if end_ns is None else end_ns
+    streams = [_of_file(number, file, wanted, begin_ns) for number, file in enumerate(recording.files)]
+    length_ns = max(until_ns - begin_ns, 1)
+    merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=lambda raw: raw.time_ns)
+    for count, raw in enumerate(merged):
+        if raw.time_ns > until_ns:
+            return
+        if count % TOLD_EVERY == 0:
+            progress(min(max((raw.time_ns - begin_ns) / length_ns, 0.0), 1.0))
+        yield raw
+
+
+def _of_file(number: int, file: FileSource, wanted: Callable[[Channel], bool], start_ns: int) -> Iterator[Raw]:
+    channels = {channel.number: channel for channel in file.channels if channel.count and wanted(channel)}
+    if not channels:
+        return
+    try:
+        for time_ns, channel, data in file.messages(set(channels), start_ns):
+            yield Raw(time_ns, number, channels[channel], data)
+    except RecordingUnreadable:
+        raise
+    except Exception as error:  # a damaged file makes the readers fail in every way there is
+        raise RecordingUnreadable(f"{file.path} is damaged or not complete: {error}") from None
+    if file.damage.is_total:
+        raise RecordingUnreadable(f"{file.path} is damaged: none of its {file.damage.parts} parts is whole")
