@@ -8,11 +8,11 @@ from pathlib import Path
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, Message, Schema
+from mcap.records import Channel, Chunk, ChunkIndex, Header, Message, Metadata, Schema
 from mcap.stream_reader import breakup_chunk
 
 from server.recording.errors import RecordingUnreadable
-from server.recording.mcap_file import Index, McapFile
+from server.recording.mcap_file import Index, McapFile, latest
 
 MAGIC = b"\x89MCAP0\r\n"  # begins a file, and ends one that was closed
 _HEAD_BYTES = 1 + 8  # of a record: what it is, and how long
@@ -36,6 +36,8 @@ class CutMcapFile(McapFile):
         channels: dict[int, Channel] = {}
         counts: Counter[int] = Counter()
         parts: list[ChunkIndex] = []
+        notes: list[Metadata] = []
+        profile = ""
         size = self._file.seek(0, os.SEEK_END)
         at = len(MAGIC)
         while at + _HEAD_BYTES <= size:
@@ -48,10 +50,16 @@ class CutMcapFile(McapFile):
                 part = self._part(at, length, schemas, channels, counts)
                 if part is not None:
                     parts.append(part)
+            elif head[0] == Opcode.METADATA:
+                notes.append(Metadata.read(ReadDataStream(self._file)))
+            elif head[0] == Opcode.HEADER:
+                profile = Header.read(ReadDataStream(self._file)).profile
             at += _HEAD_BYTES + length
         if not parts:
             raise RecordingUnreadable(f"{self.path} is not complete: it ends too early")
-        return Index(schemas=schemas, channels=channels, counts=counts, parts=parts)
+        return Index(
+            schemas=schemas, channels=channels, counts=counts, parts=parts, metadata=latest(notes), profile=profile
+        )
 
     def _part(
         self, at: int, length: int, schemas: dict[int, Schema], channels: dict[int, Channel], counts: Counter[int]

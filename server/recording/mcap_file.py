@@ -1,29 +1,31 @@
-"""Reads MCAP files that are no ROS 2 bags: ROS 1 messages in MCAP, and messages written as JSON."""
+"""Reads MCAP files that are no ROS 2 bags: our own, ROS 1 messages in MCAP, and messages written as JSON."""
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, Literal, cast
 
 from mcap.data_stream import ReadDataStream
 from mcap.reader import McapReader, make_reader
-from mcap.records import Chunk, ChunkIndex, Message
+from mcap.records import Chunk, ChunkIndex, Message, Metadata
 from mcap.stream_reader import breakup_chunk
 
 from server.recording.errors import RecordingUnreadable
+from server.recording.own import LIBRARY, METADATA
 from server.recording.source import Channel, Damage, DefinitionFormat
 from server.source import RosVersion
 
 _FORMATS: dict[str, DefinitionFormat] = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
 
 
-def profile_of(path: Path) -> str:
-    """The profile that an MCAP file names in its header: "ros1", "ros2", another or none."""
+def is_bag2(path: Path) -> bool:
+    """Whether a recorder of ROS 2 wrote it, whose files rosbags reads with all they say of themselves."""
     with path.open("rb") as file:
-        return make_reader(cast("IO[bytes]", file)).get_header().profile
+        header = make_reader(cast("IO[bytes]", file)).get_header()
+        return header.profile == "ros2" and not header.library.startswith(LIBRARY)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +37,8 @@ class Index:
     counts: Mapping[int, int]  # of messages by channel
     parts: Sequence[ChunkIndex]
     span_ns: tuple[int, int] | None = None  # first and last message; None: that of the parts
+    metadata: Mapping[str, str] = field(default_factory=dict)  # what catgraph says of its own recording
+    profile: str = ""
 
 
 class McapFile:
@@ -64,7 +68,10 @@ class McapFile:
             _channel(channel, index.schemas.get(channel.schema_id), index.counts.get(channel.id, 0))
             for channel in index.channels.values()
         ]
-        is_ros2 = any(c.encoding == "cdr" or "/msg/" in c.type for c in self.channels if c.encoding != "ros1")
+        self.metadata = dict(index.metadata)
+        is_ros2 = index.profile == "ros2" or any(
+            c.encoding == "cdr" or "/msg/" in c.type for c in self.channels if c.encoding != "ros1"
+        )
         self.ros_version: RosVersion = 2 if is_ros2 else 1
 
     def _read_index(self) -> Index:
@@ -78,6 +85,8 @@ class McapFile:
             counts=statistics.channel_message_counts,
             parts=summary.chunk_indexes,
             span_ns=(statistics.message_start_time, statistics.message_end_time),
+            metadata=latest(self._reader.iter_metadata()),
+            profile=self._reader.get_header().profile,
         )
 
     def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
@@ -113,6 +122,15 @@ class McapFile:
 
     def close(self) -> None:
         self._file.close()
+
+
+def latest(records: Iterable[Metadata]) -> dict[str, str]:
+    """What the last record of ours says: the first was written at the beginning, one more when the file was closed."""
+    found: dict[str, str] = {}
+    for record in records:
+        if record.name == METADATA:
+            found = dict(record.metadata)
+    return found
 
 
 def _channel(channel: Any, schema: Any, count: int) -> Channel:

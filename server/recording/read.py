@@ -16,7 +16,8 @@ from server.recording.decode import Decode, compile_decoder
 from server.recording.definitions import definitions_of
 from server.recording.errors import RecordingUnreadable, Undecodable
 from server.recording.mcap_cut import CutMcapFile, is_cut
-from server.recording.mcap_file import McapFile, profile_of
+from server.recording.mcap_file import McapFile, is_bag2
+from server.recording.own import PREFIX
 from server.recording.recognise import Kind, recognise
 from server.recording.rosbag1 import Bag1
 from server.recording.rosbag2 import Bag2
@@ -75,6 +76,9 @@ class Recording:
         self.ros_version: RosVersion = sources[0].ros_version
         self.topics: dict[str, TopicInfo] = {}
         self.notes: list[str] = []  # topics left out, each with the reason, for a person
+        self.metadata: dict[str, str] = next(
+            (s.metadata for s in sources if isinstance(s, McapFile) and s.metadata), {}
+        )
         self.rejected: dict[str, int] = {}  # messages by topic that could not be decoded while reading
         self.why_rejected: dict[str, str] = {}
         self._roads: list[dict[int, _Road]] = []
@@ -124,6 +128,18 @@ class Recording:
         else:
             yield from heapq.merge(*streams, key=operator.attrgetter("at_s"))
 
+    def own(self, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
+        """What catgraph itself wrote on one of its channels ("/catgraph/alarms"), in time order: seconds since 1970,
+        and what it says. None of it is among `topics` and `messages()`."""
+        for source in self._sources:
+            numbers = {channel.number for channel in source.channels if channel.topic == topic}
+            if numbers and topic.startswith(PREFIX):
+                for time_ns, _, raw in source.messages(numbers, 0):
+                    try:
+                        yield time_ns / 1e9, _decode_json(raw)
+                    except Undecodable:
+                        self.rejected[topic] = self.rejected.get(topic, 0) + 1
+
     def close(self) -> None:
         for source in self._sources:
             source.close()
@@ -139,6 +155,8 @@ class Recording:
     def _roads_of(self, source: FileSource, decoders: dict[tuple[str, str, str], Decode]) -> dict[int, _Road]:
         roads: dict[int, _Road] = {}
         for channel in source.channels:
+            if channel.topic.startswith(PREFIX) and channel.encoding == "json":
+                continue
             type = _spelled(channel.type, self.ros_version)
             key = (channel.type, channel.definition, channel.encoding)
             try:
@@ -155,7 +173,7 @@ class Recording:
             self.topics[channel.topic] = TopicInfo(
                 type=type,
                 count=channel.count + (known.count if known else 0),
-                definition=channel.definition or None,
+                definition=_definition_of(channel) or (known.definition if known else None),
                 is_latched=channel.is_latched or (known is not None and known.is_latched),
             )
         return roads
@@ -185,6 +203,11 @@ class Recording:
             raise RecordingUnreadable(_what_is_wrong(source.path, error)) from None
 
 
+def _definition_of(channel: Channel) -> str | None:
+    """In .msg or .idl text; a channel of JSON has none, even where a ROS type is named."""
+    return channel.definition or None if channel.encoding != "json" else None
+
+
 def _nothing(raw: bytes) -> dict[str, Any]:
     return {}
 
@@ -195,7 +218,7 @@ def _open(path: Path, kind: Kind) -> FileSource:
             return Bag1(path)
         if kind == "mcap" and is_cut(path):
             return CutMcapFile(path)
-        if kind == "mcap" and profile_of(path) != "ros2":
+        if kind == "mcap" and not is_bag2(path):
             return McapFile(path)
         return Bag2(path, kind)
     except RecordingUnreadable:

@@ -21,8 +21,16 @@ from server.recording.errors import Undecodable
 from tests.server.recording.bags import build, typestore
 from tests.server.recording.test_decode import DEFINITIONS, ODD, messages_of
 
-TYPES = [ODD, "sensor_msgs/msg/LaserScan", "diagnostic_msgs/msg/DiagnosticArray", "nav_msgs/msg/Odometry",
-         "sensor_msgs/msg/NavSatFix", "sensor_msgs/msg/Imu", "std_msgs/msg/Empty", "sensor_msgs/msg/PointCloud2"]  # fmt: skip
+TYPES = [
+    ODD,
+    "sensor_msgs/msg/LaserScan",
+    "diagnostic_msgs/msg/DiagnosticArray",
+    "nav_msgs/msg/Odometry",
+    "sensor_msgs/msg/NavSatFix",
+    "sensor_msgs/msg/Imu",
+    "std_msgs/msg/Empty",
+    "sensor_msgs/msg/PointCloud2",
+]
 
 
 def raw_of(store: Any, version: int, type: str, content: dict[str, Any]) -> bytes:
