@@ -39,6 +39,7 @@ export function mount(root, store) {
     html('div', { class: 'clip left' }, slower), pointer, top, speedMeter, accelerationMeter,
   );
   let drawnFace = '';
+  let isSeen = true;
 
   function scaleOf() {
     return {
@@ -70,6 +71,7 @@ export function mount(root, store) {
 
   // Each frame: what moves.
   function move() {
+    if (!isSeen) return; // six layers on their way to where nobody looks cost as much as all the rest
     drawFace();
     const scale = scaleOf();
     const limit = scale.limit_mps === null ? 180 : speedAngle(scale.limit_mps, scale.speed_max_mps);
@@ -119,7 +121,12 @@ export function mount(root, store) {
 
   move();
   draw();
-  const stops = [store.on('move', move), store.on('draw', draw)];
+  const watcher = new IntersectionObserver((entries) => {
+    isSeen = entries.at(-1)?.isIntersecting ?? true;
+    move();
+  });
+  watcher.observe(root);
+  const stops = [store.on('move', move), store.on('draw', draw), () => watcher.disconnect()];
   return () => stops.forEach((stop) => stop());
 }
 
@@ -148,13 +155,22 @@ function sweep(inner, outer, from, kind = '') {
   return svg('svg', { viewBox: VIEW, class: `moves ${kind}`.trim(), 'aria-hidden': 'true' }, svg('path', { class: 'val', d: band(inner, outer, from, from + 180) }));
 }
 
+/** A turn smaller than the pointer is wide is put, not moved: it looks the same, and is half of what Home costs [degrees]. */
+const PUT_DEG = 1;
+/** @type {WeakMap<Element, number>} */
+const turned = new WeakMap();
+
 /**
  * @param {HTMLElement | SVGElement} element
  * @param {number} degrees
  */
 function rotate(element, degrees) {
-  const transform = `rotate(${degrees.toFixed(1)}deg)`;
-  if (element.style.transform !== transform) element.style.transform = transform;
+  const before = turned.get(element);
+  if (before !== undefined && Math.abs(degrees - before) < 0.1) return;
+  turned.set(element, degrees);
+  const duration = before === undefined || Math.abs(degrees - before) < PUT_DEG ? '0s' : '';
+  if (element.style.transitionDuration !== duration) element.style.transitionDuration = duration;
+  element.style.transform = `rotate(${degrees.toFixed(1)}deg)`;
 }
 
 /**

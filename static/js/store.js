@@ -11,6 +11,10 @@ import { Wire } from './wire.js';
 
 /** Digits change at most five times a second. */
 const DRAW_EVERY_MS = 200;
+/** What moves, moves for so long from one frame to the next (instruments.css): a new aim sooner would only cost [ms]. */
+const MOVE_EVERY_MS = 95;
+/** While frames come so close after each other they set the pace of drawing, after that a timer does [ms]. */
+const FED_MS = 300;
 /** A command is for now: without an answer by then it counts as refused [ms]. */
 const REPLY_MS = 4000;
 
@@ -46,8 +50,10 @@ export class Store {
   #delay_ms = 0;
   #started_ms = 0;
   #drew_ms = -Infinity;
+  #moved_ms = -Infinity;
   #isMoved = false;
   #urgent = '';
+  #isUrgent = false;
   #asked = 0;
   /** @type {Map<string, (answer: Answer) => void>} */
   #waiting = new Map();
@@ -243,17 +249,20 @@ export class Store {
     this.heard_ms = Date.now();
     this.wire.proof(now_ms);
     this.#emit('beat');
-    if (!this.#isMoved) {
-      this.#isMoved = true;
-      requestAnimationFrame(() => {
-        this.#isMoved = false;
-        this.#emit('move');
-        // What asks for the operator is drawn at once; the rest five times a second.
-        const urgent = urgentOf(this.frame);
-        if (urgent !== this.#urgent || now_ms - this.#drew_ms >= DRAW_EVERY_MS) this.#draw();
-        this.#urgent = urgent;
-      });
-    }
+    // What asks for the operator is drawn at once; pointers ten times a second, the rest five times and with them.
+    const urgent = urgentOf(frame);
+    const isUrgent = urgent !== this.#urgent;
+    this.#urgent = urgent;
+    if (isUrgent) this.#isUrgent = true;
+    if (this.#isMoved || (!isUrgent && now_ms - this.#moved_ms < MOVE_EVERY_MS)) return;
+    this.#isMoved = true;
+    this.#moved_ms = now_ms;
+    requestAnimationFrame(() => {
+      this.#isMoved = false;
+      this.#emit('move');
+      if (this.#isUrgent || now_ms - this.#drew_ms >= 2 * MOVE_EVERY_MS) this.#draw();
+      this.#isUrgent = false;
+    });
   }
 
   /** @param {ArrayBuffer} bytes */
@@ -277,7 +286,7 @@ export class Store {
     if (slept_ms > 2000 && this.frame) this.deadMan.cover();
     this.deadMan.look(now_ms);
     this.wire.look(now_ms);
-    if (!document.hidden && now_ms - this.#drew_ms >= DRAW_EVERY_MS - 20) requestAnimationFrame(() => this.#draw());
+    if (!document.hidden && now_ms - this.deadMan.heard_ms > FED_MS && now_ms - this.#drew_ms >= DRAW_EVERY_MS - 20) requestAnimationFrame(() => this.#draw());
     this.#emit('tick');
   }
 

@@ -4,6 +4,8 @@ import { field, listen, setAttribute } from './dom.js';
 
 export const TABS = /** @type {const} */ (['home', 'map', 'scan', 'files', 'settings']);
 const REMEMBERED = 'catgraph.tab';
+/** So long after the last finger and the last movement the tabs are at rest [ms]. */
+const FOLD_AFTER_MS = 700;
 
 /**
  * Which tab a key leads to, or null where it is none of ours.
@@ -47,6 +49,8 @@ export class Tabs {
       ...this.buttons.map((button, i) => listen(button, 'click', () => this.go(i))),
       ...this.buttons.map((button) => listen(button, 'keydown', (event) => this.#key(event))),
       listen(this.pager, 'scroll', () => this.#scrolled(), { passive: true }),
+      listen(this.pager, 'pointerdown', () => this.#unfold(), { passive: true }),
+      listen(this.pager, 'wheel', () => this.#unfold(), { passive: true }),
       listen(window, 'hashchange', () => this.#linked()),
       listen(window, 'resize', () => this.place()),
     ];
@@ -55,6 +59,7 @@ export class Tabs {
 
   /** Unmount. */
   stop() {
+    clearTimeout(this.#folding);
     for (const stop of this.stops) stop();
   }
 
@@ -70,6 +75,19 @@ export class Tabs {
   /** What is out of sight is out of reach of keys and readers. */
   #still() {
     this.panels.forEach((panel, i) => setAttribute(panel, 'inert', !this.shows(TABS[i] ?? 'home')));
+    this.#unfold();
+  }
+
+  /** What is out of sight is neither laid out nor painted: half of what the page costs. @type {ReturnType<typeof setTimeout> | undefined} */
+  #folding;
+
+  /** While a finger or a wheel may move them, all are there; at rest those out of sight are folded again. */
+  #unfold() {
+    for (const panel of this.panels) setAttribute(panel, 'data-folded', null);
+    clearTimeout(this.#folding);
+    this.#folding = setTimeout(() => {
+      for (const panel of this.panels) setAttribute(panel, 'data-folded', panel.inert);
+    }, FOLD_AFTER_MS);
   }
 
   /**
