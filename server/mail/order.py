@@ -1,0 +1,90 @@
+"""What was ordered to be mailed, what became of it, mail by mail and recipient by recipient."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+State = Literal["queued", "sending", "sent", "failed", "cancelled"]
+Format = Literal["mcap", "bag", "csv", "html"]
+TooLarge = Literal["split", "link"]
+Way = Literal["attached", "split", "link"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """What somebody asked for; never changed."""
+
+    recordings: tuple[str, ...]
+    format: Format
+    to: tuple[str, ...]  # addresses as they go over the wire
+    subject: str
+    text: str
+    too_large: TooLarge
+    by: str = ""  # who asked
+    base: str = ""  # the address by which the page reached this server, for links
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipient:
+    """One address of one mail."""
+
+    address: str
+    state: Literal["waiting", "accepted", "refused"] = "waiting"
+    said: str = ""  # the server's words
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mail:
+    """One mail of an order: all of it, or one part."""
+
+    n: int
+    letter: int
+    part: int
+    parts: int
+    message_id: str
+    file: str  # in the folder of the outbox
+    size_bytes: int  # of the file
+    state: State
+    attempts: int
+    next_ms: int | None  # when it is tried again
+    done_ms: int | None
+    said: str
+    recipients: tuple[Recipient, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Letter:
+    """One order and its mails."""
+
+    n: int
+    key: str  # names it over restarts, and on the glass of who ordered it
+    ordered_ms: int
+    order: Order
+    is_ready: bool  # its mails are composed
+    state: State
+    said: str
+    sender: str = ""  # address the mails were composed for
+    way: Way | None = None
+    size_bytes: int | None = None  # of what is attached, all parts together
+    sha256: str | None = None
+    mails: tuple[Mail, ...] = field(default=())
+
+
+def state_of(mails: tuple[Mail, ...]) -> State:
+    """The state of a letter whose mails are composed."""
+    states = {mail.state for mail in mails}
+    for state in ("sending", "queued", "failed", "cancelled"):
+        if state in states:
+            return state
+    return "sent"
+
+
+def said_of(mails: tuple[Mail, ...]) -> str:
+    """What is to be told of them in one line: the newest word of the mail that keeps the letter where it is."""
+    state = state_of(mails)
+    telling = [mail for mail in mails if mail.state == state and mail.said]
+    if not telling:
+        return ""
+    mail = telling[0]
+    return f"Part {mail.part} of {mail.parts}: {mail.said}" if mail.parts > 1 else mail.said

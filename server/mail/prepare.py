@@ -1,0 +1,153 @@
+"""From an order to mails on the disk: exported, packed, cut or linked, written. Off the event loop."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import threading
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+from urllib.parse import quote
+
+from server.mail import address, compose, words
+from server.mail.order import Letter, Way
+from server.mail.outbox import Composed, Prepared
+from server.mail.pack import NoRoom, Pack, cut, need_room, pack
+from server.mail.settings import MailSettings, sync_folder
+from server.mail.source import Source
+
+T = TypeVar("T")
+MAX_PARTS = 60
+_EXPORTED, _PACKED = 0.6, 0.9  # of the progress: where exporting ends, where packing does
+
+
+class CannotPrepare(Exception):
+    """It cannot be made; `str()` is one sentence for the operator."""
+
+
+async def prepare(
+    letter: Letter, settings: MailSettings, source: Source, folder: Path, files: Path, progress: Callable[[float], None]
+) -> Prepared:
+    """Writes the mails of a letter into `files`; `folder` takes what lies between. Raises CannotPrepare, OSError."""
+    work = folder / letter.key
+    stop = threading.Event()
+    try:
+        await asyncio.to_thread(_begin, work)
+        paths = await _exported(letter, source, work, lambda share: progress(share * _EXPORTED))
+        packing = partial(
+            pack,
+            paths,
+            work / "pack.zip",
+            _pack_name(letter),
+            letter.ordered_ms,
+            lambda share: progress(_EXPORTED + share * (_PACKED - _EXPORTED)),
+            stop,
+        )
+        packed = await _in_thread(packing, stop)
+        made = await _in_thread(partial(_write, letter, settings, packed, files, stop), stop)
+        progress(1.0)
+        return made
+    except (NoRoom, ValueError) as why:
+        raise CannotPrepare(str(why)) from None
+    finally:
+        await asyncio.shield(asyncio.to_thread(shutil.rmtree, work, True))
+
+
+def _begin(work: Path) -> None:
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+
+
+async def _in_thread(work: Callable[[], T], stop: threading.Event) -> T:
+    """Work in a thread, which is told to stop and waited for when the task is cancelled."""
+    running = asyncio.ensure_future(asyncio.to_thread(work))
+    try:
+        return await asyncio.shield(running)
+    except asyncio.CancelledError:
+        stop.set()
+        await asyncio.wait([running])
+        if not running.cancelled():
+            running.exception()
+        raise
+
+
+async def _exported(letter: Letter, source: Source, work: Path, progress: Callable[[float], None]) -> list[Path]:
+    found: list[Path] = []
+    order = letter.order
+    for i, recording in enumerate(order.recordings):
+        path = await asyncio.to_thread(source.path_of, recording)
+        if path is None:
+            raise CannotPrepare(f"There is no recording {recording} any more.")
+        if order.format != "mcap":
+            into = work / f"{i}"
+            await asyncio.to_thread(into.mkdir)
+            told = partial(_part_of, progress, i, len(order.recordings))
+            try:
+                path = await source.export(path, order.format, into, told)
+            except (OSError, ValueError, RuntimeError) as why:
+                raise CannotPrepare(f"{recording} cannot be written as {order.format}: {why}") from None
+        found.append(path)
+        progress((i + 1) / len(order.recordings))
+    return found
+
+
+def _part_of(progress: Callable[[float], None], i: int, of: int, share: float) -> None:
+    progress((i + share) / of)
+
+
+def _write(letter: Letter, settings: MailSettings, packed: Pack, files: Path, stop: threading.Event) -> Prepared:
+    order = letter.order
+    parts = cut(packed, settings.limit_bytes)
+    way: Way = "attached" if len(parts) == 1 else order.too_large
+    if way == "split" and len(parts) > MAX_PARTS:
+        raise CannotPrepare(
+            f"{packed.size_bytes / 1e6:.0f} MB would be {len(parts)} mails, and {MAX_PARTS} are the most: "
+            "send it as a link."
+        )
+    if way == "link":
+        texts = [words.linked(order.text, order.recordings, order.format, packed, _links(letter, settings))]
+    else:
+        texts = words.attached(order.text, order.recordings, order.format, packed, parts)
+        need_room(files, packed.size_bytes * 3 // 2)
+    sender = address.parse(settings.sender)
+    made: list[Composed] = []
+    for number, text in enumerate(texts, 1):
+        # The content is in the name: the same mail made anew is known as the same, another content is another mail.
+        message_id = f"<{letter.key}.{packed.sha256[:12]}.{number}of{len(texts)}@{sender.domain}>"
+        stretch = parts[number - 1]
+        draft = compose.Draft(
+            sender=sender,
+            sender_name=settings.sender_name,
+            to=[address.parse(one) for one in order.to],
+            subject=words.subject_of(order.subject, number, len(texts)),
+            at_ms=letter.ordered_ms,
+            message_id=message_id,
+            text=text,
+            attachment=None
+            if way == "link"
+            else compose.Attachment(path=packed.path, start=stretch.start, length=stretch.length, name=stretch.name),
+        )
+        name = f"{letter.key}-{number}.eml"
+        half = files / f"{name}.new"
+        half.unlink(missing_ok=True)
+        size = compose.write(draft, half, stop)
+        half.replace(files / name)
+        sync_folder(files)
+        made.append(Composed(part=number, parts=len(texts), message_id=message_id, file=name, size_bytes=size))
+    return Prepared(mails=tuple(made), sender=sender.text, way=way, size_bytes=packed.size_bytes, sha256=packed.sha256)
+
+
+def _links(letter: Letter, settings: MailSettings) -> list[str]:
+    base = settings.link_base or letter.order.base
+    if not base:
+        raise CannotPrepare("No address for links is known: set it in Settings, E-mail.")
+    ending = "file.mcap" if letter.order.format == "mcap" else f"export/{letter.order.format}"
+    return [f"{base}/api/recordings/{quote(recording, safe='')}/{ending}" for recording in letter.order.recordings]
+
+
+def _pack_name(letter: Letter) -> str:
+    """The name of what is attached: the recording's, or the first one's and how many more."""
+    first, *more = letter.order.recordings
+    return f"{first}_and_{len(more)}_more" if more else first

@@ -1,0 +1,20 @@
+"""Where the recordings come from that are mailed: the catalog and the exports, as the mailer needs them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+
+class Source(Protocol):
+    """What the rest of the server gives to the mailer."""
+
+    def path_of(self, recording: str) -> Path | None:
+        """The finished recording of that name; None where there is none. May be called from any thread."""
+
+    async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Path:
+        """Writes a recording in another format into the folder `into`; the file. Progress goes from 0 to 1.
+
+        Raises OSError, ValueError or RuntimeError with a sentence where it cannot be done.
+        """
