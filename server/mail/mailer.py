@@ -7,9 +7,9 @@ import contextlib
 import fcntl
 import logging
 import os
+import secrets
 import shutil
 import sqlite3
-import tempfile
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -53,17 +53,17 @@ class Underway:
 
 
 class Mailer:
-    """One server's mail. `folder` None: kept for this run only."""
+    """One server's mail, kept in `folder`."""
 
     def __init__(
         self,
-        folder: Path | None,
+        folder: Path,
         source: Source,
         *,
         wall_ms: Callable[[], int],
         pause_s: Callable[[int], float] = pauses.pause_s,
     ) -> None:
-        self._given = folder
+        self._folder = folder
         self._source = source
         self._wall_ms = wall_ms
         self._pause_s = pause_s
@@ -77,15 +77,8 @@ class Mailer:
         self.settings = MailSettings()
         self.complaints: list[str] = []  # what was found wrong at the start
         self.trouble: str | None = None  # why nothing can be kept or sent now
-        self._folder: Path | None = None
-        self._temporary: Path | None = None
         self._lock: int | None = None
         self._outbox: Outbox | None = None
-
-    @property
-    def is_kept(self) -> bool:
-        """Whether the outbox outlives this run."""
-        return self._given is not None
 
     async def start(self) -> None:
         """Opens the outbox and begins to send. Never raises for what the disk does: `trouble` says it."""
@@ -114,6 +107,17 @@ class Mailer:
         self._to_send.set()
 
     # --- what the routes ask for
+
+    def new_key(self) -> str:
+        """A name for an order that brings none."""
+        return secrets.token_hex(12)
+
+    def share_of(self, letter: Letter) -> float | None:
+        """How much of it is made, or sent of the mail that is on its way: 0 to 1; None: neither is going on."""
+        for under_way in (self.making, self.sending):
+            if under_way is not None and under_way.letter == letter.n:
+                return round(under_way.share, 3)
+        return None
 
     async def order(self, key: str, order: Order) -> Letter:
         """Takes an order; it is on the disk when this returns. Raises MailRefused."""
@@ -173,11 +177,10 @@ class Mailer:
     async def change(self, body: Mapping[str, Any]) -> MailSettings:
         """Takes settings over, once they are on the disk; what waits is tried. Raises BadMailSetting, MailRefused."""
         settings = await asyncio.to_thread(checked, body, self.settings)
-        folder = self._folder
-        if folder is None:
+        if self._outbox is None:
             raise MailRefused(self.trouble or "Mail is not ready yet.", status=503)
         try:
-            await self._in_thread(lambda: MailSettingsFile(folder / "settings.toml").write(settings))
+            await self._in_thread(lambda: MailSettingsFile(self._folder / "settings.toml").write(settings))
         except OSError as why:
             raise MailRefused(f"The mail settings are not kept: {_reason(why)}.", status=507) from None
         self.settings = settings
@@ -198,13 +201,12 @@ class Mailer:
             await self._make(letter)
 
     async def _make(self, letter: Letter) -> None:
-        folder, outbox = self._folder, self._outbox
-        assert folder is not None
+        outbox = self._outbox
         assert outbox is not None
         under_way = Underway(
             letter=letter.n,
             task=asyncio.ensure_future(
-                prepare(letter, self.settings, self._source, folder / "work", outbox.files, self._made_so_far)
+                prepare(letter, self.settings, self._source, self._folder / "work", outbox.files, self._made_so_far)
             ),
         )
         self.making = under_way
@@ -329,7 +331,7 @@ class Mailer:
         outbox = self._outbox
         assert outbox is not None
         if under_way.connection is None or not under_way.connection.is_open:
-            under_way.connection = await connect(account_of(self.settings))
+            under_way.connection = await connect(Account.of(self.settings))
         path = outbox.files / mail.file
         waiting = [one.address for one in mail.recipients if one.state == "waiting"]
         envelope = Envelope(
@@ -410,9 +412,7 @@ class Mailer:
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def _open(self) -> None:
-        folder = self._given
-        if folder is None:
-            folder = self._temporary = Path(tempfile.mkdtemp(prefix="catgraph-mail-"))
+        folder = self._folder
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self._lock = _locked(folder / "lock")
         file = MailSettingsFile(folder / "settings.toml")
@@ -423,26 +423,13 @@ class Mailer:
         self.complaints = [one for one in (file.complaint, outbox.complaint) if one]
         for one in self.complaints:
             log.error("%s", one)
-        self._folder, self._outbox = folder, outbox
+        self._outbox = outbox
 
     def _close(self) -> None:
         if self._outbox is not None:
             self._outbox.close()
         if self._lock is not None:
             os.close(self._lock)
-        if self._temporary is not None:
-            shutil.rmtree(self._temporary, ignore_errors=True)
-
-
-def account_of(settings: MailSettings) -> Account:
-    return Account(
-        host=settings.host,
-        port=settings.port,
-        security=settings.security,
-        user=settings.user,
-        password=settings.password,
-        ca=settings.ca,
-    )
 
 
 def _next_due(outbox: Outbox, now_ms: int) -> Mail | None:

@@ -224,8 +224,8 @@ class Outbox:
             )
 
     def try_all_again(self, sender: str, now_ms: int) -> None:
-        """The settings are others now: what waits is due, what failed for the account waits again, what was composed for
-        another sender is composed anew."""
+        """The settings are others now: what waits is due, what failed for the account waits again, and what was
+        composed for another sender is composed anew."""
         with self._change() as database:
             database.execute(
                 "UPDATE mail SET state = 'queued', next_ms = ?, done_ms = NULL, of_account = 0 "

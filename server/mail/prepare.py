@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import shutil
 import threading
 from collections.abc import Callable
@@ -150,4 +151,6 @@ def _links(letter: Letter, settings: MailSettings) -> list[str]:
 def _pack_name(letter: Letter) -> str:
     """The name of what is attached: the recording's, or the first one's and how many more."""
     first, *more = letter.order.recordings
-    return f"{first}_and_{len(more)}_more" if more else first
+    plain = re.sub(r"[^A-Za-z0-9_-]", "-", first)[:80]
+    name = plain if plain[:1].isalnum() else f"recording{plain}"
+    return f"{name}_and_{len(more)}_more" if more else name

@@ -22,6 +22,7 @@ from aiosmtplib.protocol import SMTPProtocol
 
 from server.address import BadAddress, refuse_forbidden
 from server.mail.replies import Trouble, clean
+from server.mail.settings import MailSettings
 
 DIAL_S = 20.0
 REPLY_S = 60.0  # RFC 5321 4.5.3.2 has minutes; a server that thinks so long is tried again
@@ -40,8 +41,20 @@ class Account:
     password: str
     ca: str
 
-    def __repr__(self) -> str:
-        return f"Account({self.host}:{self.port})"
+    def __repr__(self) -> str:  # no password in any log
+        return f"Account({self.shown})"
+
+    @classmethod
+    def of(cls, settings: MailSettings) -> Account:
+        """Whom these settings name."""
+        return cls(
+            host=settings.host,
+            port=settings.port,
+            security=settings.security,
+            user=settings.user,
+            password=settings.password,
+            ca=settings.ca,
+        )
 
     @property
     def shown(self) -> str:
@@ -209,7 +222,7 @@ async def connected(account: Account) -> AsyncIterator[Connection]:
 async def connect(account: Account) -> Connection:
     """Dials, encrypts, logs in. Raises Trouble of the account."""
     context = await asyncio.to_thread(_context, account.ca) if account.security != "none" else None
-    with in_words(account, "on connecting"):
+    with in_words(account, ""):
         dialled = await _dial(account)
         smtp = aiosmtplib.SMTP(
             hostname=account.host,
@@ -334,7 +347,7 @@ async def _write(protocol: SMTPProtocol, piece: bytes, answer: asyncio.Future[An
 @contextmanager
 def in_words(account: Account, when: str) -> Iterator[None]:
     """Whatever a connection may fail with, as a Trouble with a sentence."""
-    is_dialling = when == "on connecting"
+    is_dialling = not when
     try:
         yield
     except Trouble:
@@ -342,7 +355,9 @@ def in_words(account: Account, when: str) -> Iterator[None]:
     except aiosmtplib.SMTPResponseException as answer:
         words = f"{answer.code} {clean(answer.message, account.password)}"
         raise Trouble(
-            f"{account.shown} says {when}: {words}", is_permanent=answer.code >= 500, is_of_account=is_dialling
+            f"{account.shown} says{'' if is_dialling else f' {when}'}: {words}",
+            is_permanent=answer.code >= 500,
+            is_of_account=is_dialling,
         ) from None
     except (aiosmtplib.SMTPException, OSError, TimeoutError) as error:
         trusted = _of_trust(error)
@@ -350,7 +365,9 @@ def in_words(account: Account, when: str) -> Iterator[None]:
             raise Trouble(
                 f"{account.shown} does not prove who it is: {trusted}.", is_permanent=True, is_of_account=True
             ) from None
-        raise Trouble(f"{account.shown} {_how(error)} {when}.", is_of_account=is_dialling) from None
+        raise Trouble(
+            f"{account.shown} {_how(error)}{'' if is_dialling else f' {when}'}.", is_of_account=is_dialling
+        ) from None
 
 
 def _of_trust(error: BaseException) -> str | None:

@@ -8,7 +8,7 @@ from server.mail.order import Format
 from server.mail.pack import Pack, Stretch
 
 FORMATS: dict[Format, str] = {
-    "mcap": "MCAP (Foxglove, Lichtblick, mcap)",
+    "mcap": "recorded (MCAP opens in Foxglove and Lichtblick)",
     "bag": "ROS 1 bag (rosbag, rqt_bag)",
     "csv": "CSV tables",
     "html": "HTML report",

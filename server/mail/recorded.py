@@ -1,0 +1,22 @@
+"""What is mailed, from where it is kept: the catalog of recordings and the exports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+
+class Recorded:
+    """The mailer's source in a running server."""
+
+    def __init__(self, path_of: Callable[[str], Path | None]) -> None:
+        self._path_of = path_of
+
+    def path_of(self, recording: str) -> Path | None:
+        return self._path_of(recording)
+
+    async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Path:
+        from server.recording.export import make_export  # type: ignore[attr-defined]
+
+        made: Path = await make_export(path, format, into, progress)
+        return made
