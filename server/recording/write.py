@@ -8,7 +8,9 @@ is closed, whole and on the disk. A disk that refuses leaves it cut behind the l
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -34,7 +36,8 @@ class PartFile:
         self._channels: dict[tuple[str, str, str], int] = {}  # topic, encoding, type → number
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._sequence: dict[int, int] = {}
-        self.messages = 0
+        self.failed: OSError | None = None  # what the disk said of keeping it; the next flush raises it
+        self._closing = threading.Lock()
         make_folder(path.parent)
         self._writing = writing_path(path)
         if path.exists():
@@ -82,16 +85,25 @@ class PartFile:
         """One message; `at_ns` is the time of day when it came."""
         sequence = self._sequence[channel] = self._sequence.get(channel, 0) + 1
         self._writer.add_message(channel, at_ns, data, publish_time=at_ns, sequence=sequence)
-        self.messages += 1
 
     def flush(self) -> None:
         """Hands all that was added to the system: a kill does not lose it any more."""
+        if self.failed is not None:
+            raise self.failed
         self._writer.flush()
         self._stream.drain()
 
     def sync(self) -> None:
-        """Waits until the disk has what was flushed: a loss of power does not lose it any more."""
-        os.fdatasync(self._fd)
+        """Waits until the disk has what was flushed: a loss of power does not lose it any more. For any thread."""
+        with self._closing:
+            if self._fd >= 0:
+                os.fdatasync(self._fd)
+
+    def demand_place(self) -> None:
+        """Raises OSError where the file has been taken away, or replaced, while it is written."""
+        here, there = os.fstat(self._fd), os.stat(self._writing)
+        if (here.st_dev, here.st_ino) != (there.st_dev, there.st_ino):
+            raise FileNotFoundError(errno.ENOENT, "replaced", str(self._writing))
 
     def close(self, **ended: str) -> Path:
         """Completes the file, and only when the disk has all of it, gives it its name. Raises OSError: then it is left
@@ -105,7 +117,7 @@ class PartFile:
         except BaseException:
             self.abandon()
             raise
-        os.close(self._fd)
+        self._shut()
         os.rename(self._writing, self.path)
         sync_folder(self.path.parent)
         return self.path
@@ -113,7 +125,13 @@ class PartFile:
     def abandon(self) -> None:
         """Leaves what the disk took, to be recovered when the server starts again."""
         with contextlib.suppress(OSError):
-            os.close(self._fd)
+            self._shut()
+
+    def _shut(self) -> None:
+        with self._closing:
+            fd, self._fd = self._fd, -1
+            if fd >= 0:
+                os.close(fd)
 
 
 class _Stream:

@@ -1,0 +1,90 @@
+"""How much room there is for recordings, how much they take already, and why a disk refuses, in words."""
+
+from __future__ import annotations
+
+import errno
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Allowance:
+    """What the operator lets recordings have, in bytes."""
+
+    quota: int  # of all recordings together, those in the trash too; 0: no limit
+    min_free: int  # on their disk, for the log and for everything else
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Space:
+    """What the disk says, in bytes."""
+
+    free: int  # for this user
+    used: int  # by all recordings together
+
+    def exhausted(self, allowance: Allowance) -> str | None:
+        """Why nothing more may be recorded, as a sentence; None: it may."""
+        if self.free < allowance.min_free:
+            return f"The disk has {amount(self.free)} left, and recording stops at {amount(allowance.min_free)}."
+        if allowance.quota and self.used >= allowance.quota:
+            return f"Recordings take {amount(self.used)}, all of the {amount(allowance.quota)} they may have."
+        return None
+
+    def left(self, allowance: Allowance) -> int:
+        """Until it is exhausted."""
+        room = self.free - allowance.min_free
+        return max(0, min(room, allowance.quota - self.used) if allowance.quota else room)
+
+
+def free_at(root: Path) -> int:
+    """Bytes left for this user on the disk of a folder that need not be there yet. Raises OSError."""
+    standing = next(folder for folder in (root, *root.parents) if folder.is_dir())
+    disk = os.statvfs(standing)
+    return disk.f_bavail * disk.f_frsize
+
+
+def used_by(root: Path) -> int:
+    """Bytes of all files below; what vanishes meanwhile counts nothing."""
+    total = 0
+    waiting = [root]
+    while waiting:
+        try:
+            with os.scandir(waiting.pop()) as found:
+                for entry in found:
+                    if entry.is_dir(follow_symlinks=False):
+                        waiting.append(Path(entry.path))
+                    else:
+                        total += entry.stat(follow_symlinks=False).st_size
+        except OSError:
+            continue
+    return total
+
+
+def amount(size: float) -> str:
+    """“1.2 GB”, “340 MB”: as shops count them."""
+    for unit, factor in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if size >= factor:
+            number = size / factor
+            return f"{number:.0f} {unit}" if number >= 99.5 else f"{number:.1f} {unit}"
+    return f"{size:.0f} bytes"
+
+
+_WHY = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "the disk is full for this user",
+    errno.EROFS: "the folder for recordings can only be read",
+    errno.EACCES: "this user may not write into the folder for recordings",
+    errno.EPERM: "this user may not write into the folder for recordings",
+    errno.ENOENT: "the folder or the file was taken away",
+    errno.ENOTDIR: "the folder for recordings is no folder",
+    errno.EIO: "the disk reports an error",
+    errno.EFBIG: "the file has grown too large for its disk",
+    errno.ENODEV: "the disk was taken away",
+    errno.ESTALE: "the disk was taken away",
+}
+
+
+def why(error: OSError) -> str:
+    """What the disk did, in a few words."""
+    return _WHY.get(error.errno or 0) or (error.strerror or str(error)).lower()

@@ -1,0 +1,240 @@
+"""The recorder's thread: what is handed over is on the disk, in order; what is not is counted and said."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from server.recording import recorder as recorder_module
+from server.recording.folder import RecordingsFolder
+from server.recording.read import open_recording
+from server.recording.recorder import Part, Recorder
+from server.recording.space import Allowance, amount
+from server.source import RosVersion
+
+AT_NS = 1_700_000_000_000_000_000
+PLENTY = Allowance(quota=0, min_free=0)
+V = {"x": 1.0, "y": 0.0, "z": 0.0}
+
+
+class Desk:
+    """The loop's side of a recorder."""
+
+    def __init__(self, root: Path, allowance: Allowance = PLENTY) -> None:
+        self.folder = RecordingsFolder(root)
+        self.finished: list[Path] = []
+        loop = asyncio.get_running_loop()
+        self.recorder = Recorder(
+            self.folder, call=loop.call_soon_threadsafe, on_finished=self.finished.append, allowance=allowance
+        )
+
+    def part(self, n: int = 1, version: RosVersion = 1) -> Part:
+        id = self.folder.new_id("car", 1_700_000_000_000 + n * 1000)
+        return Part(path=self.folder.place("car", id), version=version, metadata={"part": str(n)})
+
+    def say(self, n: int, topic: str = "/vel", type: str | None = "geometry_msgs/Twist", message: Any = None) -> None:
+        said = {"linear": V | {"x": float(n)}, "angular": V} if message is None else message
+        self.recorder.take(topic, type, said, AT_NS + n * 1_000_000, 100, n / 1000)
+
+    async def end(self, **ended: str) -> None:
+        done = asyncio.Event()
+        self.recorder.end(then=done.set, **ended)
+        async with asyncio.timeout(10):
+            await done.wait()
+
+    async def stop(self) -> None:
+        done = asyncio.Event()
+        self.recorder.stop(then=done.set)
+        async with asyncio.timeout(10):
+            await done.wait()
+
+    async def until(self, holds: Callable[[], bool]) -> None:
+        async with asyncio.timeout(10):
+            while not holds():
+                await asyncio.sleep(0.01)
+
+
+async def test_what_was_handed_over_before_the_end_is_in_the_file(tmp_path: Path) -> None:
+    desk = Desk(tmp_path / "recordings")
+    desk.recorder.begin(desk.part())
+    for n in range(1000):
+        desk.say(n)
+        if n % 100 == 0:
+            desk.recorder.own("alarms", {"n": n}, AT_NS + n * 1_000_000)
+    desk.say(1000, "/odd", "his_msgs/Odd", {"a": [None, "é"]})
+    desk.say(1001, "/vel", "geometry_msgs/Twist", {"linear": "no vector"})
+    desk.say(1002, "/untyped", None, {"b": 1})
+    await desk.end(ended="closed", why="enough")
+    (path,) = desk.finished
+    assert desk.recorder.status.state == "off"
+    assert desk.recorder.status.misfits == 1
+    assert desk.recorder.status.messages == 1003
+    assert desk.recorder.dropped == 0
+    with open_recording([path]) as recording:
+        assert recording.metadata == {"part": "1", "ended": "closed", "why": "enough"}
+        messages = list(recording.messages())
+        assert [m.message["linear"]["x"] for m in messages[:1000]] == [float(n) for n in range(1000)]
+        assert [(m.topic, m.message) for m in messages[1000:]] == [
+            ("/odd", {"a": [None, "é"]}),
+            ("/vel", {"linear": "no vector"}),
+            ("/untyped", {"b": 1}),
+        ]
+        own = list(recording.own("/catgraph/alarms"))
+        assert [said for _, said in own] == [{"time_ms": AT_NS // 1_000_000 + n, "n": n} for n in range(0, 1000, 100)]
+    await desk.stop()
+
+
+async def test_parts_follow_each_other_and_share_nothing(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    for n in (1, 2):
+        desk.recorder.begin(desk.part(n))
+        for i in range(n * 10):
+            desk.say(i)
+        desk.recorder.end(ended="closed")
+        desk.say(99)  # between two parts nothing is recorded
+    await desk.stop()
+    assert [path.name for path in desk.finished] == ["car_20231114T221321Z.mcap", "car_20231114T221322Z.mcap"]
+    for n, path in enumerate(desk.finished, 1):
+        with open_recording([path]) as recording:
+            assert (recording.metadata["part"], recording.count) == (str(n), n * 10)
+
+
+async def test_a_definition_that_the_bridge_gave_counts_from_then_on(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    desk.recorder.begin(desk.part())
+    desk.say(1, "/a", "my_msgs/A", {"x": 1.5})
+    desk.recorder.learn({"my_msgs/A": "float32 x\n"})
+    desk.say(2, "/a", "my_msgs/A", {"x": 2.5})
+    await desk.stop()
+    with open_recording(desk.finished) as recording:
+        assert recording.topics["/a"].definition == "float32 x\n"
+        assert [m.message for m in recording.messages()] == [{"x": 1.5}, {"x": 2.5}]
+
+
+async def test_it_is_on_the_disk_within_half_a_second_without_being_asked(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    part = desk.part()
+    desk.recorder.begin(part)
+    desk.say(1)
+    await desk.until(lambda: desk.recorder.status.state == "recording")
+    desk.say(2)
+    handed_s = time.monotonic()
+    await desk.until(lambda: desk.recorder.status.messages == 2)
+    assert time.monotonic() - handed_s < 0.5
+    with open_recording([part.path.with_name(f"{part.id}.mcap.writing")]) as recording:
+        assert recording.count == 2
+    await desk.stop()
+
+
+async def test_what_does_not_fit_the_queue_is_dropped_and_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_module, "MAX_QUEUED", 10)
+    desk = Desk(tmp_path)
+    for n in range(15):  # nobody takes from the queue yet: the disk of a thread that hangs looks the same
+        desk.say(n)
+    assert (desk.recorder.queued, desk.recorder.dropped, desk.recorder.dropped_at_s) == (10, 5, 0.014)
+    desk.recorder.own("alarms", {"n": 1}, AT_NS)
+    assert (desk.recorder.queued, desk.recorder.dropped) == (11, 5), "there is room left for what is ours"
+
+
+async def test_large_messages_fill_the_queue_by_their_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recorder_module, "MAX_QUEUED_BYTES", 350)
+    desk = Desk(tmp_path)
+    for n in range(6):
+        desk.say(n)
+    assert (desk.recorder.queued, desk.recorder.dropped) == (4, 2)
+    desk.recorder.begin(desk.part())
+    await desk.until(lambda: desk.recorder.queued == 0)
+    desk.say(7)
+    assert desk.recorder.dropped == 2, "what was taken from it is no load any more"
+    await desk.stop()
+
+
+@pytest.mark.parametrize(
+    ("allowance", "why"),
+    [
+        (Allowance(quota=0, min_free=1 << 62), r"The disk has .* left, and recording stops at 4611686018 GB\."),
+        (Allowance(quota=1000, min_free=0), r"Recordings take 1\.5 kB, all of the 1\.0 kB they may have\."),
+    ],
+)
+async def test_where_there_is_no_room_nothing_is_begun(tmp_path: Path, allowance: Allowance, why: str) -> None:
+    (tmp_path / "bus").mkdir()
+    (tmp_path / "bus" / "old.mcap").write_bytes(bytes(1500))
+    desk = Desk(tmp_path, allowance)
+    desk.recorder.begin(desk.part())
+    desk.say(1)
+    await desk.until(lambda: desk.recorder.status.state == "stopped")
+    assert desk.recorder.status.trouble is not None
+    assert re.fullmatch(why, desk.recorder.status.trouble)
+    await desk.stop()
+    assert desk.finished == []
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["bus", "old.mcap"], "and nothing is deleted for it"
+
+
+async def test_at_the_limit_it_stops_and_what_was_recorded_is_saved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_module, "LOOK_S", 0.1)
+    desk = Desk(tmp_path)
+    desk.recorder.begin(desk.part())
+    desk.say(1)
+    await desk.until(lambda: desk.recorder.status.messages == 1)
+    assert desk.finished == []
+    desk.recorder.allowance = Allowance(quota=1, min_free=0)
+    await desk.until(lambda: bool(desk.finished))
+    status = desk.recorder.status
+    assert status.state == "stopped"
+    assert status.trouble is not None
+    assert status.trouble.startswith("Recordings take ")
+    assert status.trouble.endswith("What was recorded is saved.")
+    desk.say(2)
+    desk.recorder.allowance = PLENTY
+    desk.recorder.begin(desk.part(2))
+    desk.say(3)
+    await desk.stop()
+    with open_recording([desk.finished[0]]) as recording:
+        assert recording.count == 1
+        assert recording.metadata["why"] == status.trouble
+    with open_recording([desk.finished[1]]) as recording:
+        assert [m.message["linear"]["x"] for m in recording.messages()] == [3.0]
+
+
+async def test_a_folder_that_is_none_is_said(tmp_path: Path) -> None:
+    (tmp_path / "recordings").write_text("a file")
+    desk = Desk(tmp_path / "recordings")
+    desk.recorder.begin(replace(desk.part(), path=tmp_path / "recordings" / "car" / "a.mcap"))
+    await desk.until(lambda: desk.recorder.status.state == "stopped")
+    assert desk.recorder.status.trouble == "Recording stopped: the folder for recordings is no folder."
+    await desk.stop()
+
+
+async def test_a_file_that_is_taken_away_while_it_is_written_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_module, "LOOK_S", 0.1)
+    desk = Desk(tmp_path)
+    part = desk.part()
+    desk.recorder.begin(part)
+    await desk.until(lambda: desk.recorder.status.state == "recording")
+    part.path.with_name(f"{part.id}.mcap.writing").unlink()
+    await desk.until(lambda: desk.recorder.status.state == "stopped")
+    assert desk.recorder.status.trouble == "Recording stopped: the folder or the file was taken away."
+    assert desk.finished == []
+    await desk.stop()
+
+
+@pytest.mark.parametrize(
+    ("size", "said"),
+    [(0, "0 bytes"), (999, "999 bytes"), (1000, "1.0 kB"), (1_250_000, "1.2 MB"), (99_400_000, "99.4 MB"),
+     (340_000_000, "340 MB"), (1_200_000_000, "1.2 GB"), (2e12, "2000 GB")],
+)  # fmt: skip
+def test_amounts_are_said_as_people_say_them(size: float, said: str) -> None:
+    assert amount(size) == said
