@@ -389,6 +389,14 @@ class State:
             clock_jump=self._clock_jump,
         )
 
+    def glance(self, now_s: float) -> Snapshot:
+        """As `snapshot`, for showing only: whether and when anybody looks changes nothing of what is judged later."""
+        kept = self._rates_at_s, self._rates, self._latest_s
+        try:
+            return self.snapshot(now_s)
+        finally:
+            self._rates_at_s, self._rates, self._latest_s = kept
+
     def _follow_clock(self, at_s: float) -> None:
         """When the clock goes back, what is known keeps its age; else old values would look new for a long time."""
         if at_s >= self._latest_s:

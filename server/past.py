@@ -60,7 +60,7 @@ def recall(bus: LocalBus, vehicle: str, *, now_s: float, wall_ms: int) -> Past:
         transition
         for alarm in bus.alarms_told(vehicle)
         for event in _since_rest(bus, vehicle, alarm)
-        if (transition := _transition(event, moment_s, shelf_s)) is not None
+        if (transition := transition_of(event, moment_s, shelf_s)) is not None
     ]
     return Past(
         address=address,
@@ -77,7 +77,7 @@ def _recent(bus: LocalBus, vehicle: str, wall_ms: int, moment_s: Clock, shelf_s:
     for event in _backwards(bus, vehicle, None):
         if wall_ms - event["at_ms"] > WINDOW_S * 1000 or len(found) >= KEPT:
             break
-        transition = _transition(event, moment_s, shelf_s)
+        transition = transition_of(event, moment_s, shelf_s)
         if transition is not None:
             found.append(transition)
     return found[::-1]
@@ -117,7 +117,7 @@ def _backwards(bus: LocalBus, vehicle: str, alarm: str | None) -> Iterator[dict[
         before = events[-1]["n"]
 
 
-def _transition(event: Mapping[str, Any], moment_s: Clock, shelf_s: Clock) -> Transition | None:
+def transition_of(event: Mapping[str, Any], moment_s: Clock, shelf_s: Clock) -> Transition | None:
     """What an event tells, or None where it tells nothing that can be used: the log may be older than this program."""
     change = event.get("change")
     if change not in _CHANGES or not isinstance(event.get("at_ms"), (int, float)):

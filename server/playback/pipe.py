@@ -1,0 +1,16 @@
+"""How a server and the process of one replay talk: orders as lines of JSON, answers as records with a length."""
+
+from __future__ import annotations
+
+import struct
+from typing import Literal
+
+HEAD = struct.Struct("<BI")  # what it is, how many bytes follow
+Kind = Literal["state", "position", "scan", "timeline", "reply", "failed"]
+KINDS: tuple[Kind, ...] = ("state", "position", "scan", "timeline", "reply", "failed")
+MOST_BYTES = 4 * 1024 * 1024
+
+
+def record(kind: Kind, payload: bytes) -> bytes:
+    """One answer as it goes through the pipe."""
+    return HEAD.pack(KINDS.index(kind), len(payload)) + payload
