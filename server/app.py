@@ -9,6 +9,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
@@ -18,12 +19,14 @@ from server.bus import LocalBus
 from server.config import Config
 from server.hub import Hub
 from server.journal import Journal
+from server.recording.catalog import Catalog
 from server.session import Session
 from server.settings import SettingsFile
 from server.version import catgraph_version
 from server.web import api, docs, errors, metrics, notices, pages
 from server.web import ground as web_ground
 from server.web import log as alarm_log
+from server.web import recordings as web_recordings
 from server.web.ground import Ground
 from server.web.headers import SecurityHeaders
 
@@ -44,6 +47,7 @@ class Running:
     version: str
     started_s: float
     ground: Ground
+    recordings: Catalog | None  # None: nothing is kept, so nothing is recorded
 
     def server_facts(self) -> dict[str, Any]:
         """The `server` part of a state."""
@@ -96,6 +100,7 @@ def create_app(
         version=catgraph_version(),
         started_s=now(),
         ground=ground,
+        recordings=_catalog(config.data, now=now, wall_ms=wall_ms),
     )
     for vehicle in config.vehicles:
         running.sessions[vehicle.name] = Session(
@@ -111,12 +116,16 @@ def create_app(
 
     @asynccontextmanager
     async def life(_: FastAPI) -> AsyncIterator[None]:
+        if running.recordings is not None:
+            await running.recordings.start()
         for session in running.sessions.values():
             await session.start()
         try:
             yield
         finally:
             await asyncio.gather(*(session.stop() for session in running.sessions.values()))
+            if running.recordings is not None:
+                await running.recordings.stop()
             journal.close()
             ground.close()
 
@@ -133,9 +142,16 @@ def create_app(
     errors.install(app)
     app.include_router(api.router)
     app.include_router(alarm_log.router)
+    app.include_router(web_recordings.router)
     app.include_router(metrics.router)
     app.include_router(web_ground.router)
     app.include_router(notices.router)
     app.include_router(docs.router)
     pages.install(app)
     return app
+
+
+def _catalog(data: Path | None, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Catalog | None:
+    if data is None:
+        return None
+    return Catalog(data / "recordings", data / "recordings.sqlite", now=now, wall_ms=wall_ms)

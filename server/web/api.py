@@ -82,6 +82,7 @@ async def health(request: Request) -> dict[str, Any]:
         "up_for_s": round(app.now() - app.started_s, 1),
         "vehicles": {name: session.phase for name, session in app.sessions.items()},
         "pages": app.hub.pages,
+        "recordings": None if app.recordings is None else app.recordings.totals() | {"unread": app.recordings.waiting},
     }
 
 

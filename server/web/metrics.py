@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+
 from fastapi import APIRouter, Request
 from fastapi.responses import PlainTextResponse
 
+from server.recording.catalog import Catalog
+from server.recording.catalog_file import Which
 from server.web.api import running
 
 router = APIRouter()
@@ -29,6 +33,9 @@ async def metrics(request: Request) -> PlainTextResponse:
         [("", app.hub.skipped)],
     )
     add("up_seconds", "gauge", "Seconds since the server started.", [("", app.now() - app.started_s)])
+    if app.recordings is not None:
+        for name, help, rows in await asyncio.to_thread(_recorded, app.recordings):  # it looks at a disk
+            add(name, "gauge", help, rows)
     received, rejected, open_, lag, load, chattering, kept, phones = [], [], [], [], [], [], [], []
     for name, session in app.sessions.items():
         vehicle = f'vehicle="{name}"'
@@ -55,3 +62,16 @@ async def metrics(request: Request) -> PlainTextResponse:
     add("phones", "gauge", "Phones that tell their position, or why they cannot.", phones)
     add("tick_lag_seconds", "gauge", "How late the newest tick was.", lag)
     return PlainTextResponse("\n".join(lines) + "\n", media_type=_TEXT)
+
+
+def _recorded(catalog: Catalog) -> list[tuple[str, str, list[tuple[str, float]]]]:
+    """Name, help and rows of what there is to say of the recordings."""
+    places = [('{place="kept"}', catalog.totals()), ('{place="trash"}', catalog.totals(Which(is_trashed=True)))]
+    free = catalog.free_bytes()
+    return [
+        ("recordings", "Recordings in the folder and in the trash.", [(at, t["count"]) for at, t in places]),
+        ("recordings_bytes", "What they take of the disk.", [(at, t["bytes"]) for at, t in places]),
+        ("recordings_unread", "Recordings that are yet to be read.", [("", catalog.waiting)]),
+        ("recordings_unreadable", "Recordings that cannot be read.", [("", catalog.unreadable)]),
+        ("disk_free_bytes", "What the disk of the recordings has left.", [] if free is None else [("", free)]),
+    ]
