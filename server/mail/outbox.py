@@ -368,6 +368,8 @@ class Outbox:
             case "cancelled":
                 is_under_way = any(mail.state == "sending" for mail in bare.mails)
                 sent = sum(mail.state == "sent" for mail in bare.mails)
+                if sent and sent == len(bare.mails):
+                    return replace(bare, state="sent", said="It was sent before it could be cancelled.")
                 said = f"{sent} of {len(bare.mails)} mails were sent before." if sent else ""
                 return replace(bare, state="sending" if is_under_way else "cancelled", said=said)
             case "failed":

@@ -1,0 +1,167 @@
+"""Mails as files: read back by Python's own parser they are what was ordered, and no head is added."""
+
+from __future__ import annotations
+
+import email
+import hashlib
+import threading
+import tracemalloc
+from email import policy
+from email.header import decode_header, make_header
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.mail import address, compose, heads
+from server.mail.compose import Attachment, Draft, Stopped
+from tests.server.mail.mailing import START_MS
+from tests.server.mail.post import read
+
+ANN, JORG = address.parse("ann@example.org"), address.parse("jörg@bücher.example")
+LINE = st.text(st.characters(exclude_categories=("Cc", "Cs", "Zl", "Zp")), max_size=120).filter(heads.is_one_line)
+
+
+def draft(**more: Any) -> Draft:
+    facts: dict[str, Any] = {
+        "sender": ANN,
+        "sender_name": "",
+        "to": [ANN],
+        "subject": "Drive",
+        "at_ms": START_MS,
+        "message_id": "<key.1of1@example.org>",
+        "text": "Hello",
+        **more,
+    }
+    return Draft(**facts)
+
+
+def written(tmp_path: Path, **more: Any) -> Path:
+    path = tmp_path / "mail.eml"
+    path.unlink(missing_ok=True)
+    size = compose.write(draft(**more), path, threading.Event())
+    assert size == path.stat().st_size
+    return path
+
+
+def test_a_mail_has_what_every_mail_must_have(tmp_path: Path) -> None:
+    mail = read(written(tmp_path, to=[ANN, address.parse("bob@example.com")], sender_name='Prüfstand "Süd"'))
+    assert mail.keys()[:5] == ["Date", "From", "To", "Message-ID", "Subject"]
+    assert mail["Date"] == "Mon, 21 Sep 2026 14:13:20 +0000"
+    assert [str(one) for one in mail["To"].addresses] == ["ann@example.org", "bob@example.com"]
+    assert mail["From"].addresses[0].display_name == 'Prüfstand "Süd"'
+    assert mail["From"].addresses[0].addr_spec == "ann@example.org"
+    assert mail["Message-ID"] == "<key.1of1@example.org>"
+    assert mail.get_content() == "Hello\r\n"
+    assert mail.defects == []
+
+
+def test_lines_are_short_ascii_and_end_as_the_wire_wants_it(tmp_path: Path) -> None:
+    attached = tmp_path / "a.bin"
+    attached.write_bytes(bytes(range(256)) * 999)
+    raw = written(
+        tmp_path,
+        subject="Fährt " * 30,
+        text="line\n.dot\r\n" + "x" * 3000,
+        attachment=Attachment(path=attached, start=0, length=attached.stat().st_size, name="a.zip"),
+    ).read_bytes()
+    assert raw.isascii()
+    assert raw.replace(b"\r\n", b"").count(b"\n") == raw.replace(b"\r\n", b"").count(b"\r") == 0
+    assert max(len(line) for line in raw.split(b"\r\n")) <= 78
+    assert raw.endswith(b"\r\n")
+
+
+@given(LINE)
+def test_any_subject_reads_back_as_it_was(subject: str) -> None:
+    head = heads.text_line("Subject", subject)
+    assert max(len(line) for line in head.split(b"\r\n")) <= 78
+    mail = email.message_from_bytes(head + b"X-Next: 1\r\n\r\n")
+    assert mail.keys() == ["Subject", "X-Next"]
+    found = str(make_header(decode_header(mail["Subject"]))) if subject else mail["Subject"]
+    assert found == subject
+
+
+@given(LINE)
+def test_any_name_of_a_sender_stays_a_name(name: str) -> None:
+    head = heads.address_line("From", [ANN], name.strip())
+    mail = email.message_from_bytes(head + b"\r\n", policy=policy.default)
+    assert mail.keys() == ["From"]
+    assert [one.addr_spec for one in mail["From"].addresses] == ["ann@example.org"]
+
+
+@pytest.mark.parametrize(
+    "text", ["a\r\nBcc: evil@x", "a\nb", "a\rb", "a\x00", "a\u2028b", "a\u202eb", "a\x85b", "\ud800"]
+)
+def test_no_line_break_gets_into_a_head(text: str) -> None:
+    assert not heads.is_one_line(text)
+    with pytest.raises(ValueError, match="line"):
+        heads.text_line("Subject", text)
+    with pytest.raises(ValueError, match=r"written|line"):
+        heads.line("X-Any", text)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "a b.zip", 'a".zip', "a\r\nX: y.zip", "../a.zip", "a/b.zip", ".zip", "ä.zip", "a;b", "x" * 121]
+)
+def test_no_name_of_a_file_breaks_out(name: str) -> None:
+    with pytest.raises(ValueError, match="no name"):
+        heads.file_name(name)
+
+
+@given(st.text(max_size=400))
+def test_any_text_reads_back_line_by_line(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    if any(0xD800 <= ord(letter) < 0xE000 for letter in text):
+        return
+    mail = read(written(tmp_path_factory.mktemp("mail"), text=text))
+    plain = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n") + "\n"
+    assert (mail.get_payload(decode=True) or b"").decode().replace("\r\n", "\n") == plain  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("size", [0, 1, 56, 57, 58, 57 * 4096 - 1, 57 * 4096, 57 * 4096 + 1, 500_000])
+def test_what_is_attached_reads_back(tmp_path: Path, size: int) -> None:
+    content = hashlib.shake_256(b"x").digest(size + 20)
+    source = tmp_path / "source"
+    source.write_bytes(content)
+    mail = read(written(tmp_path, attachment=Attachment(path=source, start=10, length=size, name="drive.zip.001")))
+    assert mail.defects == []
+    text, attached = mail.iter_parts()
+    assert text.get_content() == "Hello\r\n"
+    assert attached.get_filename() == "drive.zip.001"
+    assert attached.get_content() == content[10 : 10 + size]
+
+
+def test_an_address_beyond_ascii_stands_in_its_own_letters(tmp_path: Path) -> None:
+    raw = written(tmp_path, to=[ANN, JORG], sender=JORG, sender_name="Jörg").read_bytes()
+    assert "To: ann@example.org,\r\n jörg@xn--bcher-kva.example\r\n".encode() in raw
+    assert "<jörg@xn--bcher-kva.example>\r\n".encode() in raw
+
+
+def test_a_file_that_shrank_is_no_mail(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(b"short")
+    with pytest.raises(OSError, match="shorter"):
+        written(tmp_path, attachment=Attachment(path=source, start=0, length=9, name="a.zip"))
+
+
+def test_a_cancelled_mail_is_not_written_to_its_end(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(b"content")
+    stop = threading.Event()
+    stop.set()
+    with pytest.raises(Stopped):
+        compose.write(
+            draft(attachment=Attachment(path=source, start=0, length=7, name="a.zip")), tmp_path / "m.eml", stop
+        )
+
+
+def test_a_large_mail_takes_little_memory(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    with open(source, "wb") as file:
+        file.truncate(40_000_000)
+    tracemalloc.start()
+    written(tmp_path, attachment=Attachment(path=source, start=0, length=40_000_000, name="a.zip"))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 5_000_000
