@@ -19,6 +19,8 @@ from server.bus import LocalBus
 from server.config import Config
 from server.hub import Hub
 from server.journal import Journal
+from server.mail.mailer import Mailer
+from server.mail.recorded import Recorded
 from server.recording.catalog import Catalog
 from server.session import Session
 from server.settings import SettingsFile
@@ -26,6 +28,7 @@ from server.version import catgraph_version
 from server.web import api, docs, errors, metrics, notices, pages
 from server.web import ground as web_ground
 from server.web import log as alarm_log
+from server.web import mail as web_mail
 from server.web import recordings as web_recordings
 from server.web.ground import Ground
 from server.web.headers import SecurityHeaders
@@ -47,6 +50,7 @@ class Running:
     version: str
     started_s: float
     ground: Ground
+    mailer: Mailer | None  # None: nothing is kept, so nothing is mailed
     recordings: Catalog | None  # None: nothing is kept, so nothing is recorded
 
     def server_facts(self) -> dict[str, Any]:
@@ -100,6 +104,7 @@ def create_app(
         version=catgraph_version(),
         started_s=now(),
         ground=ground,
+        mailer=_mailer(config.data, lambda id: _recording(running, id), wall_ms=wall_ms),
         recordings=_catalog(config.data, now=now, wall_ms=wall_ms),
     )
     for vehicle in config.vehicles:
@@ -118,12 +123,16 @@ def create_app(
     async def life(_: FastAPI) -> AsyncIterator[None]:
         if running.recordings is not None:
             await running.recordings.start()
+        if running.mailer is not None:
+            await running.mailer.start()
         for session in running.sessions.values():
             await session.start()
         try:
             yield
         finally:
             await asyncio.gather(*(session.stop() for session in running.sessions.values()))
+            if running.mailer is not None:
+                await running.mailer.stop()
             if running.recordings is not None:
                 await running.recordings.stop()
             journal.close()
@@ -143,6 +152,7 @@ def create_app(
     app.include_router(api.router)
     app.include_router(alarm_log.router)
     app.include_router(web_recordings.router)
+    app.include_router(web_mail.router)
     app.include_router(metrics.router)
     app.include_router(web_ground.router)
     app.include_router(notices.router)
@@ -155,3 +165,12 @@ def _catalog(data: Path | None, *, now: Callable[[], float], wall_ms: Callable[[
     if data is None:
         return None
     return Catalog(data / "recordings", data / "recordings.sqlite", now=now, wall_ms=wall_ms)
+
+
+def _mailer(data: Path | None, path_of: Callable[[str], Path | None], *, wall_ms: Callable[[], int]) -> Mailer | None:
+    return None if data is None else Mailer(data / "mail", Recorded(path_of), wall_ms=wall_ms)
+
+
+def _recording(running: Running, id: str) -> Path | None:
+    """Where a finished recording lies."""
+    return None if running.recordings is None else running.recordings.path(id)
