@@ -21,6 +21,7 @@ from server.hub import Hub
 from server.journal import Journal
 from server.mail.mailer import Mailer
 from server.mail.recorded import Recorded
+from server.playback.desk import Desk
 from server.recording.catalog import Catalog
 from server.session import Session
 from server.settings import SettingsFile
@@ -52,6 +53,7 @@ class Running:
     ground: Ground
     mailer: Mailer | None  # None: nothing is kept, so nothing is mailed
     recordings: Catalog | None  # None: nothing is kept, so nothing is recorded
+    desk: Desk
 
     def server_facts(self) -> dict[str, Any]:
         """The `server` part of a state."""
@@ -93,10 +95,11 @@ def create_app(
         config.data.mkdir(parents=True, exist_ok=True)
     journal = Journal(config.data / "events.sqlite" if config.data is not None else None)
     bus = LocalBus(journal, now=now)
+    desk = Desk(lambda id: _recording(running, id), now=now)
     running = Running(
         config=config,
         bus=bus,
-        hub=Hub(bus, now=now),
+        hub=Hub(bus, desk=desk, server=lambda: running.server_facts()),
         sessions={},
         now=now,
         wall_ms=wall_ms,
@@ -105,6 +108,7 @@ def create_app(
         started_s=now(),
         ground=ground,
         mailer=_mailer(config.data, lambda id: _recording(running, id), wall_ms=wall_ms),
+        desk=desk,
         recordings=_catalog(config.data, now=now, wall_ms=wall_ms),
     )
     for vehicle in config.vehicles:
@@ -130,6 +134,7 @@ def create_app(
         try:
             yield
         finally:
+            await desk.close_all()
             await asyncio.gather(*(session.stop() for session in running.sessions.values()))
             if running.mailer is not None:
                 await running.mailer.stop()

@@ -18,6 +18,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from server import commands, label
 from server.bus import LocalBus, NotServed
+from server.playback import orders
+from server.playback.desk import Desk, NoReplay
+from server.playback.seat import Seat
 
 log = logging.getLogger("catgraph.hub")
 
@@ -25,22 +28,34 @@ EVENTS_A_BATCH = 100
 MAX_PAGES = 500
 MAX_COMPLAINTS = 200  # a page that sends nothing sensible is let go
 MAX_REPLIES = 200  # and so is one that asks and never reads
-FRAME_KINDS = ("state", "scan")
+FROM_A_REPLAY = ("position",)  # where the phone is, the live monitor must know whatever its page shows
+NOT_FROM_A_REPLAY = "This page replays a recording: nothing is ordered from it. Go back to live first."
 
 
 class Page:
     """One page's connection, from its acceptance to its end."""
 
     def __init__(
-        self, socket: WebSocket, bus: LocalBus, vehicle: str, *, hello: Mapping[str, Any], now: Callable[[], float]
+        self,
+        socket: WebSocket,
+        bus: LocalBus,
+        vehicle: str,
+        *,
+        hello: Mapping[str, Any],
+        desk: Desk,
+        server: Callable[[], Mapping[str, Any]],
+        replay: orders.Open | None = None,
     ):
+        """`replay`: the recording with which the page begins."""
         self._socket = socket
         self._bus = bus
         self._vehicle = vehicle
         self._hello = hello
-        self._now = now
         self._wake = asyncio.Event()
-        self._sent = dict.fromkeys(FRAME_KINDS, 0)  # number of the newest frame of a kind this page got
+        self._seat = Seat(bus, vehicle, desk, server=server, on_new=self._something_replayed, on_turned=self._turned)
+        self._begins_with = replay
+        self._opening: asyncio.Task[None] | None = None
+        self._sent = dict.fromkeys(self._seat.kinds, 0)  # number of the newest frame of a kind this page got
         self._watches_scan = False
         self._seq = 0
         self._offered = False  # an offer stands unanswered
@@ -64,20 +79,35 @@ class Page:
             pass  # it left, perhaps while something was being sent
         finally:
             unwatch()
-            self._watch_scan(False)
+            if self._opening is not None:
+                self._opening.cancel()
+                await asyncio.gather(self._opening, return_exceptions=True)
             writer.cancel()
             with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError, OSError):
                 await writer
+            self._watch_scan(False)
+            await self._seat.leave()
 
     # -- from the bus ------------------------------------------------------------------------------------------------
 
     def _something_new(self, kind: str) -> None:
         if kind == "events":
             self._events_due = True
+        elif kind == "scan" and self._seat.is_replaying:
+            return
         elif self._offered or (kind == "scan" and not self._watches_scan):
             if kind == "state":
                 self.skipped += 1
             return
+        self._wake.set()
+
+    def _something_replayed(self, kind: str) -> None:
+        if kind == "failed" or not self._offered:
+            self._wake.set()
+
+    def _turned(self) -> None:
+        """Another thing is looked at: none of its frames was sent."""
+        self._sent = dict.fromkeys(self._seat.kinds, 0)
         self._wake.set()
 
     # -- from the page -----------------------------------------------------------------------------------------------
@@ -116,6 +146,8 @@ class Page:
                 self._watch_scan(message.get("scan") is True)
             case "hello":
                 self._hear_hello(message)
+            case "replay":
+                await self._replay(message)
             case _:
                 await self._command(message)
 
@@ -129,14 +161,54 @@ class Page:
         self._wake.set()
 
     async def _command(self, message: dict[str, Any]) -> None:
-        identity = message.get("id")
-        if not isinstance(identity, str) or len(identity) > 80:
-            self._complain("A command carries an id of at most 80 letters.")
+        identity = self._identity(message)
+        if identity is None:
+            return
+        if self._seat.is_replaying and message.get("kind") not in FROM_A_REPLAY:
+            self._reply(identity, {"ok": False, "reason": NOT_FROM_A_REPLAY})
             return
         try:
             answer = await self._bus.request(self._vehicle, message | {"by": self._name})
         except NotServed as why:
             answer = {"ok": False, "reason": f"{str(why).capitalize()}."}
+        self._reply(identity, answer)
+
+    async def _replay(self, message: Mapping[str, Any]) -> None:
+        """An order to this page's own replay."""
+        identity = self._identity(message)
+        if identity is None:
+            return
+        try:
+            order = orders.read({name: value for name, value in message.items() if name not in ("id", "kind")})
+        except orders.NotUnderstood as why:
+            self._reply(identity, {"ok": False, "reason": str(why)})
+            return
+        match order:
+            case orders.Open() if self._opening is not None and not self._opening.done():
+                self._reply(identity, {"ok": False, "reason": "A recording is being opened already."})
+            case orders.Open():  # it takes a second; meanwhile this page goes on taking what is live
+                self._opening = asyncio.create_task(self._open(identity, order), name="open a replay")
+            case orders.Leave():
+                await self._seat.leave()
+                self._reply(identity, {"ok": True})
+            case _:
+                self._reply(identity, await self._seat.ask(order))
+
+    async def _open(self, identity: str, order: orders.Open) -> None:
+        try:
+            await self._seat.open(order)
+            self._reply(identity, {"ok": True})
+        except NoReplay as why:
+            self._reply(identity, {"ok": False, "reason": str(why)})
+
+    def _identity(self, message: Mapping[str, Any]) -> str | None:
+        identity = message.get("id")
+        if isinstance(identity, str) and len(identity) <= 80:
+            return identity
+        self._complain("A command carries an id of at most 80 letters.")
+        return None
+
+    def _reply(self, identity: str, answer: Mapping[str, Any]) -> None:
         self._replies.append({"kind": "reply", "id": identity, **answer})
         self._wake.set()
 
@@ -148,13 +220,18 @@ class Page:
     def _watch_scan(self, wanted: bool) -> None:
         if wanted != self._watches_scan:
             self._watches_scan = wanted
-            self._bus.want(self._vehicle, "scan", +1 if wanted else -1)
+            self._seat.watch_scan(wanted)
 
     # -- to the page -------------------------------------------------------------------------------------------------
 
     async def _write(self) -> None:
         try:
             await self._send(self._hello)
+            if self._begins_with is not None:
+                try:
+                    await self._seat.open(self._begins_with)
+                except NoReplay as why:
+                    await self._send({"kind": "replay", "ended": str(why)})
             with contextlib.suppress(NotServed):
                 await self._bus.request(self._vehicle, {"kind": "refresh"})  # nobody may have looked for a while
             await self._send_newest("state", unasked=True)
@@ -166,6 +243,9 @@ class Page:
             return  # the reader notices the same end
 
     async def _write_round(self) -> None:
+        if self._seat.ended is not None:
+            self._replies.append({"kind": "replay", "ended": self._seat.ended})
+            await self._seat.leave()
         replies, self._replies = self._replies, []
         for reply in replies:
             await self._send(reply)
@@ -173,9 +253,9 @@ class Page:
             await self._send_events()
         if self._take:
             self._take = False
-            await self._send_newest("state")
-            if self._watches_scan:
-                await self._send_newest("scan")
+            for kind in self._seat.kinds:
+                if self._is_new(kind):
+                    await self._send_newest(kind)
         if not self._offered:
             await self._offer()
 
@@ -188,7 +268,7 @@ class Page:
             await self._send({"kind": "events", "events": events, "last": self._bus.last_event(self._vehicle)})
 
     async def _offer(self) -> None:
-        fresh = [kind for kind in FRAME_KINDS if self._is_new(kind)]
+        fresh = [kind for kind in self._seat.kinds if self._is_new(kind)]
         if fresh:
             self._seq += 1
             self._offered = True
@@ -197,11 +277,10 @@ class Page:
     def _is_new(self, kind: str) -> bool:
         if kind == "scan" and not self._watches_scan:
             return False
-        frame = self._bus.newest(self._vehicle, kind)
-        return frame is not None and frame.number > self._sent[kind]
+        return self._seat.number(kind) > self._sent[kind]
 
     async def _send_newest(self, kind: str, *, unasked: bool = False) -> None:
-        frame = self._bus.newest(self._vehicle, kind)
+        frame = self._seat.newest(kind)
         if frame is None or (frame.number <= self._sent[kind] and not unasked):
             return
         self._sent[kind] = frame.number
@@ -217,9 +296,11 @@ class Page:
 class Hub:
     """All pages of the server."""
 
-    def __init__(self, bus: LocalBus, *, now: Callable[[], float]) -> None:
+    def __init__(self, bus: LocalBus, *, desk: Desk, server: Callable[[], Mapping[str, Any]]) -> None:
+        """`server`: what a state tells of the server."""
         self._bus = bus
-        self._now = now
+        self._desk = desk
+        self._server = server
         self._pages: set[Page] = set()
 
     @property
@@ -230,13 +311,15 @@ class Hub:
     def skipped(self) -> int:
         return sum(page.skipped for page in self._pages)
 
-    async def serve(self, socket: WebSocket, vehicle: str, hello: Mapping[str, Any]) -> None:
-        """Serves one page until it leaves."""
+    async def serve(
+        self, socket: WebSocket, vehicle: str, hello: Mapping[str, Any], *, replay: orders.Open | None = None
+    ) -> None:
+        """Serves one page until it leaves; `replay`: the recording it begins with."""
         await socket.accept()
         if len(self._pages) >= MAX_PAGES:
             await socket.close(code=1013, reason="too many pages")
             return
-        page = Page(socket, self._bus, vehicle, hello=hello, now=self._now)
+        page = Page(socket, self._bus, vehicle, hello=hello, desk=self._desk, server=self._server, replay=replay)
         self._pages.add(page)
         try:
             await page.serve()

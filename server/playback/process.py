@@ -205,7 +205,6 @@ def _until(over_s: float) -> Callable[[], bool]:
 
 
 def _sentence(text: str) -> str:
-    text = text[:1].upper() + text[1:]
     return text if text.endswith(".") else f"{text}."
 
 

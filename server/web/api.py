@@ -10,6 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from server import label
 from server.bus import NotServed
+from server.playback import orders
+from server.playback.desk import NoReplay
 from server.web.errors import Problem
 
 if TYPE_CHECKING:
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 router = APIRouter()
 NAME_HEADER = "x-catgraph-name"  # what the caller wants to be called in the log
 VehicleName = Annotated[str | None, Query(description="Which vehicle; the first where it is left out", max_length=40)]
+ReplayToken = Annotated[str | None, Query(description="Of a page's replay, as its state names it", max_length=40)]
 
 
 class Done(BaseModel):
@@ -66,6 +69,18 @@ async def ask(request: Request, vehicle: str | None, message: dict[str, Any]) ->
         more = {name: value for name, value in answer.items() if name not in ("ok", "reason")}
         raise Problem(422 if "field" in answer else 409, str(answer.get("reason")), **more)
     return answer
+
+
+async def _ask_either(
+    request: Request, vehicle: str | None, replay: str | None, message: dict[str, Any]
+) -> dict[str, Any]:
+    """What is asked of the live car, or of one page's replay."""
+    if replay is None:
+        return await ask(request, vehicle, message)
+    try:
+        return await running(request).desk.by_token(replay).ask(message)
+    except NoReplay as why:
+        raise HTTPException(404, str(why)) from None
 
 
 def _json(body: Any) -> Response:
@@ -118,8 +133,9 @@ async def track_points(
     request: Request,
     vehicle: VehicleName = None,
     after: Annotated[int, Query(ge=0, le=2**53, description="Only points with greater numbers")] = 0,
+    replay: ReplayToken = None,
 ) -> Response:
-    return _json(await ask(request, vehicle, {"kind": "track_points", "after": after}))
+    return _json(await _ask_either(request, vehicle, replay, {"kind": "track_points", "after": after}))
 
 
 @router.get("/api/trends", tags=["vehicle"], summary="The last minute of speed, pedals, steering and distance")
@@ -127,8 +143,9 @@ async def trends(
     request: Request,
     vehicle: VehicleName = None,
     after: Annotated[int | None, Query(ge=0, le=2**53, description="Only the steps after this one")] = None,
+    replay: ReplayToken = None,
 ) -> Response:
-    return _json(await ask(request, vehicle, {"kind": "trends", "after": after}))
+    return _json(await _ask_either(request, vehicle, replay, {"kind": "trends", "after": after}))
 
 
 @router.get("/api/events", tags=["alarms"], summary="The numbered log of what happened, oldest first")
@@ -238,11 +255,13 @@ async def limited_body(request: Request, most: int) -> bytes:
 
 
 @router.websocket("/ws")
-async def page_socket(socket: WebSocket, vehicle: str | None = None) -> None:
-    """The page's socket; docs/protocol.md."""
+async def page_socket(
+    socket: WebSocket, vehicle: str | None = None, replay: str | None = None, t: str | None = None
+) -> None:
+    """The page's socket; docs/protocol.md. `replay`: the recording it begins with, `t` seconds after its beginning."""
     app = running(socket)
     name = vehicle if vehicle is not None else next(iter(app.sessions))
     if name not in app.sessions:
         await socket.close(code=1008, reason="no such vehicle")
         return
-    await app.hub.serve(socket, name, app.hello(name))
+    await app.hub.serve(socket, name, app.hello(name), replay=orders.opening(replay, t))
