@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 import re
+from datetime import UTC, datetime
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -33,6 +34,7 @@ def page(report: Report) -> str:
         "lasting": words.length,
         "grouped": words.grouped,
         "line": words.printable,
+        "day_time": _day_time,
     }
     template = environment.from_string(_text("report.html"))
     return template.render(
@@ -62,6 +64,10 @@ def _facts(report: Report) -> dict[str, Any]:
         "name": ", ".join(words.printable(_base(file), 80) for file in report.files),
         "files": report.files,
         "report": report,
+        "told": report.told,
+        "brand": "catgraph check"
+        if report.told is None
+        else f"catgraph {'incident' if report.told.clip_of else 'drive'}",
         "run": run,
         "recording": recording,
         "recorded": report.recorded,
@@ -132,6 +138,14 @@ def _json(value: Any) -> str:
 
 def _hash(text: str) -> str:
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
+
+def _day_time(at_ms: int) -> str:
+    """A time of day, UTC; nothing where no calendar has it."""
+    try:
+        return datetime.fromtimestamp(at_ms / 1000, UTC).strftime("%H:%M:%S")
+    except (OverflowError, ValueError, OSError):
+        return ""
 
 
 def _base(path: str) -> str:

@@ -13,6 +13,7 @@ from server.recording.read import Recording
 from server.rehearsal.compare import Change, compare
 from server.rehearsal.rehearse import Rehearsed
 from server.rehearsal.thresholds import Wishes
+from server.rehearsal.told import Told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +45,7 @@ class Report:
     run: Rehearsed
     before: Rehearsed | None = None  # with the first settings of two, or without the injected faults
     open_s: float = 0.0  # what opening the files took
+    told: Told | None = None  # what the recording says was told and done: of a drive's own page
 
     @property
     def changes(self) -> list[Change]:

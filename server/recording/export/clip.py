@@ -1,0 +1,229 @@
+"""The minute around an alarm as a recording of its own: what came then, and what was already so when it begins.
+
+A clip is a recording like any other: the same channels and definitions, the same stamps. At its beginning stand the
+settings in force, the state of the link and the last message of each latched topic; its metadata names the recording
+it was cut from, and the alarms that stood.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from server.recording.errors import RecordingUnreadable
+from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
+from server.recording.export.raw import OWN, Raw, raw_messages, span_ns
+from server.recording.folder import WRITING, id_of
+from server.recording.own import own_schema
+from server.recording.read import Recording
+from server.recording.schemas import Schema, TypeBook
+from server.recording.source import Channel
+from server.recording.write import PartFile
+
+BEFORE_S = AFTER_S = 30.0
+LONGEST_S = 3600.0  # before and after: beyond that it is a drive and no clip
+_ALARMS, _SETTINGS, _LINK = f"{OWN}alarms", f"{OWN}settings", f"{OWN}link"
+_STANDING = ("UNACKED", "ACKED", "RTN_UNACKED", "SHELVED")
+_LATCHED = {"offered_qos_profiles": "- durability: transient_local"}  # as the readers look for it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Window:
+    """Which minute. Times are ns since 1970."""
+
+    at_ns: int
+    before_s: float = BEFORE_S
+    after_s: float = AFTER_S
+
+    @property
+    def from_ns(self) -> int:
+        return self.at_ns - round(self.before_s * 1e9)
+
+    @property
+    def to_ns(self) -> int:
+        return self.at_ns + round(self.after_s * 1e9)
+
+
+def write_clip(
+    recording: Recording, path: Path, window: Window, *, clip_of: str, progress: Progress = nothing
+) -> Outcome:
+    """Writes the clip to `path`, which must not be there and ends in .mcap; until it is whole it ends in .writing.
+
+    Raises ExportRefused where nothing was recorded then, RecordingUnreadable, OSError.
+    """
+    first_ns, last_ns = span_ns(recording)
+    if not last_ns or window.to_ns < first_ns or window.from_ns > last_ns:
+        raise ExportRefused(f"Nothing was recorded from {_clock(window.from_ns)} to {_clock(window.to_ns)} UTC.")
+    before = _before(recording, max(window.from_ns, first_ns), progress)
+    file = PartFile(path, profile=f"ros{recording.ros_version}", metadata=_metadata(recording, window, before, clip_of))
+    try:
+        outcome = _copy(recording, file, window, before, progress)
+        file.close(ended="closed", why="")
+    except BaseException:
+        file.abandon()
+        with contextlib.suppress(OSError):
+            path.with_name(id_of(path) + WRITING).unlink()
+        raise
+    outcome.notes += _short(window, first_ns, last_ns)
+    outcome.notes += [f"{sentence}." for sentence in recording.damage]
+    return outcome
+
+
+def first_raised_ns(recording: Recording, alarm: str) -> int | None:
+    """When an alarm was first raised, by the recording's own log."""
+    for at_s, event in recording.own(_ALARMS):
+        if event.get("alarm") == alarm and event.get("change") == "raised":
+            at_ms = event.get("at_ms")
+            return at_ms * 1_000_000 if isinstance(at_ms, int) else round(at_s * 1e9)
+    return None
+
+
+@dataclass(slots=True)
+class _Before:
+    """What was so when the clip begins."""
+
+    standing: dict[str, Mapping[str, Any]]  # alarm → its newest event
+    latest: dict[tuple[int, int], Raw]  # file and channel → the last message of settings, link and latched topics
+    settings: str | None
+
+
+def _before(recording: Recording, from_ns: int, progress: Progress) -> _Before:
+    found = _Before({}, {}, recording.metadata.get("settings"))
+
+    def matters(channel: Channel) -> bool:
+        return channel.is_latched or channel.topic in (_ALARMS, _SETTINGS, _LINK)
+
+    for raw in raw_messages(
+        recording, wanted=matters, end_ns=from_ns - 1, progress=lambda part: progress(part * _LOOKING)
+    ):
+        if raw.channel.topic == _ALARMS:
+            _note_standing(found.standing, raw.data)
+            continue
+        if raw.channel.topic == _SETTINGS:
+            found.settings = _toml(raw.data) or found.settings
+        found.latest = {place: old for place, old in found.latest.items() if old.channel.topic != raw.channel.topic}
+        found.latest[raw.file, raw.channel.number] = raw
+    return found
+
+
+_LOOKING = 0.4  # of the work: the rest is copying
+
+
+def _note_standing(standing: dict[str, Mapping[str, Any]], data: bytes) -> None:
+    event = _json(data)
+    alarm = event.get("alarm")
+    if not isinstance(alarm, str):
+        return
+    state = event.get("state")
+    if state in _STANDING or (state is None and event.get("change") in ("raised", "recaused")):
+        standing[alarm] = event
+    elif state is not None or event.get("change") == "cleared":
+        standing.pop(alarm, None)
+
+
+def _copy(recording: Recording, file: PartFile, window: Window, before: _Before, progress: Progress) -> Outcome:
+    outcome = Outcome()
+    channels: dict[tuple[int, int], int] = {}
+    books: dict[int, TypeBook] = {}
+
+    def add(raw: Raw, at_ns: int) -> None:
+        place = (raw.file, raw.channel.number)
+        number = channels.get(place)
+        if number is None:
+            schema = _schema(recording, raw.channel, books)
+            number = channels[place] = file.channel(
+                raw.channel.topic, schema, _LATCHED if raw.channel.is_latched else None
+            )
+        file.add(number, at_ns, raw.data)
+
+    begin_ns = max(window.from_ns, span_ns(recording)[0])
+    for raw in before.latest.values():
+        add(raw, begin_ns)  # what held then; when it was said stands in the message where it has a stamp
+    for raw in _within(recording, window, progress):
+        add(raw, raw.time_ns)
+        outcome.entries += 1
+    if not outcome.entries:
+        raise ExportRefused(f"Nothing was recorded from {_clock(window.from_ns)} to {_clock(window.to_ns)} UTC.")
+    return outcome
+
+
+def _within(recording: Recording, window: Window, progress: Progress) -> Iterator[Raw]:
+    yield from raw_messages(
+        recording,
+        start_ns=window.from_ns,
+        end_ns=window.to_ns,
+        progress=lambda part: progress(_LOOKING + (1 - _LOOKING) * part),
+    )
+
+
+def _schema(recording: Recording, channel: Channel, books: dict[int, TypeBook]) -> Schema:
+    """As the recorder declares it."""
+    if channel.topic.startswith(OWN) and channel.encoding == "json":
+        with contextlib.suppress(KeyError):
+            return own_schema(channel.topic.removeprefix(OWN))  # type: ignore[arg-type]
+    name = channel.type.replace("/msg/", "/", 1) if channel.encoding == "ros1" else channel.type
+    if channel.encoding == "json":
+        data = channel.definition or '{"type":"object"}'
+        return Schema(name=name, encoding="jsonschema", data=data.encode(), message_encoding="json", encode=None)
+    definition = channel.definition
+    if channel.format == "none":
+        version = recording.ros_version
+        known = books.setdefault(version, TypeBook(version)).schema(channel.type)
+        if known is None:
+            raise RecordingUnreadable(f"The definition of {channel.type} is missing")
+        return known
+    encoding = {"ros1": "ros1msg", "cdr": "ros2idl" if channel.format == "idl" else "ros2msg"}[channel.encoding]
+    return Schema(
+        name=name, encoding=encoding, data=definition.encode(), message_encoding=channel.encoding, encode=None
+    )
+
+
+def _metadata(recording: Recording, window: Window, before: _Before, clip_of: str) -> dict[str, str]:
+    kept = {name: text for name, text in recording.metadata.items() if name not in ("ended", "why", "closed_ms")}
+    standing = [*before.standing.values()]
+    return {
+        "vehicle": "car",
+        "profile": f"ros{recording.ros_version}",
+        **kept,
+        **({"settings": before.settings} if before.settings else {}),
+        "started_ms": str(window.from_ns // 1_000_000),
+        "clip_of": clip_of,
+        "clip_at_ms": str(window.at_ns // 1_000_000),
+        "clip_from_ms": str(window.from_ns // 1_000_000),
+        "clip_to_ms": str(window.to_ns // 1_000_000),
+        "standing": orjson.dumps(standing).decode(),
+    }
+
+
+def _short(window: Window, first_ns: int, last_ns: int) -> Iterator[str]:
+    """What of the window was not recorded."""
+    if first_ns > window.from_ns + 1_000_000_000:
+        yield f"The recording begins {(first_ns - window.from_ns) / 1e9:.1f} s after the clip should."
+    if last_ns < window.to_ns - 1_000_000_000:
+        yield f"The recording ends {(window.to_ns - last_ns) / 1e9:.1f} s before the clip should."
+
+
+def _json(data: bytes) -> dict[str, Any]:
+    try:
+        found = orjson.loads(data)
+    except orjson.JSONDecodeError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _toml(data: bytes) -> str | None:
+    text = _json(data).get("toml")
+    return text if isinstance(text, str) else None
+
+
+def _clock(time_ns: int) -> str:
+    try:
+        return datetime.fromtimestamp(time_ns / 1e9, UTC).strftime("%Y-%m-%d %H:%M:%S")
+    except (OverflowError, ValueError, OSError):
+        return f"{time_ns / 1e9:.1f} s"
