@@ -21,7 +21,7 @@ class ScanFeed:
         self._vehicle = vehicle
         self._bus = bus
         self._number = 0
-        self._put_s = -1.0
+        self._due_s = -math.inf
 
     @property
     def is_empty(self) -> bool:
@@ -32,14 +32,15 @@ class ScanFeed:
         self._number += 1
 
     def is_due(self, now_s: float) -> bool:
-        return now_s - self._put_s >= SCAN_FRAME_S and self._bus.wanted(self._vehicle, "scan")
+        return now_s >= self._due_s and self._bus.wanted(self._vehicle, "scan")
 
     def put(self, snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bool, kinds_kept: bool) -> None:
         """Offers the newest scan, and how it is judged. `was_active`: an obstacle is alarmed; `kinds_kept`: the
         transport told NaN and ±Inf apart."""
         reading = snapshot.get("scan")
         if reading is not None and isinstance(reading.value, LaserScan):
-            self._put_s = snapshot.now_s
+            # Counted from when it was due: scans that come at just this rate come a little early as often as late.
+            self._due_s = max(self._due_s, snapshot.now_s - SCAN_FRAME_S) + SCAN_FRAME_S
             frame = wire.scan_frame(
                 reading.value,
                 number=self._number,

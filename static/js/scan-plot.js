@@ -6,6 +6,8 @@ import { codeWords, namedSectors, plotScale, pointsOf, ringsOf, sectorsOf, unsee
 import { fixed } from './words.js';
 
 const COLOURS = /** @type {const} */ (['panel', 'line', 'ink', 'ink2', 'you', 'hatch', 'raise']);
+/** Pixels of the canvas for one of CSS: 20 pictures a second are carried to the glass, and finer than this nobody sees. */
+const FINEST = 2;
 const NAMES_SHOWN = 4;
 const HATCH = { apart_px: 10, width_px: 2.5 };
 
@@ -29,11 +31,24 @@ export class ScanPlot {
   /** @type {CanvasPattern | null} */
   #hatching = null;
   #hatchingKey = '';
+  /** Width and height [CSS px]: asked anew at each scan, they would have the whole page laid out first. */
+  #size = { width: 0, height: 0 };
+  #watcher = new ResizeObserver(() => this.#measure());
 
   /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
+    this.#watcher.observe(canvas);
     this.readTheme();
+  }
+
+  /** Unmount. */
+  stop() {
+    this.#watcher.disconnect();
+  }
+
+  #measure() {
+    this.#size = { width: this.canvas.clientWidth, height: this.canvas.clientHeight };
   }
 
   /** Colours and font as the style sheet has them now. */
@@ -55,9 +70,9 @@ export class ScanPlot {
    * @param {Around} around
    */
   draw(scan, around) {
-    const width = this.canvas.clientWidth;
-    const height = this.canvas.clientHeight;
-    const dpr = window.devicePixelRatio || 1;
+    if (!this.#size.width) this.#measure();
+    const { width, height } = this.#size;
+    const dpr = Math.min(window.devicePixelRatio || 1, FINEST);
     if (!width || !height) return;
     for (const canvas of [this.canvas, this.#ground]) {
       const [w, h] = [Math.round(width * dpr), Math.round(height * dpr)];
@@ -249,7 +264,7 @@ export class ScanPlot {
     const bearing_rad = bearingOf(scan, beam);
     const [x, y] = at(range_m * Math.cos(bearing_rad), range_m * Math.sin(bearing_rad));
     this.#ring(g, x, y, this.#colour.ink);
-    const way = x + 120 > this.canvas.clientWidth ? -1 : 1;
+    const way = x + 120 > this.#size.width ? -1 : 1;
     g.beginPath();
     g.moveTo(x + 15 * way, y);
     g.lineTo(x + 36 * way, y);

@@ -205,6 +205,7 @@ export function mount(root, store) {
     },
     unmount() {
       for (const stop of stops) stop();
+      plot.stop();
     },
   };
 }
