@@ -1,4 +1,4 @@
-"""How many scans a second the pages are offered: all of a laser of 20 Hz, whose scans come a little early as often as late."""
+"""How many scans a second the pages are offered: all of a laser of 20 Hz, whose scans come early as often as late."""
 
 from __future__ import annotations
 
