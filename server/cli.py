@@ -29,6 +29,9 @@ COMMANDS = {
     "simulate": _Command(module="server.simulator.command", help="a simulated car behind a rosbridge of its own"),
     "replay": _Command(module="server.bridge.replay", help="a recording behind a rosbridge, at its true speed"),
     "check": _Command(module="server.rehearsal.command", help="every check over a recording, faster than real time"),
+    "export": _Command(
+        module="server.export", help="a recording as ROS 1 bag, tables, tracks or page, or a part of it"
+    ),
     "doctor": _Command(module="server.doctor", help="what a car publishes and how it maps to signals"),
     "health": _Command(module="server.health", help="asks a running server whether it is well"),
 }

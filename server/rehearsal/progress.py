@@ -14,8 +14,11 @@ _WIDTH = 30
 class Progress:
     """Writes only to a terminal, and wipes its line in the end."""
 
-    def __init__(self, begin_s: float, end_s: float, what: str, stream: TextIO | None = None) -> None:
-        """From which to which second of the recording the job goes."""
+    def __init__(
+        self, begin_s: float, end_s: float, what: str, stream: TextIO | None = None, *, in_seconds: bool = True
+    ) -> None:
+        """From which to which second of the recording the job goes, or of what else it counts."""
+        self._in_seconds = in_seconds
         self._begin_s, self._end_s, self._what = begin_s, end_s, what
         self._stream = sys.stderr if stream is None else stream
         self._is_terminal = self._stream is not None and self._stream.isatty()  # None: it was closed
@@ -32,9 +35,10 @@ class Progress:
         self._shown = True
         part = min(1.0, max(0.0, (at_s - self._begin_s) / max(self._end_s - self._begin_s, 1e-9)))
         done = round(part * _WIDTH)
-        speed = (at_s - self._begin_s) / (now_s - self._started_s)
+        speed = (at_s - self._begin_s) / max(now_s - self._started_s, 1e-9)
+        pace = f"  {at_s:.0f} s, {speed:.0f} × real time" if self._in_seconds else ""
         bar = "█" * done + "·" * (_WIDTH - done)
-        self._stream.write(f"\r{self._what} {bar} {part * 100:3.0f} %  {at_s:.0f} s, {speed:.0f} × real time\x1b[K")
+        self._stream.write(f"\r{self._what} {bar} {part * 100:3.0f} %{pace}\x1b[K")
         self._stream.flush()
 
     def close(self) -> None:

@@ -100,7 +100,7 @@ def _entry(event: Mapping[str, Any], start_s: float) -> Entry:
 
 def _priority(event: Mapping[str, Any]) -> Priority:
     try:
-        return Priority(event.get("priority"))
+        return Priority(str(event.get("priority")))
     except ValueError:
         return Priority.ADVISORY
 

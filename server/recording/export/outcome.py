@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 Progress = Callable[[float], None]  # told now and then, from 0 to 1
 
 
-class ExportRefused(Exception):
+class ExportRefused(RuntimeError):
     """There is nothing to export in this form, or it cannot be written. The text is one sentence for a person."""
 
 

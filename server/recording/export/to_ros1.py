@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, cast
+from typing import Any
 
 from rosbags.convert.converter import is_same_wireformat, migrate_bytes
 from rosbags.interfaces import Nodetype
@@ -46,7 +46,7 @@ def ros1_form(channel: Channel, source: FileSource) -> Ros1Form:
         case "cdr":
             return _from_cdr(channel, source)
         case "json":
-            raise Undecodable("it was recorded as JSON, because the definition of its type was not known")
+            raise Undecodable("it was recorded as JSON: its type's definition was not known, or it was not of its type")
         case other:
             raise Undecodable(f"messages encoded as {other!r} are not supported")
 
@@ -109,8 +109,8 @@ def _converter(type: str, here: Typestore, there: Typestore, *, is_same: bool) -
     def convert(raw: bytes) -> bytes | memoryview:
         try:
             if is_same and raw[:2] == _LITTLE:
-                return cast("memoryview", here.cdr_to_ros1(raw, type))
-            return cast("memoryview", migrate_bytes(here, there, type, type, cache, raw, src_is2=True, dst_is2=False))
+                return here.cdr_to_ros1(raw, type)
+            return migrate_bytes(here, there, type, type, cache, raw, src_is2=True, dst_is2=False)
         except (SerdeError, ValueError, IndexError, AssertionError, OverflowError, MemoryError):
             raise Undecodable(f"its {len(raw)} bytes do not fit its type") from None
 
@@ -130,12 +130,12 @@ def _ros1_store(type: str, here: Typestore) -> Typestore:
         if definition is None:
             raise Undecodable(f"the definition of {name} is missing")
         found[name] = definition
-        for _, (kind, what) in definition[1]:
-            item = what[0] if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE) else (kind, what)
-            if item[0] == Nodetype.NAME:
-                waiting.append(item[1])
-            elif item[1][0] in _WITHOUT_COUNTERPART:
-                raise Undecodable(f"{name} has a {item[1][0]}, which ROS 1 does not have")
+        for _, description in definition[1]:
+            kind, what = _item(description)
+            if kind == Nodetype.NAME:
+                waiting.append(what)
+            elif what[0] in _WITHOUT_COUNTERPART:
+                raise Undecodable(f"{name} has a {what[0]}, which ROS 1 does not have")
     return _store(found)
 
 
@@ -149,18 +149,25 @@ def _lost(type: str, here: Typestore, there: Typestore) -> Iterator[str]:
             continue
         seen.add(name)
         places = {field.lower() for field, _ in there.fielddefs[name][1]}
-        for field, (kind, what) in here.fielddefs[name][1]:
+        for field, description in here.fielddefs[name][1]:
             if field.lower() not in places and field != _PLACEHOLDER:
                 yield f"{name.replace('/msg/', '/')}.{field}"
-            item = what[0] if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE) else (kind, what)
-            if item[0] == Nodetype.NAME:
-                waiting.append(item[1])
+            kind, what = _item(description)
+            if kind == Nodetype.NAME:
+                waiting.append(what)
+
+
+def _item(description: Any) -> tuple[Any, Any]:
+    """What a field is, or what is in its array."""
+    kind, what = description
+    found: tuple[Any, Any] = what[0] if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE) else description
+    return found
 
 
 def _store(definitions: dict[str, Any]) -> Typestore:
     store = get_typestore(Stores.EMPTY)
     store.register(definitions)
-    return cast("Typestore", store)
+    return store
 
 
 @cache

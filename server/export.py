@@ -1,0 +1,275 @@
+"""`catgraph export`: a recording in the forms that others read.
+
+With --background it is the worker of a server: it works when nobody else needs the machine, tells its progress as lines
+of JSON, and ends when the server does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import math
+import os
+import signal
+import sys
+import tempfile
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import orjson
+
+from server.recording.export.bag_file import COMPRESSIONS
+from server.recording.export.clip import AFTER_S, BEFORE_S, LONGEST_S, Window, first_raised_ns, write_clip
+from server.recording.export.formats import CLIP, FORMATS
+from server.recording.export.outcome import ExportRefused, Outcome
+from server.recording.read import Recording, RecordingUnreadable, open_recording
+from server.recording.space import amount, free_at
+from server.rehearsal.progress import Progress
+from server.web.assets import AssetsMissing
+
+WHOLE, NOT_ALL, CANNOT = 0, 1, 2
+_NICENESS = 10
+_EVERY_S = 0.1  # progress is told
+_LOOK_EVERY_S = 0.5
+LEAVE_FREE = 500_000_000  # bytes on the disk, for the recording that may be going on
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's arguments."""
+    parser.add_argument(
+        "files",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help="a recording of catgraph, ROS 1 bag, ROS 2 bag directory, .mcap, .db3; several are one recording",
+    )
+    forms = ", ".join(f"{form.name}: {form.what}" for form in FORMATS.values())
+    parser.add_argument(
+        "--format", required=True, choices=[*FORMATS, CLIP], help=f"{forms}, {CLIP}: with --at, cut out as it is"
+    )
+    parser.add_argument("--out", type=Path, metavar="OUT", help="the file to write; else named after the recording")
+    parser.add_argument("--compression", choices=COMPRESSIONS, default="none", help="of a bag's chunks (default: none)")
+    parser.add_argument(
+        "--without-own", action="store_true", help="leave catgraph's own channels (/catgraph/*) out of a bag"
+    )
+    parser.add_argument(
+        "--at",
+        metavar="WHEN",
+        help="only the time around a moment: seconds after the beginning, a time such as 2026-06-01T12:00:30Z, "
+        "or the name of an alarm, for when it was first raised",
+    )
+    parser.add_argument("--before", type=_seconds, default=BEFORE_S, metavar="S", help="with --at (default: 30)")
+    parser.add_argument("--after", type=_seconds, default=AFTER_S, metavar="S", help="with --at (default: 30)")
+    parser.add_argument("--background", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--name", help=argparse.SUPPRESS)  # what the recording is called, where not as its file
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 all of it was written, 1 written, but part of the recording is damaged and not in it, 2 nothing was written."""
+    if args.background:
+        _live_with_the_server()
+    speaker: _Lines | _Person = _Lines() if args.background else _Person(args.format)
+    try:
+        out = _target(args)
+        with open_recording(args.files) as recording:
+            progress = _with_room(out, speaker.progress) if args.background else speaker.progress
+            outcome = _export(recording, args, out, progress)
+            is_whole = not recording.damage
+    except (RecordingUnreadable, ExportRefused, AssetsMissing, _Impossible) as error:
+        return speaker.refused(str(error))
+    except OSError as error:
+        return speaker.refused(f"It cannot be written: {error.strerror or error}.")
+    except Exception as error:  # the one net: 1 would say that something was written
+        traceback.print_exc()
+        return speaker.refused(f"a fault of catgraph itself, please report it: {type(error).__name__}: {error}")
+    speaker.done(out, outcome)
+    return WHOLE if is_whole else NOT_ALL
+
+
+def _with_room(out: Path, progress: Callable[[float], None]) -> Callable[[float], None]:
+    """Progress that stops where the disk gets full: an export must not take the room of a recording."""
+    next_s = 0.0
+
+    def told(part: float) -> None:
+        nonlocal next_s
+        now_s = time.monotonic()
+        if now_s >= next_s:
+            next_s = now_s + _LOOK_EVERY_S
+            free = free_at(out.parent)
+            if free < LEAVE_FREE:
+                raise _Impossible(f"The disk has only {amount(free)} left: there is no room for an export.")
+        progress(part)
+
+    return told
+
+
+class _Impossible(Exception):
+    """What was asked for cannot be done. The text is one sentence."""
+
+
+def _export(recording: Recording, args: argparse.Namespace, out: Path, progress: Callable[[float], None]) -> Outcome:
+    """Whole or not at all: nothing has the name of `out` before it is complete."""
+    name = args.name or _stem(args.files[0])
+    with tempfile.TemporaryDirectory(prefix=".export-", dir=out.parent) as folder:
+        new = Path(folder) / "new"
+        if args.at is None:
+            outcome = _write(recording, new, name, args, progress)
+        else:
+            new, outcome = _cut(recording, Path(folder), name, args, progress)
+        with new.open("rb") as file:
+            os.fsync(file.fileno())
+        os.replace(new, out)
+    return outcome
+
+
+def _cut(
+    recording: Recording, folder: Path, name: str, args: argparse.Namespace, progress: Callable[[float], None]
+) -> tuple[Path, Outcome]:
+    """The time around a moment, as a recording, and that in the format asked for."""
+    clip, new = folder / "clip.mcap", folder / "new"
+    window = Window(at_ns=_moment_ns(recording, args.at), before_s=args.before, after_s=args.after)
+    share = 1.0 if args.format == CLIP else 0.5
+    outcome = write_clip(recording, clip, window, clip_of=name, progress=lambda part: progress(part * share))
+    if args.format == CLIP:
+        return clip, outcome
+    with open_recording([clip]) as cut:
+        made = _write(cut, new, f"{name}, clip", args, lambda part: progress(share + part * (1.0 - share)))
+    made.notes[:0] = outcome.notes
+    return new, made
+
+
+def _write(
+    recording: Recording, path: Path, name: str, args: argparse.Namespace, progress: Callable[[float], None]
+) -> Outcome:
+    form = FORMATS[args.format]
+    module, _, function = form.writer.partition(":")
+    known: dict[str, Any] = {"compression": args.compression, "with_own": not args.without_own, "name": name}
+    options = {option: known[option] for option in form.options}
+    outcome: Outcome = getattr(importlib.import_module(module), function)(recording, path, progress=progress, **options)
+    return outcome
+
+
+def _target(args: argparse.Namespace) -> Path:
+    """Where to write, found to be writable before the work and not after it."""
+    if args.format == CLIP and args.at is None:
+        raise _Impossible("--format mcap cuts out the time around a moment: name it with --at.")
+    ending = CLIP if args.format == CLIP else FORMATS[args.format].ending
+    part = "_clip" if args.at is not None else ""
+    out: Path = args.out or Path(f"{_stem(args.files[0])}{part}.{ending}")
+    if out.is_dir():
+        out = out / f"{_stem(args.files[0])}{part}.{ending}"
+    if not out.parent.is_dir():
+        raise _Impossible(f"{out} cannot be written: {out.parent} is no directory.")
+    if any(out.exists() and file.exists() and out.samefile(file) for file in args.files):
+        raise _Impossible(f"{out} is the recording itself: name another file with --out.")
+    if args.out is None and out.exists():
+        raise _Impossible(f"{out} is there already: name the file with --out.")
+    return out
+
+
+def _moment_ns(recording: Recording, text: str) -> int:
+    """Seconds after the beginning, a time of day, or the name of an alarm."""
+    with contextlib.suppress(ValueError):
+        seconds = float(text)
+        if not math.isfinite(seconds):
+            raise _Impossible(f"--at {text}: that is no moment.")
+        return round((recording.start_s + seconds) * 1e9)
+    with contextlib.suppress(ValueError):
+        moment = datetime.fromisoformat(text)
+        if moment.tzinfo is None:
+            raise _Impossible(f"--at {text}: say which time that is, as {text}Z for UTC.")
+        return round((moment - datetime(1970, 1, 1, tzinfo=UTC)).total_seconds() * 1e9)
+    found = first_raised_ns(recording, text)
+    if found is None:
+        raise _Impossible(f"--at {text}: that is no moment, and no alarm of that name is in the recording's log.")
+    return found
+
+
+def _stem(path: Path) -> str:
+    name = path.resolve().name
+    for ending in (".mcap.writing", ".mcap", ".bag", ".db3"):
+        if name.endswith(ending):
+            return name.removesuffix(ending)
+    return name
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= LONGEST_S:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds from 0 to {LONGEST_S:.0f}")
+    return value
+
+
+class _Person:
+    """Tells somebody at a terminal."""
+
+    def __init__(self, what: str) -> None:
+        self._bar = Progress(0.0, 1.0, f"Exporting {what}", in_seconds=False)
+
+    def progress(self, part: float) -> None:
+        self._bar(part)
+
+    def refused(self, sentence: str) -> int:
+        self._bar.close()
+        print(f"catgraph export: {sentence}", file=sys.stderr)
+        return CANNOT
+
+    def done(self, out: Path, outcome: Outcome) -> None:
+        self._bar.close()
+        for note in outcome.notes:
+            print(f"catgraph export: {note}", file=sys.stderr)
+        with contextlib.suppress(BrokenPipeError):  # who read the other end of a pipe has seen enough
+            print(f"{out} ({amount(out.stat().st_size)})", flush=True)
+
+
+class _Lines:
+    """Tells a server, a line of JSON at a time."""
+
+    def __init__(self) -> None:
+        self._next_s = 0.0
+
+    def progress(self, part: float) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._next_s:
+            self._next_s = now_s + _EVERY_S
+            self._tell({"progress": round(part, 4)})
+
+    def refused(self, sentence: str) -> int:
+        self._tell({"refused": f"{sentence[:1].upper()}{sentence[1:]}"})
+        return CANNOT
+
+    def done(self, out: Path, outcome: Outcome) -> None:
+        self._tell({"done": str(out), "entries": outcome.entries, "notes": outcome.notes[:100]})
+
+    def _tell(self, what: dict[str, Any]) -> None:
+        with contextlib.suppress(BrokenPipeError):
+            sys.stdout.write(orjson.dumps(what).decode() + "\n")
+            sys.stdout.flush()
+
+
+def _live_with_the_server() -> None:
+    """Steps behind whatever else runs here, and ends with the server: its end of our input is closed then."""
+    with contextlib.suppress(OSError):
+        os.nice(_NICENESS)
+    signal.signal(signal.SIGTERM, _stop)  # what lies half-made is swept up on the way out
+
+    def wait() -> None:
+        while os.read(0, 1):  # not through a buffer: its lock would be in the way when Python ends
+            pass
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=wait, daemon=True, name="the server is there").start()
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    raise SystemExit(CANNOT)

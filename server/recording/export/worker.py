@@ -1,0 +1,98 @@
+"""Runs an export as a process of its own: its reckoning never holds up the event loop, and it can be ended at once."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from server.recording.export.outcome import ExportRefused, Progress
+
+log = logging.getLogger("catgraph.export")
+
+_ROOT = Path(__file__).resolve().parents[3]  # of the packages: the process must find the same code
+_LINE = 1 << 20  # bytes of an answer at most
+_PATIENCE_S = 5.0  # to sweep up after itself, before it is killed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Made:
+    """What the process wrote."""
+
+    path: Path
+    entries: int
+    notes: list[str]  # what is not in it, and why
+
+
+async def run_worker(arguments: Sequence[str], progress: Progress) -> Made:
+    """Runs `catgraph export` with these arguments. Raises ExportRefused with its sentence, OSError; ends the process
+    where this is cancelled."""
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "server", "export", "--background", *arguments),
+        stdin=asyncio.subprocess.PIPE,  # never written to: its end tells the process that the server has gone
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.PIPE,
+        cwd=_ROOT,
+        limit=_LINE,
+    )
+    complaints = asyncio.create_task(_last_words(process))
+    try:
+        answer = await _listen(process, progress)
+        await process.wait()
+    finally:
+        await asyncio.shield(_end(process))
+        said = await complaints
+    if answer is None:
+        log.error("an export ended with %s: %s", process.returncode, said)
+        raise ExportRefused("The export failed: it ran out of memory or was ended from outside.")
+    if "refused" in answer:
+        if said:
+            log.error("an export failed: %s", said)
+        raise ExportRefused(str(answer["refused"]))
+    return Made(path=Path(answer["done"]), entries=int(answer["entries"]), notes=[str(n) for n in answer["notes"]])
+
+
+async def _listen(process: asyncio.subprocess.Process, progress: Progress) -> dict[str, Any] | None:
+    """Its last word; None where it ended without one."""
+    assert process.stdout is not None
+    last: dict[str, Any] | None = None
+    async for line in process.stdout:
+        with contextlib.suppress(orjson.JSONDecodeError, KeyError, TypeError):
+            told = orjson.loads(line)
+            if "progress" in told:
+                progress(float(told["progress"]))
+            elif "done" in told or "refused" in told:
+                last = told
+    return last
+
+
+async def _last_words(process: asyncio.subprocess.Process) -> str:
+    """The end of what it complained of."""
+    assert process.stderr is not None
+    said = b""
+    while portion := await process.stderr.read(1 << 16):
+        said = (said + portion)[-4000:]
+    return said.decode("utf-8", "replace")
+
+
+async def _end(process: asyncio.subprocess.Process) -> None:
+    if process.stdin is not None:
+        process.stdin.close()
+    if process.returncode is not None:
+        return
+    with contextlib.suppress(ProcessLookupError):
+        process.terminate()
+    try:
+        async with asyncio.timeout(_PATIENCE_S):
+            await process.wait()
+    except TimeoutError:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+        await process.wait()
