@@ -17,6 +17,7 @@ from monitor.motion import Slope, Standstill
 from monitor.phones import NO_PHONE, Phones, PhoneView, PhoneWord
 from monitor.quick import maker
 from monitor.rates import Rate, RateMeter
+from monitor.recorder import RecorderFacts
 from monitor.repeats import RepeatFollower, Repeats, Wheels
 from monitor.signals import SIGNALS, Signal
 from monitor.stamps import MANY_WRITERS, ClockJump, StampFollower, merged
@@ -120,6 +121,7 @@ class Snapshot:
     standing_since_s: float | None = None  # when the car came to rest by its wheels; None: it moves, or cannot be told
     speed_slope_mps2: float | None = None  # how the wheels' speed changes, over 0.6 s; None: too little heard to tell
     clock_jump: ClockJump | None = None  # the newest since connecting
+    recorder: RecorderFacts = field(default_factory=RecorderFacts)
 
     @overload
     def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...
@@ -257,6 +259,7 @@ class State:
         self._scan_earlier = self._heard["scan"].earlier = Earlier()
         self._distance_earlier = self._heard["distance"].earlier = Earlier()
         self._link = LinkFacts()
+        self._recorder = RecorderFacts()
         self._paused = False
         self._paused_since_s: float | None = None
 
@@ -354,6 +357,10 @@ class State:
                 heard.restart()
             self._clock_jump = None
 
+    def recorder(self, facts: RecorderFacts) -> None:
+        """What is now known of the recorder."""
+        self._recorder = facts
+
     def set_paused(self, paused: bool, since_s: float | None = None) -> None:
         """Monitoring is paused or goes on. `since_s` is when the pause began, where it was not now."""
         self._paused = paused
@@ -387,6 +394,7 @@ class State:
             standing_since_s=self._standstill.since_s if self._is_fresh("speed", now_s) else None,
             speed_slope_mps2=self._slope_mps2,
             clock_jump=self._clock_jump,
+            recorder=self._recorder,
         )
 
     def glance(self, now_s: float) -> Snapshot:

@@ -16,6 +16,7 @@ from monitor.check import Verdict
 from monitor.gps_watch import GpsWatch
 from monitor.link import LinkFacts
 from monitor.rates import Rate
+from monitor.recorder import RecorderFacts
 from monitor.repeats import Repeats
 from monitor.stamps import ClockJump
 from monitor.state import Reading, Snapshot
@@ -57,6 +58,10 @@ def with_more(snapshot: Snapshot, **more: Any) -> Snapshot:
 
 def linked(**facts: Any) -> Snapshot:
     return known(link=replace(LINK, **facts))
+
+
+def taped(**facts: Any) -> Snapshot:
+    return replace(known(), recorder=RecorderFacts(**facts))
 
 
 def diagnosed(*levels: int) -> Snapshot:
@@ -223,6 +228,21 @@ ROWS: dict[str, Row | Callable[[str], Row]] = {
     ),
     "log_not_kept": Row(
         ok=linked(), fault=linked(log_trouble="The disk is full."), unknown="the disk's own word, which is there or not"
+    ),
+    "recording_stopped": Row(
+        ok=taped(state="recording"),
+        fault=taped(state="stopped", trouble="Recording stopped: the disk is full."),
+        unknown=taped(state="off"),
+    ),
+    "recorder_behind": Row(
+        ok=taped(state="recording", behind_s=0.3),
+        fault=taped(state="recording", dropped=3, dropped_s=NOW_S - 1.0),
+        unknown=taped(state="off"),
+    ),
+    "disk_nearly_full": Row(
+        ok=taped(state="recording", left_gb=50.0),
+        fault=taped(state="recording", left_gb=0.4),
+        unknown=taped(state="recording", left_gb=None),
     ),
     "paused_long": Row(
         ok=known(),
