@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from server.recording.export import make_export
+
 
 class Recorded:
     """The mailer's source in a running server."""
@@ -16,7 +18,4 @@ class Recorded:
         return self._path_of(recording)
 
     async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Path:
-        from server.recording.export import make_export  # type: ignore[attr-defined]
-
-        made: Path = await make_export(path, format, into, progress)
-        return made
+        return await make_export(path, format, into, progress)
