@@ -5,7 +5,7 @@ import { need, setAttribute } from './dom.js';
 
 const NAME = 'catgraph';
 
-/** @typedef {{title: string, icon: 'plain' | 'critical' | 'warning' | 'lost', count: number | null}} Badge count: null, a dot */
+/** @typedef {{title: string, icon: 'plain' | 'critical' | 'warning' | 'lost' | 'replay', count: number | null}} Badge count: null, a dot */
 
 /**
  * The worst first; what is not live is never called by its last alarm.
@@ -16,18 +16,18 @@ const NAME = 'catgraph';
 export function badgeOf(frame, { isSilent, isMonitoring, word }) {
   if (!frame || !isMonitoring) return { title: NAME, icon: 'plain', count: 0 };
   if (isSilent || word === 'Lost') return { title: `${isSilent ? 'Not live' : 'Connection lost'} · ${NAME}`, icon: 'lost', count: null };
-  const { standing } = layOut(frame.alarms);
+  const { standing } = layOut((frame.replay ? frame.live?.alarms : frame.alarms) ?? []);
   const urgent = standing.filter((alarm) => alarm.priority !== 'advisory');
-  const paused = frame.session.paused ? 'Paused · ' : '';
-  if (!urgent[0]) return { title: `${paused}${NAME}`, icon: 'plain', count: 0 };
+  const paused = frame.replay ? 'REPLAY · ' : frame.session.paused ? 'Paused · ' : '';
+  if (!urgent[0]) return { title: `${paused}${NAME}`, icon: frame.replay ? 'replay' : 'plain', count: 0 };
   const icon = urgent[0].priority === 'critical' ? 'critical' : 'warning';
-  return { title: `(${urgent.length}) ${urgent[0].title} · ${paused}${NAME}`, icon, count: urgent.length };
+  return { title: `(${urgent.length}) ${frame.replay ? 'LIVE ' : ''}${urgent[0].title} · ${paused}${NAME}`, icon, count: urgent.length };
 }
 
 /** @param {import('./store.js').Store} store */
 export function mount(store) {
   const link = /** @type {HTMLLinkElement} */ (need(document, 'link[rel="icon"]'));
-  const icons = { plain: link.getAttribute('href'), critical: link.dataset['critical'], warning: link.dataset['warning'], lost: link.dataset['lost'] };
+  const icons = { plain: link.getAttribute('href'), critical: link.dataset['critical'], warning: link.dataset['warning'], lost: link.dataset['lost'], replay: '/static/icons/catgraph-replay.svg' };
   /** @type {number | null | undefined} */
   let told;
 

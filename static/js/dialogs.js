@@ -30,6 +30,7 @@ const LOST_AFTER_S = 4;
 export function dialogOf({ frame, isSilent, silence_s, isChoosing, isAnswered }) {
   if (!frame) return null;
   const { phase, paused } = frame.session;
+  if (frame.replay && !isSilent) return null; // what asked then asks nobody now; what is live asks through replay.js
   const isWatching = phase === 'monitoring' || phase === 'lost';
   if (isSilent) return isWatching && !isChoosing && !isAnswered && silence_s > LOST_AFTER_S ? { kind: 'lost', alarm: null } : null;
   if (phase === 'failed') return isChoosing || isAnswered ? null : { kind: 'failed', alarm: layOut(frame.alarms).dialog };

@@ -7,7 +7,7 @@ import { age, timeOfDay } from './words.js';
  * @typedef {{name: string, mark: string, isBad: boolean, isKnown: boolean}} Node
  *
  * @typedef {object} ChainView
- * @property {'Live' | 'Silent' | 'Lost' | 'Dialling' | 'Waiting' | 'Waking'} word
+ * @property {'Live' | 'Silent' | 'Lost' | 'Dialling' | 'Waiting' | 'Waking' | 'Replay'} word
  * @property {number | null} age_s age of what is beyond the cut, or of the car's newest message
  * @property {0 | 1 | 2 | null} cut the broken wire: after the phone, the server or the bridge
  * @property {number | null} since_ms wall clock: when what is beyond the cut was last heard
@@ -34,6 +34,7 @@ export function chainOf({ frame, isSilent, silence_s, lag_s, heard_ms }) {
   if (isSilent && frame && silence_s <= 2) return waking(silence_s);
   if (isSilent || !frame) return serverSilent(silence_s, heard_ms);
   const { session, link } = frame;
+  if (frame.replay) return { word: 'Replay', age_s: frame.replay.silent_s, cut: null, since_ms: null, nodes: nodesOf(null, []), sentence: 'A recording is shown.', detail: '' };
   const bridge_s = older(link.bridge_age_s, lag_s);
   const car_s = older(link.car_age_s, lag_s);
   if (session.phase === 'connecting' || session.phase === 'failed') {

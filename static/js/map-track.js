@@ -105,19 +105,21 @@ export class TrackFeed {
   look(frame, now_ms) {
     const { track } = frame.session;
     if (!track) return;
-    const key = `${frame.server.boot} ${track.number}`;
+    const { replay } = frame;
+    const boot = frame.server.boot + (replay?.token ?? '');
+    const key = `${boot} ${track.number}`;
     const version = this.track.version;
     const after = this.track.lacks(key, track.last);
     if (version !== this.track.version) this.onChange();
     if (after === null || this.#isAsking || now_ms < this.#next_ms) return;
     this.#isAsking = true;
     this.#next_ms = now_ms + EVERY_MS;
-    this.#ask(key, frame.server.boot, after).catch(() => { this.#next_ms = now_ms + AGAIN_MS; }).finally(() => { this.#isAsking = false; });
+    this.#ask(key, boot, after, replay ? `&replay=${replay.token}` : '').catch(() => { this.#next_ms = now_ms + AGAIN_MS; }).finally(() => { this.#isAsking = false; });
   }
 
-  /** @param {string} key @param {string} boot @param {number} after */
-  async #ask(key, boot, after) {
-    const answer = await fetch(`/api/track/points?after=${after}${this.query}`);
+  /** @param {string} key @param {string} boot @param {number} after @param {string} replay */
+  async #ask(key, boot, after, replay) {
+    const answer = await fetch(`/api/track/points?after=${after}${this.query}${replay}`);
     if (!answer.ok) throw new Error(`status ${answer.status}`);
     const { number, points } = await answer.json();
     if (`${boot} ${number}` !== key) return; // another track began meanwhile: the next state says so

@@ -14,6 +14,9 @@ const DIALLING_MS = 15000;
 /** The server's time in a frame older than this says little of the way [ms]. */
 const ECHO_MS = 2000;
 
+/** Only then a position is wanted. */
+const WATCHED = ['monitoring', 'lost'];
+
 /** @param {string} name */
 function kept(name) {
   try {
@@ -141,7 +144,7 @@ export class Phone {
     const { store } = this;
     if (!this.#isArmed) return;
     const now_ms = store.now();
-    const phase = store.frame?.session.phase;
+    const phase = store.heeded?.session.phase;
     const isWanted = (phase !== undefined && phase !== 'idle') || now_ms - this.#armed_ms < DIALLING_MS;
     if (!isWanted) this.#stop();
     else if (this.#watch === null && !document.hidden && this.#teller.why(now_ms) !== 'denied') this.#start();
@@ -157,7 +160,7 @@ export class Phone {
     const now_ms = store.now();
     const { frame } = store;
     const held_ms = now_ms - store.deadMan.heard_ms;
-    if (!this.#isArmed || !frame || !store.isMonitoring || held_ms > ECHO_MS) return;
+    if (!this.#isArmed || !frame || held_ms > ECHO_MS || !WATCHED.includes(store.heeded?.session.phase ?? '')) return;
     const word = this.#teller.due(now_ms);
     if (!word) return;
     const said = 'fix' in word ? { fix: { ...word.fix, heard_ms: frame.server.time_ms, held_s: held_ms / 1000 } } : word;

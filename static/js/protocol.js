@@ -115,6 +115,42 @@
  * @property {{state: string, why: string | null}} decelerate
  * @property {{holder: string | null}} control
  * @property {PhoneShown | null} [phone] the operator's phone that is compared with the car
+ * @property {ReplayAt} [replay] of a recording: what all the rest is of
+ * @property {LiveAside | null} [live] in a replay only: what is live meanwhile; null: not known
+ *
+ * @typedef {object} ReplayAt
+ * @property {string} id
+ * @property {string} token by which trends and track are asked for
+ * @property {number} at_s the moment shown, or gone to, since the recording's beginning
+ * @property {number} at_ms
+ * @property {number} start_ms
+ * @property {number} end_ms
+ * @property {number} length_s
+ * @property {boolean} is_playing
+ * @property {number} rate
+ * @property {number | null} reached_rate where it does not keep the pace
+ * @property {boolean} is_seeking
+ * @property {boolean} is_settled false: the checks were only warmed up before this moment
+ * @property {number | null} silent_s since the car's newest message then; null: none yet
+ * @property {number} seek grows with each leap: another number, another course of the minute and another track
+ * @property {'recording' | 'judged'} alarms_from
+ * @property {'recording' | 'now'} settings_from
+ * @property {number | null} hangs_s its process tells nothing
+ *
+ * @typedef {object} LiveAside
+ * @property {Session['phase']} phase
+ * @property {string | null} name
+ * @property {boolean} paused
+ * @property {Link['cut']} cut
+ * @property {string | null} problem
+ * @property {{state: string, for_s: number | null}} recording
+ * @property {Alarm[]} alarms
+ * @property {number} alarms_in_all
+ *
+ * @typedef {{at_s: number, alarm: string, title: string, priority: Priority, text: string}} Mark
+ * @typedef {{kind: 'timeline', length_s: number, done_s: number, is_done: boolean, bucket_s: number, speed_mps: (number | null)[],
+ *   gaps: [number, number][], marks: Mark[], marks_left_out: number, notes: string[]}} Timeline
+ * @typedef {{kind: 'replay', ended: string}} ReplayEnded
  *
  * @typedef {number | 'none' | null} Step none: messages came and had no number to give; null: none came
  * @typedef {{step_s: number, since: number, first: number, now: number, lowest: Record<string, Step[]>, highest: Record<string, Step[]>}} Trends
@@ -160,7 +196,7 @@
  * @typedef {{kind: 'reply', id: string, ok: boolean, reason?: string, problem?: Problem & {suggestion: string | null},
  *   version?: number, conflict?: boolean, field?: string}} Reply
  * @typedef {{kind: 'problem', reason: string}} Refusal
- * @typedef {Hello | Offer | State | Events | Reply | Refusal} Message
+ * @typedef {Hello | Offer | State | Events | Reply | Refusal | Timeline | ReplayEnded} Message
  */
 
 /** What a message of each kind must at least hold, and as what; anything else is not understood. */
@@ -174,6 +210,8 @@ const SHAPES = /** @type {Record<string, Record<string, string>>} */ ({
   events: { events: 'array' },
   reply: { id: 'string', ok: 'boolean' },
   problem: { reason: 'string' },
+  timeline: { length_s: 'number', bucket_s: 'number', speed_mps: 'array', gaps: 'array', marks: 'array', notes: 'array' },
+  replay: { ended: 'string' },
 });
 
 /**

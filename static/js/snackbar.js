@@ -30,7 +30,7 @@ export function mount(root, store, say) {
   shelve.addEventListener('click', () => shown && openShelve(store, shown, say));
 
   function draw() {
-    const waiting = store.isSilent || !store.frame ? [] : layOut(store.frame.alarms).snackbars;
+    const waiting = store.isSilent || !store.frame || store.replaying ? [] : layOut(store.frame.alarms).snackbars;
     shown = waiting[0] ?? null;
     show(bar, shown !== null);
     if (!shown) return;

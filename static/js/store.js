@@ -22,9 +22,9 @@ const REPLY_MS = 4000;
  * @typedef {import('./protocol.js').State} State
  * @typedef {import('./protocol.js').AlarmEvent} AlarmEvent
  * @typedef {import('./events.js').Gap} Gap
- * @typedef {'move' | 'draw' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open'} Topic
+ * @typedef {'move' | 'draw' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open' | 'replay'} Topic
  *   move: a fresh frame is to be drawn · draw: five times a second, seen or not by a frame · scan: a new scan ·
- *   beat: a fresh frame came (also while the page is hidden) · tick: time passed (seldom while it is hidden) · log: new events · gap: a blind time is over · open: connected
+ *   beat: a fresh frame came (also while the page is hidden) · tick: time passed (seldom while it is hidden) · log: new events · gap: a blind time is over · open: connected · replay: its time line, or its end
  * @typedef {{ok: boolean, reason?: string, suggestion?: string, version?: number, isConflict?: boolean}} Answer suggestion: an address
  *   that would do; version: of the settings, once changed; isConflict: somebody else changed them in between
  */
@@ -42,6 +42,10 @@ export class Store {
   /** Frames and scans that could not be read. */
   unreadable = 0;
   log = new EventLog();
+  /** The page shows a recording: frames of the live car are none of it, nor the other way round. */
+  replaying = false;
+  /** What a new socket is asked for. */
+  tail = '';
   deadMan = new DeadMan();
   /** @type {Set<string>} names of what wants the scan */
   #watchers = new Set();
@@ -137,6 +141,20 @@ export class Store {
     return this.frame?.session.phase === 'monitoring' || this.frame?.session.phase === 'lost';
   }
 
+  /** What must be heard of: the live car, also while a recording is shown. @returns {State | null} */
+  get heeded() {
+    const { frame } = this;
+    if (!frame?.replay) return frame;
+    const { live } = frame;
+    return live ? { ...frame, alarms: live.alarms, session: { ...frame.session, phase: live.phase, paused: live.paused } } : null;
+  }
+
+  /** From now on a recording, which a new socket asks for with this tail; null: live again. @param {string | null} tail */
+  turn(tail) {
+    this.replaying = tail !== null;
+    this.tail = tail ?? '';
+  }
+
   /** A signal of the newest frame. @param {string} name */
   signal(name) {
     return this.frame?.signals[name];
@@ -160,9 +178,10 @@ export class Store {
    * Ask the server for something. It is refused at once where the server is not there: a command is never kept for later.
    * @param {string} kind
    * @param {object} [fields]
+   * @param {number} [within_ms]
    * @returns {Promise<Answer>}
    */
-  ask(kind, fields = {}) {
+  ask(kind, fields = {}, within_ms = REPLY_MS) {
     this.#asked += 1;
     const id = `p${this.#asked}`;
     if (!this.wire.send({ kind, id, ...fields })) {
@@ -170,7 +189,7 @@ export class Store {
     }
     return new Promise((resolve) => {
       this.#waiting.set(id, resolve);
-      setTimeout(() => this.#answer(id, { ok: false, reason: 'The server gave no answer in time.' }), REPLY_MS);
+      setTimeout(() => this.#answer(id, { ok: false, reason: 'The server gave no answer in time.' }), within_ms);
     });
   }
 
@@ -221,6 +240,13 @@ export class Store {
         this.#caughtUp();
         break;
       }
+      case 'replay':
+        this.turn(null); // it ended, or never began: what comes now is live
+        this.#emit('replay', message);
+        break;
+      case 'timeline':
+        this.#emit('replay', message);
+        break;
       case 'reply':
         this.#answer(message.id, answerOf(message));
         break;
@@ -241,6 +267,7 @@ export class Store {
 
   /** @param {State} frame */
   #state(frame) {
+    if ((frame.replay !== undefined) !== this.replaying) return; // under way while the page turned
     const now_ms = this.now();
     const delay_ms = this.#clock.note(frame.server.time_ms, now_ms);
     if (!this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service

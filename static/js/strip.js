@@ -36,7 +36,7 @@ export function mount(root, store) {
  * @param {import('./store.js').Store} store
  */
 function modeOf(store) {
-  const { frame } = store;
+  const frame = store.heeded;
   if (!frame || !store.isMonitoring) return 'none';
   if (frame.session.paused && !store.isSilent) return 'paused';
   if (store.chain.word === 'Lost' && store.silence_s > 2) return 'critical';

@@ -43,8 +43,12 @@ export class Trends {
   #hear() {
     const { frame } = this.store;
     if (!frame?.trends) return;
-    if (frame.server.boot !== this.#boot) this.minute.clear();
-    this.#boot = frame.server.boot;
+    const boot = `${frame.server.boot} ${frame.replay?.token} ${frame.replay?.seek}`; // a leap is another course
+    if (boot !== this.#boot) {
+      this.minute.clear();
+      this.#asked_ms = -Infinity;
+    }
+    this.#boot = boot;
     this.minute.take(frame.trends);
     // How long the frame was under way counts: the picture's right edge is now, not then.
     this.#heard_ms = this.store.now() - 1000 * Math.max(0, this.store.lag_s);
@@ -58,6 +62,8 @@ export class Trends {
     const query = new URLSearchParams(after >= 0 ? { after: String(after) } : {});
     const vehicle = this.store.frame?.vehicle;
     if (vehicle) query.set('vehicle', vehicle);
+    const replay = this.store.frame?.replay;
+    if (replay) query.set('replay', replay.token);
     try {
       const answer = await fetch(`/api/trends?${query}`, { cache: 'no-store' });
       if (!answer.ok || boot !== this.#boot) return;

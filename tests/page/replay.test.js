@@ -1,0 +1,132 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { badgeOf } from '../../static/js/badge.js';
+import { dialogOf } from '../../static/js/dialogs.js';
+import { chainOf } from '../../static/js/link.js';
+import { Track } from '../../static/js/map-track.js';
+import { readMessage } from '../../static/js/protocol.js';
+import { asideOf, atByKey, atOf, BASE, clockOf, gapBands, markBeside, markPath, placed, rateWords, speedPath, spoken, toldOf, xOf } from '../../static/js/replay-layout.js';
+import { alarm, state } from './frames.js';
+
+const mark = (at_s, more = {}) => ({ at_s, alarm: 'speed_limit', title: 'Speed above limit', priority: /** @type {const} */ ('critical'), text: '', ...more });
+const replay = (more = {}) => ({
+  id: 'r', token: 't', at_s: 246, at_ms: 1_790_000_000_000, start_ms: 0, end_ms: 0, length_s: 512, is_playing: false, rate: 1, reached_rate: null,
+  is_seeking: false, is_settled: true, silent_s: 0, seek: 1, alarms_from: /** @type {const} */ ('judged'), settings_from: /** @type {const} */ ('now'), hangs_s: null, ...more,
+});
+const live = (more = {}) => ({ phase: /** @type {const} */ ('monitoring'), name: 'car', paused: false, cut: null, problem: null, recording: { state: 'off', for_s: null }, alarms: [], alarms_in_all: 0, ...more });
+const playing = (more = {}) => state({ replay: replay(), live: live(), ...more });
+
+test('a moment and its place on the line are each other\'s turning round, and never beyond the ends', () => {
+  for (const at_s of [0, 1, 246, 512]) assert.ok(Math.abs(atOf(xOf(at_s, 512, 364), 512, 364) - at_s) < 1e-9);
+  assert.equal(xOf(-5, 512, 364), 0);
+  assert.equal(xOf(9e9, 512, 364), 364);
+  assert.equal(xOf(5, 0, 364), 0, 'a recording of one moment');
+  assert.equal(atOf(-40, 512, 364), 0);
+  assert.equal(atOf(4000, 512, 364), 512);
+  assert.equal(atOf(10, 512, 0), 0, 'not laid out yet');
+  assert.equal(atOf(NaN, 512, 364), 0);
+});
+
+test('the speed is a line that breaks where none was recorded', () => {
+  const line = { speed_mps: [0, 2, 4, null, null, null, null, 4, 2], bucket_s: 1, length_s: 9 };
+  const path = speedPath(line, 90);
+  assert.equal(path.match(/M/g)?.length, 2);
+  assert.ok(path.startsWith(`M5.0 ${BASE.toFixed(1)}`), path);
+  assert.ok(path.includes('L25.0 27.0'), 'the highest reaches the top');
+  assert.equal(speedPath({ ...line, speed_mps: [1, null, 1, 1], length_s: 4 }, 90).match(/M/g)?.length, 1, 'a slow signal is one line');
+  assert.equal(speedPath({ ...line, speed_mps: [null, null] }, 90), '');
+  assert.equal(speedPath({ speed_mps: [], bucket_s: 1, length_s: 0 }, 90), '');
+});
+
+test('a gap is as wide as it was long, and never too narrow to be seen', () => {
+  assert.deepEqual(gapBands({ gaps: [[10, 20], [50, 50.1]], length_s: 100 }, 200), [[20, 20], [100, 2]]);
+});
+
+test('marks that would cover each other are one, of the shape of the most urgent', () => {
+  const marks = [mark(10, { priority: 'warning' }), mark(12), mark(13, { priority: 'warning' }), mark(60, { priority: 'warning' }), mark(80, { priority: 'advisory' })];
+  const found = placed(marks, 100, 200);
+  assert.deepEqual(found.map(({ x, count, priority }) => [x, count, priority]), [[20, 3, 'critical'], [120, 1, 'warning']]);
+  assert.equal(found[0]?.at_s, 12);
+  assert.equal(markPath(found[0] ?? assert.fail()), 'M20.0 4l8 8.5-8 8.5-8-8.5z', 'a diamond');
+  assert.equal(markPath(found[1] ?? assert.fail()), 'M120.0 4.5l9 16h-18z', 'a triangle');
+});
+
+test('keys lead to the alarm before and after, and not to the one that is shown', () => {
+  const marks = [mark(5), mark(10), mark(10), mark(90)];
+  assert.equal(markBeside(marks, 0, 1)?.at_s, 5);
+  assert.equal(markBeside(marks, 10, 1)?.at_s, 90);
+  assert.equal(markBeside(marks, 10.4, -1)?.at_s, 5, 'what was just gone to is this one still');
+  assert.equal(markBeside(marks, 20, -1)?.at_s, 10);
+  assert.equal(markBeside(marks, 90, 1), null);
+  assert.equal(markBeside([], 90, -1), null);
+});
+
+test('arrows go by steps, pages by six, ends to the ends, other keys nowhere', () => {
+  assert.equal(atByKey('ArrowRight', 10, 512), 15);
+  assert.equal(atByKey('ArrowLeft', 3, 512), 0);
+  assert.equal(atByKey('PageUp', 10, 512), 40);
+  assert.equal(atByKey('End', 10, 512), 512);
+  assert.equal(atByKey('Home', 10, 512), 0);
+  assert.equal(atByKey('ArrowRight', 10, 20), 11, 'a short one by a second');
+  assert.equal(atByKey('x', 10, 512), null);
+});
+
+test('times as a person reads and hears them', () => {
+  assert.equal(clockOf(246.9), '04:06');
+  assert.equal(clockOf(3846), '1:04:06');
+  assert.equal(spoken(246, 512), '4 minutes 6 seconds of 8 minutes 32 seconds');
+  assert.equal(spoken(0, 3600), '0 seconds of 1 hour');
+  assert.equal(spoken(61, 61), '1 minute 1 second of 1 minute 1 second');
+  assert.deepEqual([0.25, 0.5, 1, 16, 8.74].map(rateWords), ['×0.25', '×0.5', '×1', '×16', '×8.74']);
+});
+
+test('the line says first what is wrong with the replay, then what was not recorded, then the alarms', () => {
+  const fast = alarm({ title: 'Speed above limit' });
+  const told = (more, rest = {}) => toldOf(playing({ replay: replay(more), ...rest }));
+  assert.deepEqual(told({}, { alarms: [fast] }), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: 'judged anew' });
+  assert.equal(told({ alarms_from: 'recording' }, { alarms: [fast] }).end, 'as told then');
+  assert.equal(told({}, { alarms: [fast, alarm({ id: 'b', priority: 'warning' })] }).end, '1 of 2, judged anew');
+  assert.equal(told({}, { alarms: [alarm({ active: false, state: 'RTN_UNACKED' })] }).text, 'No alarms', 'what was over then is no alarm of this moment');
+  assert.equal(told({ silent_s: 3.42 }, { alarms: [fast] }).text, 'Nothing recorded for 3.4 s');
+  assert.equal(told({ silent_s: null }).text, 'No message of the car yet');
+  assert.equal(told({ is_seeking: true, silent_s: 9 }).text, 'Going to 04:06');
+  assert.equal(told({ hangs_s: 3.2, is_seeking: true }).text, 'The replay has not answered for 3 s');
+  assert.equal(told({ is_settled: false }).text, 'Checks warmed up over 60 s');
+  assert.equal(toldOf(playing({ session: { paused: true } })).text, 'Monitoring was paused');
+});
+
+test('what is live is told beside a recording: alarms, a lost link, a pause, and that it is not known', () => {
+  assert.equal(asideOf(live()), null);
+  assert.equal(asideOf(null)?.text, 'Live: not known');
+  assert.equal(asideOf(live({ phase: 'idle' })), null);
+  assert.equal(asideOf(live({ phase: 'lost' }))?.text, 'Live: connection lost');
+  assert.equal(asideOf(live({ cut: 'bridge-car' }))?.text, 'Live: the car fell silent');
+  assert.equal(asideOf(live({ paused: true }))?.text, 'Live: monitoring is paused');
+  const fast = alarm();
+  const gps = alarm({ id: 'gps', title: 'GPS drift', priority: 'warning' });
+  assert.deepEqual(asideOf(live({ alarms: [gps, fast] })), { kind: 'crit', text: 'Live: Speed above limit (1 of 2)', asking: fast });
+  assert.equal(asideOf(live({ alarms: [gps] }))?.kind, 'warn');
+  assert.equal(asideOf(live({ alarms: [gps] }))?.asking, null);
+  assert.equal(asideOf(live({ alarms: [alarm({ state: 'ACKED' })] }))?.asking, null, 'somebody has seen it');
+  assert.equal(asideOf(live({ alarms: [alarm({ state: 'SHELVED' }), alarm({ priority: 'advisory' })] })), null);
+});
+
+test('a recording rings nobody: no dialog, and the title says REPLAY', () => {
+  const frame = playing({ alarms: [alarm()] });
+  const seen = { frame, isSilent: false, silence_s: 0.1, isChoosing: false, isAnswered: false };
+  assert.equal(dialogOf(seen), null);
+  assert.equal(dialogOf({ ...seen, isSilent: true, silence_s: 5 })?.kind, 'lost', 'the server itself is live');
+  assert.deepEqual(badgeOf(frame, { isSilent: false, isMonitoring: true, word: 'Replay' }), { title: 'REPLAY · catgraph', icon: 'replay', count: 0 });
+  const alarmed = playing({ live: live({ alarms: [alarm()] }) });
+  assert.deepEqual(badgeOf(alarmed, { isSilent: false, isMonitoring: true, word: 'Replay' }), { title: '(1) LIVE Speed above limit · REPLAY · catgraph', icon: 'critical', count: 1 });
+  assert.equal(chainOf({ frame, isSilent: false, silence_s: 0, lag_s: 0.1, heard_ms: 0 }).word, 'Replay');
+  assert.equal(chainOf({ frame, isSilent: true, silence_s: 3, lag_s: 3, heard_ms: 0 }).word, 'Lost');
+});
+
+test('what is no time line is not taken for one', () => {
+  const line = { kind: 'timeline', length_s: 9, bucket_s: 1, speed_mps: [], gaps: [], marks: [], notes: [] };
+  assert.equal(readMessage(JSON.stringify(line))?.kind, 'timeline');
+  assert.equal(readMessage(JSON.stringify({ ...line, marks: null })), null);
+  assert.equal(readMessage('{"kind":"replay"}'), null);
+  assert.equal(new Track().lacks('a', 3), 0);
+});
