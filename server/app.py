@@ -17,16 +17,19 @@ from fastapi import FastAPI
 from monitor.catalog import AnyCheck
 from server.bus import LocalBus
 from server.config import Config
+from server.export_jobs import Exports
 from server.hub import Hub
 from server.journal import Journal
 from server.mail.mailer import Mailer
 from server.mail.recorded import Recorded
 from server.playback.desk import Desk
 from server.recording.catalog import Catalog
+from server.recording.folder import RecordingsFolder
 from server.session import Session
 from server.settings import SettingsFile
 from server.version import catgraph_version
 from server.web import api, docs, errors, metrics, notices, pages
+from server.web import exports as web_exports
 from server.web import ground as web_ground
 from server.web import log as alarm_log
 from server.web import mail as web_mail
@@ -54,6 +57,7 @@ class Running:
     mailer: Mailer | None  # None: nothing is kept, so nothing is mailed
     recordings: Catalog | None  # None: nothing is kept, so nothing is recorded
     desk: Desk
+    exports: Exports | None = None  # None: nothing is kept, so nothing is exported
 
     def server_facts(self) -> dict[str, Any]:
         """The `server` part of a state."""
@@ -111,6 +115,8 @@ def create_app(
         desk=desk,
         recordings=_catalog(config.data, now=now, wall_ms=wall_ms),
     )
+    if running.recordings is not None and config.data is not None:
+        running.exports = _exports(config.data, running.recordings, now=now, wall_ms=wall_ms)
     for vehicle in config.vehicles:
         running.sessions[vehicle.name] = Session(
             vehicle,
@@ -127,6 +133,8 @@ def create_app(
     async def life(_: FastAPI) -> AsyncIterator[None]:
         if running.recordings is not None:
             await running.recordings.start()
+        if running.exports is not None:
+            await running.exports.start()
         if running.mailer is not None:
             await running.mailer.start()
         for session in running.sessions.values():
@@ -138,6 +146,8 @@ def create_app(
             await asyncio.gather(*(session.stop() for session in running.sessions.values()))
             if running.mailer is not None:
                 await running.mailer.stop()
+            if running.exports is not None:
+                await running.exports.stop()
             if running.recordings is not None:
                 await running.recordings.stop()
             journal.close()
@@ -156,6 +166,7 @@ def create_app(
     errors.install(app)
     app.include_router(api.router)
     app.include_router(alarm_log.router)
+    app.include_router(web_exports.router)
     app.include_router(web_recordings.router)
     app.include_router(web_mail.router)
     app.include_router(metrics.router)
@@ -170,6 +181,11 @@ def _catalog(data: Path | None, *, now: Callable[[], float], wall_ms: Callable[[
     if data is None:
         return None
     return Catalog(data / "recordings", data / "recordings.sqlite", now=now, wall_ms=wall_ms)
+
+
+def _exports(data: Path, catalog: Catalog, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Exports:
+    folder = RecordingsFolder(catalog.folder)
+    return Exports(data / "exports", folder, catalog.path, catalog.add, now=now, wall_ms=wall_ms)
 
 
 def _mailer(data: Path | None, path_of: Callable[[str], Path | None], *, wall_ms: Callable[[], int]) -> Mailer | None:

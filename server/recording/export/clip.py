@@ -23,7 +23,7 @@ from server.recording.folder import WRITING, id_of
 from server.recording.own import own_schema
 from server.recording.read import Recording
 from server.recording.schemas import Schema, TypeBook
-from server.recording.source import Channel
+from server.recording.source import Channel, Damage
 from server.recording.write import PartFile
 
 BEFORE_S = AFTER_S = 30.0
@@ -71,7 +71,7 @@ def write_clip(
             path.with_name(id_of(path) + WRITING).unlink()
         raise
     outcome.notes += _short(window, first_ns, last_ns)
-    outcome.notes += [f"{sentence}." for sentence in recording.damage]
+    outcome.notes += _damage(recording, first_ns)
     return outcome
 
 
@@ -207,6 +207,13 @@ def _short(window: Window, first_ns: int, last_ns: int) -> Iterator[str]:
         yield f"The recording begins {(first_ns - window.from_ns) / 1e9:.1f} s after the clip should."
     if last_ns < window.to_ns - 1_000_000_000:
         yield f"The recording ends {(window.to_ns - last_ns) / 1e9:.1f} s before the clip should."
+
+
+def _damage(recording: Recording, first_ns: int) -> Iterator[str]:
+    """What could not be read. That a file has no end yet is no damage to a clip: see `_short`."""
+    for file in recording.files:
+        lost = Damage(parts=file.damage.parts, lost=file.damage.lost)
+        yield from (f"{sentence}." for sentence in lost.sentences(file.path.name, first_ns, file.end_ns))
 
 
 def _json(data: bytes) -> dict[str, Any]:
