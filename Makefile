@@ -14,10 +14,10 @@ FAST := not browser and not slow and not soak
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
 
-demo: $(VENV)/.ready ## a simulated car, its bridge and the server: open the address it prints
+demo: $(VENV)/.ready static/built/built.json ## a simulated car, its bridge and the server: open the address it prints
 	$(PY) -m server demo
 
-test: $(VENV)/.ready-test ## all of the tests: what must pass before a change goes in
+test: $(VENV)/.ready-test static/built/built.json ## all of the tests: what must pass before a change goes in
 	$(PY) -m tests.chromium
 	$(MAKE) --no-print-directory format lint types imports tsc node
 	$(PYTEST) -m "not soak"
@@ -26,14 +26,14 @@ check: $(VENV)/.ready-test ## the fast half of the tests, without a browser
 	$(MAKE) --no-print-directory format lint types imports tsc node
 	$(PYTEST) -q -n 2 -m "$(FAST)"
 
-bench: $(VENV)/.ready-test ## latency, bytes and load, beside a bare client and one bridge connection a page
+bench: $(VENV)/.ready-test static/built/built.json ## latency, bytes and load, beside a bare client and one bridge connection a page
 	$(PY) -m tests.bench
 
-soak: $(VENV)/.ready-test ## the long proofs
+soak: $(VENV)/.ready-test static/built/built.json ## the long proofs
 	$(PY) -m tests.chromium
 	$(PYTEST) -m soak --timeout 7200
 
-screenshots: $(VENV)/.ready-test ## pictures of the page in its states, for a look and for the README
+screenshots: $(VENV)/.ready-test static/built/built.json ## pictures of the page in its states, for a look and for the README
 	$(PY) -m tests.chromium
 	$(PY) -m tests.page.screenshots
 
@@ -56,7 +56,7 @@ node: $(VENV)/.ready-test
 	files=$$(find tests/page -name '*.test.js' | sort); [ -z "$$files" ] || node --test --test-reporter dot $$files
 
 clean: ## back to a fresh clone; recordings in data/ stay
-	rm -rf $(VENV) node_modules static/vendor build dist out *.egg-info
+	rm -rf $(VENV) node_modules static/vendor static/built build dist out *.egg-info
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find monitor server tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -85,3 +85,8 @@ $(VENV)/.ready-test: $(GROUND) $(LOST) | $(VENV)/pyvenv.cfg
 	$(PY) -m pip install --quiet -c constraints.txt -e '.[test]'
 	npm ci --silent
 	@touch $(VENV)/.ready $@
+
+# The page's own files, joined. Where they cannot be, they are served one by one: slower, and never yesterday's.
+static/built/built.json: $(wildcard static/js/*.js static/css/*.css) server/web/built.py | $(VENV)/.ready
+	@if [ -x node_modules/.bin/esbuild ]; then $(PY) -m server.web.built node_modules/.bin/esbuild; \
+	  else $(PY) -m pip install --quiet -c constraints.txt -e .; fi && touch -c $@ || echo "The page's files are served one by one."

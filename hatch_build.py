@@ -1,4 +1,4 @@
-"""Build hook: fetches the page's third-party files into static/vendor, and puts the page inside the wheel."""
+"""Build hook: fetches others' files into static/vendor, joins the page's own in static/built, puts both in the wheel."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import importlib.util
 import json
 import shutil
 import subprocess
+import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -23,34 +26,48 @@ class PageHook(BuildHookInterface):
 
     def dependencies(self) -> list[str]:
         """What the build environment must have besides hatchling."""
-        return [] if self._vendor_is_current() or working_npm() else [NODE]
+        return [] if self._is_current() or working_npm() else [NODE]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Bring static/vendor up to package.json; a wheel that is to be carried elsewhere gets the page's folders."""
-        if not self._vendor_is_current():
-            fill(self._vendor, Path(self.root))
-            self._assets.write_stamp(self._vendor, Path(self.root))
+        """Bring both folders up to date; a wheel that is to be carried elsewhere gets all of the page."""
+        if not self._is_current():
+            with packages(Path(self.root)) as modules:
+                if not self._vendor_is_current():
+                    fill(self._vendor, Path(self.root), modules)
+                    self._assets.write_stamp(self._vendor, Path(self.root))
+                self._built.join(modules / ".bin" / "esbuild", self._static)
         if version == "standard":  # an editable install reads them from the project's root instead
             build_data["force_include"].update({"static": "server/static", "templates": "server/templates"})
 
     @property
+    def _static(self) -> Path:
+        return Path(self.root, "static")
+
+    @property
     def _vendor(self) -> Path:
-        return Path(self.root, "static", "vendor")
+        return self._static / "vendor"
 
     @property
     def _assets(self) -> ModuleType:
         return load(Path(self.root, "server", "web", "assets.py"))
 
+    @property
+    def _built(self) -> ModuleType:
+        return load(Path(self.root, "server", "web", "built.py"))
+
+    def _is_current(self) -> bool:
+        return self._vendor_is_current() and self._built.find(self._static) is not None
+
     def _vendor_is_current(self) -> bool:
         return self._assets.vendor_problem(self._vendor, Path(self.root)) is None
 
 
-def fill(vendor: Path, project: Path) -> None:
-    """Copy what package.json lists under "vendor" from the packages pinned in package-lock.json into `vendor`."""
+@contextmanager
+def packages(project: Path) -> Iterator[Path]:
+    """The packages pinned in package-lock.json, in a folder that is gone afterwards."""
     npm = working_npm()
     if npm is None:
         raise SystemExit("catgraph's page needs npm to fetch its parts: install npm, or build with build isolation on.")
-    wanted: dict[str, str] = json.loads((project / "package.json").read_text(encoding="utf-8"))["vendor"]
     with tempfile.TemporaryDirectory(prefix="catgraph-page-") as folder:
         for name in ("package.json", "package-lock.json", ".npmrc"):
             shutil.copy(project / name, folder)
@@ -59,9 +76,15 @@ def fill(vendor: Path, project: Path) -> None:
         )
         if done.returncode:
             raise SystemExit(f"npm could not fetch the parts of catgraph's page:\n{done.stdout}{done.stderr}")
-        shutil.rmtree(vendor, ignore_errors=True)
-        for source, name in wanted.items():
-            copy(Path(folder, "node_modules", source), vendor / name)
+        yield Path(folder, "node_modules")
+
+
+def fill(vendor: Path, project: Path, modules: Path) -> None:
+    """Copy what package.json lists under "vendor" into `vendor`."""
+    wanted: dict[str, str] = json.loads((project / "package.json").read_text(encoding="utf-8"))["vendor"]
+    shutil.rmtree(vendor, ignore_errors=True)
+    for source, name in wanted.items():
+        copy(modules / source, vendor / name)
 
 
 def working_npm() -> str | None:
@@ -87,5 +110,6 @@ def load(path: Path) -> ModuleType:
     if spec is None or spec.loader is None:
         raise SystemExit(f"{path} cannot be loaded.")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look there for the types of their fields
     spec.loader.exec_module(module)
     return module

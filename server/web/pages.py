@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,7 +15,16 @@ from starlette.responses import FileResponse
 
 from server.web.api import running, vehicle_of
 from server.web.assets import check_vendor, static_dir, templates_dir
-from server.web.static_files import StaticText, answer, modules_of, packed
+from server.web.built import ENTRY, STYLES, Built, find
+from server.web.static_files import StaticText, answer, packed
+
+
+def parts_of(built: Built | None, asset: Callable[[str], str]) -> dict[str, object]:
+    """The addresses of what the page begins with: few joined files, or all that there are."""
+    if built is None:
+        return {"styles": [asset(f"css/{name}.css") for name in STYLES], "script": asset(f"js/{ENTRY}"), "needed": []}
+    style, script, *needed = (f"/static/{name}" for name in (built.style, built.script, *built.needed))
+    return {"styles": [style], "script": script, "needed": needed}
 
 
 def install(app: FastAPI) -> None:
@@ -33,12 +43,12 @@ def install(app: FastAPI) -> None:
         return f"/static/{name}?v={digest(path, path.stat().st_mtime_ns)}"
 
     templates.env.globals["asset"] = asset
-    templates.env.globals["modules"] = lambda: modules_of(static / "js" / "app.js")
     app.mount("/static", StaticText(directory=static), name="static")
 
     @app.get("/", response_class=HTMLResponse, include_in_schema=False)
     async def page(request: Request, vehicle: str | None = None) -> Response:
-        context = {"version": running(request).version, "vehicle": vehicle_of(running(request), vehicle)}
+        parts = parts_of(find(static), asset)
+        context = parts | {"version": running(request).version, "vehicle": vehicle_of(running(request), vehicle)}
         drawn = templates.TemplateResponse(request, "page.html", context)
         return answer(packed(bytes(drawn.body)), request.headers, "text/html; charset=utf-8", "no-cache")
 

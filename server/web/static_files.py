@@ -1,8 +1,7 @@
-"""The page's files as they go out: compressed once and kept, scripts without their comments.
+"""The page's files as they go out: compressed once and kept.
 
-A phone on an access point loads some sixty small modules; as they are written they are 260 kB, as they go out 70 kB.
-What a browser must never do is run yesterday's script: a file asked for with the hash of its content may be kept for
-ever, every other one is asked about each time, and answered 304 while it is the same.
+What a browser must never do is run yesterday's script: a file with the hash of its content in its address may be kept
+for ever, every other one is asked about each time, and answered 304 while it is the same.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ from __future__ import annotations
 import gzip
 import hashlib
 import os
-import re
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -21,6 +19,8 @@ from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
+from server.web.built import FOLDER
+
 _YEAR = "public, max-age=31536000, immutable"
 _TYPES = {
     ".js": "text/javascript; charset=utf-8",
@@ -29,10 +29,6 @@ _TYPES = {
     ".txt": "text/plain; charset=utf-8",
     ".webmanifest": "application/manifest+json",
 }
-# Whole lines of comment, and blocks that begin and end their lines: a third of our scripts. No more is taken out, for
-# what else stands between two quotes, in a pattern or in a text within a text is not for an expression to tell.
-_COMMENT = re.compile(rb"^[ \t]*(?://[^\n]*|/\*\*(?:(?!\*/)[\s\S])*\*/)[ \t]*\r?\n", re.MULTILINE)
-_IMPORT = re.compile(r"""^\s*(?:import|export)\b[^;'"(]*?(?:from\s+)?['"](\.[^'"]+)['"]""", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +62,8 @@ class StaticText(StaticFiles):
     """Static files; texts among them small."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        keep = _YEAR if scope.get("query_string", b"").startswith(b"v=") else "no-cache"
+        is_named = path.startswith(f"{FOLDER}/") or scope.get("query_string", b"").startswith(b"v=")
+        keep = _YEAR if is_named else "no-cache"
         media_type = _TYPES.get(os.path.splitext(path)[1])
         if media_type is not None and scope["method"] == "GET":
             full, stat = self.lookup_path(path)
@@ -79,24 +76,4 @@ class StaticText(StaticFiles):
 
 @lru_cache(maxsize=512)
 def _read(path: Path, changed_ns: int) -> Packed:
-    body = path.read_bytes()
-    is_ours = path.suffix == ".js" and "vendor" not in path.parts  # others' licences stand in their first lines
-    return packed(_COMMENT.sub(b"", body) if is_ours else body)
-
-
-def modules_of(script: Path) -> list[str]:
-    """The names of all modules beside `script` that it imports, and they import, without what is imported later.
-
-    The page names them in its head, so that a browser asks for all at once instead of one depth after another.
-    """
-    found: dict[str, None] = {}
-    waiting = [script]
-    while waiting:
-        module = waiting.pop(0)
-        for name in _IMPORT.findall(module.read_text("utf-8")):
-            path = (module.parent / name).resolve()
-            key = path.relative_to(script.parent.resolve()).as_posix() if path.is_file() else ""
-            if key and key not in found and path != script:
-                found[key] = None
-                waiting.append(path)
-    return list(found)
+    return packed(path.read_bytes())

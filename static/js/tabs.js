@@ -55,6 +55,7 @@ export class Tabs {
       listen(window, 'resize', () => this.place()),
     ];
     this.#bring(this.index);
+    this.#fold();
   }
 
   /** Unmount. */
@@ -69,13 +70,13 @@ export class Tabs {
     this.#isPlaced = true;
     this.pager.scrollTo({ left: this.#leftOf(this.index), behavior: 'instant' });
     this.#still();
+    this.#fold();
     this.onFront();
   }
 
   /** What is out of sight is out of reach of keys and readers. */
   #still() {
     this.panels.forEach((panel, i) => setAttribute(panel, 'inert', !this.shows(TABS[i] ?? 'home')));
-    this.#unfold();
   }
 
   /** What is out of sight is neither laid out nor painted: half of what the page costs. @type {ReturnType<typeof setTimeout> | undefined} */
@@ -85,9 +86,12 @@ export class Tabs {
   #unfold() {
     for (const panel of this.panels) setAttribute(panel, 'data-folded', null);
     clearTimeout(this.#folding);
-    this.#folding = setTimeout(() => {
-      for (const panel of this.panels) setAttribute(panel, 'data-folded', panel.inert);
-    }, FOLD_AFTER_MS);
+    this.#folding = setTimeout(() => this.#fold(), FOLD_AFTER_MS);
+  }
+
+  #fold() {
+    clearTimeout(this.#folding);
+    for (const panel of this.panels) setAttribute(panel, 'data-folded', panel.inert);
   }
 
   /**
@@ -95,6 +99,7 @@ export class Tabs {
    * @param {number} index
    */
   go(index) {
+    this.#unfold();
     this.#bring(index);
     const isStill = matchMedia('(prefers-reduced-motion: reduce)').matches;
     this.pager.scrollTo({ left: this.#leftOf(index), behavior: isStill ? 'instant' : 'smooth' });
@@ -125,6 +130,7 @@ export class Tabs {
   #scrolled() {
     if (!this.#isPlaced || !this.pager.clientWidth) return;
     const { scrollLeft } = this.pager;
+    if (Math.abs(this.#leftOf(this.index) - scrollLeft) > 1) this.#unfold();
     const nearest = this.panels.reduce((best, _, i) =>
       Math.abs(this.#leftOf(i) - scrollLeft) < Math.abs(this.#leftOf(best) - scrollLeft) ? i : best, 0);
     if (this.#aim !== null && nearest !== this.#aim) return;

@@ -1,0 +1,121 @@
+"""The page's scripts and styles as they are sent: joined and made small when catgraph is installed.
+
+What is written lies in static/js and static/css, and is served as it is wherever the joined files are absent or older,
+so that nobody is ever shown yesterday's page. The build hook loads this file by its path: standard library only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+FOLDER = "built"  # in static/, beside js/ and css/, so that what they name by ../ is found from here too
+STYLES = ("tokens", "frame", "instruments", "map", "sheets", "screens", "settings", "wide")  # in this order
+ENTRY = "app.js"
+_LIST = "built.json"  # written last
+_TARGET = "es2022"  # private fields and top-level await: every browser of 2022 and later
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Built:
+    """The joined files that the page begins with, as paths within static/."""
+
+    script: str
+    style: str
+    needed: tuple[str, ...]  # scripts that `script` asks for at once
+
+
+def join(esbuild: Path, static: Path) -> None:
+    """Makes static/built from static/js and static/css. Raises SystemExit with esbuild's words where it cannot."""
+    into = static / FOLDER
+    into.mkdir(exist_ok=True)
+    sources = digest_of_sources(static)
+    for old in into.iterdir():
+        old.unlink()
+    with tempfile.TemporaryDirectory(prefix="catgraph-page-") as folder:
+        style = Path(folder, "page.css")
+        imports = (f"@import {json.dumps(str(static / 'css' / f'{name}.css'))};" for name in STYLES)
+        style.write_text("\n".join(imports), encoding="utf-8")
+        meta = Path(folder, "meta.json")
+        names = ["--entry-names=[name]-[hash]", "--chunk-names=[name]-[hash]"]
+        apart = ["--external:../vendor/*", "--external:../fonts/*"]
+        options = ["--bundle", "--minify", f"--target={_TARGET}", f"--outdir={into}", *names, *apart]
+        script = [str(static / "js" / ENTRY), "--format=esm", "--splitting", f"--metafile={meta}"]
+        for one in (script, [str(style)]):
+            done = subprocess.run([str(esbuild), *one, *options], capture_output=True, text=True, check=False)
+            if done.returncode:
+                raise SystemExit(f"The page's files could not be joined:\n{done.stderr}")
+        told = json.loads(meta.read_text(encoding="utf-8"))["outputs"]
+    outputs = {Path(name).name: about for name, about in told.items()}
+    begin = next(name for name, about in outputs.items() if Path(about.get("entryPoint", "")).name == ENTRY)
+    listed = {
+        "sources": sources,
+        "script": f"{FOLDER}/{begin}",
+        "style": f"{FOLDER}/{next(path.name for path in into.glob('page-*.css'))}",
+        "needed": [f"{FOLDER}/{name}" for name in _needed(begin, outputs)],
+    }
+    (into / _LIST).write_text(json.dumps(listed), encoding="utf-8")
+
+
+def find(static: Path) -> Built | None:
+    """The joined files, or None where they were made of other sources than lie here now."""
+    try:
+        stamps = tuple((str(path), path.stat().st_mtime_ns) for path in _sources(static))
+        listed_ns = (static / FOLDER / _LIST).stat().st_mtime_ns
+    except OSError:
+        return None
+    return _find(static, stamps, listed_ns)
+
+
+def digest_of_sources(static: Path) -> str:
+    """Hash of all that the joined files are made of, and of how."""
+    digest = hashlib.sha256(f"{STYLES} {_TARGET} {sys.modules[__name__].__doc__}".encode())
+    for path in _sources(static):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=8)
+def _find(static: Path, stamps: tuple[tuple[str, int], ...], listed_ns: int) -> Built | None:
+    # The times stand in the call so that a changed file is read anew; they decide nothing, for a clone has none.
+    try:
+        listed = json.loads((static / FOLDER / _LIST).read_text(encoding="utf-8"))
+        found = Built(script=listed["script"], style=listed["style"], needed=tuple(listed["needed"]))
+        is_whole = all((static / name).is_file() for name in (found.script, found.style, *found.needed))
+        return found if is_whole and listed["sources"] == digest_of_sources(static) else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _sources(static: Path) -> list[Path]:
+    return sorted([*(static / "js").glob("*.js"), *(static / "css").glob("*.css")])
+
+
+def _needed(begin: str, outputs: dict[str, dict[str, list[dict[str, str]]]]) -> list[str]:
+    found: dict[str, None] = {}
+    waiting = [begin]
+    while waiting:
+        for one in outputs[waiting.pop(0)].get("imports", []):
+            name = Path(one["path"]).name
+            if one.get("kind") == "import-statement" and name in outputs and name not in found:
+                found[name] = None
+                waiting.append(name)
+    return list(found)
+
+
+def main(arguments: Iterable[str]) -> None:
+    """`python -m server.web.built ESBUILD`: joins the files of this project, where they are not current."""
+    static = Path(__file__).resolve().parents[2] / "static"
+    if find(static) is None:
+        join(Path(next(iter(arguments))), static)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
