@@ -28,8 +28,9 @@ export function mount(root, store) {
     const view = store.chain;
     drawChain(chain, view);
     setText(word, view.word);
-    setWords(wordAge, view.age_s === null ? '' : `${age(view.age_s)} s`);
-    setAttribute(link, 'aria-label', `Link to the car: ${view.word}. ${view.sentence}`);
+    const since = view.age_s === null ? '' : ` ${age(view.age_s)} s`;
+    setWords(wordAge, since.trim());
+    setAttribute(link, 'aria-label', `${view.word}${since}: the link to the car. ${view.sentence}`); // begins with what is seen
     const { frame } = store;
     if (!frame) return;
     const recording = recordingWords(frame.recording, view.word === 'Live');
