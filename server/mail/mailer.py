@@ -28,6 +28,7 @@ from server.mail.wire import Account, Connection, Envelope, connect
 
 log = logging.getLogger("catgraph.mail")
 T = TypeVar("T")
+_LONGEST_MS = round(1000 * pauses.LONGEST_S)
 _AGAIN_S = 5.0  # until a task that failed is begun again
 _BREAK_OFF_S = 10.0  # a cancelled mail that was handed over already waits so long for its answer
 
@@ -72,6 +73,7 @@ class Mailer:
         self._to_make = asyncio.Event()
         self._to_send = asyncio.Event()
         self._failures = 0  # of the account, one after the other
+        self._held: tuple[int, str] | None = None  # until when the server is not asked again [ms], and why
         self.making: Underway | None = None
         self.sending: Underway | None = None
         self.settings = MailSettings()
@@ -95,9 +97,7 @@ class Mailer:
 
     async def stop(self) -> None:
         """Ends it; what is on its way is sent again at the next start."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await asyncio.gather(*(_ended(task) for task in self._tasks))
         await self._in_thread(self._close)
         self._thread.shutdown(wait=True)
 
@@ -159,7 +159,8 @@ class Mailer:
             if under_way.connection is None or not under_way.connection.is_doubtful:
                 under_way.task.cancel()
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(under_way.over.wait(), _BREAK_OFF_S)
+                async with asyncio.timeout(_BREAK_OFF_S):
+                    await under_way.over.wait()
         return await self.letter(n)
 
     async def resend(self, n: int) -> Letter:
@@ -171,6 +172,7 @@ class Mailer:
             letter = await self._with(lambda outbox: outbox.resend(n, self.settings.sender, self._wall_ms()))
         except WrongState as why:
             raise MailRefused(str(why), status=409) from None
+        self._held = None
         self.look()
         return letter
 
@@ -184,7 +186,7 @@ class Mailer:
         except OSError as why:
             raise MailRefused(f"The mail settings are not kept: {_reason(why)}.", status=507) from None
         self.settings = settings
-        self._failures = 0
+        self._failures, self._held = 0, None
         await self._with(lambda outbox: outbox.try_all_again(settings.sender, self._wall_ms()))
         self.look()
         return settings
@@ -252,6 +254,9 @@ class Mailer:
                         connection = None
                     await self._wait()
                     continue
+                if self._is_held():
+                    await self._hold()
+                    continue
                 connection = await self._send(mail, connection)
         finally:
             if connection is not None:
@@ -264,7 +269,8 @@ class Mailer:
         if timeout is not None:
             timeout = min(timeout, pauses.LONGEST_S)
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._to_send.wait(), timeout)
+            async with asyncio.timeout(timeout):  # wait_for of Python 3.11 may swallow the end of the task
+                await self._to_send.wait()
 
     async def _send(self, mail: Mail, connection: Connection | None) -> Connection | None:
         """One attempt, and what came of it on the disk; the connection where it can be used again."""
@@ -365,8 +371,20 @@ class Mailer:
             await self._with(lambda outbox: outbox.refuse_all(str(trouble), self._wall_ms()))
             return
         self._failures += 1
-        next_ms = self._wall_ms() + round(1000 * self._pause_s(self._failures))
-        await self._with(lambda outbox: outbox.hold(str(trouble), next_ms))
+        self._held = self._wall_ms() + round(1000 * self._pause_s(self._failures)), str(trouble)
+        await self._hold()
+
+    async def _hold(self) -> None:
+        if self._held is not None:
+            until_ms, why = self._held
+            await self._with(lambda outbox: outbox.hold(why, until_ms, _LONGEST_MS))
+
+    def _is_held(self) -> bool:
+        """The server was asked in vain a short while ago: what was ordered since waits with the others."""
+        if self._held is None:
+            return False
+        left_ms = self._held[0] - self._wall_ms()
+        return 0 < left_ms <= _LONGEST_MS  # more: the clock was set back
 
     async def _settle(self, mail: Mail, outcome: Outcome) -> None:
         """Keeps what came of an attempt, however long the disk takes: forgetting it would send the mail again."""
@@ -433,7 +451,7 @@ class Mailer:
 
 
 def _next_due(outbox: Outbox, now_ms: int) -> Mail | None:
-    return outbox.next_due(now_ms, round(1000 * pauses.LONGEST_S))
+    return outbox.next_due(now_ms, _LONGEST_MS)
 
 
 async def _joined(task: asyncio.Future[Any]) -> None:
@@ -441,9 +459,15 @@ async def _joined(task: asyncio.Future[Any]) -> None:
     try:
         await asyncio.wait([task])
     except asyncio.CancelledError:
-        task.cancel()
-        await asyncio.wait([task])
+        await _ended(task)
         raise
+
+
+async def _ended(task: asyncio.Future[Any]) -> None:
+    """Ends a task; told again and again, for wait_for of Python 3.11 (aiosmtplib uses it) may swallow the word."""
+    while not task.done():
+        task.cancel()
+        await asyncio.wait([task], timeout=0.5)
 
 
 def _locked(path: Path) -> int:

@@ -207,11 +207,12 @@ class Outbox:
         if state in ("sent", "cancelled"):
             (self.files / row["file"]).unlink(missing_ok=True)
 
-    def hold(self, said: str, next_ms: int) -> None:
+    def hold(self, said: str, next_ms: int, longest_ms: int) -> None:
         """The server takes nothing now: no mail that waits is tried before that time."""
         with self._change() as database:
             database.execute(
-                "UPDATE mail SET next_ms = ?, said = ? WHERE state = 'queued' AND next_ms < ?", (next_ms, said, next_ms)
+                "UPDATE mail SET next_ms = ?, said = ? WHERE state = 'queued' AND (next_ms < ? OR next_ms > ?)",
+                (next_ms, said, next_ms, next_ms + longest_ms),
             )
 
     def refuse_all(self, said: str, now_ms: int) -> None:

@@ -178,7 +178,8 @@ class Connection:
             if not answer.done():
                 self.is_doubtful = True
                 protocol.write(b".\r\n")
-            said = await asyncio.wait_for(answer, END_S)
+            async with asyncio.timeout(END_S):
+                said = await answer
         finally:
             if not answer.done():
                 answer.cancel()
@@ -249,8 +250,7 @@ async def connect(account: Account) -> Connection:
             if account.user:
                 await _log_in(smtp, account)
         except BaseException:
-            smtp.close()
-            dialled.close()
+            smtp.close()  # and with it the socket, which is its transport's now
             raise
     return connection
 

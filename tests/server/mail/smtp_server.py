@@ -60,7 +60,7 @@ class Mailbox:
                         "date": message["Date"],
                         "to": envelope.rcpt_tos,
                         "from": envelope.mail_from,
-                        "tls": session.ssl is not None,
+                        "tls": bool(server.transport and server.transport.get_extra_info("sslcontext")),
                         "login": session.auth_data.login.decode() if session.auth_data else None,
                         "sha256": hashlib.sha256(content).hexdigest(),
                         "size": len(content),

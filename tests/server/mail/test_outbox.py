@@ -290,7 +290,7 @@ def test_what_is_on_its_way_is_not_resent(outbox: Outbox) -> None:
 
 def test_a_server_that_takes_nothing_holds_or_fails_all_that_waits(outbox: Outbox) -> None:
     first, second = ready(outbox, "one"), ready(outbox, "two")
-    outbox.hold("no answer", T + 10_000)
+    outbox.hold("no answer", T + 10_000, HOUR_MS)
     assert outbox.next_due(T, HOUR_MS) is None
     outbox.refuse_all("535 login refused", T)
     assert [letter.state for letter in outbox.letters()] == ["failed", "failed"]
