@@ -5,6 +5,7 @@ import { Arming } from './arming.js';
 import { deviceName, keptHere } from './device.js';
 import { field, listen, need, show } from './dom.js';
 import { gapWords } from './events.js';
+import { FilesTab } from './files-tab.js';
 import { MapTab } from './map-tab.js';
 import { notices } from './notice.js';
 import { Page } from './page.js';
@@ -45,6 +46,7 @@ const page = new Page(store, arming, say);
 
 const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
 const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null);
+const files = new FilesTab(need(monitor, '[data-panel="files"]'), store, say, () => page.isMonitorShown && tabs.shows('files') && screens.open === null);
 const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
 const screens = new Screens(monitor, store, front);
 const tabs = new Tabs(monitor, front);
@@ -76,6 +78,7 @@ function front() {
   queueMicrotask(() => {
     scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null);
     map.look();
+    files.look();
     settings.look();
   });
 }

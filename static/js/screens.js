@@ -11,7 +11,6 @@ import { field, html, listen, need, setText, show, words } from './dom.js';
 
 // Each is fetched when it is first opened: a page that begins has enough to load.
 const SCREENS = /** @type {Record<string, {title: string, load: () => Promise<Mount>}>} */ ({
-  saved: { title: 'Saved data', load: async () => still(['Nothing is recorded yet: this version has no recorder.', 'What you see now is not kept.']) },
   log: { title: 'Alarm log', load: async () => (await import('./log.js')).mount },
   signals: { title: 'Signals', load: async () => (await import('./signals.js')).mount },
   license: { title: 'License', load: async () => (await import('./about.js')).mountLicense },
@@ -49,6 +48,7 @@ export class Screens {
         closeSheet(this.menu);
         const name = key.dataset['screen'] ?? null;
         if (name === 'preferences') openPreferences();
+        else if (name === 'saved') this.#tab('files');
         else this.show(name);
       })),
     ];
@@ -65,6 +65,16 @@ export class Screens {
     else {
       history[this.open ? 'replaceState' : 'pushState']({ screen: name }, '');
       this.#set(name);
+    }
+  }
+
+  /** From wherever the menu was opened to a tab. @param {string} tab */
+  #tab(tab) {
+    const go = () => { location.hash = `#${tab}`; };
+    if (this.open === null) go();
+    else {
+      window.addEventListener('popstate', go, { once: true });
+      this.show(null);
     }
   }
 

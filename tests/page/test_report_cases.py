@@ -1,7 +1,7 @@
 """The cases of the design report, 7.5 and 7.6, that no other file drives: each named by its number.
 
 Elsewhere: 3 and 12–14 in test_chain.py, 5 in test_scan.py, 7 in test_phone.py, 11 in test_connect.py, 17–18 in
-test_alarms.py, 7.6.1 in test_tabs.py.
+test_alarms.py, 7.6.1 in test_tabs.py, 7.6.2 in test_files.py.
 """
 
 from __future__ import annotations

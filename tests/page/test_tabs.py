@@ -90,14 +90,6 @@ async def test_keys_links_and_memory(phone: Phone, watch: Process) -> None:
     await in_front(phone, "files")
 
 
-@pytest.mark.parametrize("tab", ["files"])
-async def test_what_is_not_built_yet_says_so(phone: Phone, watch: Process, tab: str) -> None:
-    await phone.open(f"{watch.address}/#{tab}")
-    await phone.live()
-    await expect(phone.page.locator(f"#panel-{tab} h2")).to_have_text(tab.capitalize())
-    await expect(phone.page.locator(f"#panel-{tab}")).to_contain_text("yet")
-
-
 async def test_ui_report_fig_3_9_the_overflow_menu(phone: Phone, watch: Process) -> None:
     await phone.open(watch.address)
     await phone.live()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,9 @@ NORTH_M = 111_000.0  # of one degree of latitude, near enough
 Alarm = tuple[float, str]  # seconds since the beginning, priority
 
 
-def _known(book: TypeBook, type: str) -> Schema:
-    found = book.schema(type)
+@cache
+def _known(type: str) -> Schema:
+    found = TypeBook(1).schema(type)
     assert found is not None
     assert found.encode is not None
     return found
@@ -38,10 +40,9 @@ def record(
     **metadata: str,
 ) -> Path:
     """A drive at a steady speed, north at first and then ever more to the right; `at` None: without a position."""
-    book = TypeBook(1)
     told = {"vehicle": path.parent.name, "session": "5e55", "part": "1", "started_ms": str(began_ms)} | metadata
     file = PartFile(path, profile="ros1", metadata=told)
-    fix, vel = _known(book, "sensor_msgs/NavSatFix"), _known(book, "geometry_msgs/Twist")
+    fix, vel = _known("sensor_msgs/NavSatFix"), _known("geometry_msgs/Twist")
     east_m = north_m = heading = 0.0
     events = list(alarms)
     for n in range(round(seconds * 10) + 1):
@@ -62,11 +63,13 @@ def record(
             _, priority = events.pop(0)
             _event(file, at_ns, raised(n, priority, at_ns))
             _event(file, at_ns, raised(n, priority, at_ns) | {"change": "cleared"})
-        file.flush()
+        if n % 10 == 9:
+            file.flush()
+    file.flush()
     if not is_closed:
         file.abandon()
         return path
-    return file.close(ended="closed")
+    return file.close(ended=metadata.get("ended", "closed"))
 
 
 def raised(n: int, priority: str, at_ns: int) -> dict[str, Any]:

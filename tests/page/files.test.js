@@ -1,0 +1,83 @@
+// How recordings read in the list.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import {
+  alarmWords, choiceOf, countsOf, distanceWords, factWords, lengthWords, nameOf, originWords, pointsOf, queryOf, sizeWords, tagsOf, warningWords, whenWords,
+} from '../../static/js/files-layout.js';
+
+const NOW = new Date(2026, 10, 21, 15, 0).getTime();
+const row = (more = {}) => /** @type {import('../../static/js/files-layout.js').Recording} */ ({
+  id: 'car_1', vehicle: 'car', session: null, part: 1, started_ms: NOW - 3_600_000, length_s: 512.4, size_bytes: 38_000_000, distance_m: 1302, top_speed_mps: 12.64,
+  alarms: { critical: 2, warning: 1, advisory: 0 }, title: '', note: '', tags: [], state: 'read', problem: null, damage: [], ended: 'closed', ended_why: null,
+  is_clip: false, file: 'car_1.mcap', format: 'mcap', sketch: null, trashed_ms: null, ...more,
+});
+
+test('a time is that of this phone, and a day is named as people do', () => {
+  const at = (/** @type {number[]} */ ...parts) => whenWords(new Date(.../** @type {[number, number]} */ (/** @type {unknown} */ (parts))).getTime(), NOW);
+  assert.equal(at(2026, 10, 21, 0, 0), 'Today 00:00');
+  assert.equal(at(2026, 10, 20, 23, 59), 'Yesterday 23:59');
+  assert.equal(at(2026, 10, 19, 14, 5), '19 Nov 14:05');
+  assert.equal(at(2025, 11, 31, 9, 7), '31 Dec 2025 09:07');
+  assert.equal(whenWords(new Date(2026, 0, 1, 8, 0).getTime(), new Date(2026, 0, 2, 0, 1).getTime()), 'Yesterday 08:00');
+  assert.equal(whenWords(NaN, NOW), '–');
+});
+
+test('sizes have three figures at most and a unit that fits', () => {
+  const cases = /** @type {[number | null, string][]} */ ([
+    [0, '0 B'], [-5, '0 B'], [940, '940 B'], [1500, '1.5 kB'], [18_400, '18 kB'], [999_400, '999 kB'], [999_600, '1.0 MB'], [18_600_000, '18.6 MB'], [138_000_000, '138 MB'],
+    [1_900_000_000, '1.9 GB'], [41_000_000_000, '41.0 GB'], [2_500_000_000_000, '2.5 TB'], [null, '–'],
+  ]);
+  for (const [bytes, words] of cases) assert.equal(sizeWords(bytes), words);
+});
+
+test('lengths and distances', () => {
+  assert.equal(lengthWords(252), '04:12 min');
+  assert.equal(lengthWords(3725), '1:02:05 h');
+  assert.equal(lengthWords(0), '00:00 min');
+  assert.equal(lengthWords(null), '–');
+  assert.equal(distanceWords(75.7), '76 m');
+  assert.equal(distanceWords(1302), '1.3 km');
+});
+
+test('no alarms is not the same as no alarms recorded', () => {
+  assert.equal(alarmWords(row().alarms), '2 critical alarms, 1 warning');
+  assert.equal(alarmWords({ critical: 0, warning: 0, advisory: 2 }), '2 advisories');
+  assert.equal(alarmWords({ critical: 0, warning: 0, advisory: 0 }), 'no alarms');
+  assert.equal(alarmWords(null), 'alarms not recorded');
+  assert.deepEqual(countsOf(null), []);
+});
+
+test('what a recording is called, and what stands beneath', () => {
+  assert.equal(nameOf(row(), NOW), 'Today 14:00');
+  assert.equal(originWords(row(), NOW), 'car');
+  assert.equal(nameOf(row({ title: 'Wet lot' }), NOW), 'Wet lot');
+  assert.equal(originWords(row({ title: 'Wet lot', part: 2, ended: 'recovered', is_clip: true }), NOW), 'Today 14:00 · car · clip · part 2 · recovered');
+  assert.equal(originWords(row({ format: 'bag', vehicle: '', damage: ['x'] }), NOW), 'ROS 1 bag · damaged');
+  assert.equal(originWords(row({ trashed_ms: NOW - 60_000 }), NOW), 'car · deleted Today 14:59');
+});
+
+test('the facts in one sentence, and what is unknown as unknown', () => {
+  assert.equal(factWords(row()), '08:32 min, 38.0 MB, 1.3 km, up to 12.6 m/s, 2 critical alarms, 1 warning.');
+  assert.equal(factWords(row({ distance_m: null, top_speed_mps: null, alarms: null })), '08:32 min, 38.0 MB, no position, alarms not recorded.');
+  assert.equal(factWords(row({ state: 'waiting', length_s: null })), '38.0 MB, being read now.');
+  assert.equal(factWords(row({ state: 'unreadable', problem: 'x.mcap is empty.' })), '38.0 MB. x.mcap is empty.');
+  assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'the server was killed.', damage: ['A part is lost.'] })), ['Recovered: the server was killed.', 'A part is lost.']);
+  assert.deepEqual(warningWords(row()), []);
+});
+
+test('what is asked of the server', () => {
+  const query = (/** @type {string} */ choice, text = '') => Object.fromEntries(new URLSearchParams(queryOf({ text, choice: choiceOf(choice), limit: 50 }, NOW)));
+  assert.deepEqual(query('all', '  wet  '), { limit: '50', text: 'wet' });
+  assert.deepEqual(query('vehicle:a:b&c'), { limit: '50', vehicle: 'a:b&c' });
+  assert.deepEqual(query('tag:lot 3'), { limit: '50', tag: 'lot 3' });
+  assert.deepEqual(query('days:1'), { limit: '50', since_ms: String(new Date(2026, 10, 21).getTime()) });
+  assert.deepEqual(query('nonsense'), { limit: '50' });
+});
+
+test('tags as they are typed, points as they are drawn', () => {
+  assert.deepEqual(tagsOf(' wet, lot 3;;\nnight ,'), ['wet', 'lot 3', 'night']);
+  assert.deepEqual(tagsOf(''), []);
+  assert.equal(pointsOf([1, 2.5, 3, 4]), '1,2.5 3,4');
+});

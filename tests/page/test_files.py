@@ -1,0 +1,338 @@
+"""The Files tab: what was recorded is listed, opened by a press, called by names, fetched, deleted and taken back."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import AsyncIterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from axe_playwright_python.async_playwright import Axe
+from playwright.async_api import Locator, expect
+
+from server.recording import remarks
+from server.recording.remarks import Remarks
+from tests.page.conftest import Phone
+from tests.page.drives import steady
+from tests.page.processes import Process, replay, running, server
+from tests.page.test_barriers import HANGS_OVER, TOO_SMALL
+from tests.server.recording.made import BEGAN_MS, record
+
+HOUR_MS = 3_600_000
+HOSTILE = "<img src=x onerror=alert(1)> \u05d0\u05d1 & “lot”"
+SIZES = [(320, 640), (412, 915), (640, 400), (1280, 800)]
+
+
+def name_of(n: int) -> str:
+    """The file's name of the n-th drive, an hour after the one before."""
+    return f"car_{datetime.fromtimestamp((BEGAN_MS + n * HOUR_MS) / 1000, UTC).strftime('%Y%m%dT%H%M%SZ')}"
+
+
+def fill(data: Path) -> None:
+    folder = data / "recordings" / "car"
+    for n in range(5):
+        record(folder / f"{name_of(n)}.mcap", seconds=8.0, began_ms=BEGAN_MS + n * HOUR_MS)
+    loud = record(
+        folder / f"{name_of(5)}.mcap", seconds=30.0, began_ms=BEGAN_MS + 5 * HOUR_MS, ended="recovered",
+        alarms=[(5.0, "warning"), (9.0, "critical"), (20.0, "critical")],
+    )  # fmt: skip
+    remarks.write(loud, Remarks(title=HOSTILE, note="two\nlines", tags=("wet",)))
+    record(folder / f"{name_of(6)}.mcap", seconds=8.0, began_ms=BEGAN_MS + 6 * HOUR_MS, at=None)
+    (folder / "notes.mcap").write_text("hello")
+
+
+@pytest_asyncio.fixture(loop_scope="module", scope="module")
+async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Process]:
+    """A server with eight recordings that watches a calm car."""
+    folder = tmp_path_factory.mktemp("files")
+    fill(folder / "data")
+    calm = steady(folder / "calm.bag", 3.0)
+    async with running(*replay(calm)) as car, running(*server(folder / "data", car.address)) as process:
+        yield process
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def opened(phone: Phone, watch: Process) -> Phone:
+    """The Files tab with all that is to be seen in it."""
+    await phone.open(f"{watch.address}/#files")
+    await phone.live()
+    await expect(row(phone, name_of(5))).to_have_attribute("data-state", "read", timeout=20_000)
+    await expect(row(phone, name_of(0))).to_have_attribute("data-state", "read", timeout=20_000)
+    return phone
+
+
+def row(phone: Phone, id: str) -> Locator:
+    return phone.page.locator(f'#panel-files [data-f=recordings] [data-id="{id}"]')
+
+
+def sheet(phone: Phone) -> Locator:
+    return phone.page.locator("#sheet-file")
+
+
+async def press_long(phone: Phone, where: Locator) -> None:
+    """A finger that rests, as the browser gets it from a touch screen."""
+    box = await where.bounding_box()
+    assert box is not None
+    point = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
+    cdp = await phone.page.context.new_cdp_session(phone.page)
+    await cdp.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [point]})
+    await asyncio.sleep(0.8)
+    await cdp.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    await cdp.detach()
+
+
+@pytest.mark.parametrize("how", ["press", "long press", "right button", "three dots", "keyboard"])
+async def test_case_7_6_2_pressing_a_file_opens_its_context_menu(opened: Phone, how: str) -> None:
+    item = row(opened, name_of(5))
+    await item.scroll_into_view_if_needed()
+    if how == "press":
+        await item.locator(".t").tap()
+    elif how == "long press":
+        await press_long(opened, item.locator(".t"))
+    elif how == "right button":
+        await item.click(button="right")
+    elif how == "three dots":
+        await item.get_by_role("button").tap()
+    else:
+        await item.get_by_role("button").focus()
+        await opened.page.keyboard.press("Enter")
+    await expect(sheet(opened)).to_be_visible()
+    await expect(sheet(opened).locator("h2")).to_have_text(HOSTILE)
+    items = await sheet(opened).locator(".menu-list li").all_inner_texts()
+    assert [re.sub(r"\n.*", "", one) for one in items] == [
+        "Open replay", "Share", "E-mail", "Download", "Cut out an incident", "Rename", "Note and tags", "Delete",
+    ]  # fmt: skip
+    about = sheet(opened).locator(".bd")
+    await expect(about).to_contain_text("00:30 min")
+    await expect(about).to_contain_text("2 critical alarms, 1 warning")
+    await expect(about).to_contain_text("Recovered")
+    await expect(about).to_contain_text("wet")
+    await opened.page.keyboard.press("Escape")
+    await expect(sheet(opened)).to_be_hidden()
+    if how == "keyboard":
+        await expect(item.get_by_role("button")).to_be_focused()
+
+
+async def test_a_scroll_is_no_press(opened: Phone) -> None:
+    cdp = await opened.page.context.new_cdp_session(opened.page)
+    for step in range(12):
+        kind = "touchStart" if step == 0 else "touchMove"
+        point = {"x": 200, "y": 600 - 25 * step}
+        await cdp.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [point]})
+        await asyncio.sleep(0.06)
+    await cdp.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    await opened.page.wait_for_function("() => document.querySelector('#panel-files').scrollTop > 50")
+    await expect(sheet(opened)).to_be_hidden()
+
+
+async def test_a_row_says_what_was_driven_and_what_was_wrong(opened: Phone) -> None:
+    loud, none, broken = row(opened, name_of(5)), row(opened, name_of(6)), row(opened, "notes-")
+    broken = opened.page.locator("#panel-files [data-state=unreadable]")
+    await expect(loud.locator("svg.thumb .al")).to_have_count(2)
+    await expect(loud.locator("svg.thumb .aw")).to_have_count(1)
+    await expect(loud).to_contain_text("recovered")
+    assert "2 critical alarms" in await loud.inner_text()
+    await expect(none.locator(".thumb")).to_have_text("no position")
+    await expect(none).to_contain_text("no alarms")
+    await expect(broken).to_contain_text("notes.mcap is no recording: it is a text file.")
+    await broken.get_by_role("button").tap()
+    actions = await sheet(opened).locator(".menu-list li").all_inner_texts()
+    assert not {"Open replay", "E-mail", "Cut out an incident"} & set(actions)
+    assert await opened.page.evaluate("document.querySelectorAll('#panel-files img').length") == 0
+
+
+async def test_the_menu_leads_here(opened: Phone) -> None:
+    await opened.page.evaluate("location.hash = '#home'")
+    await expect(opened.page.locator("#tab-home")).to_have_attribute("aria-selected", "true")
+    for first in (None, "Signals"):
+        if first:
+            await opened.f("menu").tap()
+            await opened.page.locator("#sheet-menu").get_by_text(first).tap()
+            await expect(opened.f("title")).to_have_text(first)
+        await opened.f("menu").tap()
+        await opened.page.locator("#sheet-menu").get_by_text("View saved data").tap()
+        await expect(opened.page.locator("#tab-files")).to_have_attribute("aria-selected", "true")
+        await expect(row(opened, name_of(5))).to_be_in_viewport()
+        await expect(opened.f("screen")).to_be_hidden()
+        await opened.page.evaluate("location.hash = '#map'")
+        await expect(opened.page.locator("#tab-map")).to_have_attribute("aria-selected", "true")
+
+
+async def test_a_name_a_note_and_tags_are_kept_and_found(opened: Phone) -> None:
+    item = row(opened, name_of(3))
+    await item.get_by_role("button").tap()
+    await sheet(opened).get_by_text("Rename").tap()
+    await opened.page.locator("#file-name").fill("Gate 4, night")
+    await opened.page.keyboard.press("Enter")
+    await expect(sheet(opened)).to_be_hidden()
+    await expect(item.locator(".t")).to_have_text("Gate 4, night")
+    await item.get_by_role("button").tap()
+    await sheet(opened).get_by_text("Note and tags").tap()
+    await opened.page.locator("#file-note").fill("Fog.\nLights on.")
+    await opened.page.locator("#file-tags").fill("fog, " + "x" * 41)
+    await sheet(opened).get_by_role("button", name="Save").tap()
+    await expect(sheet(opened).get_by_role("alert")).to_have_text(
+        "Not saved. A tag has at most 40 letters; this has 41."
+    )
+    assert [said for said in opened.complaints if "422" not in said] == []
+    opened.complaints.clear()
+    await opened.page.locator("#file-tags").fill("fog, night")
+    await sheet(opened).get_by_role("button", name="Save").tap()
+    await expect(item.locator(".chip")).to_have_text(["fog", "night"])
+    rows = opened.page.locator("#panel-files [data-f=recordings] .file")
+    await opened.page.get_by_label("Search the recordings").fill("LIGHTS on")
+    await expect(rows).to_have_count(1)
+    await opened.page.get_by_label("Search the recordings").fill("no such words")
+    await expect(opened.page.locator("#panel-files .empty")).to_contain_text("Nothing found")
+    await opened.page.get_by_label("Search the recordings").fill("")
+    await opened.page.get_by_label("Which recordings").select_option(label="fog")
+    await expect(rows).to_have_count(1)
+    await expect(rows.first.locator(".t")).to_have_text("Gate 4, night")
+    await opened.page.get_by_label("Which recordings").select_option(label="All")
+    await expect(rows).to_have_count(8)
+
+
+async def test_delete_asks_and_can_be_taken_back_at_once_and_later(opened: Phone) -> None:
+    item = row(opened, name_of(2))
+    head = opened.page.locator("#panel-files .sec")
+    await expect(head).to_contain_text(re.compile(r"8 recordings, \d.*free"))
+    for again in (False, True):
+        await item.get_by_role("button").tap()
+        await sheet(opened).get_by_text("Delete", exact=False).last.tap()
+        await expect(sheet(opened)).to_contain_text("can be taken back")
+        if again:
+            await sheet(opened).get_by_role("button", name="Keep it").tap()
+            await expect(sheet(opened)).to_be_hidden()
+            await expect(item).to_be_visible()
+            await item.get_by_role("button").tap()
+            await sheet(opened).locator(".menu-list li").last.tap()
+        await sheet(opened).get_by_role("button", name="Delete").tap()
+        await expect(item).to_have_count(0)
+        await expect(head).to_contain_text("7 recordings")
+        if not again:
+            await opened.page.locator(".snack.note").get_by_role("button", name="Undo").tap()
+            await expect(item).to_have_count(1)
+    await opened.f("files-trash", "#panel-files").tap()
+    await expect(head).to_contain_text("Trash: 1 recording")
+    await expect(item).to_contain_text("deleted")
+    await item.get_by_role("button").tap()
+    await sheet(opened).get_by_text("Take it back").tap()
+    await expect(opened.page.locator("#panel-files .empty")).to_contain_text("The trash is empty")
+    await opened.f("files-back", "#panel-files").tap()
+    await expect(item).to_have_count(1)
+
+
+async def test_the_trash_is_emptied_only_after_a_question(opened: Phone, watch: Process) -> None:
+    answer = await opened.page.request.delete(f"{watch.address}/api/recordings/{name_of(1)}")
+    assert answer.ok
+    await opened.page.reload()
+    await opened.f("files-trash", "#panel-files").tap()
+    await opened.f("files-empty", "#panel-files").tap()
+    await expect(sheet(opened)).to_contain_text("1 recording is deleted for good")
+    await sheet(opened).get_by_role("button", name="Keep").tap()
+    await expect(row(opened, name_of(1))).to_be_visible()
+    await opened.f("files-empty", "#panel-files").tap()
+    await sheet(opened).get_by_role("button", name="Empty the trash").tap()
+    await expect(opened.page.locator("#panel-files .empty")).to_contain_text("The trash is empty")
+    assert (await (await opened.page.request.get(f"{watch.address}/api/trash")).json())["recordings"] == []
+
+
+async def test_the_file_itself_is_saved(opened: Phone, tmp_path: Path) -> None:
+    await row(opened, name_of(5)).get_by_role("button").tap()
+    await sheet(opened).get_by_text("Download").tap()
+    async with opened.page.expect_download() as coming:
+        await sheet(opened).get_by_role("link", name="MCAP").tap()
+    saved = await coming.value
+    assert saved.suggested_filename.startswith(f"{name_of(5)} _img src=x onerror=alert(1)_")
+    await saved.save_as(tmp_path / "it.mcap")
+    assert (tmp_path / "it.mcap").read_bytes().startswith(b"\x89MCAP0\r\n")
+    await expect(sheet(opened)).to_be_hidden()
+
+
+async def test_a_phone_that_shares_no_files_shares_a_link(opened: Phone) -> None:
+    await opened.page.evaluate(
+        """() => {
+          window.shared = [];
+          navigator.canShare = () => false;
+          navigator.share = async (what) => { window.shared.push(what); };
+        }"""
+    )
+    await row(opened, name_of(5)).get_by_role("button").tap()
+    await sheet(opened).get_by_text("Share", exact=True).tap()
+    await expect(sheet(opened)).to_contain_text("a link is shared instead")
+    await sheet(opened).get_by_role("button", name="Share the link").tap()
+    await expect(sheet(opened)).to_be_hidden()
+    (shared,) = await opened.page.evaluate("window.shared")
+    assert shared["url"].endswith(f"/api/recordings/{name_of(5)}/file.mcap")
+
+
+async def test_a_phone_that_shares_files_is_handed_the_file(opened: Phone) -> None:
+    await opened.page.evaluate(
+        """() => {
+          window.shared = [];
+          navigator.canShare = () => true;
+          navigator.share = async ({ files }) => { window.shared.push([files[0].name, files[0].size]); };
+        }"""
+    )
+    await row(opened, name_of(5)).get_by_role("button").tap()
+    await sheet(opened).get_by_text("Share", exact=True).tap()
+    await sheet(opened).get_by_role("button", name="Share the file").tap()
+    ((name, size),) = await opened.page.evaluate("window.shared")
+    assert name == f"{name_of(5)}.mcap"
+    assert size > 1000
+
+
+async def test_a_silent_server_is_said_and_the_list_is_not_passed_off_as_new(opened: Phone, watch: Process) -> None:
+    watch.freeze()
+    try:
+        await expect(opened.f("files-state", "#panel-files")).to_contain_text(
+            "The server does not answer", timeout=12_000
+        )
+    finally:
+        watch.thaw()
+    await expect(opened.f("files-state", "#panel-files")).to_be_empty(timeout=20_000)
+
+
+async def test_no_barrier_in_the_list_or_any_sheet(opened: Phone) -> None:
+    async def look(where: str) -> None:
+        for theme in ("dark", "light"):
+            await opened.page.emulate_media(color_scheme=theme, reduced_motion="reduce")
+            await opened.page.wait_for_timeout(150)
+            found = (await Axe().run(opened.page)).response["violations"]
+            assert [(one["id"], one["nodes"][0]["html"]) for one in found] == [], f"{where}, {theme}"
+
+    await look("list")
+    assert await opened.page.evaluate(TOO_SMALL) == []
+    button = row(opened, name_of(5)).get_by_role("button")
+    await button.tap()
+    await look("actions")
+    for action in ("Download", "Cut out an incident", "Rename", "Note and tags", "Delete"):
+        await sheet(opened).locator(".menu-list li", has_text=action).tap()
+        await expect(sheet(opened).locator("h2")).to_contain_text(re.compile(action.split()[0]))
+        await look(action)
+        await opened.page.keyboard.press("Escape")
+        await expect(sheet(opened)).to_be_hidden()
+        await button.tap()
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+async def test_nothing_hangs_over_the_edge(opened: Phone, size: tuple[int, int]) -> None:
+    await opened.page.set_viewport_size({"width": size[0], "height": size[1]})
+    await opened.page.evaluate("location.hash = '#home'; location.hash = '#files'")
+    await expect(row(opened, name_of(5))).to_be_visible()
+    await opened.page.wait_for_timeout(600)
+    assert await opened.page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    assert await opened.page.evaluate(HANGS_OVER) == []
+    await row(opened, name_of(5)).get_by_role("button").tap()
+    box = await sheet(opened).bounding_box()
+    close = await sheet(opened).get_by_role("button", name="Close").bounding_box()
+    assert box is not None
+    assert close is not None
+    assert box["y"] >= 0
+    assert close["y"] + close["height"] <= size[1]
+    items: Any = await sheet(opened).locator(".menu-list li").first.bounding_box()
+    assert items["height"] >= 56
