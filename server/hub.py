@@ -194,12 +194,18 @@ class Page:
             case _:
                 self._reply(identity, await self._seat.ask(order))
 
-    async def _open(self, identity: str, order: orders.Open) -> None:
+    async def _open(self, identity: str | None, order: orders.Open) -> None:
+        """`identity` None: it was asked for by the address, and only a refusal is answered."""
         try:
             await self._seat.open(order)
-            self._reply(identity, {"ok": True})
+            if identity is not None:
+                self._reply(identity, {"ok": True})
         except NoReplay as why:
-            self._reply(identity, {"ok": False, "reason": str(why)})
+            if identity is not None:
+                self._reply(identity, {"ok": False, "reason": str(why)})
+            else:
+                self._replies.append({"kind": "replay", "ended": str(why)})
+                self._wake.set()
 
     def _identity(self, message: Mapping[str, Any]) -> str | None:
         identity = message.get("id")
@@ -228,10 +234,7 @@ class Page:
         try:
             await self._send(self._hello)
             if self._begins_with is not None:
-                try:
-                    await self._seat.open(self._begins_with)
-                except NoReplay as why:
-                    await self._send({"kind": "replay", "ended": str(why)})
+                self._opening = asyncio.create_task(self._open(None, self._begins_with), name="open a replay")
             with contextlib.suppress(NotServed):
                 await self._bus.request(self._vehicle, {"kind": "refresh"})  # nobody may have looked for a while
             await self._send_newest("state", unasked=True)

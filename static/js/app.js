@@ -90,7 +90,7 @@ function draw() {
 
 function speak() {
   const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
-  voice.say(soundOf(store.frame, { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
+  voice.say(soundOf(store.heeded, { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
 }
 
 store.on('draw', draw);
@@ -103,6 +103,13 @@ listen(document, 'keydown', () => { document.documentElement.dataset['keys'] = '
 listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
 listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
 
+// A link may lead to a moment of a recording.
+const asked = new URLSearchParams(location.search);
+const recording = asked.get('replay');
+const unasked = store.on('open', () => {
+  unasked();
+  if (recording) import('./replay.js').then(({ openReplay }) => openReplay(recording, store, say, Number(asked.get('t')) || 0)).catch(() => say('What shows a recording could not be fetched.', 'Not replayed'));
+});
 store.start();
 draw();
 // The screens an operator may want when the server is gone are fetched while it is there, once the page has begun.

@@ -205,10 +205,10 @@ export function asideOf(live) {
     const asking = live.alarms.find((alarm) => alarm.priority === 'critical' && alarm.state === 'UNACKED') ?? null;
     return { kind: 'crit', text: `Live: ${live.phase === 'lost' || live.cut === 'server-bridge' ? 'connection lost' : 'the car fell silent'}`, asking };
   }
-  const urgent = live.alarms.filter((alarm) => alarm.priority !== 'advisory' && alarm.state !== 'SHELVED' && (alarm.active || alarm.state === 'UNACKED'));
+  const urgent = live.alarms.filter((alarm) => alarm.priority !== 'advisory' && alarm.state !== 'SHELVED');
   const worst = [...urgent].sort((a, b) => RANK[b.priority] - RANK[a.priority])[0];
   if (!worst) return live.phase === 'monitoring' && live.paused ? { kind: 'warn', text: 'Live: monitoring is paused', asking: null } : null;
   const asking = urgent.find((alarm) => alarm.priority === 'critical' && alarm.state === 'UNACKED') ?? null;
   const more = urgent.length > 1 ? ` (1 of ${urgent.length})` : '';
-  return { kind: worst.priority === 'critical' ? 'crit' : 'warn', text: `Live: ${worst.title}${more}`, asking };
+  return { kind: worst.priority === 'critical' ? 'crit' : 'warn', text: `Live: ${worst.title}${worst.active ? '' : ': over'}${more}`, asking };
 }

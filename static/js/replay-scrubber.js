@@ -34,6 +34,7 @@ export class Scrubber {
     this.store = store;
     this.say = say;
     this.gaps = svg('g', { class: 'gaps' });
+    this.base = svg('path', { class: 'base' });
     this.all = svg('path', { class: 'all' });
     this.past = svg('path', { class: 'past', 'clip-path': 'url(#replay-past)' });
     this.clip = svg('rect', { x: -4, y: 0, height: HEIGHT, width: 0 });
@@ -41,10 +42,10 @@ export class Scrubber {
     this.head = svg('g', { class: 'head' }, svg('path', { class: 'stem', d: `M0 22V${BASE}` }), svg('path', { class: 'knob', d: `M-10 ${HEIGHT}v-6l10-8 10 8v6z` }));
     this.picture = svg('svg', { height: HEIGHT, 'aria-hidden': 'true' },
       svg('defs', {}, svg('clipPath', { id: 'replay-past' }, this.clip)),
-      this.gaps, svg('path', { class: 'base', d: `M0 ${BASE}H4000` }), this.all, this.past, this.marks, this.head);
+      this.gaps, this.base, this.all, this.past, this.marks, this.head);
     this.slider = html('div', { class: 'time-line', role: 'slider', tabindex: 0, 'aria-label': 'Moment of the recording', 'aria-valuemin': 0, 'aria-valuemax': 0, 'aria-valuenow': 0 }, this.picture);
     this.before = html('button', { type: 'button', class: 'key', 'aria-label': 'Previous alarm' }, icon('back'), 'Alarm');
-    this.play = html('button', { type: 'button', class: 'key' }, icon('play'), html('span', {}, 'Play'));
+    this.play = html('button', { type: 'button', class: 'key' }, icon('play', 'fill'), html('span', {}, 'Play'));
     this.rate = /** @type {HTMLSelectElement} */ (html('select', { 'aria-label': 'Pace of the replay', class: 'n' }, ...RATES.map((rate) => html('option', { value: rate }, rateWords(rate)))));
     this.rateKey = html('label', { class: 'key' }, this.rate, html('span', { 'aria-hidden': 'true' }, 'Rate'));
     this.after = html('button', { type: 'button', class: 'key', 'aria-label': 'Next alarm' }, icon('next'), 'Alarm');
@@ -137,6 +138,7 @@ export class Scrubber {
     this.#width = width;
     setAttribute(this.picture, 'viewBox', `0 0 ${width} ${HEIGHT}`);
     setAttribute(this.picture, 'width', width);
+    setAttribute(this.base, 'd', `M0 ${BASE}H${width}`);
     this.#picture();
     if (this.store.frame) this.draw(this.store.frame);
   }

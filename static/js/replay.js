@@ -29,20 +29,16 @@ let current = null;
  */
 export async function openReplay(id, store, say, at_s = 0) {
   await styled();
-  if (store.replaying && !current) {
-    current = new Replay(id, store, say); // the page's address said so: the socket begins with it
-    return true;
-  }
   say('It is read from the disk.', 'Opening the recording');
   const answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
   if (!answer.ok) {
     say(answer.reason ?? 'Refused.', 'Not replayed');
     return false;
   }
-  for (const note of document.querySelectorAll('.snack.note')) note.remove();
   current?.unmount();
-  store.turn(tailOf(id, at_s));
+  store.turn(true);
   current = new Replay(id, store, say);
+  for (const note of document.querySelectorAll('.snack.note')) note.remove();
   return true;
 }
 
@@ -61,18 +57,13 @@ function styled() {
   });
 }
 
-/** @param {string} id @param {number} at_s */
-function tailOf(id, at_s) {
-  return new URLSearchParams({ replay: id, t: at_s.toFixed(2) }).toString();
-}
-
 class Replay {
   #noted_ms = -Infinity;
   #isLeaving = false;
   /** The occurrence of a live alarm that was seen and stayed away from. */
   #seen = '';
   /** How it ran, for a socket that breaks. */
-  #ran = { is_playing: false, rate: 1 };
+  #ran = { is_playing: false, rate: 1, at_s: 0 };
   parts = build();
 
   /**
@@ -122,7 +113,7 @@ class Replay {
       }
     }
     this.unmount();
-    this.store.turn(null);
+    this.store.turn(false);
     const url = new URL(location.href);
     url.searchParams.delete('replay');
     url.searchParams.delete('t');
@@ -148,16 +139,22 @@ class Replay {
     const { replay } = this.store.frame ?? {};
     if (!replay) return;
     setAttribute(this.root, 'data-replay', 'on');
-    this.#ran = { is_playing: replay.is_playing, rate: replay.rate };
+    this.#ran = { is_playing: replay.is_playing, rate: replay.rate, at_s: replay.at_s };
     this.#note();
     this.#aside();
   }
 
-  /** The socket is there again: it came back to the moment, but stands. */
-  #again() {
-    const { is_playing, rate } = this.#ran;
-    if (rate !== 1) void this.store.ask('replay', { do: 'rate', rate });
-    if (is_playing) void this.store.ask('replay', { do: 'play' });
+  /** The socket is there again: back to the moment, and on as it ran. Until then nothing live is shown as recorded. */
+  async #again() {
+    const { is_playing, rate, at_s } = this.#ran;
+    const { store } = this;
+    const answer = await store.ask('replay', { do: 'open', recording: this.id, at_s }, OPENS_MS);
+    if (current !== this || !answer.ok) {
+      if (current === this && store.wire.isOpen) void this.leave(answer.reason ?? 'Refused.');
+      return;
+    }
+    if (rate !== 1) void store.ask('replay', { do: 'rate', rate });
+    if (is_playing) void store.ask('replay', { do: 'play' });
   }
 
   /** @param {any} message */
@@ -169,7 +166,6 @@ class Replay {
   /** The address leads back here. @param {boolean} [isNow] */
   #note(isNow = false) {
     const at_s = this.store.frame?.replay?.at_s ?? 0;
-    this.store.tail = this.store.frame?.replay ? tailOf(this.id, at_s) : this.store.tail;
     if (!isNow && this.store.now() - this.#noted_ms < NOTE_MS) return;
     this.#noted_ms = this.store.now();
     const url = new URL(location.href);

@@ -44,8 +44,6 @@ export class Store {
   log = new EventLog();
   /** The page shows a recording: frames of the live car are none of it, nor the other way round. */
   replaying = false;
-  /** What a new socket is asked for. */
-  tail = '';
   deadMan = new DeadMan();
   /** @type {Set<string>} names of what wants the scan */
   #watchers = new Set();
@@ -149,10 +147,9 @@ export class Store {
     return live ? { ...frame, alarms: live.alarms, session: { ...frame.session, phase: live.phase, paused: live.paused } } : null;
   }
 
-  /** From now on a recording, which a new socket asks for with this tail; null: live again. @param {string | null} tail */
-  turn(tail) {
-    this.replaying = tail !== null;
-    this.tail = tail ?? '';
+  /** From now on a recording, or live again. @param {boolean} isReplay */
+  turn(isReplay) {
+    this.replaying = isReplay;
   }
 
   /** A signal of the newest frame. @param {string} name */
@@ -241,7 +238,7 @@ export class Store {
         break;
       }
       case 'replay':
-        this.turn(null); // it ended, or never began: what comes now is live
+        this.turn(false); // it ended: what comes now is live
         this.#emit('replay', message);
         break;
       case 'timeline':
@@ -267,8 +264,11 @@ export class Store {
 
   /** @param {State} frame */
   #state(frame) {
-    if ((frame.replay !== undefined) !== this.replaying) return; // under way while the page turned
     const now_ms = this.now();
+    if ((frame.replay !== undefined) !== this.replaying) {
+      this.wire.proof(now_ms);
+      return; // under way while the page turned, or while a recording is opened again
+    }
     const delay_ms = this.#clock.note(frame.server.time_ms, now_ms);
     if (!this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service
     this.frame = frame;
