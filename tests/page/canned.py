@@ -25,6 +25,7 @@ from server.settings import SettingsFile
 from server.topics import candidates
 from server.tuning import Tuning
 from server.web.assets import static_dir, templates_dir
+from server.web.pages import parts_of
 
 Json = dict[str, Any]
 TILES = (
@@ -230,13 +231,13 @@ class Canned:
         self.app = FastAPI()
         self._watching = False
         templates = Jinja2Templates(directory=templates_dir())
-        templates.env.globals["asset"] = lambda name: f"/static/{name}"
-        templates.env.globals["modules"] = list
+        asset = templates.env.globals["asset"] = lambda name: f"/static/{name}"
         self.app.mount("/static", StaticFiles(directory=static_dir()))
 
         @self.app.get("/", response_class=HTMLResponse)
         async def page(request: Request) -> HTMLResponse:
-            return templates.TemplateResponse(request, "page.html", {"version": "0.1.0", "vehicle": "car"})
+            parts = parts_of(None, asset)
+            return templates.TemplateResponse(request, "page.html", parts | {"version": "0.1.0", "vehicle": "car"})
 
         @self.app.get("/api/vehicles")
         async def vehicles() -> Json:
