@@ -60,6 +60,9 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
     snapshot = state.snapshot(recording.duration_s + 1.0)
     drawn = sketch(snapshot.track, [(at_s - recording.start_s, event.get("priority", "")) for at_s, event in events])
     counts = Counter(event.get("priority") for _, event in events)
+    started_ms = _whole(metadata.get("started_ms"))
+    if started_ms is None or "clip_of" in metadata:  # a clip may have been asked for from before its drive began
+        started_ms = round(recording.start_s * 1000)
     damage = [_sentence(words, path) for words in (*recording.damage, *broke_off)]
     return {
         "vehicle": _text(metadata.get("vehicle")),
@@ -67,7 +70,7 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "part": _whole(metadata.get("part")),
         "version": _text(metadata.get("version")),
         "ros_version": recording.ros_version,
-        "started_ms": _whole(metadata.get("started_ms")) or round(recording.start_s * 1000),
+        "started_ms": started_ms,
         "length_s": round(recording.duration_s, 3),
         "messages": recording.count,
         "topics": len(recording.topics),

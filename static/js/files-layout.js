@@ -180,3 +180,37 @@ export function pointsOf(line) {
   for (let i = 0; i + 1 < line.length; i += 2) pairs.push(`${line[i]},${line[i + 1]}`);
   return pairs.join(' ');
 }
+
+/**
+ * The recorder as the state tells of it.
+ * @typedef {object} Recorder
+ * @property {string} state off, recording, held, saving or stopped
+ * @property {number | null} for_s
+ * @property {number | null} [part]
+ * @property {number} [bytes]
+ * @property {number} [dropped] messages that were lost because the disk was too slow
+ * @property {string | null} [reason] why it is not recording
+ *
+ * @typedef {{name: string, mark: string, facts: string, isOn: boolean, isBad: boolean, order: boolean | null}} Live order: what a key asks for, true to record; null: no key
+ */
+
+const NAMES = /** @type {Record<string, string>} */ ({ recording: 'Recording now', held: 'Recording held', saving: 'Being saved', stopped: 'Recording stopped', off: 'Not recording' });
+
+/**
+ * What stands above the list of what was recorded: what is recorded now, or why nothing is. Null: nothing is to be said.
+ * @param {Recorder | undefined} recorder
+ * @param {{vehicle: string | null, isMonitoring: boolean, isSilent: boolean}} now
+ * @returns {Live | null}
+ */
+export function liveOf(recorder, { vehicle, isMonitoring, isSilent }) {
+  if (!recorder || (recorder.state === 'off' && !isMonitoring)) return null;
+  const { state, for_s, part, bytes, dropped, reason } = recorder;
+  const isOn = state === 'recording';
+  const facts = [for_s === null || state === 'off' ? '' : lengthWords(for_s), bytes ? sizeWords(bytes) : '', dropped ? `${dropped} messages lost: the disk is too slow` : ''];
+  const mark = isOn ? [vehicle ?? '', (part ?? 1) > 1 ? `part ${part}` : ''] : [reason ?? ''];
+  if (isSilent) return { name: 'Recording?', mark: 'The server does not answer: nobody knows whether it records.', facts: '', isOn: false, isBad: true, order: null };
+  return {
+    name: NAMES[state] ?? state, mark: mark.filter(Boolean).join(' · '), facts: facts.filter(Boolean).join(' · '), isOn, isBad: state === 'stopped' || Boolean(dropped),
+    order: state === 'saving' || !isMonitoring ? null : !(isOn || state === 'held'),
+  };
+}

@@ -1,11 +1,12 @@
 // The Files tab: what was recorded, newest first, what is being recorded now, and the trash.
 
 import { FileSheet } from './files-sheet.js';
+import { FilesLive } from './files-live.js';
 import { choiceOf, sizeWords } from './files-layout.js';
 import { FilesModel, sentenceOf } from './files-model.js';
 import { drawRow } from './files-row.js';
 import { html, icon, listen, setAttribute, setText, setWords, show, words } from './dom.js';
-import { counted, duration, timeOfDay } from './words.js';
+import { counted, timeOfDay } from './words.js';
 
 /** @typedef {import('./files-layout.js').Recording} Recording */
 
@@ -31,7 +32,7 @@ export function mount(panel, store, say, isShown) {
   const count = html('span');
   const free = html('span');
   const state = html('p', { class: 'state', role: 'status', 'data-f': 'files-state' });
-  const live = html('ul', { class: 'list' });
+  const live = new FilesLive(store, say);
   const list = html('ul', { class: 'list', 'data-f': 'recordings', 'aria-label': 'Recordings' });
   const emptyTitle = html('h2');
   const emptyWords = html('p');
@@ -40,7 +41,7 @@ export function mount(panel, store, say, isShown) {
   const trash = html('button', { type: 'button', class: 'key wide', 'data-f': 'files-trash' }, icon('trash'), html('span'));
   const back = html('button', { type: 'button', class: 'key wide', 'data-f': 'files-back' }, icon('back'), html('span', {}, 'Back to the recordings'));
   const clear = html('button', { type: 'button', class: 'key wide', 'data-f': 'files-empty' }, icon('trash'), html('span', {}, 'Empty the trash'));
-  const files = html('div', { class: 'files' }, html('div', { class: 'sec' }, count, free), find, state, live, list, empty, html('div', { class: 'files-foot' }, older, trash, back, clear));
+  const files = html('div', { class: 'files' }, html('div', { class: 'sec' }, count, free), find, state, live.element, list, empty, html('div', { class: 'files-foot' }, older, trash, back, clear));
   panel.replaceChildren(files);
   const style = /** @type {HTMLLinkElement} */ (html('link', { rel: 'stylesheet', href: '/static/css/files.css' }));
   style.onload = style.onerror = () => show(files, true); // not seen before it looks as it should
@@ -68,7 +69,7 @@ export function mount(panel, store, say, isShown) {
   function draw() {
     if (!isShown()) return;
     drawHead();
-    drawLive();
+    live.draw(!model.isTrash && !model.isFiltered);
     drawList();
   }
 
@@ -112,26 +113,6 @@ export function mount(panel, store, say, isShown) {
     }
   }
 
-  /** What is recorded now stands above all others, and counts. */
-  function drawLive() {
-    const told = /** @type {{state: string, for_s: number | null, bytes?: number} | undefined} */ (store.heeded?.recording); // that of now, whatever is replayed
-    const isOn = !model.isTrash && !model.isFiltered && told !== undefined && told.state !== 'off';
-    if (!isOn || !told) {
-      if (live.firstChild) live.replaceChildren();
-      return;
-    }
-    if (!live.firstChild) {
-      live.append(html('li', { class: 'file', 'data-live': '' }, html('span', { class: 'thumb none' }, icon('rec', 'fill')),
-        html('div', { class: 'tx' }, html('div', { class: 't' }), html('div', { class: 'm' }), html('div', { class: 'm' })), html('span')));
-    }
-    const [name, mark, facts] = /** @type {HTMLElement[]} */ ([...live.querySelectorAll('.tx > div')]);
-    if (!name || !mark || !facts) return;
-    const isHeld = told.state === 'held' || store.isSilent;
-    setText(name, 'Recording now');
-    setText(mark, `${store.heeded?.vehicle ?? ''}${isHeld ? ' · held: nothing comes from the car' : ''}`);
-    setWords(facts, [told.for_s === null ? '' : `${duration(told.for_s, true)} ${told.for_s < 3600 ? 'min' : 'h'}`, typeof told.bytes === 'number' ? sizeWords(told.bytes) : ''].filter(Boolean).join(' · '));
-  }
-
   function drawList() {
     const now_ms = Date.now();
     const today = new Date(now_ms).toDateString();
@@ -173,7 +154,7 @@ export function mount(panel, store, say, isShown) {
     store.on('draw', () => {
       if (!isShown()) return;
       look();
-      drawLive();
+      live.draw(!model.isTrash && !model.isFiltered);
       if (store.isSilent || state.textContent) drawHead();
     }),
     listen(search, 'input', () => {
@@ -200,6 +181,7 @@ export function mount(panel, store, say, isShown) {
     stop: () => {
       clearTimeout(typing);
       for (const stop of stops) stop();
+      live.stop();
       sheet.stop();
       panel.replaceChildren();
     },

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import {
-  alarmWords, choiceOf, countsOf, distanceWords, factWords, lengthWords, nameOf, originWords, pointsOf, queryOf, sizeWords, tagsOf, warningWords, whenWords,
+  alarmWords, choiceOf, countsOf, distanceWords, factWords, lengthWords, liveOf, nameOf, originWords, pointsOf, queryOf, sizeWords, tagsOf, warningWords, whenWords,
 } from '../../static/js/files-layout.js';
 
 const NOW = new Date(2026, 10, 21, 15, 0).getTime();
@@ -80,4 +80,23 @@ test('tags as they are typed, points as they are drawn', () => {
   assert.deepEqual(tagsOf(' wet, lot 3;;\nnight ,'), ['wet', 'lot 3', 'night']);
   assert.deepEqual(tagsOf(''), []);
   assert.equal(pointsOf([1, 2.5, 3, 4]), '1,2.5 3,4');
+});
+
+test('what is recorded now, and why nothing is', () => {
+  const now = { vehicle: 'car', isMonitoring: true, isSilent: false };
+  const on = { state: 'recording', for_s: 252, part: 1, bytes: 18_600_000, dropped: 0, reason: null };
+  assert.deepEqual(liveOf(on, now), { name: 'Recording now', mark: 'car', facts: '04:12 min · 18.6 MB', isOn: true, isBad: false, order: false });
+  assert.equal(liveOf({ ...on, part: 2 }, now)?.mark, 'car · part 2');
+  assert.equal(liveOf({ ...on, dropped: 7 }, now)?.facts, '04:12 min · 18.6 MB · 7 messages lost: the disk is too slow');
+  assert.equal(liveOf({ ...on, dropped: 7 }, now)?.isBad, true);
+  const held = liveOf({ ...on, state: 'held', reason: 'The link is lost.' }, now);
+  assert.deepEqual([held?.name, held?.mark, held?.isOn, held?.order], ['Recording held', 'The link is lost.', false, false]);
+  const stopped = liveOf({ ...on, state: 'stopped', reason: 'The disk is full.' }, now);
+  assert.deepEqual([stopped?.name, stopped?.mark, stopped?.isBad, stopped?.order], ['Recording stopped', 'The disk is full.', true, true]);
+  assert.equal(liveOf({ ...on, state: 'saving' }, now)?.order, null);
+  const off = { state: 'off', for_s: null, reason: 'Recording begins by hand: a setting.' };
+  assert.deepEqual([liveOf(off, now)?.name, liveOf(off, now)?.order, liveOf(off, now)?.facts], ['Not recording', true, '']);
+  assert.equal(liveOf(off, { ...now, isMonitoring: false }), null);
+  assert.equal(liveOf(undefined, now), null);
+  assert.equal(liveOf(on, { ...now, isSilent: true })?.isOn, false, 'nobody knows');
 });

@@ -253,6 +253,54 @@ async def test_the_file_itself_is_saved(opened: Phone, tmp_path: Path) -> None:
     await expect(sheet(opened)).to_be_hidden()
 
 
+async def test_another_form_is_made_while_one_waits_and_can_be_cancelled(opened: Phone, tmp_path: Path) -> None:
+    await row(opened, name_of(5)).get_by_role("button").tap()
+    await sheet(opened).get_by_text("Download").tap()
+    await sheet(opened).get_by_role("button", name="HTML report").tap()
+    await expect(sheet(opened).get_by_role("progressbar")).to_be_visible()
+    await sheet(opened).get_by_role("button", name="Cancel").tap()
+    await expect(sheet(opened).get_by_role("button", name="GPX track")).to_be_visible()
+    async with opened.page.expect_download(timeout=40_000) as coming:
+        await sheet(opened).get_by_role("button", name="GPX track").tap()
+    await (await coming.value).save_as(tmp_path / "it.gpx")
+    assert "<trkpt" in (tmp_path / "it.gpx").read_text()
+    await expect(sheet(opened)).to_contain_text("It is made.")
+    await expect(sheet(opened).get_by_role("button", name="Save again")).to_be_visible()
+
+
+async def test_an_incident_becomes_a_recording_of_its_own(opened: Phone) -> None:
+    await row(opened, name_of(5)).get_by_role("button").tap()
+    await sheet(opened).get_by_text("Cut out an incident").tap()
+    alarms = sheet(opened).locator(".menu-list li")
+    await expect(alarms).to_have_count(3)
+    await expect(alarms.first).to_contain_text("A warning alarm")
+    await alarms.nth(1).get_by_role("button").tap()
+    clip = opened.page.locator("#panel-files [data-f=recordings] .file", has_text="clip")
+    await expect(clip).to_have_count(1, timeout=40_000)
+    await expect(clip).to_have_attribute("data-state", "read", timeout=40_000)
+    await expect(clip).to_contain_text("00:30 min")  # all of it lies within 30 s of the alarm
+
+
+async def test_open_replay_shows_it(opened: Phone) -> None:
+    await row(opened, name_of(5)).get_by_role("button").tap()
+    await sheet(opened).get_by_text("Open replay").tap()
+    await expect(opened.page.locator('[data-replay="on"]')).to_have_count(1, timeout=20_000)
+    await expect(sheet(opened)).to_be_hidden()
+
+
+async def test_what_is_recorded_now_stands_on_top_counts_and_is_ended_by_hand(opened: Phone) -> None:
+    live = opened.page.locator("#panel-files [data-live]")
+    await expect(live).to_contain_text("Recording now")
+    first = await live.inner_text()
+    await expect(live).not_to_have_text(first)
+    await live.get_by_role("button", name="End the recording").tap()
+    await expect(live).to_contain_text("Not recording", timeout=15_000)
+    newest = opened.page.locator("#panel-files [data-f=recordings] .file").first
+    await expect(newest).to_contain_text("Today", timeout=15_000)
+    await live.get_by_role("button", name="Record").tap()
+    await expect(live).to_contain_text("Recording now")
+
+
 async def test_a_phone_that_shares_no_files_shares_a_link(opened: Phone) -> None:
     await opened.page.evaluate(
         """() => {

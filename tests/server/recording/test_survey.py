@@ -57,9 +57,10 @@ def test_without_a_position_nothing_is_drawn_and_nothing_is_driven(tmp_path: Pat
 
 
 def test_a_clip_is_told_as_one(tmp_path: Path) -> None:
-    found = survey(record(tmp_path / "car" / "car_1_clip.mcap", clip_of="car_1"))
+    found = survey(record(tmp_path / "car" / "car_1_clip.mcap", clip_of="car_1", started_ms=str(BEGAN_MS - 9000)))
     assert found["is_clip"]
     assert found["clip_of"] == "car_1"
+    assert found["started_ms"] == BEGAN_MS, "what it holds begins there, whatever was asked for"
 
 
 def test_the_topics_of_the_drives_own_settings_count(tmp_path: Path) -> None:
