@@ -23,7 +23,6 @@ const FORMATS = /** @type {const} */ ([
   ['html', 'HTML report', 'plots and alarms in one page, works offline'],
 ]);
 const KINDS = /** @type {Record<string, [string, string]>} */ ({ mcap: ['MCAP', 'all of it, for Foxglove and Lichtblick'], bag: ['ROS 1 bag', 'the file as it is'], db3: ['ROS 2 db3', 'the file as it is'] });
-const MAIL = './mail.js';
 const CLIP_S = 30; // before and after an alarm
 const PRIORITY_ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
 
@@ -146,7 +145,7 @@ export class FileSheet {
 
   async #mail() {
     const { id } = this.row;
-    const { openMail } = await this.#module(() => import(MAIL));
+    const { openMail } = await this.#module(() => import('./mail.js'));
     closeSheet(this.sheet);
     openMail([id], this.store, this.say);
   }

@@ -2,6 +2,7 @@
 
 import { SettingsFileKeys } from './settings-file.js';
 import { SettingsGroup } from './settings-group.js';
+import { SettingsMail } from './settings-mail.js';
 import { groupsOf } from './settings-layout.js';
 import { settingsOf } from './settings-model.js';
 import { SettingsTopics } from './settings-topics.js';
@@ -30,12 +31,13 @@ export function mount(panel, store, say, isShown) {
   const none = html('p', { class: 'nothing', hidden: true });
   const topics = new SettingsTopics(store, model);
   const file = new SettingsFileKeys(store, model, say);
+  const mail = new SettingsMail(say);
   const phone = html('button', { type: 'button', class: 'key wide' }, icon('phone'), 'Preferences of this phone');
   const all = html('fieldset', { class: 'all' }, groups, none, topics.element, file.element);
   const keys = html('div', { class: 'keys' }, phone);
   panel.replaceChildren(
     html('div', { class: 'find' }, html('div', { class: 'field' }, icon('search'), search), undo), state,
-    all, keys,
+    all, mail.element, keys,
   );
   /** @type {SettingsGroup[]} */
   let shown = [];
@@ -57,7 +59,7 @@ export function mount(panel, store, say, isShown) {
     const query = search.value.trim();
     if (query === drawnQuery && !isForced) return;
     drawnQuery = query;
-    const hits = shown.reduce((sum, group) => sum + group.filter(query), 0) + topics.filter(query) + file.filter(query);
+    const hits = shown.reduce((sum, group) => sum + group.filter(query), 0) + topics.filter(query) + file.filter(query) + mail.filter(query);
     show(keys, query === '');
     if (!isForced) panel.scrollTop = 0;
     show(none, hits === 0 && query !== '');
@@ -107,6 +109,7 @@ export function mount(panel, store, say, isShown) {
     for (const group of shown) group.stop();
     topics.stop();
     file.stop();
+    mail.stop();
     panel.replaceChildren();
   };
 }
