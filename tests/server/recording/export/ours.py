@@ -24,10 +24,21 @@ class OurFile:
         about = {"vehicle": vehicle, "session": "s1", "part": "1", "profile": profile, "settings": TOML}
         self._file = PartFile(path, profile=profile, metadata=about | more)
 
-    def write(self, time_ns: int, topic: str, type: str, definition: str, encoding: str, data: bytes) -> None:
+    def write(
+        self,
+        time_ns: int,
+        topic: str,
+        type: str,
+        definition: str,
+        encoding: str,
+        data: bytes,
+        *,
+        is_latched: bool = False,
+    ) -> None:
         of = {"ros1": "ros1msg", "cdr": "ros2msg", "json": "jsonschema"}[encoding]
         schema = Schema(name=type, encoding=of, data=definition.encode(), message_encoding=encoding, encode=None)
-        self._file.add(self._file.channel(topic, schema), time_ns, data)
+        more = {"offered_qos_profiles": "- durability: transient_local"} if is_latched else None
+        self._file.add(self._file.channel(topic, schema, more), time_ns, data)
 
     def own(self, time_ns: int, topic: str, what: Mapping[str, Any]) -> None:
         schema = own_schema(cast("Any", topic.rpartition("/")[2]))
@@ -52,7 +63,10 @@ def as_ours(source: Path, path: Path, own: Iterable[Own] = (), **metadata: str) 
                 made.own(*waiting.pop(0))
             channel = raw.channel
             type = channel.type.replace("/msg/", "/") if channel.encoding == "ros1" else channel.type
-            made.write(raw.time_ns, channel.topic, type, channel.definition, channel.encoding, raw.data)
+            how = channel.encoding
+            made.write(
+                raw.time_ns, channel.topic, type, channel.definition, how, raw.data, is_latched=channel.is_latched
+            )
         for one in waiting:
             made.own(*one)
     return made.close()
