@@ -25,6 +25,8 @@ from server.mail.recorded import Recorded
 from server.playback.desk import Desk
 from server.recording.catalog import Catalog
 from server.recording.folder import RecordingsFolder
+from server.recording.recover import Recovered
+from server.recovering import recover_left
 from server.session import Session
 from server.settings import SettingsFile
 from server.version import catgraph_version
@@ -127,12 +129,15 @@ def create_app(
             allowed_hosts=config.allowed_hosts,
             checks=checks,
             settings=SettingsFile(config.data / "settings" / f"{vehicle.name}.toml" if config.data else None),
+            recordings=RecordingsFolder(config.data / "recordings") if config.data else None,
+            on_finished=running.recordings.add if running.recordings is not None else lambda _: None,
         )
 
     @asynccontextmanager
     async def life(_: FastAPI) -> AsyncIterator[None]:
         if running.recordings is not None:
             await running.recordings.start()
+        recovering = _recover(running)
         if running.exports is not None:
             await running.exports.start()
         if running.mailer is not None:
@@ -142,6 +147,8 @@ def create_app(
         try:
             yield
         finally:
+            if recovering is not None:
+                recovering.cancel()  # what it was at is done again at the next start
             await desk.close_all()
             await asyncio.gather(*(session.stop() for session in running.sessions.values()))
             if running.mailer is not None:
@@ -190,6 +197,28 @@ def _exports(data: Path, catalog: Catalog, *, now: Callable[[], float], wall_ms:
 
 def _mailer(data: Path | None, path_of: Callable[[str], Path | None], *, wall_ms: Callable[[], int]) -> Mailer | None:
     return None if data is None else Mailer(data / "mail", Recorded(path_of), wall_ms=wall_ms)
+
+
+def _recover(running: Running) -> asyncio.Task[None] | None:
+    """Begins to make whole what the last run left, which must be looked for before anything is recorded anew."""
+    recordings = running.recordings
+    if recordings is None:
+        return None
+    folder = RecordingsFolder(recordings.folder)
+    try:
+        left = folder.unfinished()
+    except OSError as why:
+        log.error("the recordings cannot be looked through: %s", why)
+        return None
+
+    def told(path: Path, found: Recovered) -> None:
+        if found.path is not None:
+            recordings.add(found.path)
+        for name, session in running.sessions.items():
+            if folder.place(name, found.id).parent == path.parent:
+                session.recovered(found)
+
+    return asyncio.create_task(recover_left(left, told=told), name="recover recordings") if left else None
 
 
 def _recording(running: Running, id: str) -> Path | None:

@@ -55,11 +55,13 @@ class LocalBus:
         frame = self._frames.get((vehicle, kind))
         return frame if frame is not None and self._now() - frame.put_s <= FRAME_LIVES_S else None
 
-    def append(self, vehicle: str, events: Sequence[Mapping[str, Any]]) -> None:
-        """Numbers and keeps events, then wakes those who watch."""
-        if events:
-            self._journal.append(vehicle, events)
-            self._wake(vehicle, "events")
+    def append(self, vehicle: str, events: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """Numbers and keeps events, then wakes those who watch; answers them with their numbers."""
+        if not events:
+            return []
+        numbered = self._journal.append(vehicle, events)
+        self._wake(vehicle, "events")
+        return numbered
 
     def events_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
         return self._journal.after(vehicle, n, limit)

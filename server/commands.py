@@ -38,6 +38,13 @@ class Resume(_Command):
     kind: Literal["resume"]
 
 
+class Record(_Command):
+    """Begin to record, or end it, by hand."""
+
+    kind: Literal["record"]
+    on: bool
+
+
 class Acknowledge(_Command):
     kind: Literal["acknowledge"]
     alarm: Name
@@ -107,7 +114,9 @@ class Position(_Command):
         return self
 
 
-Command = Connect | Retry | Disconnect | Pause | Resume | Acknowledge | Shelve | Unshelve | Set | Import | Position
+Command = (
+    Connect | Retry | Disconnect | Pause | Resume | Record | Acknowledge | Shelve | Unshelve | Set | Import | Position
+)
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping
 
-from server import discovery, judging
+from server import discovery, judging, others
 from server.link import LinkDown, RosLink, Subscription
+from server.others import Also
 from server.topics import BY_SIGNAL, TOPICS, Source, map_signals
 from server.tuning import Tuning
 
@@ -30,6 +31,7 @@ class Conversation:
         now: Callable[[], float],
         proved: Callable[[], None],
         recognised: Callable[[str], None],
+        learned: Callable[[Mapping[str, str]], None] = lambda _: None,
     ) -> None:
         """`link` None: no car is dialled, and nothing is known of any."""
         self._link = link
@@ -37,6 +39,7 @@ class Conversation:
         self._now = now
         self._proved = proved
         self._recognised = recognised
+        self._learned = learned
         self._offer: discovery.Offer | None = None
         self._looked = False
         self._cbor_failed = False  # then scans come as JSON
@@ -45,6 +48,12 @@ class Conversation:
         self.by_topic: Mapping[str, tuple[Source, ...]] = {}
         self.unmapped: Mapping[str, str] = {}  # topic → type of what carries no signal
         self.offers_nothing = False
+        self.judged = 0  # topics that are subscribed to for their signals
+        self._also: Also = "none"
+        self._asked: set[str] = set()  # types whose definitions the bridge was asked for
+        self._look_soon = False
+        self.others: Mapping[str, str] = {}  # topic → type of what is subscribed to only to be recorded
+        self.left_out: tuple[str, ...] = ()  # topics that are not recorded, for they are bulky or there are too many
         self.ros_version: int | None = None
         self.ros_alive: bool | None = None
         self.ros_answered_s: float | None = None
@@ -55,8 +64,8 @@ class Conversation:
         looked_s = -LOOK_AGAIN_S
         while link is not None and link is self._link and link.is_open:
             try:
-                if self._now() - looked_s >= (LOOK_AGAIN_S if self.sources else 1.0):
-                    looked_s = self._now()
+                if self._look_soon or self._now() - looked_s >= (LOOK_AGAIN_S if self.sources else 1.0):
+                    looked_s, self._look_soon = self._now(), False
                     await self._look(link)
                 alive = await discovery.ask_alive(link)
             except LinkDown:
@@ -77,6 +86,18 @@ class Conversation:
     def end(self) -> None:
         """Whatever is still answered is of no interest any more."""
         self._link = None
+
+    def record(self, also: Also) -> None:
+        """Which topics are to be heard beyond those that carry signals; they are judged by nobody."""
+        if also != self._also:
+            self._also, self._look_soon = also, True
+            if self._offer is not None:
+                self._subscribe()
+
+    def type_of(self, topic: str) -> str | None:
+        """The type of a topic that is subscribed to, as the bridge spells it; None: not known."""
+        sources = self.by_topic.get(topic)
+        return self.others.get(topic) or (sources[0].type if sources else None)
 
     def map_again(self) -> None:
         """After a change of settings."""
@@ -114,6 +135,20 @@ class Conversation:
         if self._tuning.recognise(offer.topics, offer.ros):
             self._recognised(self._tuning.profile.title)
         self._map(offer)
+        if self._also != "none":
+            await self._learn(link, offer)
+
+    async def _learn(self, link: RosLink, offer: discovery.Offer) -> None:
+        """Definitions come first: what is recorded before they are known is JSON."""
+        types = {kind for kind in offer.topics.values() if kind} - self._asked
+        if types:
+            found = await discovery.ask_definitions(link, types)
+            if link is not self._link:
+                return
+            self._asked |= types
+            if found:
+                self._learned(found)
+            self._subscribe()
 
     def _map(self, offer: discovery.Offer) -> None:
         """Chooses the topic of each signal and subscribes to them."""
@@ -142,6 +177,18 @@ class Conversation:
                     compression="cbor" if rows[0].compression == "cbor" and not self._cbor_failed else "none",
                     queue_length=min(row.queue_length for row in rows),
                 )
+        self.judged = len(wanted)
+        if self._offer is not None:
+            self.others, self.left_out = others.choose(
+                self._offer.topics, without=wanted, also=self._also, asked=self._asked
+            )
+            for topic, kind in self.others.items():
+                wanted[topic] = Subscription(
+                    topic=topic,
+                    type=kind or None,
+                    compression="none" if self._cbor_failed else "cbor",  # it keeps NaN and the infinities apart
+                    queue_length=others.QUEUE_LENGTH,
+                )
         for row in link.subscriptions:
             if row.topic not in wanted:
                 link.unsubscribe(row.topic)
@@ -167,3 +214,4 @@ class Conversation:
             if subscription.topic not in by_topic:
                 link.unsubscribe(subscription.topic)
         self.by_topic = by_topic
+        self.judged = len(by_topic)

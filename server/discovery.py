@@ -3,15 +3,21 @@ lives."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from server.link import CallFailed, LinkDown, RosLink
+from server.recording.schemas import text_of_details
 from server.source import RosVersion
 from server.topics import ros_version
 
 MAX_TOPICS = 5000
+MAX_DETAILS = 100  # types that are asked for one by one
+STANDARD = frozenset(
+    f"{name}_msgs"
+    for name in ("std", "geometry", "sensor", "nav", "diagnostic", "rosgraph", "tf2", "visualization", "shape", "map")
+) | {"trajectory_msgs", "actionlib_msgs", "builtin_interfaces", "rcl_interfaces"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +44,24 @@ async def ask_topics(link: RosLink) -> Offer | None:
     return Offer(topics=found, ros=2 if version == 2 else 1 if version == 1 else None)
 
 
+async def ask_definitions(link: RosLink, types: Collection[str]) -> dict[str, str]:
+    """The definitions of types, in .msg text, as far as the bridge knows them. Raises LinkDown."""
+    try:
+        answer = await link.call("/rosapi/topics_and_raw_types", timeout_s=5.0)
+    except CallFailed:
+        answer = None
+    found = {type: text for type, text in _texts(answer).items() if type in types}
+    for type in sorted(set(types) - found.keys())[:MAX_DETAILS]:
+        if plain_package(type) not in STANDARD:  # of those the distribution knows more than rosapi tells
+            try:
+                text = text_of_details(await link.call("/rosapi/message_details", {"type": type}, timeout_s=1.5))
+            except CallFailed:
+                continue
+            if text is not None:
+                found[type] = text
+    return found
+
+
 async def ask_alive(link: RosLink) -> bool | None:
     """Does ROS behind the bridge still answer? None: it never could say (no rosapi). Raises LinkDown."""
     try:
@@ -54,6 +78,18 @@ async def _ask_type(link: RosLink, topic: str) -> str:
         return ""
     kind = answer.get("type") if isinstance(answer, Mapping) else None
     return kind if isinstance(kind, str) else ""
+
+
+def _texts(answer: Any) -> dict[str, str]:
+    names, types = _lists(answer)
+    texts = answer.get("typedefs_full_texts") if names is not None else None
+    if not isinstance(texts, list) or len(texts) != len(types):
+        return {}
+    return {type: text for type, text in zip(types, texts, strict=True) if type and isinstance(text, str) and text}
+
+
+def plain_package(type: str) -> str:
+    return type.partition("/")[0]
 
 
 def _lists(answer: Any) -> tuple[list[str] | None, list[str]]:

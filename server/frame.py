@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from monitor import catalog, values
@@ -60,6 +60,8 @@ class Facts:
     topics_heard: int
     trends: Piece
     track_number: int  # of this run of the server; another number is another track
+    topics_judged: int = 0  # subscribed to for their signals
+    recording: Mapping[str, Any] = field(default_factory=lambda: {"state": "off", "for_s": None})
 
 
 def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str, Any]:
@@ -78,7 +80,7 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str,
         "log_trouble": facts.log_trouble,
         "trends": wire.trends(facts.trends),
         "limits": catalog.flat(monitor.limits),
-        "recording": {"state": "off", "for_s": None},
+        "recording": dict(facts.recording),
         "decelerate": {"state": "not_available", "why": "not configured"},
         "control": {"holder": None},
         "phone": phone.as_json(snapshot.phone, facts.now_s),
@@ -126,7 +128,7 @@ def _link(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
         "trying_for_s": round(facts.now_s - facts.dialled_s, 1)
         if facts.phase in ("connecting", "failed", "lost")
         else 0.0,
-        "topics_subscribed": len(link.subscriptions) if link is not None else 0,
+        "topics_subscribed": facts.topics_judged,
         "topics_heard": facts.topics_heard,
         "unreadable_frames": facts.reception.frames.rejected,
         "unreadable_why": facts.reception.frames.last_reason,

@@ -302,6 +302,7 @@ class RosLink:
         self.address = address
         self.attempts = 0
         self.heard_s: float | None = None  # when the bridge last sent anything, pongs included
+        self.frame_bytes = 0  # of the frame that is being told
         self._listener = listener
         self._now = now
         self._ros = _Ros(address.url, link=self)
@@ -487,6 +488,7 @@ class RosLink:
     def _frame(self, socket: _BridgeProtocol, payload: bytes, is_binary: bool) -> None:
         if socket is not self._socket:
             return  # stopped, or dropped: what is still in the pipe is no news
+        self.frame_bytes = len(payload)
         try:
             operation, note = frames.decode(payload, is_binary)
         except frames.Unreadable as error:

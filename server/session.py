@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import orjson
@@ -27,7 +28,10 @@ from server.logbook import Logbook
 from server.past import Past
 from server.problems import Problem
 from server.reception import Reception, Tally
+from server.recording.folder import RecordingsFolder
+from server.recording.recover import Recovered
 from server.scan_feed import ScanFeed
+from server.session_recording import SessionRecording
 from server.settings import SettingsFile
 from server.tuning import Tuning
 
@@ -59,7 +63,10 @@ class Session:
         allowed_hosts: Collection[str] = (),
         checks: Sequence[AnyCheck] | None = None,
         settings: SettingsFile | None = None,
+        recordings: RecordingsFolder | None = None,
+        on_finished: Callable[[Path], None] = lambda _: None,
     ) -> None:
+        """`recordings` None: nothing is recorded. `on_finished` is told of each part that is."""
         self.vehicle = vehicle
         self._bus = bus
         self._now = now
@@ -68,7 +75,10 @@ class Session:
         self._allowed_hosts = frozenset(allowed_hosts)
         self._tuning = Tuning(settings or SettingsFile(None))
         self._monitor = Monitor(checks, self._tuning.limits)
-        self._logbook = Logbook(vehicle.name, bus, self._tuning, wall_ms=wall_ms)
+        self._recording = SessionRecording(
+            vehicle.name, recordings, self._tuning, now=now, wall_ms=wall_ms, told=on_finished
+        )
+        self._logbook = Logbook(vehicle.name, bus, self._tuning, wall_ms=wall_ms, also=self._recording.events)
         self._load = RecentLoad()
         self._held: Past | None = None  # what stood when the server ended, until a car is monitored again
         self._log_trouble: str | None = None
@@ -108,6 +118,7 @@ class Session:
             now=self._now,
             proved=self._prove,
             recognised=lambda title: self._tuned([f"Taken for: {title}"], by=None),
+            learned=self._recording.learn,
         )
 
     # -- life --------------------------------------------------------------------------------------------------------
@@ -126,6 +137,11 @@ class Session:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._recording.stop()
+
+    def recovered(self, found: Recovered) -> None:
+        """What became of a recording that the last run of the server left."""
+        self._logbook.note("recovered", found.sentence, recording=found.id)
 
     def _spawn(self, work: Any, name: str) -> asyncio.Task[None]:
         task = asyncio.get_running_loop().create_task(work, name=f"{self.vehicle.name} {name}")
@@ -191,6 +207,7 @@ class Session:
             self._saved_s = now_s
             self._log_trouble = self._bus.save_events()
         self._watch_link(now_s)
+        self._watch_recording(now_s)
         self._judge(now_s, None)
         if put:
             self._put_state(now_s)
@@ -277,14 +294,20 @@ class Session:
                 number=self._track_number,
                 after=after if isinstance(after, int) else 0,
             )
+        by = label.clean(message.get("by")) or label.NAMELESS
         try:
             command = commands.read(dict(message))
-            self._obey(command, by=label.clean(message.get("by")) or label.NAMELESS)
+            self._obey(command, by=by)
+            if isinstance(command, commands.Record):
+                await self._recording.demand_settled()
         except answers.REFUSALS as why:
             if isinstance(why, BadAddress) and self._phase in ("idle", "failed"):
                 self._phase, self._problem = "failed", problems.of_bad_address(why)
                 self._put_state(self._now())
-            return answers.refusal(why)
+            refusal = answers.refusal(why)
+            self._recording.asked(message, by=by, reason=refusal["reason"])
+            return refusal
+        self._recording.asked(message, by=by)
         return {"ok": True} | ({"version": self._tuning.settings.version} if commands.is_of_settings(command) else {})
 
     def _obey(self, command: commands.Command, *, by: str) -> None:
@@ -302,6 +325,10 @@ class Session:
                 self._pause(now_s, by=by)
             case commands.Resume():
                 self._resume(now_s, by=by)
+            case commands.Record():
+                self._recording.order(command.on, by=by)
+                self._logbook.note("recording", f"Recording {'begins' if command.on else 'ends'}, by hand.", by=by)
+                self._watch_recording(now_s)
             case commands.Acknowledge():
                 self._tell(self._monitor.acknowledge(command.alarm, command.occurrence, by=by, now_s=now_s))
             case commands.Shelve():
@@ -328,6 +355,7 @@ class Session:
         """New settings count from this moment on."""
         if lines:
             self._logbook.settings("; ".join(lines), by=by)
+            self._recording.settings()
         self._monitor.limits = self._tuning.limits
         self._state.expect(expected_rates(self._tuning.limits))
         self._conversation.map_again()
@@ -360,6 +388,7 @@ class Session:
         """One car's monitoring is over: its alarms end in the log, and all that is known of it is forgotten."""
         self._tell(self._monitor.end(self._now()))
         self._drop_link()
+        self._recording.ended()
         self._paused_since_s = self._paused_by = None
         self._clear()
 
@@ -399,6 +428,8 @@ class Session:
             if self._phase != "lost":
                 self._phase, self._since_s = "lost", now_s
                 self._logbook.note("lost", problem.title)
+                self._recording.link(phase="lost", problem=problem.title)
+                self._recording.link_lost()
             self._problem = problem
         elif self._address is not None and self._phase != "failed":
             self._phase = "failed"
@@ -431,7 +462,12 @@ class Session:
     def message_received(self, topic: str, message: Any, note: str | None) -> None:
         """One message of the car: decoded, applied and judged in the same pass."""
         now_s = self._now()
-        sources = self._conversation.by_topic.get(topic)
+        talk = self._conversation
+        if self._recording.is_on and self._link is not None:
+            self._recording.take(topic, talk.type_of(topic), message, now_s, self._link.frame_bytes)
+        if topic in talk.others:
+            return  # heard to be recorded: what is judged must not depend on what is recorded
+        sources = talk.by_topic.get(topic)
         if sources is None:
             self._reception.unasked += 1
             return
@@ -483,12 +519,22 @@ class Session:
     def _reopened(self) -> None:
         now_s = self._now()
         self._phase, self._since_s, self._problem = "monitoring", now_s, None
+        self._recording.link_opened(self.address_url)
+        self._recording.link(phase="monitoring", problem=None)
         self._after_link_change(now_s)
 
     # -- judging -----------------------------------------------------------------------------------------------------
 
     def _watch_link(self, now_s: float) -> None:
         self._state.link(self._facts(now_s))
+
+    def _watch_recording(self, now_s: float) -> None:
+        """The recorder hears what the conversation knows, and the other way round."""
+        self._recording.ros_version = self._conversation.ros_version
+        self._recording.left_out = self._conversation.left_out
+        self._recording.tick(now_s)
+        self._conversation.record(self._recording.also)
+        self._state.recorder(self._recording.facts(now_s))
 
     def _facts(self, now_s: float) -> LinkFacts:
         link = self._link
@@ -501,7 +547,7 @@ class Session:
             bridge_answers=self.bridge_answers(now_s),
             problem_title=self._problem.title if self._problem else None,
             problem_hint=self._problem.hint if self._problem else None,
-            topics_subscribed=len(link.subscriptions) if link is not None else 0,
+            topics_subscribed=self._conversation.judged,
             connected_s=self._connected_s,
             last_message_s=self._last_message_s,
             published=judging.published(self._conversation.sources.values()),
@@ -571,6 +617,8 @@ class Session:
             reception=self._reception,
             sources=self._conversation.sources,
             topics_heard=len(self._heard),
+            topics_judged=self._conversation.judged,
+            recording=self._recording.frame(now_s),
             trends=self._trends.piece(now_s, at_most=TRENDS_A_FRAME),
             track_number=self._track_number,
         )

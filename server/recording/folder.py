@@ -50,10 +50,17 @@ class RecordingsFolder:
         """What nothing could be read of, kept aside."""
         return sorted(self._files(DAMAGED))
 
+    def first_id(self, vehicle: str, at_ms: int) -> str:
+        """The name for what begins at that time of day. Looks at no disk: something may have it already."""
+        stamp = datetime.fromtimestamp(at_ms / 1000, UTC).strftime("%Y%m%dT%H%M%SZ")
+        return f"{_letters(vehicle)}_{stamp}"
+
     def new_id(self, vehicle: str, at_ms: int) -> str:
         """A name that nothing has yet, for what begins at that time of day."""
-        stamp = datetime.fromtimestamp(at_ms / 1000, UTC).strftime("%Y%m%dT%H%M%SZ")
-        first = f"{_letters(vehicle)}_{stamp}"
+        return self.free_id(self.first_id(vehicle, at_ms))
+
+    def free_id(self, first: str) -> str:
+        """That name, or the next one that nothing has. Raises OSError."""
         taken = {id_of(path) for path in self._all()}
         for n in range(1, 10_000):
             id = first if n == 1 else f"{first}-{n}"

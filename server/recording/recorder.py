@@ -20,7 +20,7 @@ import orjson
 from server.bridge.encoding import Unencodable, json_bytes
 from server.recording import recover, space
 from server.recording.encode import Misfit
-from server.recording.folder import RecordingsFolder, id_of, writing_path
+from server.recording.folder import FINISHED, RecordingsFolder, id_of, writing_path
 from server.recording.own import PREFIX, Own, own_schema
 from server.recording.schemas import Schema, TypeBook
 from server.recording.space import Allowance, Space
@@ -62,6 +62,7 @@ class Status:
 
     state: Writing = "off"
     part: Part | None = None  # the one being written, or the last one
+    path: Path | None = None  # what it is called: another name than was asked for, where that was taken
     size: int = 0
     messages: int = 0  # of the car, in this part
     misfits: int = 0  # of them, that were not of their type and are kept as JSON
@@ -114,6 +115,14 @@ class Recorder:
     def queued(self) -> int:
         return len(self._queue)
 
+    def behind_s(self, now_s: float) -> float:
+        """How long the oldest message of the car waits already."""
+        try:
+            item = self._queue[0]
+        except IndexError:  # the thread has just taken it
+            return 0.0
+        return max(0.0, now_s - float(item[6])) if item[0] == "message" else 0.0
+
     def begin(self, part: Part) -> None:
         """From here on what is taken belongs to this part."""
         self._start()
@@ -130,7 +139,7 @@ class Recorder:
             self.dropped_at_s = now_s
             return
         self._put_bytes += size
-        self._queue.append(("message", topic, type, at_ns, message, size))
+        self._queue.append(("message", topic, type, at_ns, message, size, now_s))
 
     def own(self, channel: Own, said: Mapping[str, Any], at_ns: int) -> None:
         """Something of ours: there is little of it, and room is kept for it."""
@@ -247,19 +256,24 @@ class Recorder:
         self._messages = self._misfits = 0
         if self._book is None or self._book.version != part.version:
             self._book = TypeBook(part.version)
-        self.status = Status(state="stopped", part=part)
         now_s = time.monotonic()
-        self._count_up()
-        found = self._look(now_s)
-        exhausted = found.exhausted(self.allowance)
+        try:
+            self._count_up()
+            found = self._look(now_s)
+            path = part.path.with_name(self._folder.free_id(part.id) + FINISHED)
+            if (exhausted := found.exhausted(self.allowance)) is None:
+                self._file = PartFile(path, profile=f"ros{part.version}", metadata=part.metadata)
+        except OSError as error:
+            log.error("a recording cannot begin: %s", error)
+            trouble = f"Recording cannot begin: {space.why(error)}."
+            self.status = Status(state="stopped", part=part, trouble=trouble)
+            return
         if exhausted is not None:
             log.warning("%s", exhausted)
             self.status = Status(state="stopped", part=part, space=found, trouble=exhausted)
             return
-        profile = f"ros{part.version}"
-        self._file = PartFile(part.path, profile=profile, metadata=part.metadata)
         self._flushed_s = now_s
-        self.status = Status(state="recording", part=part, space=found)
+        self.status = Status(state="recording", part=part, path=path, space=found)
 
     def _close(self, ended: Mapping[str, str], *, state: Writing = "off", trouble: str | None = None) -> None:
         file, self._file = self._file, None

@@ -8,6 +8,7 @@ aside under another name, and said.
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import zlib
 from collections import Counter
@@ -87,6 +88,10 @@ def _recover(left: Path) -> Recovered:
             return Recovered(id=id, path=finished, sentence=f"{id} had been recovered already.")
         return _aside(left, f"{id} stands beside a finished recording of its name; both are kept")
     with left.open("rb") as file:
+        try:
+            fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return Recovered(id=id, sentence=f"{id} is being written by another server.", is_settled=False)
         walk = Walk(file, os.fstat(file.fileno()).st_size)
         new = _Copy(left.with_name(id + RECOVERING))
         try:

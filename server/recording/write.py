@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import os
 import threading
 from collections.abc import Mapping
@@ -43,6 +44,7 @@ class PartFile:
         if path.exists():
             raise FileExistsError(f"{path.name} is there already")
         self._fd = os.open(self._writing, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)  # no other server takes it for left behind
         self._stream = _Stream(self._fd)
         try:
             self._writer: Any = Writer(  # the library types only a part of itself

@@ -36,6 +36,11 @@ class ConnectRequest(BaseModel):
     )
 
 
+class RecordRequest(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    on: bool = Field(description="true begins a recording, false ends the one that is made")
+
+
 class AcknowledgeRequest(BaseModel):
     model_config = ConfigDict(extra="forbid")
     occurrence: int = Field(ge=0, le=2**53, description="Which occurrence was seen; an older one is refused")
@@ -182,6 +187,12 @@ async def connect(request: Request, body: Annotated[ConnectRequest, Body()], veh
 @router.post("/api/disconnect", tags=["vehicle"], summary="End monitoring")
 async def disconnect(request: Request, vehicle: VehicleName = None) -> Done:
     await ask(request, vehicle, {"kind": "disconnect"})
+    return Done()
+
+
+@router.post("/api/record", tags=["vehicle"], summary="Begin to record, or end it, by hand")
+async def record(request: Request, body: RecordRequest, vehicle: VehicleName = None) -> Done:
+    await ask(request, vehicle, {"kind": "record", "on": body.on})
     return Done()
 
 

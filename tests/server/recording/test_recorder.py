@@ -212,7 +212,7 @@ async def test_a_folder_that_is_none_is_said(tmp_path: Path) -> None:
     desk = Desk(tmp_path / "recordings")
     desk.recorder.begin(replace(desk.part(), path=tmp_path / "recordings" / "car" / "a.mcap"))
     await desk.until(lambda: desk.recorder.status.state == "stopped")
-    assert desk.recorder.status.trouble == "Recording stopped: the folder for recordings is no folder."
+    assert desk.recorder.status.trouble == "Recording cannot begin: the folder for recordings is no folder."
     await desk.stop()
 
 
