@@ -74,9 +74,13 @@ export class Tabs {
     this.onFront();
   }
 
-  /** What is out of sight is out of reach of keys and readers. */
+  /** What is out of sight is out of reach of keys and readers, and its tab is not marked. */
   #still() {
-    this.panels.forEach((panel, i) => setAttribute(panel, 'inert', !this.shows(TABS[i] ?? 'home')));
+    this.panels.forEach((panel, i) => {
+      const isShown = this.shows(TABS[i] ?? 'home');
+      setAttribute(panel, 'inert', !isShown);
+      setAttribute(this.buttons[i] ?? panel, 'data-shown', isShown); // on a wide screen several are
+    });
   }
 
   /** What is out of sight is neither laid out nor painted: half of what the page costs. @type {ReturnType<typeof setTimeout> | undefined} */

@@ -227,6 +227,7 @@ class Canned:
             {"name": "Simulated car", "address": "ws://127.0.0.1:9091"},
         ]
         self.ground: Json = {"layers": [], "image": None}
+        self.log: list[Json] = []  # newest first
         self.tile: Callable[[int, int, int], bytes] = lambda z, x, y: b""
         self.app = FastAPI()
         self._watching = False
@@ -251,6 +252,10 @@ class Canned:
         async def signals() -> Json:
             offered = {one["topic"]: one["type"] for one in self.state["signals"].values() if one["topic"]}
             return {"candidates": candidates(offered), "topics": [{"topic": "/rosout", "type": "rosgraph_msgs/Log"}]}
+
+        @self.app.get("/api/log")
+        async def log() -> Json:
+            return {"events": self.log, "next_before": None}
 
         @self.app.get("/api/map")
         async def ground() -> Json:

@@ -185,6 +185,41 @@ async def signals(server: Canned, page: Page) -> None:
     await page.tap("[data-screen=signals]")
 
 
+@scene("alarm-log")
+async def alarm_log(server: Canned, page: Page) -> None:
+    state = live()
+    state["alarms"] = [alarm("GPS drift", "GPS drift", state="ACKED", text="6.3 m of 2.0 m")]
+    server.state = state
+    told = (
+        ("14:07:38", "cleared", "critical", "Speed above limit", "back under 10.5 m/s for 2 s", None),
+        ("14:07:33", "acknowledged", "critical", "Speed above limit", "", "Pixel 7"),
+        ("14:07:31", "raised", "critical", "Speed above limit", "12.6 m/s, limit 11.0 m/s", None),
+        ("14:06:12", "settings", None, None, "Speed limit: 9.0 m/s → 11.0 m/s", "Pixel 7"),
+        ("14:05:02", "raised", "warning", "GPS drift", "6.3 m from where it stopped 41 s ago; 2.0 m are allowed", None),
+        ("14:04:51", "shelved", "warning", "Scan slow", "until 14:14", "Pixel 7"),
+        ("14:04:40", "raised", "warning", "Scan slow", "61 of 75 Hz", None),
+        ("14:03:58", "cleared", "advisory", "Vehicle not moving", "", None),
+        ("14:03:40", "raised", "advisory", "Vehicle not moving", "standing for 10 s", None),
+        ("14:02:17", "connected", None, None, "Connected to 192.168.4.1:9090.", None),
+    )
+    server.log = [
+        {"n": 117 - i, "at_ms": at(clock), "change": change, "priority": priority, "alarm": title, "title": title,
+         "text": text, "by": by, "occurrence": 1}
+        for i, (clock, change, priority, title, text, by) in enumerate(told)
+    ]  # fmt: skip
+    await page.tap("#monitor [data-f=menu]")
+    await page.tap("[data-screen=log]")
+    await page.tap("text=Older")
+    await page.evaluate("document.querySelector('.screen').scrollTo(0, 9999)")
+
+
+@scene("tablet")
+async def tablet(server: Canned, page: Page) -> None:
+    server.state = live()
+    await page.set_viewport_size({"width": 1280, "height": 800})
+    await page.wait_for_timeout(1500)  # the track is asked for once a second
+
+
 @scene("connect")
 async def connect(server: Canned, page: Page) -> None:
     server.state = idle()

@@ -159,3 +159,22 @@ async def test_no_barrier_that_a_machine_can_find(phone: Phone, watch: Process) 
             await phone.page.emulate_media(color_scheme=theme)
             found = (await Axe().run(phone.page)).response["violations"]
             assert [(one["id"], one["nodes"][0]["html"]) for one in found] == [], f"{screen}, {theme}"
+
+
+@pytest.mark.parametrize(
+    ("width", "hash", "marked"),
+    [(412, "home", ["home"]), (412, "settings", ["settings"]), (1280, "home", ["home", "map", "scan"])],
+)
+async def test_the_tabs_in_sight_are_marked_and_no_others(
+    phone: Phone, watch: Process, width: int, hash: str, marked: list[str]
+) -> None:
+    await phone.page.set_viewport_size({"width": width, "height": 800})
+    await phone.open(f"{watch.address}/#{hash}")
+    await phone.live()
+    tabs = phone.page.locator("#monitor [data-tab][data-shown]")
+    await expect(tabs).to_have_count(len(marked))
+    assert await tabs.evaluate_all("all => all.map((tab) => tab.dataset.tab)") == marked
+    # What is out of sight is neither reached nor laid out.
+    folded = phone.page.locator("#monitor [data-panel][data-folded]")
+    await expect(folded).to_have_count(5 - len(marked))
+    assert await folded.evaluate_all("all => all.every((panel) => panel.inert)")
