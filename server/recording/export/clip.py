@@ -189,7 +189,6 @@ def _metadata(recording: Recording, window: Window, before: _Before, clip_of: st
     standing = [*before.standing.values()]
     return {
         "vehicle": "car",
-        "profile": f"ros{recording.ros_version}",
         **kept,
         **({"settings": before.settings} if before.settings else {}),
         "started_ms": str(window.from_ns // 1_000_000),

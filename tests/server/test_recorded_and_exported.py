@@ -1,0 +1,122 @@
+"""A drive replayed, recorded over the real link, exported to a bag: it equals the original, message for message.
+
+What is compared: for every topic all messages in their order, with their type and every field, NaN included, stamps in
+headers to the nanosecond; and the order of all topics together. Not compared is when a message was received: the
+original says when it was recorded in the car, ours when it was heard. A bridge says NaN and ±Inf as null in JSON, so
+where the original has ±Inf a recording made over JSON has NaN.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from server.config import Config, Vehicle
+from server.recording.export.bag import write_bag
+from server.recording.read import Recording, open_recording
+from tests.server.conftest import serving
+
+BAG, MCAP = "catvehicle_2016-06-01.bag", "catvehicle_2016-06-01_mcap"
+QUICKER = 8  # times true speed
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(180)
+@pytest.mark.parametrize("name", [BAG, MCAP])
+async def test_a_replayed_drive_is_recorded_and_exported_as_it_was(recordings: Path, tmp_path: Path, name: str) -> None:
+    source = recordings / name
+    ours = await recorded(source, tmp_path / "data")
+    with open_recording([ours]) as recording:
+        assert recording.ros_version == (1 if name == BAG else 2)
+        outcome = write_bag(recording, tmp_path / "out.bag", with_own=False)
+    assert outcome.notes == []
+    with open_recording([source]) as before, open_recording([tmp_path / "out.bag"]) as after:
+        assert {t: (i.type.replace("/msg/", "/"), i.count) for t, i in before.topics.items()} == {
+            t: (i.type, i.count) for t, i in after.topics.items()
+        }
+        count, not_a_number = 0, 0
+        for old, new in zip(before.messages(), after.messages(), strict=True):
+            count += 1
+            assert old.topic == new.topic
+            for where, one, other in leaves(old.message, new.message, old.topic):
+                not_a_number += is_nan(one)
+                assert same(one, other), (where, one, other)
+        assert count == after.count == 14228
+        assert not_a_number == 263  # the tyre angle in every command of this drive
+
+
+async def recorded(source: Path, data: Path) -> Path:
+    """What our server keeps of a drive that our bridge plays."""
+    bridge = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-u", "-m", "server", "replay", str(source), "--port", "0", "--wait"),
+        *("--rate", str(QUICKER)),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+    assert bridge.stdout is not None
+    try:
+        address = ""
+        async with asyncio.timeout(30):
+            while not address:
+                words = (await bridge.stdout.readline()).decode().split()
+                address = next((word for word in words if word.startswith("ws://")), "").rstrip(".,")
+        async with serving(Config(vehicles=(Vehicle(name="car", address=address),), data=data)):
+            async with asyncio.timeout(120):
+                await bridge.stdout.read()
+                assert await bridge.wait() == 0
+            await asyncio.sleep(1.0)  # the link is found lost, the part is closed
+    finally:
+        if bridge.returncode is None:
+            bridge.kill()
+            await bridge.communicate()
+    (made,) = (data / "recordings" / "car").glob("*.mcap")
+    return made
+
+
+def leaves(one: Any, other: Any, where: str) -> Iterator[tuple[str, Any, Any]]:
+    """The values of a message beside those of another, field by field, whatever the ROS version names its times."""
+    if isinstance(one, dict):
+        renamed = {"sec": "secs", "nanosec": "nsecs"}
+        named = {renamed.get(name, name): value for name, value in one.items()}
+        added = {"seq"} if "seq" not in named and "frame_id" in named else set()  # of a header; ROS 2 has none
+        assert named.keys() == other.keys() - added, where
+        for name, value in named.items():
+            yield from leaves(value, other[name], f"{where}.{name}")
+    elif isinstance(one, list):
+        assert len(one) == len(other), where
+        for index, (a, b) in enumerate(zip(one, other, strict=True)):
+            yield from leaves(a, b, f"{where}[{index}]")
+    else:
+        yield where, one, other
+
+
+def same(one: Any, other: Any) -> bool:
+    if isinstance(one, np.ndarray):
+        return bool(np.array_equal(one, other, equal_nan=one.dtype.kind == "f")) and one.dtype == other.dtype
+    return type(one) is type(other) and (one == other or (is_nan(one) and is_nan(other)))
+
+
+def is_nan(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
+def test_the_comparison_finds_what_differs(recordings: Path) -> None:
+    """Otherwise it proves nothing."""
+
+    def first(recording: Recording, topic: str) -> Any:
+        return next(message.message for message in recording.messages() if message.topic == topic)
+
+    with open_recording([recordings / BAG]) as bag:
+        one = first(bag, "/gps_fix")
+    other = {**one, "latitude": math.nextafter(one["latitude"], 90.0)}
+    found = [where for where, a, b in leaves(one, other, "fix") if not same(a, b)]
+    assert found == ["fix.latitude"]
