@@ -344,7 +344,7 @@ export class FileSheet {
 
   /** All of the trash, after a question. @param {import('./files-layout.js').Total} total */
   askEmpty({ count, bytes }) {
-    this.#askDestroy(null, 'Empty the trash?', `${count === 1 ? '1 recording is' : `${count} recordings are`} deleted for good, ${sizeWords(bytes)} are freed. They cannot be taken back.`);
+    this.#askDestroy(null, 'Empty the trash?', `${count === 1 ? '1 recording is' : `${count} recordings are`} deleted for good, ${sizeWords(bytes)} are freed. ${count === 1 ? 'It' : 'They'} cannot be taken back.`);
     openSheet(this.sheet);
   }
 

@@ -20,7 +20,9 @@ from fastapi.responses import HTMLResponse
 from fastapi.staticfiles import StaticFiles
 from fastapi.templating import Jinja2Templates
 
+from monitor.tracks import TrackPoint
 from server.compression import PageSocket
+from server.recording.sketch import sketch
 from server.settings import SettingsFile
 from server.topics import candidates
 from server.tuning import Tuning
@@ -100,7 +102,7 @@ def live() -> Json:
             "obstacle.standoff_m": 5.0, "obstacle.half_width_m": 1.2, "obstacle.wheelbase_m": 2.62,
             "obstacle.laser_ahead_m": 2.5,
         },
-        "recording": {"state": "on", "for_s": 252.0},
+        "recording": {"state": "recording", "for_s": 252.0},
         "decelerate": {"state": "not_available", "why": "not configured"},
         "control": {"holder": "You"},
         "phone": {
@@ -215,6 +217,40 @@ def trends(now: float, begin: int, steps: int) -> Json:
     return {"step_s": 0.2, "since": 0, "first": first, "now": now, "lowest": rows, "highest": highest}
 
 
+def drives() -> list[Json]:
+    """Rows of GET /api/recordings: what a week of drives leaves behind."""
+    north = [(-1) ** n * 3.0 + 7 * n for n in range(14)]
+    told = [
+        (4.4, 768.0, 57.1, {"critical": 1, "warning": 2, "advisory": 0}, ""),
+        (22.7, 1865.0, 138.0, {"critical": 0, "warning": 1, "advisory": 3}, ""),
+        (49.0, 512.0, 38.0, {"critical": 2, "warning": 0, "advisory": 0}, ""),
+        (53.9, 1337.0, 99.4, {"critical": 0, "warning": 0, "advisory": 0}, "Rehearsal lot"),
+        (95.2, 221.0, 16.2, {"critical": 0, "warning": 0, "advisory": 0}, ""),
+        (123.6, 1082.0, 80.3, None, ""),
+    ]
+    rows = []
+    for n, (ago_h, length_s, megabytes, alarms, title) in enumerate(told):
+        places = [(y * math.cos(n + i / 9) / 1e5, y * math.sin(n + i / 9) / 1e5) for i, y in enumerate(north)]
+        way = [
+            TrackPoint(at_s=float(i), lat_deg=lat, lon_deg=lon, distance_m=0.0) for i, (lat, lon) in enumerate(places)
+        ]
+        counts = alarms or {}
+        marks = [(4.0 + 4 * i, kind) for kind in ("critical", "warning") for i in range(counts.get(kind, 0))]
+        drawn = sketch(way, marks) if n != 4 else None
+        rows.append(
+            {
+                "id": f"car_{n}", "vehicle": "CATVehicle", "session": None, "part": 1, "length_s": length_s,
+                "started_ms": _now_ms() - round(ago_h * 3_600_000), "size_bytes": round(megabytes * 1e6),
+                "distance_m": 2.4 * length_s, "top_speed_mps": 12.6, "alarms": alarms, "title": title, "note": "",
+                "tags": ["wet"] if title else [], "state": "read", "problem": None, "damage": [],
+                "ended": "recovered" if n == 2 else "closed", "ended_why": None, "is_clip": False, "clip_of": None,
+                "file": f"car_{n}.mcap", "format": "bag" if alarms is None else "mcap", "sha256": None,
+                "thumbnail": "", "sketch": drawn.as_json() if drawn else None, "trashed_ms": None,
+            }
+        )  # fmt: skip
+    return rows
+
+
 class Canned:
     """The server: `state` is what every page gets from now on, `silent` makes it hold its tongue."""
 
@@ -271,6 +307,13 @@ class Canned:
 
         begin = int(time.monotonic() * 5)
         self._trends = lambda steps: trends(time.monotonic() * 5, begin, steps)
+
+        @self.app.get("/api/recordings")
+        async def recordings() -> Json:
+            kept = {"count": 27, "bytes": 1_900_000_000}
+            more = {"trash": {"count": 2, "bytes": 81_000_000}, "free_bytes": 41_000_000_000, "waiting": 0}
+            names = {"vehicles": ["car"], "tags": ["wet"]}
+            return {"recordings": drives(), "next": None, "found": kept, "all": kept} | more | names
 
         @self.app.get("/api/trends")
         async def minute() -> Json:

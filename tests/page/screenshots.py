@@ -319,6 +319,20 @@ async def map_none(server: Canned, page: Page) -> None:
     await page.tap("[data-tab=map]")
 
 
+@scene("files")
+async def files(server: Canned, page: Page) -> None:
+    server.state = live()
+    server.state["recording"] |= {"state": "recording", "part": 1, "bytes": 18_600_000, "dropped": 0, "reason": None}
+    await page.tap("[data-tab=files]")
+    await page.wait_for_selector("[data-f=recordings] .file")
+
+
+@scene("files-menu")
+async def files_menu(server: Canned, page: Page) -> None:
+    await files(server, page)
+    await page.tap('[data-id="car_2"]')
+
+
 @scene("settings")
 async def settings(server: Canned, page: Page) -> None:
     server.state = live()

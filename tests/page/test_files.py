@@ -288,6 +288,13 @@ async def test_open_replay_shows_it(opened: Phone) -> None:
     await expect(sheet(opened)).to_be_hidden()
 
 
+async def test_e_mail_takes_the_recording_along(opened: Phone) -> None:
+    await row(opened, name_of(5)).get_by_role("button").tap()
+    await sheet(opened).get_by_text("E-mail").tap()
+    await expect(opened.page.locator("#sheet-mail")).to_be_visible(timeout=15_000)
+    await expect(sheet(opened)).to_be_hidden()
+
+
 async def test_what_is_recorded_now_stands_on_top_counts_and_is_ended_by_hand(opened: Phone) -> None:
     live = opened.page.locator("#panel-files [data-live]")
     await expect(live).to_contain_text("Recording now")
