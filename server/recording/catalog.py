@@ -439,6 +439,7 @@ class Catalog:
             "state": "waiting" if entry.found is None else "unreadable" if problem else "read",
             "problem": problem,
             "damage": found.get("damage", []),
+            "left_out": found.get("left_out", []),
             "ended": found.get("ended"),
             "ended_why": found.get("ended_why"),
             "is_clip": found.get("is_clip", False),

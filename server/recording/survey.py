@@ -82,6 +82,7 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "ended_why": _text(metadata.get("why")),
         "is_clip": "clip_of" in metadata,
         "clip_of": _text(metadata.get("clip_of")),
+        "left_out": [name[:200] for name in metadata.get("left_out", "").split("\n") if name][:MAX_SENTENCES],
         "damage": damage[:MAX_SENTENCES],
         "sketch": None if drawn is None else drawn.as_json(),
     }

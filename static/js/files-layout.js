@@ -24,6 +24,7 @@ import { speedWords } from './units.js';
  * @property {'waiting' | 'read' | 'unreadable'} state
  * @property {string | null} problem why it cannot be read
  * @property {string[]} damage what of it cannot be read
+ * @property {string[]} [left_out] topics that were not recorded
  * @property {string | null} ended closed, recovered, or null where nobody says
  * @property {string | null} ended_why
  * @property {boolean} is_clip
@@ -140,8 +141,10 @@ export function factWords(row) {
 
 /** What else there is to say of it, in sentences. @param {Recording} row */
 export function warningWords(row) {
-  const recovered = row.ended === 'recovered' ? [`Recovered${row.ended_why ? `: ${row.ended_why.replace(/\.$/, '')}` : ': the server ended while it was recorded'}.`] : [];
-  return [...recovered, ...row.damage];
+  const why = row.ended_why ?? 'the server ended while it was recorded.';
+  const recovered = row.ended === 'recovered' ? [/recover/i.test(why) ? why : `Recovered: ${why}`] : [];
+  const leftOut = row.left_out?.length ? [`Not recorded: ${row.left_out.join(', ')}.`] : [];
+  return [...recovered, ...row.damage, ...leftOut];
 }
 
 /** @typedef {{kind: 'all' | 'vehicle' | 'tag' | 'days', value: string}} Choice */

@@ -64,6 +64,8 @@ test('the facts in one sentence, and what is unknown as unknown', () => {
   assert.equal(factWords(row({ state: 'waiting', length_s: null })), '38.0 MB, being read now.');
   assert.equal(factWords(row({ state: 'unreadable', problem: 'x.mcap is empty.' })), '38.0 MB. x.mcap is empty.');
   assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'the server was killed.', damage: ['A part is lost.'] })), ['Recovered: the server was killed.', 'A part is lost.']);
+  assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'car_1 was recovered.', left_out: ['/camera', '/points'] })), ['car_1 was recovered.', 'Not recorded: /camera, /points.']);
+  assert.deepEqual(warningWords(row({ ended: 'recovered' })), ['Recovered: the server ended while it was recorded.']);
   assert.deepEqual(warningWords(row()), []);
 });
 

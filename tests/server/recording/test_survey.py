@@ -64,8 +64,12 @@ def test_a_clip_is_told_as_one(tmp_path: Path) -> None:
 
 
 def test_the_topics_of_the_drives_own_settings_count(tmp_path: Path) -> None:
-    path = record(tmp_path / "car" / "car_1.mcap", settings='[topics]\nspeed = "/not/there"\n')
-    assert survey(path)["top_speed_mps"] is None
+    path = record(
+        tmp_path / "car" / "car_1.mcap", left_out="/camera\n/points", settings='[topics]\nspeed = "/not/there"\n'
+    )
+    found = survey(path)
+    assert found["top_speed_mps"] is None
+    assert found["left_out"] == ["/camera", "/points"]
     assert survey(record(tmp_path / "car" / "car_2.mcap", settings="[[["))["top_speed_mps"] == 5.0
 
 
