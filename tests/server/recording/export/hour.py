@@ -38,6 +38,7 @@ def drive(path: Path, seconds: float, version: RosVersion = 1, *, lap_s: float =
         file.add(file.channel(message.topic, schema), at_ns, schema.encode(message.message))
         if int(at_s) > second:
             second = int(at_s)
+            file.flush()
             fix = {"lat_deg": 32.2, "lon_deg": -110.9 + second * 1e-6, "accuracy_m": 5.0, "age_s": 0.1}
             own(at_ns, "phone", {"phone": "9c", "why": None, "fix": fix})
             if second % 60 == 30:
