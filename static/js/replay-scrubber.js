@@ -24,6 +24,8 @@ export class Scrubber {
   /** A moment that was asked for and is not shown yet. @type {{at_s: number, since_ms: number} | null} */
   #wanted = null;
   #isAsking = false;
+  #isPlaying = false;
+  #pressed_ms = -Infinity;
   #notes = '';
 
   /**
@@ -105,20 +107,22 @@ export class Scrubber {
     setAttribute(this.slider, 'aria-valuemax', this.#length_s.toFixed(1));
     setAttribute(this.slider, 'aria-valuenow', this.#at_s.toFixed(1));
     setAttribute(this.slider, 'aria-valuetext', spoken(this.#at_s, this.#length_s));
-    setIcon(/** @type {Element} */ (this.play.firstElementChild), replay.is_playing ? 'pause' : 'play');
-    setText(/** @type {Element} */ (this.play.lastElementChild), replay.is_playing ? 'Pause' : 'Play');
+    if (replay.is_playing === this.#isPlaying || this.store.now() - this.#pressed_ms > HOLD_MS) this.#pressed_ms = -Infinity;
+    if (this.#pressed_ms === -Infinity) this.#isPlaying = replay.is_playing;
+    setIcon(/** @type {Element} */ (this.play.firstElementChild), this.#isPlaying ? 'pause' : 'play');
+    setText(/** @type {Element} */ (this.play.lastElementChild), this.#isPlaying ? 'Pause' : 'Play');
     if (document.activeElement !== this.rate) this.rate.value = String(replay.rate);
     const marks = this.#line?.marks ?? [];
     setAttribute(this.before, 'aria-disabled', markBeside(marks, this.#at_s, -1) === null ? 'true' : null);
     setAttribute(this.after, 'aria-disabled', markBeside(marks, this.#at_s, 1) === null ? 'true' : null);
-    this.isPlaying = replay.is_playing;
   }
 
-  isPlaying = false;
-
-  /** Play or pause. */
+  /** Play or pause; what was pressed counts until the server's state says so too. */
   toggle() {
-    this.#order({ do: this.isPlaying ? 'pause' : 'play' });
+    this.#order({ do: this.#isPlaying ? 'pause' : 'play' });
+    this.#isPlaying = !this.#isPlaying;
+    this.#pressed_ms = this.store.now();
+    if (this.store.frame) this.draw(this.store.frame);
   }
 
   /** Space and arrows anywhere on the page, where nothing else has them. @param {KeyboardEvent} event */

@@ -1,0 +1,249 @@
+"""Replay in the page, with a real recording, a live simulated car beside it, and the real server."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import re
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any
+
+import httpx
+import pytest
+import pytest_asyncio
+from axe_playwright_python.async_playwright import Axe
+from playwright.async_api import Browser, Page, expect
+
+from tests.page import drives
+from tests.page.conftest import PHONE, Phone
+from tests.page.processes import Process, running, server, simulate
+
+OPENS_MS = 25_000
+
+
+def speed(t: float) -> Any:
+    """Too fast from 20 s to 28 s; silent, with all else, from 40 s to 46 s."""
+    return None if 40 <= t < 46 else drives.twist(12.4 if 20 <= t < 28 else 6.0 + math.sin(t / 5))
+
+
+@dataclass(frozen=True)
+class Watch:
+    address: str
+    recording: str
+    car: Process
+
+
+@pytest_asyncio.fixture(loop_scope="module", scope="module")
+async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Watch]:
+    data = tmp_path_factory.mktemp("data")
+    folder = data / "recordings" / "car"
+    folder.mkdir(parents=True)
+    drives.write(
+        folder / "street.bag",
+        {"speed": speed, "scan": lambda t: None if 40 <= t < 46 else drives.street(t, gap_m=30.0)},
+        seconds=70.0,
+    )
+    async with running(*simulate()) as car, running(*server(data, car.address)) as process:
+        async with httpx.AsyncClient() as client, asyncio.timeout(30):
+            while not (rows := (await client.get(f"{process.address}/api/recordings")).json()["recordings"]):
+                await asyncio.sleep(0.2)
+        yield Watch(process.address, rows[-1]["id"], car)
+
+
+async def replayed(phone: Phone, watch: Watch, at_s: float, tab: str = "home") -> Page:
+    page = phone.page
+    await phone.open(f"{watch.address}/?replay={watch.recording}&t={at_s}#{tab}")
+    await shown(page)
+    return page
+
+
+async def shown(page: Page) -> None:
+    await page.wait_for_selector('html[data-replay="on"]', state="attached", timeout=OPENS_MS)
+    await expect(page.locator(".scrub .all")).to_have_attribute("d", re.compile("L"), timeout=OPENS_MS)
+
+
+def clock(page: Page) -> Any:
+    return page.locator(".scrub .clock b")
+
+
+async def test_a_link_leads_to_a_moment_and_one_tap_back_to_live(phone: Phone, watch: Watch) -> None:
+    page = await replayed(phone, watch, 24.0)
+    await expect(page.locator(".gauge .speed")).to_have_text("12.4")
+    await expect(page.locator(".replay-date")).to_contain_text("Recorded 1 Jun 2016")
+    await expect(page.locator(".replay-line")).to_contain_text("Speed above limit")
+    await expect(page.locator(".replay-line")).to_contain_text("judged anew")
+    await expect(page).to_have_title(re.compile("REPLAY"))
+    assert "catgraph-replay" in str(await page.locator('link[rel="icon"]').get_attribute("href"))
+    await expect(page.locator("#monitor > .rail")).to_be_hidden()
+    assert not await page.locator("#sheet-alarm[open]").count(), "what was an alarm then asks nobody now"
+    await page.get_by_role("button", name="Leave").tap()
+    await phone.live()
+    await expect(page.locator("#monitor > .rail")).to_be_visible()
+    assert not await page.locator(".replay-band, .scrub").count()
+    assert "replay" not in page.url
+    assert await page.evaluate("() => document.documentElement.dataset.replay") is None
+
+
+async def test_it_plays_pauses_and_changes_its_pace(phone: Phone, watch: Watch) -> None:
+    page = await replayed(phone, watch, 2.0)
+    await expect(clock(page)).to_have_text("00:02")
+    await page.get_by_label("Pace of the replay").select_option("8")
+    await page.get_by_role("button", name="Play").tap()
+    await expect(clock(page)).to_have_text(re.compile("00:(1[0-9]|[2-6])"), timeout=10_000)
+    await page.get_by_role("button", name="Pause").tap()
+    await expect(page.get_by_role("button", name="Play")).to_be_visible()
+    await page.keyboard.press("Space")  # on the key that was pressed
+    await expect(page.get_by_role("button", name="Pause")).to_be_visible()
+    await page.locator("#panel-home").focus()
+    await page.keyboard.press("Space")
+    await expect(page.get_by_role("button", name="Play")).to_be_visible()
+    stands = await clock(page).text_content()
+    await page.wait_for_timeout(1200)
+    assert await clock(page).text_content() == stands
+
+
+async def test_the_finger_and_the_keys_lead_to_any_moment(phone: Phone, watch: Watch) -> None:
+    page = await replayed(phone, watch, 5.0)
+    slider = page.get_by_role("slider", name="Moment of the recording")
+    box = await slider.bounding_box()
+    assert box is not None
+    assert box["height"] >= 56
+    await page.mouse.move(box["x"] + box["width"] * 0.1, box["y"] + 40)
+    await page.mouse.down()
+    await page.mouse.move(box["x"] + box["width"] * 24 / 70, box["y"] + 40, steps=6)
+    await page.mouse.up()
+    await expect(page.locator(".gauge .speed")).to_have_text("12.4")
+    await expect(clock(page)).to_have_text(re.compile("00:2[345]"))
+    await slider.press("End")
+    await expect(clock(page)).to_have_text("01:09")
+    await slider.press("Home")
+    await expect(clock(page)).to_have_text("00:00")
+    await slider.press("ArrowRight")
+    await expect(slider).to_have_attribute("aria-valuetext", "3 seconds of 1 minute 9 seconds")
+    assert re.search(r"[?&]t=", page.url)
+
+
+async def test_marks_stand_at_the_alarms_and_keys_lead_there(phone: Phone, watch: Watch) -> None:
+    page = await replayed(phone, watch, 10.0)
+    await expect(page.locator(".marks .critical").first).to_be_attached(timeout=OPENS_MS)
+    await expect(page.locator(".unread")).to_have_count(0, timeout=OPENS_MS)
+    await page.get_by_role("button", name="Next alarm").tap()
+    await expect(page.locator(".replay-line")).to_contain_text("Speed above limit")
+    await expect(clock(page)).to_have_text("00:20")
+    await page.get_by_role("slider", name="Moment of the recording").press("End")
+    await expect(clock(page)).to_have_text("01:09")
+    await page.get_by_role("button", name="Previous alarm").tap()
+    await expect(clock(page)).not_to_have_text("01:09")
+
+
+async def test_what_was_not_recorded_is_said_and_hatched(phone: Phone, watch: Watch) -> None:
+    page = await replayed(phone, watch, 45.0)
+    await expect(page.locator(".replay-line")).to_contain_text(re.compile("Nothing recorded for [45]"))
+    await expect(page.locator(".gaps rect")).to_have_count(1, timeout=OPENS_MS)
+    assert not await page.locator(".veil[data-on]").count(), "the server answers: nothing is covered"
+
+
+async def test_two_pages_look_at_different_moments_and_a_third_at_live(
+    browser: Browser, phone: Phone, watch: Watch
+) -> None:
+    page = await replayed(phone, watch, 24.0)
+    others = [await browser.new_context(**PHONE) for _ in range(2)]
+    second, live = [Phone(await context.new_page()) for context in others]
+    await replayed(second, watch, 60.0)
+    await live.open(f"{watch.address}/#home")
+    await live.live()
+    await expect(clock(page)).to_have_text("00:24")
+    await expect(clock(second.page)).to_have_text("01:00")
+    assert not await live.page.locator(".replay-band").count()
+    for context in others:
+        await context.close()
+
+
+async def test_scan_map_and_minute_are_those_of_the_recording(phone: Phone, watch: Watch) -> None:
+    page = await replayed(phone, watch, 30.0, "scan")
+    await expect(page.locator('#panel-scan [data-f="nearest"], #panel-scan .three').first).to_contain_text(
+        "30", timeout=15_000
+    )
+    await page.wait_for_timeout(1500)  # the scan that stands is told again: it must not grow old
+    assert "stale" not in str(await page.locator("#panel-scan").inner_text()).lower()
+
+
+async def test_nothing_is_ordered_from_a_replay(phone: Phone, watch: Watch) -> None:
+    page = await replayed(phone, watch, 3.0)
+    async with httpx.AsyncClient() as client:
+        before = (await client.get(f"{watch.address}/api/settings")).json()["values"]["speed_limit.max_mps"]
+    await page.evaluate("() => { location.hash = '#settings'; }")
+    number = page.locator('#panel-settings input[type="text"], #panel-settings input[inputmode]').first
+    await expect(number).to_be_visible(timeout=10_000)
+    await number.fill("9")
+    await number.press("Enter")
+    await expect(page.locator("body")).to_contain_text("replays a recording", timeout=10_000)
+    async with httpx.AsyncClient() as client:
+        after = (await client.get(f"{watch.address}/api/settings")).json()["values"]["speed_limit.max_mps"]
+    assert before == after
+
+
+async def test_a_live_alarm_reaches_who_looks_at_a_recording(phone: Phone, watch: Watch) -> None:
+    page = await replayed(phone, watch, 3.0)
+    await watch.car.type("speeding 30")
+    sheet = page.locator("#sheet-live[open]")
+    await expect(sheet).to_contain_text("Live: Speed above limit", timeout=20_000)
+    await expect(sheet).to_contain_text("happening now")
+    await expect(page).to_have_title(re.compile("LIVE Speed above limit"))
+    await page.get_by_role("button", name="Stay in the replay").tap()
+    await expect(page.locator(".replay-live")).to_contain_text("Live: Speed above limit")
+    await expect(page.locator(".frame")).to_have_attribute("data-mode", "asking")
+    await expect(clock(page)).to_have_text("00:03")
+    await page.locator(".replay-live").tap()
+    await expect(page.locator("#sheet-alarm[open]")).to_be_visible()
+    await watch.car.type("stop")
+    await phone.f("acknowledge", "#sheet-alarm").tap()
+
+
+async def test_a_recording_that_is_not_there_is_refused_and_live_goes_on(phone: Phone, watch: Watch) -> None:
+    await phone.open(f"{watch.address}/?replay=../../etc/passwd#home")
+    await expect(phone.page.locator(".snack.note")).to_contain_text(
+        "There is no recording named ../../etc/passwd.", timeout=15_000
+    )
+    await phone.live()
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+async def test_no_barrier(browser: Browser, watch: Watch, scheme: Any) -> None:
+    context = await browser.new_context(**PHONE | {"color_scheme": scheme, "bypass_csp": True})
+    phone = Phone(await context.new_page())
+    page = await replayed(phone, watch, 24.0)
+    found = await Axe().run(page)
+    assert [(rule["id"], rule["nodes"][0]["html"]) for rule in found.response["violations"]] == []
+    small = await page.evaluate(
+        """() => [...document.querySelectorAll('.scrub button, .scrub label, .leave, .time-line')]
+        .map((key) => [key.textContent, key.getBoundingClientRect()])
+        .filter(([, box]) => box.width < 56 || box.height < 56).map(([text]) => text)"""
+    )
+    assert small == []
+    await context.close()
+
+
+@pytest.mark.parametrize(("width", "height"), [(320, 640), (915, 412), (1280, 800)])
+async def test_nothing_overlaps_or_overflows(browser: Browser, watch: Watch, width: int, height: int) -> None:
+    context = await browser.new_context(**PHONE | {"viewport": {"width": width, "height": height}})
+    page = await replayed(Phone(await context.new_page()), watch, 24.0)
+    boxes = await page.evaluate(
+        """() => ['.replay-top .leave', '.top .menu', '.replay-date', '.replay-line', '#monitor .view',
+        '.time-line', ...[1, 2, 3, 4, 5].map((n) => `.keysrow > :nth-child(${n})`)]
+        .map((selector) => {
+          const {left, right, top, bottom} = document.querySelector(selector).getBoundingClientRect();
+          return [selector, left, right, top, bottom];
+        })"""
+    )
+    for selector, left, right, top, bottom in boxes:
+        assert -0.5 <= left, selector
+        assert right <= width + 0.5, selector
+        assert -0.5 <= top, selector
+        assert bottom <= height + 0.5, selector
+    for i, (a, *one) in enumerate(boxes):
+        for b, *two in boxes[i + 1 :]:
+            apart = one[1] <= two[0] + 1 or two[1] <= one[0] + 1 or one[3] <= two[2] + 1 or two[3] <= one[2] + 1
+            assert apart, (a, b)
+    await context.close()
