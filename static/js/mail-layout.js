@@ -120,11 +120,11 @@ export function aboutOf(mail) {
   return [what, format, mail.size_bytes === null ? '' : sizeWords(mail.size_bytes), way].filter(Boolean).join(' · ');
 }
 
-/** Who did not get it, and why; empty where all did or the reason is said already. @param {Mail} mail */
+/** Who did not get it, and why, where that is not said already. @param {Mail} mail */
 export function refusedOf(mail) {
   if (mail.to.length < 2) return [];
   const found = new Map(mail.parts.flatMap(({ recipients }) => recipients.filter(({ state }) => state === 'refused').map(({ address, said }) => [address, said])));
-  return [...found].map(([address, said]) => `${address}: ${said}`);
+  return [...found].map(([address, said]) => `${address}: ${said}`).filter((line) => !mail.said.includes(line));
 }
 
 /**

@@ -58,14 +58,14 @@ class MailForm {
     this.limit = line('limit_mb', { maxlength: 6, inputmode: 'decimal', class: 'n', 'aria-describedby': 'mail-set-limit-help' });
     this.linkBase = line('link_base', { maxlength: 300, inputmode: 'url', placeholder: location.origin, 'aria-describedby': 'mail-set-link-help' });
     this.ca = /** @type {HTMLTextAreaElement} */ (html('textarea', { id: 'mail-set-ca', 'data-mail-field': 'ca', class: 'pem', rows: 3, maxlength: 32_768, autocapitalize: 'off', spellcheck: 'false', placeholder: '-----BEGIN CERTIFICATE-----', 'aria-describedby': 'mail-set-ca-help' }));
-    this.passwordHelp = html('p', { class: 'hint', id: 'mail-set-password-help' });
+    this.passwordHelp = html('p', { class: 'mail-hint', id: 'mail-set-password-help' });
     this.bad = html('p', { class: 'bad', role: 'alert' });
     this.good = html('p', { class: 'good', role: 'status' });
     this.save = html('button', { type: 'button', class: 'key wide solid', 'data-f': 'mail-save' }, 'Save');
     this.to = line('test', { maxlength: 320, inputmode: 'email', autocomplete: 'email', placeholder: 'you@example.org', 'aria-describedby': 'mail-set-test-help' });
     this.test = html('button', { type: 'button', class: 'key wide', 'data-f': 'mail-test' }, icon('mail'), 'Test');
     const outbox = html('button', { type: 'button', class: 'key wide', 'data-f': 'mail-outbox' }, icon('files'), 'Outbox');
-    const hint = (/** @type {string} */ id, /** @type {string} */ words) => html('p', { class: 'hint', id: `mail-set-${id}-help` }, words);
+    const hint = (/** @type {string} */ id, /** @type {string} */ words) => html('p', { class: 'mail-hint', id: `mail-set-${id}-help` }, words);
     this.element = html('div', { class: 'mail-form mail-settings' },
       html('div', { class: 'two' }, html('div', {}, label('host', 'SMTP host'), this.host), html('div', {}, label('port', 'Port'), this.port)),
       html('span', { class: 'lab', id: 'mail-set-security' }, 'Encrypted by'), html('div', { class: 'seg', role: 'group', 'aria-labelledby': 'mail-set-security' }, ...this.security),

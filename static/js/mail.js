@@ -60,9 +60,9 @@ class MailSheet {
     this.subject = /** @type {HTMLInputElement} */ (html('input', { id: 'mail-subject', type: 'text', maxlength: 200, autocomplete: 'off' }));
     this.text = /** @type {HTMLTextAreaElement} */ (html('textarea', { id: 'mail-text', maxlength: 20_000, rows: 3 }));
     this.formats = FORMATS.map(([name, label]) => html('button', { type: 'button', 'data-format': name, 'aria-pressed': 'false' }, label));
-    this.formatHint = html('p', { class: 'hint' });
+    this.formatHint = html('p', { class: 'mail-hint' });
     this.ways = [html('button', { type: 'button', 'data-way': 'split', 'aria-pressed': 'false' }, 'Parts'), html('button', { type: 'button', 'data-way': 'link', 'aria-pressed': 'false' }, 'A link')];
-    this.size = html('p', { class: 'hint', 'data-f': 'mail-size' });
+    this.size = html('p', { class: 'mail-hint', 'data-f': 'mail-size' });
     this.refused = html('p', { class: 'bad', role: 'alert', id: 'mail-refused' });
     this.told = html('p', { class: 'good', role: 'status' });
     this.limit = html('span', { class: 'lab', id: 'mail-way-lab' });
