@@ -172,6 +172,30 @@ async def test_files_copied_in_by_hand_are_found_once_a_list_is_asked_for(tmp_pa
         assert len(one.rows().rows) == 6
 
 
+async def test_an_unchanged_folder_is_not_walked_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = some(tmp_path)
+    for path in folder.rglob("*.mcap*"):
+        os.utime(path, ns=(1, NOW_MS * 1_000_000 - 10**12))
+    looked: list[Path] = []
+    one = made(tmp_path)
+    look = one._look
+    monkeypatch.setattr(one, "_look", lambda path, known: looked.append(path) or look(path, known))
+    for change, seen in (
+        (lambda: None, 12),  # each once while walking, and once more where it is new
+        (lambda: None, 0),
+        (lambda: remarks.write(folder / "red" / "notes.mcap", Remarks(title="New")), 7),
+        (lambda: (folder / "red" / "notes.mcap").write_text("it grows while it is copied"), 0),
+        (lambda: os.utime(folder / "red" / "notes.mcap", ns=(1, NOW_MS * 1_000_000)), 0),
+        (lambda: (folder / "red" / "more.mcap").write_text("x"), 9),
+        (lambda: None, 7),  # two of them changed just now
+    ):
+        looked.clear()
+        change()
+        one._walk_if_changed()
+        assert len(looked) == seen
+    await one.stop()
+
+
 async def test_hidden_files_links_and_what_is_being_written_are_not_listed(tmp_path: Path) -> None:
     folder = some(tmp_path)
     outside = tmp_path / "outside.mcap"
