@@ -91,9 +91,9 @@ async def cancelled(request: Request, job: JobId) -> dict[str, Any]:
     return {"ok": True, "state": found.state}
 
 
-@router.api_route(
+@router.head("/api/exports/{job}/file", include_in_schema=False)
+@router.get(
     "/api/exports/{job}/file",
-    methods=["GET", "HEAD"],
     summary="The file of an export that is done, whole or in part",
     response_class=Response,
 )

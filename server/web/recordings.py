@@ -126,9 +126,9 @@ def delete(request: Request, id: Id) -> Response:
     return _json(request, _asked(lambda: recordings.delete(id)))
 
 
-@router.api_route(
+@router.head("/api/recordings/{id}/file.mcap", include_in_schema=False)
+@router.get(
     "/api/recordings/{id}/file.mcap",
-    methods=["GET", "HEAD"],
     summary="Its file as it is, whole or in part",
     response_class=Response,
 )
