@@ -57,7 +57,7 @@ page.onShown = () => {
 
 mountStart(need(document, '#start'), store);
 mountConnect(need(document, '#connect'), store, page);
-mountTopbar(monitor, store);
+mountTopbar(monitor, store, say);
 mountStrip(monitor, store);
 mountVeil(monitor, store);
 mountGauge(need(monitor, '[data-part="gauge"]'), store);

@@ -194,8 +194,16 @@ export function linkWords(kind, view, frame) {
   }
   const isServer = view.cut === 0;
   const again = view.cut !== 1 ? view.detail : `The server is there and dials again${link?.attempts ? `; ${counted(link.attempts, 'try', 'tries')} so far` : ''}.`;
-  const until = !isServer && frame && frame.recording.state !== 'off' && view.since_ms !== null ? ` Recording saved up to ${timeOfDay(view.since_ms)}.` : '';
-  return [view.sentence, again, `The car may still be moving: watch the car.${until}`];
+  return [view.sentence, again, `The car may still be moving: watch the car.${isServer || !frame ? '' : savedWords(frame.recording)}`];
+}
+
+/**
+ * What became of the recording when the link was lost: said only once it is on the disk and in the list.
+ * @param {import('./protocol.js').RecordingNow} recording
+ */
+export function savedWords({ state, saved }) {
+  if (state === 'saving') return ' The recording is being saved.';
+  return state === 'held' && saved ? ` Recording saved up to ${timeOfDay(saved.until_ms)}.` : '';
 }
 
 /** @param {number} count */

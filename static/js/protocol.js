@@ -111,12 +111,26 @@
  * @property {string | null} [log_trouble] why the log is not kept on the server's disk
  * @property {Trends} [trends]
  * @property {Record<string, number>} limits
- * @property {{state: string, for_s: number | null}} recording
+ * @property {RecordingNow} recording
  * @property {{state: string, why: string | null}} decelerate
  * @property {{holder: string | null}} control
  * @property {PhoneShown | null} [phone] the operator's phone that is compared with the car
  * @property {ReplayAt} [replay] of a recording: what all the rest is of
  * @property {LiveAside | null} [live] in a replay only: what is live meanwhile; null: not known
+ *
+ * @typedef {object} RecordingNow
+ * @property {string} state off, recording, saving, held (link lost) or stopped (it was to record and cannot)
+ * @property {number | null} for_s
+ * @property {string | null} [name]
+ * @property {number | null} [part]
+ * @property {number} [bytes]
+ * @property {number} [messages]
+ * @property {number} [as_json]
+ * @property {number} [dropped]
+ * @property {string[]} [left_out]
+ * @property {number | null} [room_gb]
+ * @property {{name: string, until_ms: number} | null} [saved] the newest finished file, and the time of day it reaches
+ * @property {string | null} [reason] why it does not record
  *
  * @typedef {object} ReplayAt
  * @property {string} id

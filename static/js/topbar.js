@@ -1,25 +1,35 @@
-// The top bar: the chain with its word and age, the recorder, who is in control.
+// The top bar: the chain with its word and age, the recorder and its key in the menu, who is in control.
 
 import { drawChain } from './chain.js';
-import { field, setAttribute, setText, setWords } from './dom.js';
+import { field, listen, need, setAttribute, setText, setWords, show } from './dom.js';
+import { closeSheet } from './sheet.js';
 import { age, duration } from './words.js';
 
 /**
- * What stands beside the recording dot.
- * @param {{state: string, for_s: number | null}} recording
- * @param {boolean} isLive
+ * What stands beside the recording dot, and what the menu's key orders: to record, to end it, or nothing now.
+ * @param {import('./protocol.js').RecordingNow} recording
+ * @param {boolean} isSilent the server is, so that nobody knows whether it records
  */
-export function recordingWords({ state, for_s }, isLive) {
-  if (state === 'off') return { isOn: false, text: 'off' };
-  if (!isLive || state === 'held') return { isOn: false, text: 'held' };
-  return { isOn: true, text: duration(for_s ?? 0, true) };
+export function recordingWords({ state, for_s, reason }, isSilent) {
+  if (isSilent) return { isOn: false, text: '?', title: 'The server does not answer: nobody knows whether it records.', order: null };
+  const title = `Recording ${state === 'recording' ? 'now' : state}.${reason ? ` ${reason}` : ''}`;
+  if (state === 'off') return { isOn: false, text: 'off', title, order: true };
+  if (state === 'stopped') return { isOn: false, text: 'fault', title, order: true };
+  if (state === 'saving') return { isOn: false, text: 'saving', title, order: null };
+  if (state === 'held') return { isOn: false, text: 'held', title, order: false };
+  return { isOn: true, text: duration(for_s ?? 0, true), title, order: false };
 }
 
 /**
  * @param {HTMLElement} root
  * @param {import('./store.js').Store} store
+ * @param {(sentence: string, title?: string) => void} say
  */
-export function mount(root, store) {
+export function mount(root, store, say) {
+  const menu = /** @type {HTMLDialogElement} */ (need(document, '#sheet-menu'));
+  const [key, keyWords] = [field(menu, 'record'), field(menu, 'record-words')];
+  /** @type {boolean | null} */
+  let order = null;
   const chain = field(root, 'small-chain');
   const [link, word, wordAge, rec, recFor, who] = ['link', 'word', 'word-age', 'rec', 'rec-for', 'who-name'].map((name) => field(root, name));
   if (!link || !word || !wordAge || !rec || !recFor || !who) throw new Error('The template lacks the top bar');
@@ -33,12 +43,23 @@ export function mount(root, store) {
     setAttribute(link, 'aria-label', `${view.word}${since}: the link to the car. ${view.sentence}`); // begins with what is seen
     const { frame } = store;
     if (!frame) return;
-    const recording = recordingWords(frame.recording, view.word === 'Live');
+    const recording = recordingWords(frame.recording, store.isSilent);
     setAttribute(rec, 'data-on', recording.isOn);
+    setAttribute(rec, 'title', recording.title);
     setWords(recFor, recording.text);
+    order = frame.replay || !store.isMonitoring ? null : recording.order;
+    show(key, order !== null);
+    setText(keyWords, order === false ? 'End the recording' : 'Start recording');
     setText(who, frame.control.holder ?? 'No one');
   }
 
+  async function obey() {
+    closeSheet(menu);
+    const answer = await store.ask('record', { on: order });
+    if (!answer.ok) say(answer.reason ?? 'Refused.', order ? 'Not recording' : 'The recording goes on');
+  }
+
   draw();
-  return store.on('draw', draw);
+  const stops = [store.on('draw', draw), listen(key, 'click', obey)];
+  return () => stops.forEach((stop) => stop());
 }

@@ -9,6 +9,9 @@ import { age, fixed, timeOfDay } from './words.js';
 /** Each rewinding costs a slow phone some milliseconds; a hung page is covered so much sooner than 2 s, never later. */
 const REWIND_EVERY_MS = 190;
 
+/** What is known of the recorder under the veil: what it did then, or what is safe for good. @type {Record<string, string>} */
+const RECORDED = { recording: 'it was recording', held: 'saved', saving: 'it was being saved', stopped: 'it had stopped' };
+
 /**
  * The last values, told as what they are.
  * @param {import('./protocol.js').State | null} frame
@@ -71,10 +74,10 @@ export function mount(root, store) {
       sentence.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
     }
     setWords(then, thenWords(store.frame));
-    const recording = store.frame?.recording.state ?? 'off';
-    setText(rec, recording === 'off' ? '' : 'saved up to the last message');
-    show(recName, recording !== 'off');
-    show(rec, recording !== 'off');
+    const recording = RECORDED[store.frame?.recording.state ?? 'off'] ?? '';
+    setText(rec, recording);
+    show(recName, recording !== '');
+    show(rec, recording !== '');
   }
 
   draw();

@@ -5,6 +5,7 @@ import { screenOf } from '../../static/js/page.js';
 import { slowWords } from '../../static/js/rail.js';
 import { details, headline, kindWords } from '../../static/js/signals.js';
 import { tabByHash, tabByKey } from '../../static/js/tabs.js';
+import { savedWords } from '../../static/js/dialogs.js';
 import { recordingWords } from '../../static/js/topbar.js';
 import { thenWords } from '../../static/js/veil.js';
 import { state } from './frames.js';
@@ -65,9 +66,22 @@ test('the details of a signal tell what was rejected and why', () => {
 });
 
 test('recording, slow-down and last values', () => {
-  assert.deepEqual(recordingWords({ state: 'off', for_s: null }, true), { isOn: false, text: 'off' });
-  assert.deepEqual(recordingWords({ state: 'on', for_s: 252 }, true), { isOn: true, text: '04:12' });
-  assert.deepEqual(recordingWords({ state: 'on', for_s: 252 }, false), { isOn: false, text: 'held' });
+  const bar = (/** @type {any} */ recording, isSilent = false) => {
+    const { isOn, text, order } = recordingWords({ for_s: 252, reason: null, ...recording }, isSilent);
+    return [isOn, text, order];
+  };
+  assert.deepEqual(bar({ state: 'off', for_s: null }), [false, 'off', true]);
+  assert.deepEqual(bar({ state: 'recording' }), [true, '04:12', false]);
+  assert.deepEqual(bar({ state: 'held' }), [false, 'held', false]);
+  assert.deepEqual(bar({ state: 'saving' }), [false, 'saving', null]);
+  assert.deepEqual(bar({ state: 'stopped' }), [false, 'fault', true]);
+  assert.deepEqual(bar({ state: 'recording' }, true), [false, '?', null], 'a silent server: nobody knows');
+  assert.equal(recordingWords({ state: 'stopped', for_s: 9, reason: 'The disk is full.' }, false).title, 'Recording stopped. The disk is full.');
+  const saved = { name: 'car_1', until_ms: new Date(2026, 0, 2, 9, 41, 7).getTime() };
+  assert.equal(savedWords({ state: 'held', for_s: 9, saved }), ' Recording saved up to 09:41:07.');
+  assert.equal(savedWords({ state: 'saving', for_s: 9, saved: null }), ' The recording is being saved.');
+  assert.equal(savedWords({ state: 'recording', for_s: 9, saved }), '', 'what is not saved is not said to be');
+  assert.equal(savedWords({ state: 'off', for_s: null, saved }), '');
   assert.deepEqual(slowWords({ state: 'not_available', why: 'not configured' }), { title: 'Slow-down off', why: 'not configured' });
   assert.equal(thenWords(state({ signals: { speed: { value: { speed_mps: 4.2 } }, distance: { value: { distance_m: 12.4 } } } })), '4.2 m/s, object at 12.4 m');
   assert.equal(thenWords(null), 'nothing');

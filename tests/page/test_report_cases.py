@@ -94,6 +94,45 @@ async def test_case_02_the_right_address_opens_home(
         assert float(await phone.speed()) >= 0.0
 
 
+@pytest.mark.timeout(120)
+async def test_case_04_a_lost_link_shows_its_dialog_and_what_was_recorded_is_saved_and_listed(
+    phone: Phone, tmp_path: Path
+) -> None:
+    """Saved and listed before the dialog says so, and before the connect screen; a link that returns goes on."""
+    car = await Process(*simulate()).start()
+    port = car.shown.split(":")[1]
+    async with running(*server(tmp_path / "watch", car.address)) as watch:
+        try:
+            await phone.open(watch.address)
+            await phone.live()
+            await expect(phone.f("rec")).to_have_attribute("data-on", "", timeout=15_000)
+            await expect(phone.f("rec-for")).to_have_text(re.compile(r"00:0[3-9]"), timeout=15_000)
+            await car.kill()
+            lost = phone.page.locator("#sheet-lost")
+            await expect(lost).to_contain_text(re.compile(r"Recording saved up to \d\d:\d\d:\d\d"), timeout=15_000)
+            listed = (await (await phone.page.request.get(f"{watch.address}/api/recordings")).json())["recordings"]
+            assert len(listed) == 1
+            first = listed[0]["id"]
+            folder = tmp_path / "watch" / "recordings" / "car"
+            assert [path.name for path in folder.glob("*.mcap")] == [f"{first}.mcap"]
+            assert list(folder.glob("*.writing")) == []
+            await expect(phone.f("rec")).not_to_have_attribute("data-on", "")
+            await expect(phone.f("rec-for")).to_have_text("held")
+            # the car is there again in time: the same session goes on in a second part
+            car = await Process(*simulate(port=int(port))).start()
+            await expect(phone.f("rec")).to_have_attribute("data-on", "", timeout=20_000)
+            await expect(lost).to_be_hidden()
+            await car.kill()
+            await expect(lost).to_contain_text("Recording saved up to", timeout=15_000)
+            # Change the address: the connect screen
+            await lost.locator("[data-f=change]").tap()
+            await expect(phone.page.locator("#connect h1")).to_be_visible()
+            listed = (await (await phone.page.request.get(f"{watch.address}/api/recordings")).json())["recordings"]
+            assert sorted(row["id"] for row in listed) == [first, f"{first}_p2"]
+        finally:
+            await car.kill()
+
+
 async def test_case_06_no_position_is_told(phone: Phone, drive: tuple[Process, Process]) -> None:
     car, watch = drive
     await phone.open(watch.address)

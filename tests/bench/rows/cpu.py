@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tests.bench.rig import Rig
+from tests.bench.rows import recording
 from tests.bench.table import Group, Row
 
 
@@ -12,10 +13,12 @@ def measure(rig: Rig) -> Group:
     """The server with one page and with many, beside a bare client, a bare relay, and the bridge that does it alone."""
     load_s, most = rig.pace.load_s, rig.pace.most
     with rig.pages(1):
+        recording.order(rig, False)  # it has rows of its own
         before = rig.server.ask("timings")
         one = rig.server.share_of_core(load_s)
         after = rig.server.ask("timings")
     with rig.pages(most) as pages:
+        recording.order(rig, False)
         pages.ask("begin")
         many = rig.server.share_of_core(load_s)
         report = pages.ask("report")
