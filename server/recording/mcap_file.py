@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import heapq
+import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, Literal, cast
 
 from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
 from mcap.reader import McapReader, make_reader
-from mcap.records import Chunk, ChunkIndex, Message, Metadata
-from mcap.stream_reader import breakup_chunk
+from mcap.records import Chunk, ChunkIndex, Metadata
+from mcap.stream_reader import get_chunk_data_stream
 
 from server.recording.errors import RecordingUnreadable
 from server.recording.own import LIBRARY, METADATA
@@ -19,6 +21,7 @@ from server.recording.source import Channel, Damage, DefinitionFormat
 from server.source import RosVersion
 
 _FORMATS: dict[str, DefinitionFormat] = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
+_MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 
 
 def is_bag2(path: Path) -> bool:
@@ -96,32 +99,52 @@ class McapFile:
                 if channel.id in numbers:
                     yield message.log_time, channel.id, message.data
             return
-        unread = [part for part in reversed(self._parts) if part.message_end_time >= start_ns]
+        unread = [part for part in reversed(self._parts) if _matters(part, numbers, start_ns)]
         self.damage.parts = len(unread)
         heap: list[tuple[int, int, int, bytes]] = []  # time, place, channel, message: of the parts that overlap
         place = 0
         while unread or heap:
             while unread and (not heap or unread[-1].message_start_time <= heap[0][0]):
-                for message in self._whole(unread.pop()):
-                    if message.log_time >= start_ns and message.channel_id in numbers:
-                        place += 1
-                        heapq.heappush(heap, (message.log_time, place, message.channel_id, message.data))
+                for time_ns, number, raw in self._whole(unread.pop(), numbers, start_ns):
+                    place += 1
+                    heapq.heappush(heap, (time_ns, place, number, raw))
             if heap:
                 time_ns, _, number, raw = heapq.heappop(heap)
                 yield time_ns, number, raw
 
-    def _whole(self, part: ChunkIndex) -> list[Message]:
-        """The messages of a part; none where it is damaged."""
+    def _whole(self, part: ChunkIndex, numbers: set[int], start_ns: int) -> list[tuple[int, int, bytes]]:
+        """The messages of a part that are wanted; none where it is damaged. The library's own way through a chunk makes
+        an object of each record, which takes four times as long."""
+        rows: list[tuple[int, int, bytes]] = []
         try:
             self._file.seek(part.chunk_start_offset + 1 + 8)
-            chunk = Chunk.read(ReadDataStream(self._file))
-            return [record for record in breakup_chunk(chunk, validate_crc=True) if isinstance(record, Message)]
+            stream, size = get_chunk_data_stream(Chunk.read(ReadDataStream(self._file)), validate_crc=True)
+            data = stream.read(size)
+            place = 0
+            while place < size:
+                if data[place] == Opcode.MESSAGE:
+                    _, length, number, _, time_ns, _ = _MESSAGE_HEAD.unpack_from(data, place)
+                    if number in numbers and time_ns >= start_ns:
+                        rows.append((time_ns, number, data[place + _MESSAGE_HEAD.size : place + 9 + length]))
+                else:
+                    length = int.from_bytes(data[place + 1 : place + 9], "little")
+                place += 9 + length
+            if place != size:
+                raise ValueError("its records do not fill it")
         except Exception:  # damage makes the readers fail in every way there is
             self.damage.lost.append((part.message_start_time, part.message_end_time))
             return []
+        return rows
 
     def close(self) -> None:
         self._file.close()
+
+
+def _matters(part: ChunkIndex, numbers: set[int], start_ns: int) -> bool:
+    """Whether any wanted message may be in a part; where its index does not say which channels it has, it may."""
+    return part.message_end_time >= start_ns and (
+        not part.message_index_offsets or not numbers.isdisjoint(part.message_index_offsets)
+    )
 
 
 def latest(records: Iterable[Metadata]) -> dict[str, str]:
