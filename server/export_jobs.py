@@ -264,10 +264,11 @@ class Exports:
 
     def _sweep(self) -> None:
         """Forgets what was done long ago, and the oldest files where they are too many."""
-        done = sorted((job for job in self._jobs.values() if job.is_over), key=lambda job: job.done_s or 0.0)
+        ended = {job.id: job.done_s for job in self._jobs.values() if job.done_s is not None}  # what tidies up goes on
+        done = sorted((self._jobs[id] for id in ended), key=lambda job: ended[job.id])
         room = sum(job.size or 0 for job in done if job.path is not None)
         for index, job in enumerate(done):
-            is_old = self._now() - (job.done_s or 0.0) > KEEP_S
+            is_old = self._now() - ended[job.id] > KEEP_S
             is_newest = index == len(done) - 1
             if is_old or len(done) - index > MOST_KEPT or (room > KEEP_BYTES and not is_newest):
                 room -= (job.size or 0) if job.path is not None else 0

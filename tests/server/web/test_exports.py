@@ -219,6 +219,17 @@ async def test_what_nobody_fetches_is_swept_away(bench: Bench) -> None:
     assert not job.path.exists()
 
 
+async def test_one_that_still_tidies_up_is_not_taken_for_an_old_one(bench: Bench) -> None:
+    bench.now_s = 2 * KEEP_S  # of a clock that began when the machine did
+    wide = Window(at_ns=BEGAN_MS * 1_000_000, before_s=1.0, after_s=4.0)
+    job = await bench.exports.clip(DRIVE, wide)
+    async with asyncio.timeout(60):
+        while not job.finished.is_set():
+            assert bench.exports.job(job.id) is job
+            await asyncio.sleep(0)
+    assert job.state == "done"
+
+
 async def test_the_oldest_goes_where_they_are_too_large_together(bench: Bench) -> None:
     jobs = []
     for n, format in enumerate(("geojson", "gpx", "csv")):
