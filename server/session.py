@@ -127,6 +127,7 @@ class Session:
         """Begins to tick, and dials where the vehicle's address is known."""
         self._bus.serve(self.vehicle.name, self.handle)
         self._spawn(self._run(), "tick")
+        self._recording.prepare()
         self._remember()
         if self.vehicle.address:
             self._connect(self.vehicle.address, by=None)

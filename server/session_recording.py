@@ -87,6 +87,17 @@ class SessionRecording:
         self.ros_version: int | None = None
         self.left_out: tuple[str, ...] = ()  # topics that are not recorded, for they are bulky
 
+    def prepare(self) -> None:
+        """Gets ready to record, so that the first message finds all that it needs."""
+        if self._recorder is None and self._folder is not None:
+            self._recorder = Recorder(
+                self._folder,
+                call=asyncio.get_running_loop().call_soon_threadsafe,
+                on_finished=self._finished,
+                allowance=self._allowance(),
+            )
+            self._recorder.prepare()
+
     # -- what the session says ---------------------------------------------------------------------------------------
 
     def link_opened(self, address: str | None) -> None:
@@ -351,13 +362,8 @@ class SessionRecording:
                 "settings": str(settings["toml"]),
             },
         )
-        if self._recorder is None:
-            self._recorder = Recorder(
-                self._folder,
-                call=asyncio.get_running_loop().call_soon_threadsafe,
-                on_finished=self._finished,
-                allowance=self._allowance(),
-            )
+        self.prepare()
+        assert self._recorder is not None
         self._recorder.allowance = self._allowance()
         tape.begun = part
         self._recorder.begin(part)

@@ -22,7 +22,7 @@ from server.recording import recover, space
 from server.recording.encode import Misfit
 from server.recording.folder import FINISHED, RecordingsFolder, id_of, writing_path
 from server.recording.own import PREFIX, Own, own_schema
-from server.recording.schemas import Schema, TypeBook
+from server.recording.schemas import Schema, TypeBook, standard
 from server.recording.space import Allowance, Space
 from server.recording.write import PartFile
 from server.source import RosVersion
@@ -34,7 +34,7 @@ MAX_QUEUED_BYTES = 64 * 1024 * 1024  # of their frames; in memory they take some
 KEPT_FOR_OWN = 5_000  # places behind the car's: a disk that hangs must not cost the alarms of that time
 DRAIN_S = 0.05  # the thread works in small portions: a long one would keep the loop waiting for the interpreter
 PORTION = 64  # messages between two chances for others to run
-FLUSH_S = 0.25
+FLUSH_S = 0.2  # and with the portion before it a message is at most 0.25 s old when the system has it
 SYNC_S = 1.0
 LOOK_S = 1.0  # how often the disk is asked for its room
 COUNT_S = 15.0  # how often the folder's files are counted up
@@ -90,6 +90,7 @@ class Recorder:
         self._on_finished = on_finished
         self.allowance = allowance
         self.status = Status()
+        self.is_ready = False  # the types are
         self.dropped = 0  # since the session began
         self.dropped_at_s: float | None = None  # by the clock that `take` is given
         self._queue: deque[tuple[Any, ...]] = deque()
@@ -122,6 +123,11 @@ class Recorder:
         except IndexError:  # the thread has just taken it
             return 0.0
         return max(0.0, now_s - float(item[6])) if item[0] == "message" else 0.0
+
+    def prepare(self) -> None:
+        """Gets the types ready: what comes before they are waits, and would be lost by a kill."""
+        self._start()
+        self._put(("prepare",))
 
     def begin(self, part: Part) -> None:
         """From here on what is taken belongs to this part."""
@@ -203,6 +209,10 @@ class Recorder:
                         self._own(self._file, *item[1:])
                 case "begin":
                     self._open(item[1])
+                case "prepare":
+                    standard(1)
+                    standard(2)
+                    self.is_ready = True
                 case "learn":
                     if self._book is not None:
                         self._book.learn(item[1])
@@ -218,6 +228,7 @@ class Recorder:
             done += 1
             if done % PORTION == 0:
                 time.sleep(0)  # the loop may have waited for the interpreter meanwhile
+                self._flush_if_due(time.monotonic())
         return False
 
     def _message(self, file: PartFile, topic: str, type: str | None, at_ns: int, message: Any) -> None:
@@ -314,18 +325,22 @@ class Recorder:
         if file is None:
             self._complete(now_s)
             return
-        if now_s - self._flushed_s >= FLUSH_S:
-            self._flushed_s = now_s
-            file.flush()
-            self.status = replace(
-                self.status, size=file.size, messages=self._messages, misfits=self._misfits, space=self._space(file)
-            )
+        self._flush_if_due(now_s)
         if now_s - self._looked_s >= LOOK_S:
             found = self._look(now_s)
             file.demand_place()
             exhausted = found.exhausted(self.allowance)
             if exhausted is not None:
                 self._give_up(f"{exhausted} What was recorded is saved.")
+
+    def _flush_if_due(self, now_s: float) -> None:
+        file = self._file
+        if file is not None and now_s - self._flushed_s >= FLUSH_S:
+            self._flushed_s = now_s
+            file.flush()
+            self.status = replace(
+                self.status, size=file.size, messages=self._messages, misfits=self._misfits, space=self._space(file)
+            )
 
     def _complete(self, now_s: float) -> None:
         """What a full disk left cut is made whole when there is room again."""

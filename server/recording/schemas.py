@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import orjson
@@ -31,12 +32,18 @@ class Schema:
     encode: Encode | None  # None: JSON
 
 
+@cache
+def standard(version: RosVersion) -> Any:
+    """The messages of the distribution; the first time a tenth of a second of work, and never changed."""
+    return get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
+
+
 class TypeBook:
     """The types of one car: those of the distribution, and those that its bridge described."""
 
     def __init__(self, version: RosVersion) -> None:
         self.version: RosVersion = version
-        self._store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
+        self._store = standard(version)
         self._texts: dict[str, str] = {}  # by type as rosbags spells it
         self._known: dict[str, Schema | None] = {}
 
