@@ -1,7 +1,7 @@
 """One person's look at a recording: where it stands, whether it runs and how fast, and how it gets to another moment.
 
 Where the time line is already made, a seek goes on from what was kept there and comes to the very state that playing
-would have come to. Ahead of it, the checks get a minute to warm up before the moment; the replay says so, and puts it
+would have come to. Ahead of it, the checks get some time to warm up before the moment; the replay says so, and puts it
 right once the time line has come so far.
 """
 
@@ -18,8 +18,8 @@ from server.playback.told import read_told
 from server.recording.read import Recording, RecordingUnreadable
 
 RATES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
-WARM_UP_S = 60.0  # of the recording, before a moment that the time line has not come to
-REACH_S = 20.0  # a moment so little ahead is played to
+WARM_UP_S = 25.0  # of the recording, before a moment that the time line has not come to: less than a second of work
+REACH_S = 30.0  # a moment so little ahead is played to
 BEHIND_S = 0.3  # of our own time: further behind, it does not keep the pace that was asked for
 
 
@@ -156,7 +156,7 @@ class Playback:
         kept = self.index.before(target_s)
         here_s = self._run.at_s
         is_ahead = self.is_settled and here_s <= target_s
-        if is_ahead and (kept is None or kept[0] <= here_s) and target_s - here_s <= REACH_S + WARM_UP_S / 2:
+        if is_ahead and (kept is None or kept[0] <= here_s) and target_s - here_s <= REACH_S:
             pass  # what is known already leads there soonest
         elif kept is not None and target_s - kept[0] <= max(WARM_UP_S, 2 * self.index.every_s):
             self._run = Run(self._recording, self.drive, known=kept[1]())

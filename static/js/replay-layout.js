@@ -189,7 +189,7 @@ export function toldOf(frame) {
     return { kind, icon: kind || 'info', text: worst.title, end: among };
   }
   if (frame.session.paused) return { kind: 'gap', icon: 'pause', text: 'Monitoring was paused', end: '' };
-  if (!replay.is_settled) return { kind: '', icon: 'clock', text: 'Checks warmed up over 60 s', end };
+  if (!replay.is_settled) return { kind: '', icon: 'clock', text: 'Checks still warming up', end };
   return { kind: '', icon: 'ok', text: 'No alarms', end };
 }
 

@@ -91,7 +91,7 @@ test('the line says first what is wrong with the replay, then what was not recor
   assert.equal(told({ silent_s: null }).text, 'No message of the car yet');
   assert.equal(told({ is_seeking: true, silent_s: 9 }).text, 'Going to 04:06');
   assert.equal(told({ hangs_s: 3.2, is_seeking: true }).text, 'The replay has not answered for 3 s');
-  assert.equal(told({ is_settled: false }).text, 'Checks warmed up over 60 s');
+  assert.equal(told({ is_settled: false }).text, 'Checks still warming up');
   assert.equal(toldOf(playing({ session: { paused: true } })).text, 'Monitoring was paused');
 });
 

@@ -117,11 +117,11 @@ def test_ahead_of_the_time_line_the_checks_are_warmed_up_and_it_is_put_right(str
     reach(playback)
     assert playback.position()["is_settled"] is True
     played = opened(street)
-    for at_s in (0.0, 40.0, 80.0, 120.0):  # each so little ahead that it is played to
+    for at_s in (0.0, 30.0, 60.0, 90.0, 120.0):  # each so little ahead that it is played to
         played.seek(at_s, 100.0)
         reach(played)
     assert shown(playback) == shown(played)
-    # What differs while it is not settled is what a minute cannot know: counts, extents, the track, what is over and
+    # What differs while it is not settled is what 25 s cannot know: counts, extents, the track, what is over and
     # was never acknowledged.
     late = shown(playback)
     assert early["checks"] == late["checks"]
