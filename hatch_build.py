@@ -1,4 +1,4 @@
-"""Build hook: fetches others' files into static/vendor, joins the page's own in static/built, puts both in the wheel."""
+"""Build hook: others' files into static/vendor, the page's own joined into static/built, and both into the wheel."""
 
 from __future__ import annotations
 
