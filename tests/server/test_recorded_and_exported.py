@@ -23,6 +23,7 @@ from server.config import Config, Vehicle
 from server.recording.export.bag import write_bag
 from server.recording.read import Recording, open_recording
 from tests.server.conftest import serving
+from tests.server.recording.bags import Drive, Row, write_ros1, write_ros2
 
 BAG, MCAP = "catvehicle_2016-06-01.bag", "catvehicle_2016-06-01_mcap"
 QUICKER = 8  # times true speed
@@ -53,11 +54,46 @@ async def test_a_replayed_drive_is_recorded_and_exported_as_it_was(recordings: P
         assert not_a_number == 263  # the tyre angle in every command of this drive
 
 
-async def recorded(source: Path, data: Path) -> Path:
+ODD = [math.nan, math.inf, -math.inf, -0.0, 1e-45, 3.0, 81.0]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("version", [1, 2])
+async def test_infinities_and_nan_of_scans_stay_apart(tmp_path: Path, version: int) -> None:
+    """Scans come as CBOR, which keeps them; the bridge leaves out what comes while a scan is on its way."""
+    scans: list[Row] = [
+        (
+            0.1 * n,
+            "/scan",
+            "sensor_msgs/msg/LaserScan",
+            {"header": {"stamp": {"sec": n, "nanosec": 7}, "frame_id": "laser"}, "range_max": 80.0, "ranges": ODD},
+        )
+        for n in range(1, 61)
+    ]
+    write = write_ros1 if version == 1 else write_ros2
+    source = write(tmp_path / ("in.bag" if version == 1 else "in"), Drive(messages=scans))
+    ours = await recorded(source, tmp_path / "data", quicker=2)
+    with open_recording([ours]) as recording:
+        assert write_bag(recording, tmp_path / "out.bag").notes == []
+    with open_recording([source]) as before, open_recording([tmp_path / "out.bag"]) as after:
+        sent = {message.message["header"]["stamp"][SECONDS[version]]: message.message for message in before.messages()}
+        heard = [message.message for message in after.messages() if message.topic == "/scan"]
+    assert len(heard) > 40
+    for message in heard:
+        original = sent[message["header"]["stamp"]["secs"]]
+        assert [where for where, a, b in leaves(original, message, "scan") if not same(a, b)] == []
+        assert np.signbit(message["ranges"][3])
+
+
+SECONDS = {1: "secs", 2: "sec"}
+
+
+async def recorded(source: Path, data: Path, quicker: int = QUICKER) -> Path:
     """What our server keeps of a drive that our bridge plays."""
     bridge = await asyncio.create_subprocess_exec(
         *(sys.executable, "-u", "-m", "server", "replay", str(source), "--port", "0", "--wait"),
-        *("--rate", str(QUICKER)),
+        *("--rate", str(quicker)),
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.STDOUT,
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])},
