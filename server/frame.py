@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from monitor import catalog, values
 from monitor.instruments import stopping_m, time_gap_s
@@ -15,11 +15,13 @@ from monitor.state import Reading, Snapshot
 from monitor.trends import Piece
 from server import phone, problems, wire
 from server.address import Address
-from server.link import RosLink
 from server.past import Past
 from server.problems import Problem
 from server.reception import Reception, Tally
 from server.topics import Source
+
+if TYPE_CHECKING:  # a replay shows states too, and has no use for all that dials
+    from server.link import RosLink
 
 CAR_SILENT_S = 1.4  # said before 2 s are over
 OVERDUE_PERIODS = 3

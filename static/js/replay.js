@@ -13,6 +13,8 @@ import { timeOfDay } from './words.js';
 
 /** A long file that was never closed is read through before it is shown [ms]. */
 const OPENS_MS = 25_000;
+/** A connection that breaks meanwhile is waited for so often. */
+const TRIES = 3;
 /** The address follows the moment so often; browsers allow no more [ms]. */
 const NOTE_MS = 2000;
 
@@ -30,7 +32,11 @@ let current = null;
 export async function openReplay(id, store, say, at_s = 0) {
   await styled();
   say('It is read from the disk.', 'Opening the recording');
-  const answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
+  let answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
+  for (let tries = 1; !answer.ok && !store.wire.isOpen && tries < TRIES; tries += 1) {
+    await opened(store); // the connection broke meanwhile: nobody refused
+    answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
+  }
   if (!answer.ok) {
     say(answer.reason ?? 'Refused.', 'Not replayed');
     return false;
@@ -40,6 +46,16 @@ export async function openReplay(id, store, say, at_s = 0) {
   current = new Replay(id, store, say);
   for (const note of document.querySelectorAll('.snack.note')) note.remove();
   return true;
+}
+
+/** @param {Store} store @returns {Promise<void>} once the server greets again */
+function opened(store) {
+  return new Promise((resolve) => {
+    const stop = store.on('open', () => {
+      stop();
+      resolve();
+    });
+  });
 }
 
 /** The style sheet of a replay is fetched with the first one. @returns {Promise<void>} */

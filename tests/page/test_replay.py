@@ -162,9 +162,7 @@ async def test_two_pages_look_at_different_moments_and_a_third_at_live(
 
 async def test_scan_map_and_minute_are_those_of_the_recording(phone: Phone, watch: Watch) -> None:
     page = await replayed(phone, watch, 30.0, "scan")
-    await expect(page.locator('#panel-scan [data-f="nearest"], #panel-scan .three').first).to_contain_text(
-        "30", timeout=15_000
-    )
+    await expect(page.locator('#panel-scan [data-f="distance"]').first).to_contain_text("30", timeout=15_000)
     await page.wait_for_timeout(1500)  # the scan that stands is told again: it must not grow old
     assert "stale" not in str(await page.locator("#panel-scan").inner_text()).lower()
 
