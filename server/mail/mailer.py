@@ -244,6 +244,7 @@ class Mailer:
 
     async def _send_all(self) -> None:
         connection: Connection | None = None
+        await self._with(Outbox.requeue)
         try:
             while True:
                 self._to_send.clear()

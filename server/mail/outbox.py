@@ -19,7 +19,7 @@ from server.mail.order import Letter, Mail, Order, Recipient, State, Way, said_o
 MAX_OPEN = 1000  # letters not sent and not cancelled
 KEEP = 300  # letters that are over and still listed
 KILLED = (
-    "The server was ended while this mail was on its way; it is sent again and may arrive twice, "
+    "The sender was ended while this mail was on its way; it is sent again and may arrive twice, "
     "known by its Message-ID."
 )
 
@@ -78,6 +78,11 @@ class Outbox:
 
     def recover(self) -> None:
         """After a start: what was on its way waits again, what was cancelled stays so, files nobody needs go."""
+        self.requeue()
+        self.sweep()
+
+    def requeue(self) -> None:
+        """Nothing is on its way any more: whoever sent was ended in the midst of it."""
         with self._change() as database:
             database.execute(
                 "UPDATE mail SET state = 'cancelled' WHERE state IN ('sending', 'queued') "
@@ -86,7 +91,6 @@ class Outbox:
             database.execute(
                 "UPDATE mail SET state = 'queued', next_ms = 0, said = ? WHERE state = 'sending'", (KILLED,)
             )
-        self.sweep()
 
     def sweep(self) -> None:
         """Takes files away that no mail needs any more."""

@@ -32,6 +32,8 @@ async def prepare(
     letter: Letter, settings: MailSettings, source: Source, folder: Path, files: Path, progress: Callable[[float], None]
 ) -> Prepared:
     """Writes the mails of a letter into `files`; `folder` takes what lies between. Raises CannotPrepare, OSError."""
+    if not settings.is_complete:
+        raise CannotPrepare("Mail is not set up: give SMTP host and sender in Settings, E-mail.")
     work = folder / letter.key
     stop = threading.Event()
     try:

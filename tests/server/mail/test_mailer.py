@@ -150,6 +150,7 @@ async def test_while_the_server_is_down_it_waits_longer_and_longer_and_is_sent_w
         await mailer.change(settings(post.port))
         await post.kill()
         first, second = [(await mailer.order(f"key-000{i}", order())).n for i in range(2)]
+        await until(mailer, second, lambda letter: letter.said != "")  # it waits with the first, and was not tried
         for attempts in (1, 2, 3, 4):
             letter = await until(
                 mailer, first, lambda letter, a=attempts: letter.mails and letter.mails[0].attempts == a  # type: ignore[misc]
@@ -547,6 +548,41 @@ async def test_a_task_that_fails_is_begun_again(
         await mailer.change(settings(post.port))
         assert (await over(mailer, (await mailer.order("key-0001", order())).n)).state == "sent"
     assert "sending mail failed; it is begun again" in caplog.text
+
+
+async def test_a_mail_whose_sending_broke_in_the_midst_is_sent_all_the_same(
+    tmp_path: Path, shelf: Shelf, post: Post, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from server.mail import mailer as module
+
+    monkeypatch.setattr(module, "_AGAIN_S", 0.01)
+    faults = iter([RuntimeError("a fault")])
+    whole = Mailer._finish
+
+    async def failing(self: Mailer, *given: object) -> object:
+        for fault in faults:
+            raise fault
+        return await whole(self, *given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Mailer, "_finish", failing)
+    async with mailing(tmp_path / "mail", shelf) as mailer:
+        await mailer.change(settings(post.port))
+        letter = await over(mailer, (await mailer.order("key-0001", order())).n)
+        assert (letter.state, letter.mails[0].attempts) == ("sent", 2)
+
+
+async def test_what_was_ordered_before_the_settings_were_emptied_says_so(
+    tmp_path: Path, shelf: Shelf, post: Post
+) -> None:
+    async with mailing(tmp_path / "mail", shelf) as mailer:
+        await mailer.change(settings(post.port))
+        await post.kill()
+        n = (await mailer.order("key-0001", order())).n
+        await until(mailer, n, lambda letter: letter.said != "")
+        await mailer.change({})
+        letter = await over(mailer, n)
+        assert letter.state == "failed"
+        assert letter.said == "Mail is not set up: give SMTP host and sender in Settings, E-mail."
 
 
 async def test_link_local_and_metadata_addresses_are_never_dialled(tmp_path: Path, shelf: Shelf) -> None:
