@@ -65,6 +65,7 @@ async def test_60_frames_a_second_and_a_flat_heap_for_half_an_hour(phone: Phone,
     print(tab, cost)
     assert cost.share <= SHARE, str(cost)
     assert cost.frames_hz > 55, str(cost)
+    assert tab != "scan" or cost.scans_hz > 19, str(cost)
     heaps = []
     for _ in range(30):
         heaps.append(await heap_bytes(phone.page))
