@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import hashlib
 import logging
 import os
 import re
@@ -16,15 +15,15 @@ import shutil
 import sqlite3
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from server.recording import catalog_file, remarks
+from server.recording import catalog_file, moving, remarks
 from server.recording.catalog_file import COLUMNS, Entry, Which
 from server.recording.folder import DAMAGED, FINISHED, WRITING, is_id
+from server.recording.found_files import TRASH, files_below, id_of, shape_of, started_ms_of, vehicle_of
 from server.recording.survey import VERSION
 from server.recording.surveyor import Surveyor
 
@@ -34,10 +33,6 @@ LOOK_AGAIN_S = 20.0  # at most so often the folder is walked because a list is a
 GROWS_MS = 120_000  # a file that changed so recently may still be copied: its folder does not tell
 MAX_ROWS = 200  # a page
 MAX_FRESH = 1000  # finished recordings that wait to be listed; more are found by walking the folder
-_ENDINGS = (FINISHED, ".bag", ".db3", DAMAGED)
-_DEEP = 3  # folders below the root that are looked into
-_TRASH = ".trash"
-_STAMP = re.compile(r"(\d{8}T\d{6})Z")
 _CURSOR = re.compile(r"(-?\d{1,16})\.([A-Za-z0-9][A-Za-z0-9_-]{0,89})")
 
 
@@ -218,9 +213,9 @@ class Catalog:
                 raise Refused("It is being recorded now: stop recording first.")
             entry = self._need(id)
             now_ms = max(self._wall_ms(), 1)
-            while (self.folder / _TRASH / str(now_ms) / entry.path).exists():
+            while (self.folder / TRASH / str(now_ms) / entry.path).exists():
                 now_ms += 1
-            moved = replace(entry, path=f"{_TRASH}/{now_ms}/{entry.path}", trashed_ms=now_ms)
+            moved = replace(entry, path=f"{TRASH}/{now_ms}/{entry.path}", trashed_ms=now_ms)
             self._move(entry, moved)
             return self._row(moved)
 
@@ -250,20 +245,14 @@ class Catalog:
             finally:
                 self._forget([entry.path for entry in gone])
                 for entry in gone:
-                    _tidy(self.folder / entry.path, self.folder / _TRASH)
+                    moving.tidy(self.folder / entry.path, self.folder / TRASH)
             return {"count": len(gone), "bytes": sum(entry.size for entry in gone)}
 
     def _move(self, old: Entry, new: Entry) -> None:
-        """What people said of it goes first: after a crash between, walking finds the recording where it was."""
         source, target = self.folder / old.path, self.folder / new.path
         try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            for a, b in ((remarks.beside(source), remarks.beside(target)), (source, target)):
-                with contextlib.suppress(FileNotFoundError):
-                    os.rename(a, b)
+            moving.move(source, target)
         except OSError as why:
-            with contextlib.suppress(OSError):
-                os.rename(remarks.beside(target), remarks.beside(source))
             raise Refused(f"It cannot be moved: {(why.strerror or str(why)).lower()}.") from None
         if not target.exists():
             self._forget([old.path])
@@ -271,7 +260,7 @@ class Catalog:
         self._forget([old.path])
         self._put([new])
         if old.trashed_ms is not None:
-            _tidy(source, self.folder / _TRASH)
+            moving.tidy(source, self.folder / TRASH)
 
     # -- finding files -------------------------------------------------------------------------------------------------
 
@@ -280,7 +269,7 @@ class Catalog:
         known = {entry.path: entry for entry in self._entries("", [])}
         seen: set[str] = set()
         changed: list[Entry] = []
-        for path in _files(self.folder):
+        for path in files_below(self.folder):
             entry = self._look(path, known.get(path.relative_to(self.folder).as_posix()))
             if entry is None:
                 continue
@@ -294,7 +283,7 @@ class Catalog:
 
     def _walk_if_changed(self) -> None:
         """Looking at a thousand files takes the interpreter from the judge for some 50 ms, at their folders for 1."""
-        shape = _shape(self.folder)
+        shape = shape_of(self.folder)
         still_ns = (self._wall_ms() - GROWS_MS) * 1_000_000
         if shape != self._shape or self._entries("WHERE changed_ns > ? LIMIT 1", [still_ns]):
             self.walk()
@@ -308,7 +297,7 @@ class Catalog:
             return None
         inside = path.relative_to(self.folder).as_posix()
         trashed_ms, origin = None, inside
-        if inside.startswith(f"{_TRASH}/"):
+        if inside.startswith(f"{TRASH}/"):
             _, stamp, origin = inside.split("/", 2)
             trashed_ms = int(stamp)
         is_same = known is not None and (known.size, known.changed_ns) == (stat.st_size, stat.st_mtime_ns)
@@ -319,8 +308,8 @@ class Catalog:
             path=inside,
             id=id_of(origin),
             trashed_ms=trashed_ms,
-            vehicle=_vehicle(found, origin),
-            started_ms=_started_ms(found, path.name, stat.st_mtime_ns),
+            vehicle=vehicle_of(found, origin),
+            started_ms=started_ms_of(found, path.name, stat.st_mtime_ns),
             size=stat.st_size,
             changed_ns=stat.st_mtime_ns,
             found=found,
@@ -379,8 +368,8 @@ class Catalog:
             new = replace(
                 now,
                 found=found,
-                vehicle=_vehicle(found, origin),
-                started_ms=_started_ms(found, Path(entry.path).name, entry.changed_ns),
+                vehicle=vehicle_of(found, origin),
+                started_ms=started_ms_of(found, Path(entry.path).name, entry.changed_ns),
             )
             self._put([new])
 
@@ -461,75 +450,3 @@ class Catalog:
             "sketch": found.get("sketch"),
             "trashed_ms": entry.trashed_ms,
         }
-
-
-def id_of(inside: str) -> str:
-    """The id of a file by its place below the folder: its own name where the recorder gave it, else one made of it.
-
-    A recording that was copied in may be called anything, and as one in another folder is called too.
-    """
-    path = Path(inside)
-    stem = path.name.partition(".")[0]
-    if path.suffix == FINISHED and len(path.parts) == 2 and is_id(stem) and stem.startswith(f"{path.parts[0]}_"):
-        return stem
-    plain = re.sub(r"[^A-Za-z0-9_-]+", "-", stem).strip("-_")[:60] or "recording"
-    return f"{plain}-{hashlib.sha256(os.fsencode(inside)).hexdigest()[:10]}"
-
-
-def _vehicle(found: dict[str, Any] | None, origin: str) -> str:
-    told = (found or {}).get("vehicle")
-    folder = Path(origin).parts[0] if len(Path(origin).parts) > 1 else ""
-    return remarks.line(told or folder)[:40]
-
-
-def _started_ms(found: dict[str, Any] | None, name: str, changed_ns: int) -> int:
-    """By what was recorded; until it is read by the name, else by the file's own time."""
-    told = (found or {}).get("started_ms")
-    if isinstance(told, int):
-        return told
-    stamp = _STAMP.search(name)
-    if stamp is not None:
-        with contextlib.suppress(ValueError):
-            return round(datetime.strptime(stamp[1], "%Y%m%dT%H%M%S").replace(tzinfo=UTC).timestamp() * 1000)
-    return changed_ns // 1_000_000
-
-
-def _files(folder: Path) -> Iterator[Path]:
-    """The recordings below a folder, and those in its trash; no link is followed."""
-    for at, folders, names in os.walk(folder):
-        inside = Path(at).relative_to(folder).parts
-        is_trash = inside[:1] == (_TRASH,)
-        if is_trash and len(inside) > 1 and not (inside[1].isascii() and inside[1].isdigit() and len(inside[1]) < 16):
-            folders.clear()
-            continue
-        deep = _DEEP + 2 if is_trash else _DEEP
-        folders[:] = [
-            name
-            for name in folders
-            if len(inside) < deep and (not name.startswith(".") or (name == _TRASH and not inside))
-        ]
-        if is_trash and len(inside) < 2:
-            continue
-        for name in names:
-            path = Path(at, name)
-            if name.endswith(_ENDINGS) and not name.startswith(".") and path.is_file() and not path.is_symlink():
-                yield path
-
-
-def _shape(folder: Path) -> list[tuple[str, int]]:
-    """What changes when a file below a folder comes, goes, or is called otherwise."""
-    found = []
-    for at, folders, _ in os.walk(folder):
-        folders.sort()
-        with contextlib.suppress(OSError):
-            found.append((at, os.stat(at).st_mtime_ns))
-    return found
-
-
-def _tidy(path: Path, up_to: Path) -> None:
-    """Empty folders that a file left behind."""
-    with contextlib.suppress(OSError):
-        for folder in path.parents:
-            if folder == up_to or not folder.is_relative_to(up_to):
-                break
-            folder.rmdir()

@@ -18,9 +18,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.recording import catalog_file, remarks
-from server.recording.catalog import Catalog, NotThere, Refused, id_of
+from server.recording.catalog import Catalog, NotThere, Refused
 from server.recording.catalog_file import Entry, Which
 from server.recording.folder import is_id
+from server.recording.found_files import id_of
 from server.recording.remarks import Remarks
 from tests.server.recording.made import BEGAN_MS, record
 
@@ -311,6 +312,42 @@ async def test_deleted_is_not_gone_until_somebody_empties_the_trash(tmp_path: Pa
         assert one.destroy(None)["count"] == 1
         assert not any((folder / ".trash").iterdir())
         assert one.totals()["count"] == 4
+
+
+class Killed(BaseException):
+    """As kill -9: nothing after it is done."""
+
+
+@pytest.mark.parametrize("back", [False, True], ids=["deleting", "taking back"])
+@pytest.mark.parametrize("at", ["shutil.copyfile", "os.rename", "renamed"])
+def test_a_kill_while_it_is_moved_costs_neither_the_recording_nor_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: str, back: bool
+) -> None:
+    some(tmp_path)
+    id = "blue_20260921T141320Z"
+    one = made(tmp_path)
+    one.walk()
+    if back:
+        one.delete(id)
+
+    rename = os.rename
+
+    def kill(*paths: Any) -> None:
+        if at == "renamed":
+            rename(*paths)
+        raise Killed
+
+    with monkeypatch.context() as patched:
+        patched.setattr("os.rename" if at == "renamed" else at, kill)
+        with pytest.raises(Killed):
+            (one.restore if back else one.delete)(id)
+    again = made(tmp_path)
+    again.walk()
+    found = [row for is_trashed in (False, True) for row in again.rows(Which(is_trashed=is_trashed)).rows]
+    assert [row["title"] for row in found if row["id"] == id] == ["Wet lot"]
+    assert len(found) == 6
+    one._database.close()
+    again._database.close()
 
 
 async def test_what_is_being_recorded_is_not_deleted(tmp_path: Path) -> None:
