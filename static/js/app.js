@@ -102,6 +102,9 @@ for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.
 listen(document, 'keydown', () => { document.documentElement.dataset['keys'] = ''; }, { capture: true });
 listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
 listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
+listen(field(need(document, '#connect'), 'saved'), 'click', () => {
+  import('./files-board.js').then(({ openSaved }) => openSaved(store, say, page)).catch(() => say('The recordings could not be fetched from the server. Try again.', 'Not opened'));
+});
 
 // A link may lead to a moment of a recording.
 const asked = new URLSearchParams(location.search);

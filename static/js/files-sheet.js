@@ -41,12 +41,13 @@ export class FileSheet {
     this.store = store;
     this.model = model;
     this.say = say;
-    this.title = html('h2', { id: 'file-title', tabindex: -1, dir: 'auto' });
-    this.about = html('div', { class: 'bd', id: 'file-about' });
+    const nth = document.querySelectorAll('.file-sheet').length || ''; // another one may lie beneath the connect screen
+    this.title = html('h2', { id: `file-title${nth}`, tabindex: -1, dir: 'auto' });
+    this.about = html('div', { class: 'bd', id: `file-about${nth}` });
     this.what = html('div', { class: 'what' });
     this.keys = html('div', { class: 'keys' });
     this.close = html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close');
-    this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed file-sheet', id: 'sheet-file', 'aria-labelledby': 'file-title', 'aria-describedby': 'file-about' }, this.about, this.what, this.keys));
+    this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed file-sheet', id: `sheet-file${nth}`, 'aria-labelledby': `file-title${nth}`, 'aria-describedby': `file-about${nth}` }, this.about, this.what, this.keys));
     this.keys.append(this.close);
     this.take = addSheet(this.sheet);
     this.stops = [listen(this.sheet, 'close', () => this.#job?.giveUp())];

@@ -43,10 +43,12 @@ export function mount(panel, store, say, isShown) {
   const clear = html('button', { type: 'button', class: 'key wide', 'data-f': 'files-empty' }, icon('trash'), html('span', {}, 'Empty the trash'));
   const files = html('div', { class: 'files' }, html('div', { class: 'sec' }, count, free), find, state, live.element, list, empty, html('div', { class: 'files-foot' }, older, trash, back, clear));
   panel.replaceChildren(files);
-  const style = /** @type {HTMLLinkElement} */ (html('link', { rel: 'stylesheet', href: '/static/css/files.css' }));
-  style.onload = style.onerror = () => show(files, true); // not seen before it looks as it should
-  show(files, false);
-  document.head.append(style);
+  if (!document.querySelector('link[data-files]')) {
+    const style = /** @type {HTMLLinkElement} */ (html('link', { rel: 'stylesheet', href: '/static/css/files.css', 'data-files': true }));
+    style.onload = style.onerror = () => show(files, true); // not seen before it looks as it should
+    show(files, false);
+    document.head.append(style);
+  }
 
   /** @type {Map<string, {key: string, element: HTMLElement}>} */
   let drawn = new Map();

@@ -230,6 +230,14 @@ async def connect(server: Canned, page: Page) -> None:
     await page.evaluate("document.activeElement.blur()")
 
 
+@scene("connect-saved")
+async def connect_saved(server: Canned, page: Page) -> None:
+    server.state = idle()
+    await page.wait_for_selector("#connect:not([hidden])")
+    await page.tap("#connect [data-f=saved]")
+    await page.wait_for_selector(".saved-board .file")
+
+
 @scene("connect-failed")
 async def connect_failed(server: Canned, page: Page) -> None:
     await connect(server, page)

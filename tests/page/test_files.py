@@ -391,3 +391,31 @@ async def test_nothing_hangs_over_the_edge(opened: Phone, size: tuple[int, int])
     assert close["y"] + close["height"] <= size[1]
     items: Any = await sheet(opened).locator(".menu-list li").first.bounding_box()
     assert items["height"] >= 56
+
+
+async def test_saved_data_is_there_without_a_car(phone: Phone, tmp_path: Path) -> None:
+    record(tmp_path / "recordings" / "car" / f"{name_of(0)}.mcap", seconds=8.0)
+    async with running(*server(tmp_path)) as idle:
+        await phone.open(idle.address)
+        await phone.f("saved", "#connect").tap()
+        board = phone.page.locator(".saved-board")
+        await expect(board.locator(f'[data-id="{name_of(0)}"]')).to_contain_text("00:08 min", timeout=20_000)
+        for theme in ("dark", "light"):
+            await phone.page.emulate_media(color_scheme=theme)
+            found = (await Axe().run(phone.page)).response["violations"]
+            assert [(one["id"], one["nodes"][0]["html"]) for one in found] == [], theme
+        await board.locator(f'[data-id="{name_of(0)}"] .t').tap()
+        await expect(sheet(phone)).to_be_visible()
+        await phone.page.keyboard.press("Escape")
+        await phone.f("saved-back", ".saved-board").tap()
+        await expect(board).to_have_count(0)
+        await expect(phone.page.locator("#connect h1")).to_be_visible()
+        await phone.f("saved", "#connect").tap()
+        await expect(board).to_be_visible()
+        await phone.page.go_back()  # the phone's back key
+        await expect(board).to_have_count(0)
+        await phone.f("saved", "#connect").tap()
+        await board.locator(f'[data-id="{name_of(0)}"] .t').tap()
+        await sheet(phone).get_by_text("Open replay").tap()
+        await expect(phone.page.locator('[data-replay="on"]')).to_have_count(1, timeout=20_000)
+        await expect(board).to_have_count(0)
