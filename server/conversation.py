@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable, Mapping
 
 from server import discovery, judging, others
@@ -10,6 +11,8 @@ from server.link import LinkDown, RosLink, Subscription
 from server.others import Also
 from server.topics import BY_SIGNAL, TOPICS, Source, map_signals
 from server.tuning import Tuning
+
+log = logging.getLogger("catgraph.conversation")
 
 ALIVE_EVERY_S = 1.0
 LOOK_AGAIN_S = 5.0  # the car's software may start after its bridge
@@ -51,6 +54,7 @@ class Conversation:
         self.judged = 0  # topics that are subscribed to for their signals
         self._also: Also = "none"
         self._asked: set[str] = set()  # types whose definitions the bridge was asked for
+        self._learning: asyncio.Task[None] | None = None  # beside the talk: it may take long, and proves nothing
         self._look_soon = False
         self.others: Mapping[str, str] = {}  # topic → type of what is subscribed to only to be recorded
         self.left_out: tuple[str, ...] = ()  # topics that are not recorded, for they are bulky or there are too many
@@ -86,6 +90,8 @@ class Conversation:
     def end(self) -> None:
         """Whatever is still answered is of no interest any more."""
         self._link = None
+        if self._learning is not None:
+            self._learning.cancel()
 
     def record(self, also: Also) -> None:
         """Which topics are to be heard beyond those that carry signals; they are judged by nobody."""
@@ -135,20 +141,29 @@ class Conversation:
         if self._tuning.recognise(offer.topics, offer.ros):
             self._recognised(self._tuning.profile.title)
         self._map(offer)
-        if self._also != "none":
-            await self._learn(link, offer)
+        if self._also != "none" and self._learning is None:
+            self._learning = asyncio.create_task(self._learn(link, offer), name="definitions")
+            self._learning.add_done_callback(self._learned_all)
 
     async def _learn(self, link: RosLink, offer: discovery.Offer) -> None:
         """Definitions come first: what is recorded before they are known is JSON."""
         types = {kind for kind in offer.topics.values() if kind} - self._asked
-        if types:
+        if not types:
+            return
+        try:
             found = await discovery.ask_definitions(link, types)
-            if link is not self._link:
-                return
+        except LinkDown:
+            return
+        if link is self._link:
             self._asked |= types
             if found:
                 self._learned(found)
             self._subscribe()
+
+    def _learned_all(self, task: asyncio.Task[None]) -> None:
+        self._learning = None
+        if not task.cancelled() and task.exception() is not None:
+            log.error("the definitions of types could not be learned", exc_info=task.exception())
 
     def _map(self, offer: discovery.Offer) -> None:
         """Chooses the topic of each signal and subscribes to them."""

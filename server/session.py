@@ -133,6 +133,7 @@ class Session:
             self._connect(self.vehicle.address, by=None)
 
     async def stop(self) -> None:
+        self._conversation.end()
         if self._link is not None:
             self._link.stop()
         for task in self._tasks:

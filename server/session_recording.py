@@ -313,6 +313,8 @@ class SessionRecording:
                 return None
             case "stopped":
                 return self._why_stopped()
+            case "held" if self._saved is None:
+                return f"The link is lost. {self._status().trouble or 'Nothing was recorded yet.'}"
             case "held":
                 return (
                     "The link is lost: what was recorded is saved. A link that returns within "
@@ -343,6 +345,7 @@ class SessionRecording:
         tape.due_s = None
         tape.part += 1
         tape.is_open = True
+        self._saved = None
         now_s, wall_ms = self._now(), self._wall_ms()
         self._anchor = now_s, wall_ms * 1_000_000
         version: RosVersion = 2 if self.ros_version == 2 else 1

@@ -106,6 +106,7 @@ class Recorder:
         self._roads: dict[tuple[str, str | None], tuple[int, Schema, int | None]] = {}
         self._owns: dict[Own, int] = {}
         self._messages = self._misfits = 0
+        self._stumbled = False
         self._flushed_s = self._looked_s = self._counted_s = 0.0
         self._used_elsewhere = self._free = 0
         self._left: dict[Path, float] = {}  # what is to be completed when there is room, and when it is tried next
@@ -203,7 +204,7 @@ class Recorder:
                 case "message":
                     self._taken_bytes += item[5]
                     if self._file is not None:
-                        self._message(self._file, *item[1:5])
+                        self._try(self._file, item)
                 case "own":
                     if self._file is not None:
                         self._own(self._file, *item[1:])
@@ -230,6 +231,15 @@ class Recorder:
                 time.sleep(0)  # the loop may have waited for the interpreter meanwhile
                 self._flush_if_due(time.monotonic())
         return False
+
+    def _try(self, file: PartFile, item: tuple[Any, ...]) -> None:
+        try:
+            self._message(file, *item[1:5])
+        except Exception:  # nothing is known that does it; it may cost its message and not the recording
+            self.dropped, self.dropped_at_s = self.dropped + 1, item[6]
+            if not self._stumbled:
+                self._stumbled = True
+                log.exception("a message of %s could not be written, told once", item[1])
 
     def _message(self, file: PartFile, topic: str, type: str | None, at_ns: int, message: Any) -> None:
         road = self._roads.get((topic, type)) or self._road(file, topic, type)
