@@ -232,7 +232,7 @@ async def connect(server: Canned, page: Page) -> None:
 
 @scene("connect-saved")
 async def connect_saved(server: Canned, page: Page) -> None:
-    server.state = idle()
+    server.state = idle() | {"recording": {"state": "off", "for_s": None}}
     await page.wait_for_selector("#connect:not([hidden])")
     await page.tap("#connect [data-f=saved]")
     await page.wait_for_selector(".saved-board .file")
