@@ -149,8 +149,11 @@ async def test_while_the_server_is_down_it_waits_longer_and_longer_and_is_sent_w
     async with mailing(tmp_path / "mail", shelf, clock) as mailer:
         await mailer.change(settings(post.port))
         await post.kill()
-        first, second = [(await mailer.order(f"key-000{i}", order())).n for i in range(2)]
-        await until(mailer, second, lambda letter: letter.said != "")  # it waits with the first, and was not tried
+        first = (await mailer.order("key-0001", order())).n
+        await until(mailer, first, lambda letter: letter.said != "")
+        second = (await mailer.order("key-0002", order())).n
+        waiting = await until(mailer, second, lambda letter: letter.said != "")
+        assert waiting.mails[0].attempts == 0, "it waits with the first"
         for attempts in (1, 2, 3, 4):
             letter = await until(
                 mailer, first, lambda letter, a=attempts: letter.mails and letter.mails[0].attempts == a  # type: ignore[misc]
