@@ -120,7 +120,7 @@ def _backwards(bus: LocalBus, vehicle: str, alarm: str | None) -> Iterator[dict[
 def transition_of(event: Mapping[str, Any], moment_s: Clock, shelf_s: Clock) -> Transition | None:
     """What an event tells, or None where it tells nothing that can be used: the log may be older than this program."""
     change = event.get("change")
-    if change not in _CHANGES or not isinstance(event.get("at_ms"), (int, float)):
+    if not isinstance(change, str) or change not in _CHANGES or not isinstance(event.get("at_ms"), (int, float)):
         return None
     try:
         state = AlarmState(event.get("state", ""))
