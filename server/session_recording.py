@@ -51,6 +51,11 @@ class _Tape:
     lost_s: float | None = None  # since when it is held
     due_s: float | None = None  # a part is to begin with the next message, or at this moment
 
+    @property
+    def newest(self) -> int:
+        """The part that is written, was written last, or is about to begin."""
+        return self.part + 1 if self.due_s is not None else max(1, self.part)
+
 
 class SessionRecording:
     """One vehicle's. `now` is a monotonic clock in seconds, `wall_ms` the time of day in ms since 1970. `told(path)` is
@@ -107,7 +112,7 @@ class SessionRecording:
         tape, now_s = self._tape, self._now()
         if tape is not None and tape.lost_s is not None:
             if now_s - tape.lost_s <= self._limit("hold_s"):
-                tape.lost_s, tape.due_s = None, now_s + BEGIN_AFTER_S
+                tape.lost_s, tape.due_s, tape.begun = None, now_s + BEGIN_AFTER_S, None
                 return
             self._tape = None
         if self._tape is None and self._folder is not None and self._limit("automatic") >= 1 and not self._refused_by:
@@ -275,8 +280,8 @@ class SessionRecording:
         return {
             "state": self._state(),
             "for_s": wire.plain(now_s - tape.began_s, 1) if tape is not None else None,
-            "name": id_of(path) if path else part_id(tape.id, max(1, tape.part)) if tape is not None else None,
-            "part": tape.part if tape is not None and tape.part else None,
+            "name": id_of(path) if path else part_id(tape.id, tape.newest) if tape is not None else None,
+            "part": tape.newest if tape is not None else None,
             "bytes": status.size if is_mine else 0,
             "messages": status.messages if is_mine else 0,
             "as_json": status.misfits if is_mine else 0,

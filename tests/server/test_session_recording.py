@@ -21,7 +21,6 @@ from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.viewer import Viewer, viewer
 
-
 SOON_S = 20.0  # on two busy cores
 
 
