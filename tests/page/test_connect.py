@@ -66,7 +66,7 @@ async def test_from_the_address_to_a_live_car_and_back_by_stop(phone: Phone, idl
     async with running(*simulate()) as car:
         await phone.open(idle.address)
         await expect(phone.page.locator("#connect h1")).to_have_text("Connect to a car")
-        await expect(phone.page.locator("#connect .pick")).to_contain_text("None found")
+        await expect(phone.page.locator("#connect [data-f=found]")).to_contain_text("None found")
         await connect(phone, car.shown)
         await phone.live()
         assert re.fullmatch(r"\d+\.\d", await phone.speed())
