@@ -8,7 +8,7 @@ from email.utils import getaddresses
 
 import pytest
 from aiosmtplib.email import quote_address
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.mail import address, heads
@@ -101,6 +101,7 @@ def test_what_is_more_than_one_address_or_none_is_refused(text: str) -> None:
     assert str(why.value).isprintable()
 
 
+@settings(deadline=None)  # beside other work a machine stops for longer than any limit
 @given(st.text(max_size=80) | st.builds("{}@{}".format, st.text(max_size=20), st.text(max_size=20)))
 def test_whatever_is_taken_is_one_mailbox_for_every_reader(text: str) -> None:
     try:
@@ -114,6 +115,7 @@ def test_whatever_is_taken_is_one_mailbox_for_every_reader(text: str) -> None:
     assert address.parse(one.text) == one, "taken once, it is taken again as the same"
 
 
+@settings(deadline=None)  # beside other work a machine stops for longer than any limit
 @given(st.lists(ATEXT, min_size=1, max_size=20).map("".join), st.lists(LABEL, min_size=1, max_size=4))
 def test_what_is_an_address_is_taken(local: str, labels: list[str]) -> None:
     if local.startswith("-") or labels[-1].isdigit():
@@ -122,6 +124,7 @@ def test_what_is_an_address_is_taken(local: str, labels: list[str]) -> None:
     assert one.domain == ".".join(labels)
 
 
+@settings(deadline=None)  # beside other work a machine stops for longer than any limit
 @given(st.lists(st.builds(MailAddress, local=ATEXT, domain=LABEL), min_size=1, max_size=8))
 def test_a_line_of_addresses_holds_these_and_no_other(some: list[MailAddress]) -> None:
     head = heads.address_line("To", some)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from server.mail import address, compose, heads
@@ -73,6 +73,7 @@ def test_lines_are_short_ascii_and_end_as_the_wire_wants_it(tmp_path: Path) -> N
     assert raw.endswith(b"\r\n")
 
 
+@settings(deadline=None)  # beside other work a machine stops for longer than any limit
 @given(LINE)
 def test_any_subject_reads_back_as_it_was(subject: str) -> None:
     head = heads.text_line("Subject", subject)
@@ -83,6 +84,7 @@ def test_any_subject_reads_back_as_it_was(subject: str) -> None:
     assert found == subject
 
 
+@settings(deadline=None)  # beside other work a machine stops for longer than any limit
 @given(LINE)
 def test_any_name_of_a_sender_stays_a_name(name: str) -> None:
     head = heads.address_line("From", [ANN], name.strip())
@@ -110,6 +112,7 @@ def test_no_name_of_a_file_breaks_out(name: str) -> None:
         heads.file_name(name)
 
 
+@settings(deadline=None)  # beside other work a machine stops for longer than any limit
 @given(st.text(max_size=400))
 def test_any_text_reads_back_line_by_line(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
     if any(0xD800 <= ord(letter) < 0xE000 for letter in text):
