@@ -105,7 +105,7 @@ def _recover(left: Path) -> Recovered:
                 return Recovered(id=id, path=finished, messages=new.messages, sentence=f"{id} was whole.")
             if not new.messages:
                 new.discard()
-                if walk.header is not None and not unread and not new.bad:
+                if (walk.header is not None or not walk.size) and not unread and not new.bad:
                     left.unlink()
                     sync_folder(left.parent)
                     return Recovered(id=id, sentence=f"{id} had only begun: nothing was recorded in it.")

@@ -113,6 +113,19 @@ def test_cut_at_every_byte_everything_before_the_cut_is_kept(tmp_path: Path) -> 
     assert folder.unfinished() == []
 
 
+def test_one_that_had_only_begun_is_no_loss(tmp_path: Path) -> None:
+    left = left_by(tmp_path)
+    with left.open("rb") as file:
+        first = next(iter(Walk(file, left.stat().st_size).chunks()))
+    head = left.read_bytes()[: first.at]
+    for begun in (b"", head):  # killed before its head was written, and after
+        left.write_bytes(begun)
+        done = recover(left)
+        assert (done.path, done.aside) == (None, None)
+        assert done.sentence == "car_1 had only begun: nothing was recorded in it."
+        assert names(left.parent) == []
+
+
 def test_a_closed_file_that_only_missed_its_name_gets_it(tmp_path: Path) -> None:
     path = written(tmp_path / "a.mcap", 1).close(ended="closed")
     left = path.rename(tmp_path / "a.mcap.writing")
