@@ -17,6 +17,7 @@ from monitor import catalog
 from monitor.catalog import CHECKS, AllLimits
 from monitor.link import LinkFacts
 from monitor.phones import PhoneWord
+from monitor.recorder import RecorderFacts
 from monitor.runner import Monitor
 from monitor.signals import SIGNALS
 from monitor.state import State
@@ -227,6 +228,8 @@ BY_TIME = {
     "phone_car": "a phone apart",
     "phone_tracks": "a phone on its own way",
     "phone_missing": "a phone with a fix now and then",
+    "recorder_behind": "a disk about as slow as is allowed",
+    "disk_nearly_full": "a disk about as full as is allowed",
 }
 
 # Checks without a limit that a noisy measurement could hover about, each with the reason.
@@ -237,6 +240,7 @@ WITHOUT = {
     "link_lost": "the link's own word",
     "no_message": "time only grows",
     "log_not_kept": "the disk's own word",
+    "recording_stopped": "the recorder's own word",
     "paused_long": "time only grows",
     "clock_jump": "steps, told for ten seconds each",
 }
@@ -266,6 +270,8 @@ THRESHOLDS = {
     "clock.offset_s": "a clock",
     "fuel_low.low_percent": "fuel",
     "fuel_low.deadband_percent": "fuel",
+    "recording.behind_s": "a disk about as slow as is allowed",
+    "recording.warn_gb": "a disk about as full as is allowed",
     **{f"signals.{name}_hz": "rate" for name in SIGNALS},
 }
 NO_LIMIT = {
@@ -276,6 +282,12 @@ NO_LIMIT = {
     "not_moving.after_s": "each stop is one of its own; the speed at which standing begins has its case",
     "clock.jump_s": "each step is one of its own",
     "paused_long.after_min": "time only grows",
+    "recording.automatic": "a switch",
+    "recording.all_topics": "a switch",
+    "recording.bulky": "a switch",
+    "recording.hold_s": "counted from a loss of the link, of which each is one of its own",
+    "recording.quota_gb": "recording stops, and does not begin again by itself",
+    "recording.min_free_gb": "recording stops, and does not begin again by itself",
     "gauge.speed_max_mps": "drawn, not judged",
     "gauge.acceleration_max_mps2": "drawn, not judged",
 }
@@ -346,6 +358,25 @@ def test_a_clock_about_its_limit(seconds: float, late: bool) -> None:
 
 
 LONG = pytest.mark.parametrize("seconds", [60.0, pytest.param(600.0, marks=pytest.mark.soak)])
+
+
+@LONG
+@pytest.mark.parametrize("alarm", ["recorder_behind", "disk_nearly_full"])
+def test_a_disk_about_as_slow_or_as_full_as_is_allowed(alarm: str, seconds: float) -> None:
+    """Others write on it and delete from it; a write waits for theirs."""
+    dice, monitor, state, told = random.Random(1), Monitor(), State(), []
+    state.link(LinkFacts(phase="monitoring", connected_s=0.0, last_message_s=0.0))
+    for n in range(round(10 * seconds)):
+        now_s = n / 10
+        about = gauss(dice, 2.0, 0.05, now_s)
+        is_slow = alarm == "recorder_behind"
+        state.recorder(
+            RecorderFacts(state="recording", behind_s=about if is_slow else 0.1, left_gb=90.0 if is_slow else about)
+        )
+        told += [t.alarm_id for t in monitor.step(state.snapshot(now_s)) if t.announces]
+    assert 0 < told.count(alarm) <= AT_MOST, told
+
+
 SPOKEN = ("speed", "brake", "accelerator", "position")
 
 
