@@ -90,7 +90,7 @@ export class Screens {
     show(need(this.root, '.titlebar'), screen !== undefined);
     show(need(this.root, '.tabs'), screen === undefined);
     if (screen) {
-      setText(field(this.root, 'title'), screen.title);
+      setText(field(this.root, 'title'), name === 'log' && this.store.replaying ? 'Alarm log of the live car' : screen.title);
       place.scrollTop = 0;
       this.#fill(place, screen.load);
       field(this.root, 'title').focus();
