@@ -33,10 +33,9 @@ class Series:
 
     def points(self) -> list[tuple[float, float | None]]:
         """As drawn: thinned where they are too many, with a None where nothing came for long."""
-        pairs = list(zip(self.at_s, self.values, strict=True))
-        if len(pairs) > MOST_POINTS:
-            pairs = _extremes(pairs)
-        return _with_gaps(pairs)
+        if len(self.at_s) > MOST_POINTS:
+            return _with_gaps(_extremes(self.at_s, self.values))
+        return _with_gaps(list(zip(self.at_s, self.values, strict=True)))
 
 
 @dataclass(slots=True)
@@ -110,18 +109,19 @@ class Traces:
         self.track.append((now_s, east_m, north_m, fix.sigma_m))
 
 
-def _extremes(pairs: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Each stretch's lowest and highest, so that no peak is lost."""
-    stretch = math.ceil(2 * len(pairs) / MOST_POINTS)
+def _extremes(at_s: array[float], values: array[float]) -> list[tuple[float, float]]:
+    """Each stretch's lowest and highest, so that no peak is lost. An hour has a quarter of a million numbers: they are
+    not made pairs of before it is known which are kept."""
+    stretch = math.ceil(2 * len(at_s) / MOST_POINTS)
     kept: list[tuple[float, float]] = []
-    for begin in range(0, len(pairs), stretch):
-        part = pairs[begin : begin + stretch]
-        known = [pair for pair in part if not math.isnan(pair[1])]
+    for begin in range(0, len(at_s), stretch):
+        part = range(begin, min(begin + stretch, len(at_s)))
+        known = [index for index in part if not math.isnan(values[index])]
         if not known:
-            kept.append(part[0])
+            kept.append((at_s[begin], values[begin]))
             continue
-        low, high = min(known, key=lambda pair: pair[1]), max(known, key=lambda pair: pair[1])
-        kept += sorted({low, high})
+        low, high = min(known, key=values.__getitem__), max(known, key=values.__getitem__)
+        kept += sorted({(at_s[low], values[low]), (at_s[high], values[high])})
     return kept
 
 
