@@ -30,6 +30,7 @@ BEFORE_S = AFTER_S = 30.0
 LONGEST_S = 3600.0  # before and after: beyond that it is a drive and no clip
 _ALARMS, _SETTINGS, _LINK = f"{OWN}alarms", f"{OWN}settings", f"{OWN}link"
 _STANDING = ("UNACKED", "ACKED", "RTN_UNACKED", "SHELVED")
+_HELD = 5000  # messages written and not yet handed to the system: a few MB
 _LATCHED = {"offered_qos_profiles": "- durability: transient_local"}  # as the readers look for it
 
 
@@ -148,6 +149,8 @@ def _copy(recording: Recording, file: PartFile, window: Window, before: _Before,
     for raw in _within(recording, window, progress):
         add(raw, raw.time_ns)
         outcome.entries += 1
+        if outcome.entries % _HELD == 0:
+            file.flush()
     if not outcome.entries:
         raise ExportRefused(f"Nothing was recorded from {_clock(window.from_ns)} to {_clock(window.to_ns)} UTC.")
     return outcome
