@@ -69,6 +69,16 @@ async def order(one: Viewer, do: str, **fields: Any) -> dict[str, Any]:
     return answer
 
 
+def replays() -> list[psutil.Process]:
+    """The processes of replays that run now."""
+    found = []
+    for process in psutil.Process().children():
+        with contextlib.suppress(psutil.Error):  # it ends as we look
+            if "server.playback.process" in process.cmdline():
+                found.append(process)
+    return found
+
+
 async def at(one: Viewer, at_s: float) -> dict[str, Any]:
     return await one.state(
         lambda s: s.get("replay") is not None and s["replay"]["at_s"] == at_s and not s["replay"]["is_seeking"],
@@ -283,7 +293,7 @@ async def test_a_process_that_dies_ends_the_replay_in_words_and_live_goes_on(bri
     async with viewer(base) as one:
         await order(one, "open", recording=STREET)
         await at(one, 0.0)
-        [process] = [p for p in psutil.Process().children() if "server.playback.process" in p.cmdline()]
+        [process] = replays()
         process.send_signal(signal.SIGKILL)
         said = await one.until(lambda: next((m for m in one.other if m["kind"] == "replay"), None))
         assert said["ended"].startswith("The replay ended by itself")
@@ -294,5 +304,5 @@ async def test_a_page_that_leaves_takes_its_process_along(bridge: RosBridge, bas
     async with viewer(base) as one:
         await order(one, "open", recording=STREET)
     async with asyncio.timeout(5):
-        while [p for p in psutil.Process().children() if "server.playback.process" in p.cmdline()]:
+        while replays():
             await asyncio.sleep(0.05)
