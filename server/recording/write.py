@@ -39,6 +39,7 @@ class PartFile:
         self._sequence: dict[int, int] = {}
         self.failed: OSError | None = None  # what the disk said of keeping it; the next flush raises it
         self._closing = threading.Lock()
+        self._is_named = False  # the disk knows that the file is there
         make_folder(path.parent)
         self._writing = writing_path(path)
         if path.exists():
@@ -56,9 +57,7 @@ class PartFile:
             )
             self._writer.start(profile=profile, library=f"{LIBRARY} {catgraph_version()}")
             self._writer.add_metadata(METADATA, self._metadata)
-            self._stream.drain()
-            os.fsync(self._fd)
-            sync_folder(path.parent)
+            self._stream.drain()  # what came meanwhile waits: the disk is waited for by `sync`
         except BaseException:
             os.close(self._fd)
             with contextlib.suppress(OSError):
@@ -100,6 +99,9 @@ class PartFile:
         with self._closing:
             if self._fd >= 0:
                 os.fdatasync(self._fd)
+                if not self._is_named:
+                    sync_folder(self.path.parent)
+                    self._is_named = True
 
     def demand_place(self) -> None:
         """Raises OSError where the file has been taken away, or replaced, while it is written."""

@@ -1,7 +1,6 @@
 """A process that records the simulated car at full load until it is killed, and says what it has handed over.
 
-Every message has its number as its time, so that what is readable afterwards is told by counting alone. A new part
-begins now and then, so that a kill falls also into the end of one and the beginning of the next.
+Every message has its number as its time, so that what is readable afterwards is told by counting alone.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ from server.simulator.car import SimulatedCar
 
 BEGAN_NS = 1_700_000_000_000_000_000
 REPORT_S = 0.01
-PART_S = 0.7
 
 
-def record_until_killed(root: Path, reports: Connection) -> None:
-    """Reports the monotonic time [ns], which all processes share, and how many messages were handed over before it."""
+def record_until_killed(root: Path, reports: Connection, part_s: float) -> None:
+    """A new part begins every `part_s`. Reports the monotonic time [ns], which all processes share, and how many
+    messages were handed over before it."""
     folder = RecordingsFolder(root)
     recorder = Recorder(
         folder,
@@ -39,7 +38,7 @@ def record_until_killed(root: Path, reports: Connection) -> None:
         if (wait_s := due_s - time.monotonic()) > 0:
             time.sleep(wait_s)
         now_s = time.monotonic() - began_s
-        if now_s >= parts * PART_S:
+        if now_s >= parts * part_s:
             if parts:
                 recorder.end(ended="closed")
             parts += 1

@@ -29,11 +29,11 @@ class Killed:
     files: int
 
 
-def kill_once(root: Path, after_s: float) -> Killed:
+def kill_once(root: Path, after_s: float, part_s: float = 3600.0) -> Killed:
     """Lets a process record for so long, kills it, and recovers what it left."""
     context = multiprocessing.get_context("forkserver")
     ours, its = context.Pipe(duplex=False)
-    process = context.Process(target=record_until_killed, args=(root, its), daemon=True)
+    process = context.Process(target=record_until_killed, args=(root, its, part_s), daemon=True)
     process.start()
     its.close()
     reports: list[tuple[int, int]] = [ours.recv()]  # it begins to record
@@ -64,16 +64,28 @@ def kill_once(root: Path, after_s: float) -> Killed:
     return Killed(missing=max(0, old - len(found)), lost_s=(killed_ns - lost_ns) / 1e9, files=len(folder.finished()))
 
 
-@pytest.mark.parametrize(
-    "kills", [pytest.param(10, marks=pytest.mark.slow), pytest.param(1000, marks=[pytest.mark.soak])]
-)
-def test_every_message_older_than_half_a_second_is_readable(tmp_path: Path, kills: int) -> None:
+def kill_often(root: Path, kills: int, part_s: float) -> list[Killed]:
     chance = random.Random(kills)
     multiprocessing.get_context("forkserver").set_forkserver_preload(["tests.server.recording.recording_child"])
     moments = [chance.uniform(0.0, 2.2) for _ in range(kills)]
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        found = list(pool.map(lambda n: kill_once(tmp_path / str(n), moments[n]), range(kills)))
+        return list(pool.map(lambda n: kill_once(root / str(n), moments[n], part_s), range(kills)))
+
+
+@pytest.mark.parametrize(
+    "kills", [pytest.param(10, marks=pytest.mark.slow), pytest.param(1000, marks=[pytest.mark.soak])]
+)
+def test_every_message_older_than_half_a_second_is_readable(tmp_path: Path, kills: int) -> None:
+    found = kill_often(tmp_path, kills, part_s=3600.0)
     lost_s = sorted(one.lost_s for one in found)
     print(f"{kills} kills: at most {lost_s[-1]:.3f} s lost, median {lost_s[kills // 2]:.3f} s")
     assert [one.missing for one in found] == [0] * kills
+
+
+@pytest.mark.parametrize(
+    "kills", [pytest.param(6, marks=pytest.mark.slow), pytest.param(200, marks=[pytest.mark.soak])]
+)
+def test_killed_while_one_part_ends_and_the_next_begins_nothing_is_damaged(tmp_path: Path, kills: int) -> None:
+    """The disk is waited for between two parts, so here more than half a second may be missing; nothing else is."""
+    found = kill_often(tmp_path, kills, part_s=0.3)
     assert any(one.files > 1 for one in found), "some were killed in a later part"
