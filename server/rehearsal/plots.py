@@ -11,7 +11,6 @@ from typing import Any, Literal
 from server.rehearsal.traces import Measure, Series, Traces
 
 Ink = Literal["ink", "ink2", "order", "you"]
-_NOT_DRAWN = ("s", "Hz")  # ages and rates: the alarm bars say it better
 _SAME_OF = 0.8  # so many of a check's numbers must be the signal's own for its limit to belong to that curve
 
 
@@ -70,7 +69,7 @@ def panels(traces: Traces) -> list[dict[str, Any]]:
     left = {
         name: measure
         for name, measure in traces.measures.items()
-        if measure.unit not in _NOT_DRAWN and len(measure.allowed.at_s) > 1 and len(measure.measured.at_s) > 1
+        if len(measure.allowed.at_s) > 1 and len(measure.measured.at_s) > 1
     }
     drawn = [panel for declared in PANELS if (panel := _panel(declared, traces, left)) is not None]
     return drawn + [_of_measure(measure) for measure in left.values()]

@@ -16,6 +16,7 @@ from monitor.state import Reading
 from monitor.values import GpsFix
 
 MOST_POINTS = 12_000  # of one curve: beyond that the lowest and the highest of each stretch stand for the rest
+NOT_DRAWN = ("s", "Hz")  # ages and rates: the alarm bars say it better, and of every signal they would be many
 GAP_PERIODS = 10
 GAP_FLOOR_S = 1.0
 
@@ -86,6 +87,8 @@ class Traces:
                 continue
             quantity = finding.measured or finding.limit
             assert quantity is not None
+            if quantity.unit in NOT_DRAWN:
+                continue
             measure = self.measures.get(check.id)
             if measure is None:
                 measure = self.measures[check.id] = Measure(
