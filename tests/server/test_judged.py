@@ -79,6 +79,9 @@ ELSEWHERE = {
     "fuel_low": "tests/monitor/checks/test_fuel_low.py::test_it_is_told_once",  # the car publishes none
     "gps_quality": "tests/server/test_judged.py::test_the_strict_setting_rejects_the_cars_own_receiver",
     "log_not_kept": "tests/monitor/checks/test_log_not_kept.py",
+    "recording_stopped": "tests/monitor/checks/test_recorder.py",
+    "recorder_behind": "tests/monitor/checks/test_recorder.py",
+    "disk_nearly_full": "tests/monitor/checks/test_recorder.py",
     "phone_missing": "tests/monitor/checks/test_phone.py::test_each_reason_is_said_after_10_s",
     "phone_tracks": "tests/monitor/checks/test_phone.py::test_the_correlation_has_a_deadband_and_a_setting",
 }
