@@ -15,6 +15,7 @@ from typing import Any
 from fastapi import FastAPI
 
 from monitor.catalog import AnyCheck
+from server.access.guard import Guard
 from server.bus import LocalBus
 from server.config import Config
 from server.export_jobs import Exports
@@ -169,6 +170,7 @@ def create_app(
         redoc_url=None,
     )
     app.state.running = running
+    app.add_middleware(Guard)
     app.add_middleware(SecurityHeaders)
     errors.install(app)
     app.include_router(api.router)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
@@ -10,10 +10,12 @@ from pydantic_core import PydanticCustomError
 MAX_COMMAND_BYTES = 16 * 1024
 Name = Annotated[str, Field(min_length=1, max_length=120)]
 Number = Annotated[int, Field(ge=0, le=2**53)]
+Needs = Literal["operator", "control"]  # any operator, or only the one who is in control
 
 
 class _Command(BaseModel):
     model_config = ConfigDict(extra="ignore", strict=True, frozen=True)
+    needs: ClassVar[Needs] = "control"  # what is not said to need less
     id: Annotated[str, Field(max_length=80)] | None = None
 
 
@@ -46,12 +48,14 @@ class Record(_Command):
 
 
 class Acknowledge(_Command):
+    needs: ClassVar[Needs] = "operator"
     kind: Literal["acknowledge"]
     alarm: Name
     occurrence: Number
 
 
 class Shelve(_Command):
+    needs: ClassVar[Needs] = "operator"
     kind: Literal["shelve"]
     alarm: Name
     occurrence: Number
@@ -59,6 +63,7 @@ class Shelve(_Command):
 
 
 class Unshelve(_Command):
+    needs: ClassVar[Needs] = "operator"
     kind: Literal["unshelve"]
     alarm: Name
 
@@ -101,6 +106,7 @@ class Fix(BaseModel):
 class Position(_Command):
     """Where this phone is, or why it cannot tell."""
 
+    needs: ClassVar[Needs] = "operator"
     kind: Literal["position"]
     phone: Annotated[str, Field(pattern=r"^[0-9a-z-]{4,40}$")]
     handheld: bool

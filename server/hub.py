@@ -17,6 +17,7 @@ import orjson
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from server import commands, label
+from server.access.who import Who
 from server.bus import LocalBus, NotServed
 from server.playback import orders
 from server.playback.desk import Desk, NoReplay
@@ -42,6 +43,7 @@ class Page:
         vehicle: str,
         *,
         hello: Mapping[str, Any],
+        who: Who,
         desk: Desk,
         server: Callable[[], Mapping[str, Any]],
         replay: orders.Open | None = None,
@@ -51,6 +53,7 @@ class Page:
         self._bus = bus
         self._vehicle = vehicle
         self._hello = hello
+        self._who = who
         self._wake = asyncio.Event()
         self._seat = Seat(bus, vehicle, desk, server=server, on_new=self._something_replayed, on_turned=self._turned)
         self._begins_with = replay
@@ -315,14 +318,22 @@ class Hub:
         return sum(page.skipped for page in self._pages)
 
     async def serve(
-        self, socket: WebSocket, vehicle: str, hello: Mapping[str, Any], *, replay: orders.Open | None = None
+        self,
+        socket: WebSocket,
+        vehicle: str,
+        hello: Mapping[str, Any],
+        *,
+        who: Who,
+        replay: orders.Open | None = None,
     ) -> None:
         """Serves one page until it leaves; `replay`: the recording it begins with."""
         await socket.accept()
         if len(self._pages) >= MAX_PAGES:
             await socket.close(code=1013, reason="too many pages")
             return
-        page = Page(socket, self._bus, vehicle, hello=hello, desk=self._desk, server=self._server, replay=replay)
+        page = Page(
+            socket, self._bus, vehicle, hello=hello, who=who, desk=self._desk, server=self._server, replay=replay
+        )
         self._pages.add(page)
         try:
             await page.serve()

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Body, HTTPException, Query, Request, Response, We
 from pydantic import BaseModel, ConfigDict, Field
 
 from server import label
+from server.access.who import who_of
 from server.bus import NotServed
 from server.playback import orders
 from server.playback.desk import NoReplay
@@ -275,4 +276,4 @@ async def page_socket(
     if name not in app.sessions:
         await socket.close(code=1008, reason="no such vehicle")
         return
-    await app.hub.serve(socket, name, app.hello(name), replay=orders.opening(replay, t))
+    await app.hub.serve(socket, name, app.hello(name), who=who_of(socket), replay=orders.opening(replay, t))

@@ -1,0 +1,1 @@
+"""Who is asking, what each may do, and who is in control."""

@@ -1,0 +1,41 @@
+"""Who asks: one device or program, and its role. Found once at the edge; everything inside is handed a Who."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from starlette.requests import HTTPConnection
+
+SCOPE_KEY = "catgraph.who"  # in the ASGI scope of a request that was let in
+
+
+class Role(StrEnum):
+    """What a paired device may do: a viewer looks, an operator also acts."""
+
+    VIEWER = "viewer"
+    OPERATOR = "operator"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Who:
+    """A device or program that was let in."""
+
+    id: str  # stable over restarts, never shown as a secret: safe in logs
+    name: str  # as the list of devices has it
+    role: Role
+    is_program: bool = False  # let in by a key instead of a paired browser
+
+    @property
+    def is_operator(self) -> bool:
+        return self.role is Role.OPERATOR
+
+
+LOCAL = Who(id="local", name="this machine", role=Role.OPERATOR)  # everybody, where the server listens on loopback only
+
+
+def who_of(connection: HTTPConnection) -> Who:
+    """Who sent this request or opened this socket. Raises KeyError where nobody looked: that is a mistake of ours, and
+    it must not be taken for a permission."""
+    found: Who = connection.scope[SCOPE_KEY]
+    return found
