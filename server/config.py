@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ipaddress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -12,6 +14,16 @@ class Vehicle:
 
     name: str
     address: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tls:
+    """How the page is served: over HTTPS by a certificate of our own (auto) or a given one (files), or without."""
+
+    mode: Literal["auto", "off", "files"] = "auto"
+    cert: Path | None = None  # the chain as PEM, the server's certificate first; with mode files
+    key: Path | None = None
+    setup_port: int | None = None  # of the plain listener that explains; None: the one after `port`, 0: a free one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,6 +38,22 @@ class Config:
     found: tuple[Vehicle, ...] = field(default=())  # offered on the connect screen
     maps: tuple[Path, ...] = ()  # MBTiles under the map, the last on top
     site_image: Path | None = None  # above them; its corners stand in a .toml beside it
+    tls: Tls | None = None  # None: off on loopback, else auto
+
+    @property
+    def is_open(self) -> bool:
+        """Whether only programs of this machine can reach it: nobody pairs then."""
+        if self.host == "localhost":
+            return True
+        try:
+            return ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return False
+
+    @property
+    def is_tls(self) -> bool:
+        """Whether the page is served over HTTPS."""
+        return not self.is_open if self.tls is None else self.tls.mode != "off"
 
 
 def vehicle_from_text(text: str, *, index: int) -> Vehicle:
