@@ -15,6 +15,7 @@ from typing import Any
 from fastapi import FastAPI
 
 from monitor.catalog import AnyCheck
+from server.access.access import Access
 from server.access.guard import Guard
 from server.bus import LocalBus
 from server.config import Config
@@ -50,6 +51,7 @@ class Running:
     config: Config
     bus: LocalBus
     hub: Hub
+    access: Access
     sessions: dict[str, Session]
     now: Callable[[], float]
     wall_ms: Callable[[], int]
@@ -107,6 +109,7 @@ def create_app(
         config=config,
         bus=bus,
         hub=Hub(bus, desk=desk, server=lambda: running.server_facts()),
+        access=Access(config, now=now, wall_ms=wall_ms),
         sessions={},
         now=now,
         wall_ms=wall_ms,

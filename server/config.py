@@ -38,22 +38,30 @@ class Config:
     found: tuple[Vehicle, ...] = field(default=())  # offered on the connect screen
     maps: tuple[Path, ...] = ()  # MBTiles under the map, the last on top
     site_image: Path | None = None  # above them; its corners stand in a .toml beside it
+    names: tuple[str, ...] = ()  # what else this server is called: hosts, or origins (https://…) of a proxy before it
     tls: Tls | None = None  # None: off on loopback, else auto
 
     @property
     def is_open(self) -> bool:
         """Whether only programs of this machine can reach it: nobody pairs then."""
-        if self.host == "localhost":
-            return True
-        try:
-            return ipaddress.ip_address(self.host).is_loopback
-        except ValueError:
-            return False
+        return is_loopback(self.host)
 
     @property
     def is_tls(self) -> bool:
         """Whether the page is served over HTTPS."""
         return not self.is_open if self.tls is None else self.tls.mode != "off"
+
+
+def is_loopback(host: str) -> bool:
+    """Whether `host` means this machine and nothing else; no name but localhost is looked up."""
+    if host.lower() == "localhost":
+        return True
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    mapped = getattr(address, "ipv4_mapped", None)
+    return (mapped or address).is_loopback
 
 
 def vehicle_from_text(text: str, *, index: int) -> Vehicle:
