@@ -56,7 +56,7 @@ node: $(VENV)/.ready-test
 	files=$$(find tests/page -name '*.test.js' | sort); [ -z "$$files" ] || node --test --test-reporter dot $$files
 
 clean: ## back to a fresh clone; recordings in data/ stay
-	rm -rf $(VENV) node_modules static/vendor static/built build dist out *.egg-info
+	rm -rf $(VENV) node_modules static/vendor static/built static/drawn build dist out *.egg-info
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find monitor server tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -86,7 +86,7 @@ $(VENV)/.ready-test: $(GROUND) $(LOST) | $(VENV)/pyvenv.cfg
 	npm ci --silent
 	@touch $(VENV)/.ready $@
 
-# The page's own files, joined. Where they cannot be, they are served one by one: slower, and never yesterday's.
-static/built/built.json: $(wildcard static/js/*.js static/css/*.css) server/web/built.py | $(VENV)/.ready
-	@if [ -x node_modules/.bin/esbuild ]; then $(PY) -m server.web.built node_modules/.bin/esbuild; \
+# The page's own files joined, its icons drawn. Where they cannot be, they are served one by one: slower, and never yesterday's.
+static/built/built.json: $(wildcard static/js/*.js static/css/*.css static/icons/*.svg) server/web/built.py server/web/icons.py | $(VENV)/.ready
+	@if [ -x node_modules/.bin/esbuild ]; then $(PY) -m server.web.built node_modules/.bin/esbuild && $(PY) -m server.web.icons node_modules; \
 	  else $(PY) -m pip install --quiet -c constraints.txt -e .; fi && touch -c $@ || echo "The page's files are served one by one."

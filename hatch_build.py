@@ -1,4 +1,5 @@
-"""Build hook: others' files into static/vendor, the page's own joined into static/built, and both into the wheel."""
+"""Build hook: others' files into static/vendor, the page's own joined into static/built, its icons drawn into
+static/drawn, and all of it into the wheel."""
 
 from __future__ import annotations
 
@@ -29,13 +30,14 @@ class PageHook(BuildHookInterface):
         return [] if self._is_current() or working_npm() else [NODE]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Bring both folders up to date; a wheel that is to be carried elsewhere gets all of the page."""
+        """Bring the three folders up to date; a wheel that is to be carried elsewhere gets all of the page."""
         if not self._is_current():
             with packages(Path(self.root)) as modules:
                 if not self._vendor_is_current():
                     fill(self._vendor, Path(self.root), modules)
                     self._assets.write_stamp(self._vendor, Path(self.root))
                 self._built.join(modules / ".bin" / "esbuild", self._static)
+                self._draw(modules)
         if version == "standard":  # an editable install reads them from the project's root instead
             build_data["force_include"].update({"static": "server/static", "templates": "server/templates"})
 
@@ -55,8 +57,18 @@ class PageHook(BuildHookInterface):
     def _built(self) -> ModuleType:
         return load(Path(self.root, "server", "web", "built.py"))
 
+    @property
+    def _icons(self) -> ModuleType:
+        return load(Path(self.root, "server", "web", "icons.py"))
+
+    def _draw(self, modules: Path) -> None:
+        why = self._icons.draw(modules, self._static)
+        if why is not None:  # no reason to have no catgraph
+            self.app.display_warning(f"{why} {self._icons.WITHOUT}")
+
     def _is_current(self) -> bool:
-        return self._vendor_is_current() and self._built.find(self._static) is not None
+        is_joined = self._vendor_is_current() and self._built.find(self._static) is not None
+        return is_joined and bool(self._icons.are_drawn(self._static))
 
     def _vendor_is_current(self) -> bool:
         return self._assets.vendor_problem(self._vendor, Path(self.root)) is None

@@ -18,6 +18,7 @@ from packaging.utils import canonicalize_name
 
 from monitor.check import Check
 from server.cli import main
+from server.web.icons import ICONS
 from tests.tree import PROJECT, project_files
 
 PYPROJECT: dict[str, Any] = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -59,8 +60,8 @@ def test_javascript_packages_are_pinned_without_naming_a_registry() -> None:
 
 def test_the_vendored_files_come_with_their_licences() -> None:
     packages = {source.partition("/")[0] for source in PACKAGE["vendor"]}
-    joiner = {"esbuild"}  # joins files and leaves nothing of itself in them
-    assert packages == set(PACKAGE["dependencies"]) - joiner
+    tools = {"esbuild", "@resvg/resvg-wasm"}  # join files and draw icons, and leave nothing of themselves in them
+    assert packages == set(PACKAGE["dependencies"]) - tools
     assert all(any(f"{name}/LICENSE" == source for source in PACKAGE["vendor"]) for name in packages)
 
 
@@ -114,7 +115,7 @@ def test_the_wheel_carries_the_page(tmp_path: Path) -> None:
     for path in project_files():
         (copy / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(PROJECT / path, copy / path)
-    for made in ("vendor", "built"):
+    for made in ("vendor", "built", "drawn"):
         shutil.copytree(PROJECT / "static" / made, copy / "static" / made)
     command = [
         sys.executable,
@@ -135,6 +136,7 @@ def test_the_wheel_carries_the_page(tmp_path: Path) -> None:
         built = json.loads(archive.read("server/static/built/built.json"))
     page = {path.as_posix() for path in project_files() if path.parts[0] in ("static", "templates")}
     page |= {f"static/vendor/{name}" for name in ("leaflet.js", "images/marker-icon.png", "uPlot.esm.js", "stamp")}
+    page |= {f"static/drawn/{icon.name}" for icon in ICONS}
     page |= {f"static/{name}" for name in (built["script"], built["style"], *built["needed"])}
     assert {f"server/{name}" for name in page} - names == set()
     assert {name.partition("/")[0] for name in names} == {"monitor", "server", "catgraph-0.1.0.dist-info"}
