@@ -31,6 +31,7 @@ from server.simulator.running import Scenarios
 from server.simulator.scenarios import BridgeFault, Planned, Scenario
 from server.simulator.scenery import Scenery, box
 from server.simulator.sensors import GpsError, effort_percent, steering_percent, wheel_speed_mps
+from server.simulator.stack import Stack
 from server.simulator.vehicle import LASER_AHEAD_M, Motion, MotionCommand, drive, pedals
 from server.source import Json, Message, RosVersion
 
@@ -65,7 +66,9 @@ class SimulatedCar:
     """Drives for ever. Time is virtual: it passes as steps are taken, however fast that is.
 
     `plan` holds scenarios to come. `scan_beams` replaces the interlaced SICK by so many beams round the whole circle at
-    20 Hz. `start_s` is the car's clock at the beginning [s since 1970].
+    20 Hz. `start_s` is the car's clock at the beginning [s since 1970]. `has_stopper`: whether an obstacle
+    stopper stands between the command topic and the wheels; without one the car keeps its last speed in silence.
+    `gives_way`: whether the lap's driver is still while somebody else commands, or goes on and competes.
     """
 
     def __init__(
@@ -76,6 +79,8 @@ class SimulatedCar:
         start_s: float = START_S,
         scan_beams: int | None = None,
         plan: Iterable[Planned] = (),
+        has_stopper: bool = True,
+        gives_way: bool = True,
     ) -> None:
         driver_rng, laser_rng, gps_rng, wheel_rng = (np.random.default_rng((seed, part)) for part in range(4))
         pose = lap().at(START_STATION_M)
@@ -86,7 +91,8 @@ class SimulatedCar:
         self._steps_done = 0
         self._scenery = Scenery()
         self._driver = Driver(START_STATION_M, driver_rng)
-        self._command = MotionCommand(speed_mps=0.0, tyre_rad=0.0)
+        self._stack = Stack(has_stopper=has_stopper)
+        self._gives_way = gives_way
         self._client_until_s = -math.inf
         self._blocked_at_m: float | None = None
         self._hurried_s = 0.0
@@ -127,16 +133,16 @@ class SimulatedCar:
     def obey(self, message: Json) -> None:
         """Takes a Twist from somebody on the bridge: linear.x in m/s, angular.z as tyre angle in rad.
 
-        The last message wins. The lap's driver falls silent meanwhile, and takes over when no more come. An unknown
-        tyre angle (NaN, null) keeps the tyres as they are; without a speed the message is ignored.
+        The last message wins. The lap's driver gives way meanwhile, if that is its manner, and takes over when no
+        more come. An unknown tyre angle (NaN, null) keeps the tyres as they are; without a speed the message is
+        ignored.
         """
         speed_mps = _inner(message, "linear", "x")
         if speed_mps is None:
             return
         tyre_rad = _inner(message, "angular", "z")
-        self._command = MotionCommand(
-            speed_mps=speed_mps, tyre_rad=self._command.tyre_rad if tyre_rad is None else tyre_rad
-        )
+        command = MotionCommand(speed_mps=speed_mps, tyre_rad=self._stack.tyre_rad if tyre_rad is None else tyre_rad)
+        self._stack.hear(command, self._elapsed_s)
         self._client_until_s = self._elapsed_s + CLIENT_HOLDS_S
 
     def messages(self) -> Iterator[Message]:
@@ -185,7 +191,7 @@ class SimulatedCar:
     def _go_on(self, until_s: float) -> None:
         """Moves the car to a moment: the motion in fixed steps, whoever looks at it and when."""
         while (self._steps_done + 1) / STEP_HZ <= until_s:
-            self.motion = drive(self.motion, self._command, 1 / STEP_HZ)
+            self.motion = drive(self.motion, self._stack.passed(self._steps_done / STEP_HZ), 1 / STEP_HZ)
             self._steps_done += 1
             if self.motion.speed_mps > LIMIT_MPS:
                 self._hurried_s += 1 / STEP_HZ
@@ -224,14 +230,17 @@ class SimulatedCar:
             writer.effort(ACCELERATOR, at_s, effort_percent(accelerator)),
             writer.steering(at_s, steering_percent(now)),
         ]
-        if self._elapsed_s >= self._client_until_s:
-            if self._client_until_s > -math.inf:
+        orders = self.scenarios.orders
+        if Order.SILENCE in orders:
+            self._client_until_s = max(self._client_until_s, self._elapsed_s)  # it takes the wheel anew afterwards
+        elif not self._gives_way or self._elapsed_s >= self._client_until_s:
+            if self._elapsed_s >= self._client_until_s > -math.inf:
                 self._driver.resume(now)
                 self._client_until_s = -math.inf
-            orders = self.scenarios.orders
             self._set_the_stage(now, orders)
-            self._command = self._driver.command(now, self._elapsed_s, 1 / CONTROL_HZ, orders, self._blocked_at_m)
-            messages.append(writer.twist(CMD_VEL, at_s, self._command.speed_mps, self._command.tyre_rad))
+            command = self._driver.command(now, self._elapsed_s, 1 / CONTROL_HZ, orders, self._blocked_at_m)
+            self._stack.hear(command, self._elapsed_s)
+            messages.append(writer.twist(CMD_VEL, at_s, command.speed_mps, command.tyre_rad))
         return messages
 
     def _set_the_stage(self, now: Motion, orders: set[Order]) -> None:
@@ -266,6 +275,7 @@ class SimulatedCar:
 
     def _nearest(self, ranges: Any, beams: Beams) -> list[Message]:
         distance_m, bearing_rad = nearest(ranges, beams)
+        self._stack.see(distance_m)
         return [
             self._writer.number(DISTANCE, self.now_s, distance_m),
             self._writer.number(ANGLE, self.now_s, bearing_rad),

@@ -37,6 +37,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scan-beams", type=int, metavar="N", help="N beams all round at 20 Hz instead of the interlaced 181 and 180"
     )
+    parser.add_argument(
+        "--no-obstacle-stopper",
+        action="store_true",
+        help="no obstacle stopper between the commands and the wheels: in silence the car keeps its last speed",
+    )
+    parser.add_argument(
+        "--competing-controller",
+        action="store_true",
+        help="whoever drives the lap goes on commanding while somebody else does: the last message wins",
+    )
     parser.add_argument("--rate", type=float, default=1.0, metavar="X", help="X times as fast as real (default 1)")
 
 
@@ -65,6 +75,8 @@ async def _simulate(args: argparse.Namespace) -> None:
         scan_beams=args.scan_beams,
         rate=args.rate,
         scenarios=args.scenario,
+        has_stopper=not args.no_obstacle_stopper,
+        gives_way=not args.competing_controller,
     )
     port = await service.start()
     host = f"[{args.host}]" if ":" in args.host else args.host

@@ -43,6 +43,7 @@ class Order(enum.StrEnum):
     STAND = "stand"
     STEADY = "steady"  # not faster than now
     YIELD = "yield"  # something stands in the way
+    SILENCE = "silence"  # command nothing at all
 
 
 def clear_distance_m(speed_mps: float) -> float:

@@ -67,7 +67,8 @@ _SCENARIOS = (
         sentence="Another car pulls across the way; the driver brakes and stops before it until it drives off.",
         duration_s=10.0,  # short of the ten seconds of standing after which that is told too
         alarm="obstacle in corridor",
-        consequences=("nearest object",),
+        # where the car stood already, the obstacle stopper keeps it standing
+        consequences=("nearest object", "vehicle not moving"),
         effect=ObstacleAhead,
         order=Order.YIELD,
         order_suffices=True,
@@ -233,6 +234,14 @@ _SCENARIOS = (
         duration_s=10.0,
         alarm="/diagnostics WARN",
         effect=lambda: ComponentReport(1, "Temperature high"),
+    ),
+    Scenario(
+        name="controller-silent",
+        sentence="Whoever drives commands nothing any more: the obstacle stopper brakes, if the car has one.",
+        duration_s=20.0,
+        alarm="vehicle not moving",
+        order=Order.SILENCE,
+        order_suffices=True,
     ),
     Scenario(
         name="all-silent",

@@ -44,12 +44,22 @@ class CarService:
         rate: float = 1.0,
         scenarios: Iterable[str | Planned] = (),
         clock: Callable[[], float] = time.time,
+        has_stopper: bool = True,
+        gives_way: bool = True,
     ) -> None:
         if not 0 < rate <= 100:
             raise ValueError(f"The rate must lie above 0 and be at most 100, not {rate:g}.")
         plan = tuple(planned(entry) if isinstance(entry, str) else entry for entry in scenarios)
         self._host, self._port, self._rate, self._clock = host, port, rate, clock
-        self.car = SimulatedCar(seed=seed, ros_version=ros_version, start_s=clock(), scan_beams=scan_beams, plan=plan)
+        self.car = SimulatedCar(
+            seed=seed,
+            ros_version=ros_version,
+            start_s=clock(),
+            scan_beams=scan_beams,
+            plan=plan,
+            has_stopper=has_stopper,
+            gives_way=gives_way,
+        )
         self.bridge = RosBridge(ros_version=ros_version, now=lambda: self.car.now_s, node="/simulated_car")
         for published in self.car.published:
             self.bridge.advertise(published.topic, published.type)
@@ -145,8 +155,12 @@ class CarService:
         return True
 
     def _on_publish(self, topic: str, type: str, message: Json) -> None:
-        if topic == CMD_VEL.topic and type.rpartition("/")[2] == "Twist":
-            self.car.obey(message)
+        if topic != CMD_VEL.topic:
+            return
+        kind = type.rpartition("/")[2]
+        twist = message.get("twist") if kind == "TwistStamped" else message if kind == "Twist" else None
+        if isinstance(twist, dict):
+            self.car.obey(twist)
 
     def _scenario_called(self, args: Json) -> Json:
         name, stop, duration_s = args.get("name", ""), args.get("stop", False), args.get("duration_s")

@@ -56,6 +56,7 @@ ROWS = {
     "clock-slow": Row(["clock_offset"], 11.0),  # 2 s are lost after 8 s
     "diagnostics-error": Row(["diagnostics_error"], 1.5),
     "diagnostics-warning": Row(["diagnostics_warn"], 1.5),
+    "controller-silent": Row(["not_moving"], 16.0),
     "all-silent": Row(["car_silent"], 1.5),
     "bridge-frozen": Row(["link_lost"], 2.5),
     "bridge-killed": Row(["link_lost"], 0.5),
@@ -68,7 +69,7 @@ MAY_FOLLOW = {
     "frozen-position": {"gps_drift"},  # it ends with a leap, and the car may stand by then
     "frozen-scan": {"obstacle"},
     "gps-jump": {"gps_drift", "phone_car"},
-    "obstacle": {"obstacle_nearest"},
+    "obstacle": {"obstacle_nearest", "not_moving"},  # where the car stood, the stopper keeps it standing
 }
 
 # Checks that no fault of the simulated car can raise, and the tests that raise them.
