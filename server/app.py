@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
+from starlette.types import ASGIApp
 
 from monitor.catalog import AnyCheck
 from server.access.access import Access
@@ -40,6 +41,7 @@ from server.web import mail as web_mail
 from server.web import recordings as web_recordings
 from server.web.ground import Ground
 from server.web.headers import SecurityHeaders
+from server.web.throttle import Throttle
 
 log = logging.getLogger("catgraph.app")
 
@@ -108,7 +110,7 @@ def create_app(
     running = Running(
         config=config,
         bus=bus,
-        hub=Hub(bus, desk=desk, server=lambda: running.server_facts()),
+        hub=Hub(bus, desk=desk, server=lambda: running.server_facts(), limits=config.limits, now=now),
         access=Access(config, now=now, wall_ms=wall_ms),
         sessions={},
         now=now,
@@ -164,7 +166,7 @@ def create_app(
             journal.close()
             ground.close()
 
-    app = FastAPI(
+    app = _Served(
         title="catgraph",
         version=running.version,
         description="Operator control unit for a test vehicle: its state, its alarms, its connection.",
@@ -173,8 +175,8 @@ def create_app(
         redoc_url=None,
     )
     app.state.running = running
+    app.add_middleware(Throttle, limits=config.limits, now=now)
     app.add_middleware(Guard)
-    app.add_middleware(SecurityHeaders)
     errors.install(app)
     app.include_router(api.router)
     app.include_router(alarm_log.router)
@@ -187,6 +189,13 @@ def create_app(
     app.include_router(docs.router)
     pages.install(app)
     return app
+
+
+class _Served(FastAPI):
+    """Every answer has the headers: those of a bug too, which Starlette gives outside of all that is added to it."""
+
+    def build_middleware_stack(self) -> ASGIApp:
+        return SecurityHeaders(super().build_middleware_stack())
 
 
 def _catalog(data: Path | None, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Catalog | None:

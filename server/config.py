@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from server.limits import Limits
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vehicle:
@@ -40,6 +42,7 @@ class Config:
     site_image: Path | None = None  # above them; its corners stand in a .toml beside it
     names: tuple[str, ...] = ()  # what else this server is called: hosts, or origins (https://…) of a proxy before it
     tls: Tls | None = None  # None: off on loopback, else auto
+    limits: Limits = field(default_factory=Limits)
 
     @property
     def is_open(self) -> bool:

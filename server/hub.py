@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -17,8 +18,9 @@ import orjson
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from server import commands, label
-from server.access.who import Who
+from server.access.who import LOCAL, Who
 from server.bus import LocalBus, NotServed
+from server.limits import MAX_DEPTH, Allowance, Limits, nests_deeper
 from server.playback import orders
 from server.playback.desk import Desk, NoReplay
 from server.playback.seat import Seat
@@ -30,6 +32,7 @@ MAX_PAGES = 500
 MAX_COMPLAINTS = 200  # a page that sends nothing sensible is let go
 MAX_REPLIES = 200  # and so is one that asks and never reads
 FROM_A_REPLAY = ("position",)  # where the phone is, the live monitor must know whatever its page shows
+TOO_MANY = "Too many orders at once from this page: wait a second."
 NOT_FROM_A_REPLAY = "This page replays a recording: nothing is ordered from it. Go back to live first."
 
 
@@ -46,6 +49,8 @@ class Page:
         who: Who,
         desk: Desk,
         server: Callable[[], Mapping[str, Any]],
+        limits: Limits,
+        now: Callable[[], float],
         replay: orders.Open | None = None,
     ):
         """`replay`: the recording with which the page begins."""
@@ -70,6 +75,9 @@ class Page:
         self._said_hello = False
         self._name = label.NAMELESS  # what the page calls itself: who gave its orders, in the log
         self._complaints = 0
+        self._now = now
+        self._messages = Allowance(limits.messages, now())
+        self._orders = Allowance(limits.commands, now())
         self.skipped = 0  # frames that were replaced by newer ones before this page could take them
 
     async def serve(self) -> None:
@@ -120,6 +128,9 @@ class Page:
             received = await self._socket.receive()
             if received["type"] == "websocket.disconnect":
                 return
+            if not self._messages.takes(self._now()):
+                self._complain("Too many messages at once.")
+                continue
             text = received.get("text")
             if text is None or len(text) > commands.MAX_COMMAND_BYTES:
                 self._complain("A page's message is text of at most 16 kB.")
@@ -131,6 +142,9 @@ class Page:
                 continue
             if not isinstance(message, dict):
                 self._complain("A message is an object with a kind.")
+                continue
+            if nests_deeper(message, MAX_DEPTH):
+                self._complain("A message does not nest so deep.")
                 continue
             await self._obey(message)
         await self._socket.close(code=1008, reason="too many messages that make no sense")
@@ -167,6 +181,9 @@ class Page:
         identity = self._identity(message)
         if identity is None:
             return
+        if not self._orders.takes(self._now()):
+            self._reply(identity, {"ok": False, "reason": TOO_MANY})
+            return
         if self._seat.is_replaying and message.get("kind") not in FROM_A_REPLAY:
             self._reply(identity, {"ok": False, "reason": NOT_FROM_A_REPLAY})
             return
@@ -180,6 +197,9 @@ class Page:
         """An order to this page's own replay."""
         identity = self._identity(message)
         if identity is None:
+            return
+        if not self._orders.takes(self._now()):
+            self._reply(identity, {"ok": False, "reason": TOO_MANY})
             return
         try:
             order = orders.read({name: value for name, value in message.items() if name not in ("id", "kind")})
@@ -302,12 +322,23 @@ class Page:
 class Hub:
     """All pages of the server."""
 
-    def __init__(self, bus: LocalBus, *, desk: Desk, server: Callable[[], Mapping[str, Any]]) -> None:
-        """`server`: what a state tells of the server."""
+    def __init__(
+        self,
+        bus: LocalBus,
+        *,
+        desk: Desk,
+        server: Callable[[], Mapping[str, Any]],
+        limits: Limits,
+        now: Callable[[], float],
+    ) -> None:
+        """`server`: what a state tells of the server; `now` is a monotonic clock in seconds."""
         self._bus = bus
+        self._limits = limits
+        self._now = now
         self._desk = desk
         self._server = server
         self._pages: set[Page] = set()
+        self._by_device: Counter[str] = Counter()
 
     @property
     def pages(self) -> int:
@@ -328,14 +359,28 @@ class Hub:
     ) -> None:
         """Serves one page until it leaves; `replay`: the recording it begins with."""
         await socket.accept()
-        if len(self._pages) >= MAX_PAGES:
+        if len(self._pages) >= MAX_PAGES or self._has_too_many(who):
             await socket.close(code=1013, reason="too many pages")
             return
         page = Page(
-            socket, self._bus, vehicle, hello=hello, who=who, desk=self._desk, server=self._server, replay=replay
+            socket,
+            self._bus,
+            vehicle,
+            hello=hello,
+            who=who,
+            desk=self._desk,
+            server=self._server,
+            limits=self._limits,
+            now=self._now,
+            replay=replay,
         )
         self._pages.add(page)
+        self._by_device[who.id] += 1
         try:
             await page.serve()
         finally:
             self._pages.discard(page)
+            self._by_device -= Counter((who.id,))
+
+    def _has_too_many(self, who: Who) -> bool:
+        return who is not LOCAL and self._by_device[who.id] >= self._limits.pages

@@ -17,8 +17,8 @@ import segno
 import uvicorn
 
 from server.app import create_app
-from server.compression import PageSocket
 from server.config import Config
+from server.web import requests
 from server.web.assets import AssetsMissing
 from server.web.mbtiles import MapRefused
 
@@ -85,13 +85,7 @@ async def serve(config: Config) -> int:
     server = uvicorn.Server(
         uvicorn.Config(
             app,
-            ws=PageSocket,
-            ws_max_size=64 * 1024,  # what a page may send at once
-            ws_ping_interval=5.0,  # a phone that went out of range is let go
-            ws_ping_timeout=10.0,
-            log_level="warning",
-            access_log=False,
-            lifespan="on",
+            **requests.options(config.limits),
             timeout_graceful_shutdown=2,
         )
     )

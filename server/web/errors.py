@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from http import HTTPStatus
 from typing import Any
@@ -12,6 +13,12 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 log = logging.getLogger("catgraph.web")
+
+
+class _Document(JSONResponse):
+    def render(self, content: Any) -> bytes:
+        """Half characters, which a name in a request may hold, become question marks."""
+        return json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode("utf-8", "replace")
 
 
 class Problem(HTTPException):
@@ -25,7 +32,7 @@ class Problem(HTTPException):
 def problem(status: int, detail: str, **more: Any) -> JSONResponse:
     """A problem document; `type` is about:blank, so `title` is the status in words."""
     body = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail, **more}
-    return JSONResponse(body, status_code=status, media_type="application/problem+json")
+    return _Document(body, status_code=status, media_type="application/problem+json")
 
 
 def install(app: FastAPI) -> None:

@@ -1,4 +1,9 @@
-"""Headers every answer carries: what a page of ours may load, and that nothing is kept of what is live."""
+"""Headers every answer carries, errors included: what a page of ours may load and use, and who may embed it.
+
+There is no Strict-Transport-Security: it would bind a host's name to HTTPS for a year, on phones that trust only this
+server's own authority. Reinstalled, or started once with `--tls off`, the server could then not be reached from any of
+them, and the browser would not even let its user go on. The plain listener only explains; docs/security.md says more.
+"""
 
 from __future__ import annotations
 
@@ -15,35 +20,69 @@ POLICY = "; ".join(
         "connect-src 'self'",
         "manifest-src 'self'",
         "worker-src 'self'",
+        "object-src 'none'",
         "base-uri 'none'",
         "form-action 'none'",
         "frame-ancestors 'none'",
+        "require-trusted-types-for 'script'",
+        "trusted-types default",  # the one of static/js/trusted-types.js
     )
 )
-_PARTS = (".js", ".css", ".woff2")  # never a document of their own; sixty of them would carry 25 kB of policies
+POLICY_OF_DATA = "default-src 'none'; base-uri 'none'; object-src 'none'; frame-ancestors 'none'; sandbox"
+POLICY_OF_PARTS = "default-src 'none'; base-uri 'none'; object-src 'none'"  # a dozen come with a page: short
+_DATA = (
+    "/api/",
+    "/map/",
+    "/metrics",
+    "/openapi.json",
+)  # never documents of ours, and opened as one they can do nothing
+_PARTS = "/static/"  # decided by the path and not by the kind: a 304 has no kind, and replaces what is kept
+# What a browser does not know it complains of in its console: sharing and Bluetooth, which Chromium has not everywhere.
+_SELF = ("autoplay", "clipboard-write", "fullscreen", "geolocation", "screen-wake-lock")
+_NOBODY = (
+    *("accelerometer", "camera", "display-capture", "gyroscope", "hid", "magnetometer", "microphone"),
+    *("midi", "payment", "serial", "usb", "xr-spatial-tracking"),
+)
+PERMISSIONS = ", ".join([*(f"{name}=(self)" for name in _SELF), *(f"{name}=()" for name in _NOBODY)])
+FOR_ALL = {
+    "Cache-Control": "no-store",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+}
+FOR_DOCUMENTS = {
+    "Content-Security-Policy": POLICY,
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Origin-Agent-Cluster": "?1",
+    "Permissions-Policy": PERMISSIONS,
+}
+_STARTS = ("http.response.start", "websocket.http.response.start")  # the second refuses a WebSocket
 
 
 class SecurityHeaders:
-    """Pure ASGI, so that a WebSocket passes untouched and nothing is buffered."""
+    """Around all of the app, so that no answer leaves without; pure ASGI, so that nothing is buffered."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
+        if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-
-        is_part = scope["path"].startswith("/static/") and scope["path"].endswith(_PARTS)
+        told = FOR_ALL | _of(scope["path"])
 
         async def send_with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
+            if message["type"] in _STARTS:
                 headers = MutableHeaders(scope=message)
-                headers.setdefault("X-Content-Type-Options", "nosniff")
-                if not is_part:
-                    headers.setdefault("Content-Security-Policy", POLICY)
-                    headers.setdefault("Referrer-Policy", "no-referrer")
-                headers.setdefault("Cache-Control", "no-store")
+                for name, value in told.items():
+                    headers.setdefault(name, value)
             await send(message)
 
         await self._app(scope, receive, send_with_headers)
+
+
+def _of(path: str) -> dict[str, str]:
+    if path.startswith(_PARTS):
+        return {"Content-Security-Policy": POLICY_OF_PARTS}
+    return {"Content-Security-Policy": POLICY_OF_DATA} if path.startswith(_DATA) else FOR_DOCUMENTS

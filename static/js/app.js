@@ -1,5 +1,7 @@
 // The page's beginning: one store, one voice, every panel at its place.
 
+import './trusted-types.js';
+
 import { soundOf } from './alarm-layout.js';
 import { Arming } from './arming.js';
 import { deviceName, keptHere } from './device.js';

@@ -13,8 +13,8 @@ import uvicorn
 
 from server.app import create_app
 from server.bridge.server import RosBridge
-from server.compression import PageSocket
 from server.config import Config, Vehicle
+from server.web import requests
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -30,9 +30,8 @@ async def serving(config: Config) -> AsyncIterator[str]:
     """The app on a real socket; yields its http address."""
     listening = socket.socket()
     listening.bind(("127.0.0.1", 0))
-    server = uvicorn.Server(
-        uvicorn.Config(create_app(config), ws=PageSocket, log_level="warning", lifespan="on", access_log=False)
-    )
+    patient = {"ws_ping_timeout": 60.0}  # a test stops reading for half a minute
+    server = uvicorn.Server(uvicorn.Config(create_app(config), **requests.options(config.limits) | patient))
     running = asyncio.create_task(server.serve(sockets=[listening]))
     while not server.started:
         await asyncio.sleep(0.01)
