@@ -1,0 +1,128 @@
+"""The server's own certificate: for the names it has now, for 397 days, signed by its own authority."""
+
+from __future__ import annotations
+
+import datetime as dt
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from server.tls.authority import BACK as AUTHORITY_BACK
+from server.tls.authority import Authority, clock, private_pem
+from server.tls.names import Names
+
+FILE = "leaf.pem"
+VALID = dt.timedelta(days=397)  # from end to end; browsers refuse more than 398 (Apple, Chrome, since 2020-09-01)
+BACK = dt.timedelta(days=30)  # of these lie before now: for phones whose clock is behind, and servers whose is ahead
+RENEW = dt.timedelta(days=60)  # before the end: a server that is switched on once in two months never has an old one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leaf:
+    """A certificate for this server and its key."""
+
+    cert: x509.Certificate
+    key: ec.EllipticCurvePrivateKey
+
+    @property
+    def pem(self) -> bytes:
+        """Key and certificate, as a TLS library loads them."""
+        return private_pem(self.key) + self.cert.public_bytes(serialization.Encoding.PEM)
+
+
+def make(authority: Authority, names: Names, *, now: dt.datetime) -> Leaf:
+    """A new certificate for `names`, by a clock that says `now`."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    start = _clock(authority, now).replace(microsecond=0) - BACK
+    # RFC 5280 4.1.2.5: both ends belong to it, so that a second less is 397 days.
+    end = min(start + VALID - dt.timedelta(seconds=1), authority.cert.not_valid_after_utc)
+    builder = (
+        x509.CertificateBuilder()
+        .subject_name(x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, names.dns[0][:64])]))
+        .issuer_name(authority.cert.subject)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(start)
+        .not_valid_after(end)
+        .add_extension(_alternatives(names), critical=False)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(_SIGNS, critical=True)
+        .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
+        .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(authority.key.public_key()), critical=False)
+    )
+    return Leaf(cert=builder.sign(authority.key, hashes.SHA256()), key=key)
+
+
+def why_renew(leaf: Leaf, authority: Authority, names: Names, *, now: dt.datetime) -> str | None:
+    """Why this certificate does not do any more, in words for the log; None: it does."""
+    at = _clock(authority, now)
+    try:
+        leaf.cert.verify_directly_issued_by(authority.cert)
+    except (ValueError, TypeError, InvalidSignature):
+        return "the authority is another"
+    if leaf.cert.extensions.get_extension_for_class(x509.SubjectAlternativeName).value != _alternatives(names):
+        return "this machine's addresses or names changed"
+    if at < leaf.cert.not_valid_before_utc + dt.timedelta(days=1):
+        return "the clock was put back"
+    if (
+        at > leaf.cert.not_valid_after_utc - RENEW
+        and leaf.cert.not_valid_after_utc < authority.cert.not_valid_after_utc
+    ):
+        return f"it would have ended on {leaf.cert.not_valid_after_utc:%Y-%m-%d}"
+    return None
+
+
+def load(folder: Path) -> Leaf | None:
+    """The one kept in `folder`; None where there is none that can be read: a new one costs nothing."""
+    try:
+        text = (folder / FILE).read_bytes()
+        key = serialization.load_pem_private_key(text, password=None)
+        cert = x509.load_pem_x509_certificate(text)
+        cert.extensions.get_extension_for_class(x509.SubjectAlternativeName)
+    except (OSError, ValueError, TypeError, x509.ExtensionNotFound):
+        return None
+    if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != cert.public_key():
+        return None
+    return Leaf(cert=cert, key=key)
+
+
+def keep(folder: Path, leaf: Leaf) -> Path:
+    """Writes it, readable for its owner only, and returns where. Raises OSError."""
+    path = folder / FILE
+    part = folder / f".{FILE}.new"
+    part.unlink(missing_ok=True)
+    with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        file.write(leaf.pem)
+    os.replace(part, path)
+    return path
+
+
+def _clock(authority: Authority, now: dt.datetime) -> dt.datetime:
+    """The authority was made by this very clock, so a time before that is wrong: a machine whose clock has no battery
+    wakes up in the past, and the phones do not."""
+    return max(clock(now), authority.cert.not_valid_before_utc + AUTHORITY_BACK)
+
+
+def _alternatives(names: Names) -> x509.SubjectAlternativeName:
+    addresses: list[x509.GeneralName] = [x509.IPAddress(ip) for ip in sorted(names.ips, key=str)]
+    return x509.SubjectAlternativeName([*(x509.DNSName(name) for name in sorted(names.dns)), *addresses])
+
+
+_SIGNS = x509.KeyUsage(
+    digital_signature=True,
+    content_commitment=False,
+    key_encipherment=False,
+    data_encipherment=False,
+    key_agreement=False,
+    key_cert_sign=False,
+    crl_sign=False,
+    encipher_only=False,
+    decipher_only=False,
+)

@@ -1,0 +1,156 @@
+"""The plain page that explains: how a device comes to trust this server. It hands out our authority and nothing else.
+
+Whoever can change what comes over the network can change this page too. So it carries no secret, leads nowhere but to
+itself, and tells everybody to compare the fingerprint with the one on the server's terminal.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+
+import segno
+from jinja2 import Environment, FileSystemLoader, select_autoescape
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import RedirectResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp
+
+from server.tls.authority import Authority
+from server.tls.profile import MEDIA_TYPE, mobileconfig
+from server.tls.steps import PLATFORMS, platform_of
+from server.web.assets import static_dir, templates_dir
+
+CERTIFICATE = "application/x-x509-ca-cert"
+FONTS = ("catgraph-numerals-500.woff2", "catgraph-numerals-700.woff2")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Whereabouts:
+    """Where a server is found: hosts as people type them, IPv6 without brackets, the likeliest first."""
+
+    hosts: tuple[str, ...]
+    port: int  # of the page, HTTPS
+    setup_port: int  # of this one
+
+    def secure(self, host: str | None = None) -> str:
+        """The page's address at `host`, if it is ours, else at the likeliest."""
+        return f"https://{self._host(host)}:{self.port}/"
+
+    def setup(self, host: str | None = None) -> str:
+        return f"http://{self._host(host)}:{self.setup_port}/"
+
+    def _host(self, host: str | None) -> str:
+        found = host if host in self.hosts else self.hosts[0]
+        return f"[{found}]" if ":" in found else found
+
+
+def explaining(authority: Authority, where: Callable[[], Whereabouts]) -> ASGIApp:
+    """The application that explains `authority`."""
+    static = static_dir()
+    templates = Environment(
+        loader=FileSystemLoader(templates_dir()), autoescape=select_autoescape(), trim_blocks=True, lstrip_blocks=True
+    )
+    page = templates.get_template("setup.html")
+    # Read once: the page must come while the disk is busy recording, and it never changes while the server runs.
+    style = b"\n".join((static / "css" / name).read_bytes() for name in ("tokens.css", "setup.css"))
+    script = (static / "js" / "setup.js").read_bytes()
+    fonts = {name: (static / "fonts" / name).read_bytes() for name in FONTS}
+    profile = mobileconfig(authority)
+
+    def explain(request: Request) -> Response:
+        found = where()
+        host = _host_of(request)
+        address = found.setup(host)
+        drawn = page.render(
+            name=authority.name,
+            fingerprint=_in_lines(authority.fingerprint),
+            secure=found.secure(host),
+            setup=address,
+            qr=_size(address),
+            platforms=PLATFORMS,
+            likely=platform_of(request.headers.get("user-agent", "")),
+            ends=authority.cert.not_valid_after_utc,
+        )
+        headers = _headers(found.secure(host).rstrip("/"))
+        return Response(drawn, media_type="text/html; charset=utf-8", headers=headers)
+
+    def qr(request: Request) -> Response:
+        out = BytesIO()
+        address = where().setup(_host_of(request))
+        segno.make(address, error="m").save(out, kind="svg", border=4, dark="#000", light="#fff", xmldecl=False)
+        return Response(out.getvalue(), media_type="image/svg+xml", headers=_headers())
+
+    def file(body: bytes, media_type: str, name: str = "") -> Callable[[Request], Response]:
+        headers = _headers()
+        if name:
+            headers["Content-Disposition"] = f'inline; filename="{name}"'  # "attachment" would keep a phone from asking
+        return lambda _: Response(body, media_type=media_type, headers=headers)
+
+    routes = [
+        Route("/", explain),
+        Route("/ca.crt", file(authority.pem, CERTIFICATE, "catgraph-ca.crt")),
+        Route("/ca.mobileconfig", file(profile, MEDIA_TYPE, "catgraph.mobileconfig")),
+        Route("/qr.svg", qr),
+        Route("/setup.css", file(style, "text/css; charset=utf-8")),
+        Route("/setup.js", file(script, "text/javascript; charset=utf-8")),
+        *(Route(f"/fonts/{name}", file(body, "font/woff2")) for name, body in fonts.items()),
+    ]
+    return _only(routes, lambda _: "/")
+
+
+def leading(where: Callable[[], Whereabouts]) -> ASGIApp:
+    """The application for a certificate that browsers trust already: it leads to the page."""
+    return _only([], lambda request: where().secure(_host_of(request)))
+
+
+def _only(routes: Sequence[Route], to: Callable[[Request], str]) -> ASGIApp:
+    async def elsewhere(request: Request) -> Response:
+        return RedirectResponse(to(request), 303, headers=_headers())
+
+    every = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
+    app = Starlette(routes=[*routes, Route("/{path:path}", elsewhere, methods=every)])
+    app.router.redirect_slashes = False
+    return app
+
+
+def _host_of(request: Request) -> str | None:
+    """What was typed to come here, without port and brackets. Used only if it is one of our own."""
+    try:
+        host = request.url.hostname
+    except ValueError:
+        return None
+    try:
+        return str(ipaddress.ip_address(host or ""))
+    except ValueError:
+        return host
+
+
+def _headers(secure: str = "") -> dict[str, str]:
+    # A host of IPv6 digits has no form in a policy: any https, then; the page asks for one address only.
+    asks = "https:" if "[" in secure else secure or "'none'"
+    policy = (
+        "default-src 'none'; style-src 'self'; script-src 'self'; font-src 'self'; img-src 'self' data:; "
+        f"connect-src {asks}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
+        "require-trusted-types-for 'script'; trusted-types 'none'"
+    )
+    return {
+        "Content-Security-Policy": policy,
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "no-referrer",
+        "Cache-Control": "no-store",
+    }
+
+
+def _in_lines(fingerprint: str) -> list[str]:
+    """Four lines of eight pairs, to be compared line by line."""
+    pairs = fingerprint.split(":")
+    return [" ".join(pairs[i : i + 8]) for i in range(0, len(pairs), 8)]
+
+
+def _size(text: str) -> int:
+    """How many modules a QR code has to a side, its quiet zone included."""
+    return int(segno.make(text, error="m").symbol_size(border=4)[0])
