@@ -33,7 +33,7 @@ from server.recovering import recover_left
 from server.session import Session
 from server.settings import SettingsFile
 from server.version import catgraph_version
-from server.web import api, docs, errors, metrics, notices, pages
+from server.web import api, devices, docs, errors, metrics, notices, pages
 from server.web import exports as web_exports
 from server.web import ground as web_ground
 from server.web import log as alarm_log
@@ -167,6 +167,7 @@ def create_app(
             ground.close()
 
     app = _Served(
+            running.access.stop()
         title="catgraph",
         version=running.version,
         description="Operator control unit for a test vehicle: its state, its alarms, its connection.",
@@ -176,13 +177,14 @@ def create_app(
     )
     app.state.running = running
     app.add_middleware(Throttle, limits=config.limits, now=now)
-    app.add_middleware(Guard)
+    app.add_middleware(Guard, access=running.access)
     errors.install(app)
     app.include_router(api.router)
     app.include_router(alarm_log.router)
     app.include_router(web_exports.router)
     app.include_router(web_recordings.router)
     app.include_router(web_mail.router)
+    app.include_router(devices.router)
     app.include_router(metrics.router)
     app.include_router(web_ground.router)
     app.include_router(notices.router)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from server.access.keys import Keys
 from server.limits import Limits
 
 
@@ -42,6 +43,7 @@ class Config:
     site_image: Path | None = None  # above them; its corners stand in a .toml beside it
     names: tuple[str, ...] = ()  # what else this server is called: hosts, or origins (https://…) of a proxy before it
     tls: Tls | None = None  # None: off on loopback, else auto
+    keys: Keys = field(default_factory=Keys)  # of programs, where devices are paired
     limits: Limits = field(default_factory=Limits)
 
     @property

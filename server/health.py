@@ -21,5 +21,6 @@ def run(args: argparse.Namespace) -> int:
     except (urllib.error.URLError, OSError, ValueError) as why:
         print(f"catgraph: {args.url} does not answer: {getattr(why, 'reason', why)}", file=sys.stderr)
         return 1
-    print(f"catgraph {body.get('version')}: {body.get('status')}, {body.get('vehicles')}")
+    vehicles = body.get("vehicles")  # told only to who is known there
+    print(f"catgraph {body.get('version')}: {body.get('status')}{f', {vehicles}' if vehicles else ''}")
     return 0 if body.get("status") == "ok" else 1

@@ -36,6 +36,7 @@ TOO_MANY = "Too many orders at once from this page: wait a second."
 NOT_FROM_A_REPLAY = "This page replays a recording: nothing is ordered from it. Go back to live first."
 
 
+NOT_A_VIEWERS = "This device is paired as a viewer: it looks, and changes nothing."
 class Page:
     """One page's connection, from its acceptance to its end."""
 
@@ -190,6 +191,9 @@ class Page:
         try:
             answer = await self._bus.request(self._vehicle, message | {"by": self._name})
         except NotServed as why:
+        if not self._who.is_operator:  # whatever it is: no command of the union needs less than an operator
+            self._reply(identity, {"ok": False, "reason": NOT_A_VIEWERS})
+            return
             answer = {"ok": False, "reason": f"{str(why).capitalize()}."}
         self._reply(identity, answer)
 

@@ -39,3 +39,8 @@ def who_of(connection: HTTPConnection) -> Who:
     it must not be taken for a permission."""
     found: Who = connection.scope[SCOPE_KEY]
     return found
+
+
+def is_known(connection: HTTPConnection) -> bool:
+    """Whether it is known who asks: everywhere, but for the few things that need nobody."""
+    return SCOPE_KEY in connection.scope

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Body, HTTPException, Query, Request, Response, We
 from pydantic import BaseModel, ConfigDict, Field
 
 from server import label
-from server.access.who import who_of
+from server.access.who import is_known, who_of
 from server.bus import NotServed
 from server.playback import orders
 from server.playback.desk import NoReplay
@@ -78,6 +78,17 @@ async def ask(request: Request, vehicle: str | None, message: dict[str, Any]) ->
 
 
 async def _ask_either(
+def _sender(request: Request) -> dict[str, Any]:
+    """Who sent a request, and by which lease of control: a number, where it gives one."""
+    fence = request.headers.get(FENCE_HEADER, "")
+    return {
+        "who": who_of(request).id,
+        "page": None,
+        "fence": int(fence) if fence.isascii() and fence.isdigit() and len(fence) < 16 else None,
+        "console": running(request).config.is_open,
+    }
+
+
     request: Request, vehicle: str | None, replay: str | None, message: dict[str, Any]
 ) -> dict[str, Any]:
     """What is asked of the live car, or of one page's replay."""
@@ -98,6 +109,8 @@ async def health(request: Request) -> dict[str, Any]:
     app = running(request)
     return {
         "status": "ok",
+    if not is_known(request):
+        return {"status": "ok", "version": app.version}
         "version": app.version,
         "boot": app.boot,
         "up_for_s": round(app.now() - app.started_s, 1),
@@ -276,4 +289,6 @@ async def page_socket(
     if name not in app.sessions:
         await socket.close(code=1008, reason="no such vehicle")
         return
-    await app.hub.serve(socket, name, app.hello(name), who=who_of(socket), replay=orders.opening(replay, t))
+    who = who_of(socket)
+    hello = app.hello(name) | {"who": {"id": who.id, "name": who.name, "role": who.role}}
+    await app.hub.serve(socket, name, hello, who=who, replay=orders.opening(replay, t))

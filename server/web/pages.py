@@ -47,10 +47,29 @@ def install(app: FastAPI) -> None:
 
     @app.get("/", response_class=HTMLResponse, include_in_schema=False)
     async def page(request: Request, vehicle: str | None = None) -> Response:
-        parts = parts_of(find(static), asset)
-        context = parts | {"version": running(request).version, "vehicle": vehicle_of(running(request), vehicle)}
-        drawn = templates.TemplateResponse(request, "page.html", context)
-        return answer(packed(bytes(drawn.body)), request.headers, "text/html; charset=utf-8", "no-cache")
+        one, built = running(request), find(static)
+        access = "open" if one.access.is_open else "paired"
+        context = {"version": one.version, "vehicle": vehicle_of(one, vehicle), "access": access}
+        body = page_of("page.html", request, built, worker=built is not None and one.config.worker, **context)
+        return answer(packed(body), request.headers, _HTML, "no-cache")
+
+    @app.get(OFFLINE, response_class=HTMLResponse, include_in_schema=False)
+    async def offline(request: Request, v: str | None = None) -> Response:
+        """What a phone shows while the server does not answer; `v` names the shell it is to belong to."""
+        built = find(static)
+        if v is not None and (built is None or shell(request, built).version != v):
+            raise HTTPException(404, "The page has changed since.")
+        return answer(packed(page_of("offline.html", request, built)), request.headers, _HTML, "no-cache")
+
+    @app.get(WORKER, include_in_schema=False)
+    async def worker(request: Request) -> Response:
+        """The worker that keeps the shell; with single modules, or where there shall be none, the one that goes."""
+        built = find(static)
+        is_kept = built is not None and running(request).config.worker
+        script = shell(request, built).worker(static) if built is not None and is_kept else withdrawn(static)
+        sent = answer(packed(script.encode()), request.headers, "text/javascript; charset=utf-8", "no-cache")
+        sent.headers["Service-Worker-Allowed"] = "/"
+        return sent
 
     @app.get("/manifest.webmanifest", include_in_schema=False)
     async def manifest() -> FileResponse:

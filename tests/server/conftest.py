@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import uvicorn
+from fastapi import FastAPI
 
 from server.app import create_app
 from server.bridge.server import RosBridge
@@ -28,10 +29,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @contextlib.asynccontextmanager
 async def serving(config: Config) -> AsyncIterator[str]:
     """The app on a real socket; yields its http address."""
+    async with serving_app(create_app(config), config) as base:
+        yield base
+
+
+@contextlib.asynccontextmanager
+async def serving_app(app: FastAPI, config: Config) -> AsyncIterator[str]:
+    """An app that was made before; yields its http address."""
     listening = socket.socket()
     listening.bind(("127.0.0.1", 0))
     patient = {"ws_ping_timeout": 60.0}  # a test stops reading for half a minute
-    server = uvicorn.Server(uvicorn.Config(create_app(config), **requests.options(config.limits) | patient))
+    server = uvicorn.Server(uvicorn.Config(app, **requests.options(config.limits) | patient))
     running = asyncio.create_task(server.serve(sockets=[listening]))
     while not server.started:
         await asyncio.sleep(0.01)

@@ -1,0 +1,50 @@
+"""What each request needs, in one table: who is not named here needs the role that its method asks for.
+
+Reading needs a viewer, everything else an operator; a new route is behind that without a line here. What needs nobody
+is named with its method, and the test of this file walks all routes of the app.
+"""
+
+from __future__ import annotations
+
+import re
+from enum import Enum
+
+from server.access.who import Role
+
+
+class Needs(Enum):
+    """Who may ask: anybody, any device or program that was let in, or only an operator."""
+
+    NOBODY = "nobody"
+    VIEWER = "viewer"
+    OPERATOR = "operator"
+
+
+_READS = "GET HEAD"
+_ANY_METHOD = "*"
+_SHELL = "manifest.webmanifest worker.js offline favicon.ico apple-touch-icon.png ca.crt ca.mobileconfig".split()
+
+RULES: tuple[tuple[str, str, Needs], ...] = (  # methods, pattern of the whole path, who; the first that fits holds
+    (_READS, r"/", Needs.NOBODY),  # the shell of the page: no word of the car is in it
+    (_READS, r"/static/.+", Needs.NOBODY),
+    (_READS, "/(" + "|".join(map(re.escape, _SHELL)) + ")", Needs.NOBODY),
+    (_READS, r"/api/health", Needs.NOBODY),  # status and version, for who is not known
+    ("POST", r"/api/pair", Needs.NOBODY),
+    ("POST", r"/api/ticket", Needs.VIEWER),  # for the socket, which asks for more itself
+    (_ANY_METHOD, r"/api/devices(/.*)?", Needs.OPERATOR),  # who else is paired
+    (_ANY_METHOD, r"/api/mail(/.*)?", Needs.OPERATOR),  # addresses of people, the login of the mail server
+)
+_COMPILED = tuple((methods.split(), re.compile(pattern), needs) for methods, pattern, needs in RULES)
+
+
+def needs_of(method: str, path: str) -> Needs:
+    """Who may send such a request; `path` as the router reads it, decoded."""
+    for methods, pattern, needs in _COMPILED:
+        if (method in methods or methods == [_ANY_METHOD]) and pattern.fullmatch(path):
+            return needs
+    return Needs.VIEWER if method in _READS.split() else Needs.OPERATOR
+
+
+def is_enough(role: Role, needs: Needs) -> bool:
+    """Whether who has this role may."""
+    return role is Role.OPERATOR or needs is not Needs.OPERATOR

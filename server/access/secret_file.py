@@ -1,0 +1,58 @@
+"""A small JSON file that only the server's own user may read (mode 0600), replaced whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+_MOST_BYTES = 1024 * 1024
+
+
+def read(path: Path) -> Any:
+    """What stands in it; None where there is none. A mode that others could read by is taken back.
+
+    Raises OSError where it cannot be read, ValueError where it is no JSON or far too large.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+    except FileNotFoundError:
+        return None
+    with os.fdopen(descriptor, "rb") as file:
+        status = os.fstat(file.fileno())
+        if status.st_mode & 0o077:
+            os.fchmod(file.fileno(), 0o600)
+        if status.st_size > _MOST_BYTES:
+            raise ValueError(f"{path.name} is larger than it ever is")
+        return orjson.loads(file.read())
+
+
+def write(path: Path, content: Any) -> None:
+    """Puts it there: after a loss of power either the old or the new stands in it. Raises OSError."""
+    folder(path.parent)
+    new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    try:
+        with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600), "wb") as file:
+            os.fchmod(file.fileno(), 0o600)  # whatever the umask took
+            file.write(orjson.dumps(content, option=orjson.OPT_INDENT_2))
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(new, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(new)
+        raise
+    descriptor = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def folder(path: Path) -> None:
+    """Makes it, for the server's own user only."""
+    path.mkdir(parents=True, exist_ok=True, mode=0o700)

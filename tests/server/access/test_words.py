@@ -1,0 +1,384 @@
+"""Invitations, guesses, tickets, cookies, keys and names, each by itself; time is an argument."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import pytest
+
+from server.access import secret_file, waiting
+from server.access.access import Access
+from server.access.cookie import Cookies
+from server.access.devices import FORGOTTEN_AFTER_MS, MOST, Devices
+from server.access.guesses import FEW, MANY, Guesses
+from server.access.invitations import LASTS_S, MOST_STANDING, Invitations
+from server.access.keys import BadKey, keys_from, keys_of
+from server.access.names import Names
+from server.access.tickets import Tickets
+from server.access.who import Role
+from server.config import Config, is_loopback
+from tests.server.access.pairs import config
+
+DAY_MS = 86_400_000
+
+
+# -- invitations -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("later_s", "is_in"), [(0.0, True), (LASTS_S - 0.001, True), (LASTS_S, False)])
+def test_an_invitation_lasts_ten_minutes(later_s: float, is_in: bool) -> None:
+    all_of = Invitations()
+    made = all_of.new(Role.VIEWER, now_s=100.0)
+    assert (all_of.take(token=made.token, now_s=100.0 + later_s) is not None) is is_in
+
+
+def test_token_and_pin_are_used_up_together_and_by_nothing_else() -> None:
+    all_of = Invitations()
+    one, two = all_of.new(Role.VIEWER, now_s=0.0), all_of.new(Role.OPERATOR, now_s=0.0)
+    assert one.pin != two.pin
+    for wrong in ("", one.token[:-1], one.token + "x", one.pin, "\udcff"):
+        assert all_of.take(token=wrong, now_s=1.0) is None
+    assert all_of.take(pin=one.token, now_s=1.0) is None
+    assert all_of.take(pin=one.pin, now_s=1.0) is one
+    assert all_of.take(token=one.token, now_s=1.0) is None
+    assert all_of.take(token=two.token, now_s=1.0) is two
+
+
+def test_few_pins_stand_at_once() -> None:
+    all_of = Invitations()
+    made = [all_of.new(Role.VIEWER, now_s=float(n)) for n in range(MOST_STANDING + 3)]
+    assert all_of.standing(10.0) == made[3:]
+
+
+def test_the_terminal_shows_the_same_until_it_is_used_or_old() -> None:
+    now_s = 0.0
+    access = Access(config(), now=lambda: now_s, wall_ms=lambda: 0)
+    told: list[tuple[str, Role]] = []
+    access.on_paired = lambda name, role: told.append((name, role))
+    first = access.invitation()
+    assert (access.invite(), access.pin()) == (first.token, first.pin)
+    access.pair(token=first.token, pin=None, name="Pixel", peer="10.0.0.9")
+    assert told == [("Pixel", Role.OPERATOR)]
+    second = access.invitation()
+    assert second.token != first.token
+    now_s = LASTS_S
+    assert access.invitation().token != second.token
+
+
+# -- guesses ---------------------------------------------------------------------------------------------------------
+
+
+def test_waits_grow_for_who_guesses_and_are_forgiven() -> None:
+    guesses = Guesses()
+    now_s, waits = 0.0, []
+    for _ in range(12):
+        guesses.wrong("10.0.0.9", now_s=now_s)
+        waits.append(guesses.wait_s("10.0.0.9", now_s=now_s))
+        now_s += waits[-1]
+    assert waits[:FEW] == [0.0, 0.0, 2.0]
+    assert waits[FEW:8] == [4.0, 8.0, 16.0, 32.0, 64.0]
+    assert max(waits) == 300.0
+    assert guesses.wait_s("10.0.0.8", now_s=now_s - waits[-1]) <= 30.0
+    guesses.wrong("10.0.0.9", now_s=now_s + 901.0)
+    assert guesses.wait_s("10.0.0.9", now_s=now_s + 901.0) == 0.0
+
+
+def test_many_peers_together_wait_as_one_and_get_thirty_tries_a_pin() -> None:
+    guesses, now_s, tries = Guesses(), 0.0, 0
+    while now_s < LASTS_S:
+        peer = f"2001:db8:{tries:x}::"
+        wait_s = guesses.wait_s(peer, now_s=now_s)
+        if wait_s > 0:
+            now_s += wait_s
+            continue
+        guesses.wrong(peer, now_s=now_s)
+        tries += 1
+    assert MANY < tries <= 36
+
+
+def test_a_right_pin_forgives_its_peer_only() -> None:
+    guesses = Guesses()
+    for _ in range(MANY + 2):
+        guesses.wrong("10.0.0.9", now_s=0.0)
+    guesses.right("10.0.0.9")
+    assert guesses.wait_s("10.0.0.9", now_s=0.0) == guesses.wait_s("10.0.0.8", now_s=0.0) == 8.0
+
+
+def test_peers_are_forgotten_before_they_are_too_many() -> None:
+    guesses = Guesses()
+    for n in range(1500):
+        guesses.wrong(str(n), now_s=0.0)
+    assert len(guesses._peers) == 1000
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "is_same"),
+    [
+        ("2001:db8::1", "2001:db8::ffff", True),
+        ("2001:db8::1", "2001:db8:0:1::1", False),
+        ("::ffff:10.0.0.9", "10.0.0.9", True),
+        ("10.0.0.9", "10.0.0.8", False),
+        ("fe80::1%eth0", "fe80::2%eth1", True),
+    ],
+)
+def test_a_network_of_ipv6_guesses_as_one(one: str, other: str, is_same: bool) -> None:
+    from server.access.access import _peer
+
+    assert (_peer(one) == _peer(other)) is is_same
+
+
+# -- tickets ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("later_s", "is_in"), [(4.999, True), (5.0, False), (60.0, False)])
+def test_a_ticket_lasts_five_seconds(later_s: float, is_in: bool) -> None:
+    tickets = Tickets()
+    assert tickets.use(tickets.new("a", now_s=1.0), "a", now_s=1.0 + later_s) is is_in
+
+
+def test_a_ticket_is_used_up_by_whoever_shows_it() -> None:
+    tickets = Tickets()
+    mine, other = tickets.new("a", now_s=0.0), tickets.new("a", now_s=0.0)
+    assert not tickets.use(mine, "b", now_s=0.0)
+    assert not tickets.use(mine, "a", now_s=0.0)
+    assert not tickets.use("", "", now_s=0.0)
+    assert tickets.use(other, "a", now_s=0.0)
+    for n in range(3000):
+        tickets.new(str(n), now_s=0.0)
+    assert len(tickets._open) == 2000
+
+
+# -- cookies ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_cookie_is_read_for_ninety_days_and_renewed_after_one() -> None:
+    now_ms = 1_790_000_000_000
+    cookies = Cookies("k" * 64, "0badcafe", wall_ms=lambda: now_ms)
+    given = cookies.header("id", "secret:with:colons", is_secure=False)
+    sent = f"theme=dark; {given.partition(';')[0]}; other=1"
+    assert cookies.read(sent, is_secure=False) == ("id", "secret:with:colons", False)
+    assert cookies.read(sent, is_secure=True) is None  # under TLS only the name that TLS protects
+    now_ms += DAY_MS + 1000
+    assert cookies.read(sent, is_secure=False) == ("id", "secret:with:colons", True)
+    now_ms += 89 * DAY_MS
+    assert cookies.read(sent, is_secure=False) is None
+    now_ms -= 200 * DAY_MS  # the clock of a server without a battery
+    assert cookies.read(sent, is_secure=False) is None
+    assert Cookies("l" * 64, "0badcafe", wall_ms=lambda: 1_790_000_000_000).read(sent, is_secure=False) is None
+
+
+def test_under_tls_the_cookie_is_bound_to_this_host() -> None:
+    cookies = Cookies("k" * 64, "0badcafe", wall_ms=lambda: 0)
+    given = cookies.header("id", "secret", is_secure=True)
+    assert given.startswith("__Host-catgraph-0badcafe=")
+    assert {"Secure", "HttpOnly", "SameSite=Strict", "Path=/"} <= set(given.split("; "))
+    assert "Domain" not in given
+
+
+# -- devices ---------------------------------------------------------------------------------------------------------
+
+
+def test_only_the_hash_of_a_secret_is_on_the_disk_and_only_for_the_servers_user(tmp_path: Path) -> None:
+    os.umask(0)
+    access = Access(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 1000)
+    device, secret = access.pair(token=access.invite(), pin=None, name="Pixel", peer="")
+    access.listens_at("http://192.168.4.1:8000/")
+    waiting.lay(tmp_path / "access", Role.VIEWER, wall_ms=0)
+    files = [path for path in (tmp_path / "access").rglob("*") if path.is_file()]
+    assert {path.name for path in files} >= {"devices.json", "running.json"}
+    assert [oct(path.stat().st_mode & 0o777) for path in files] == ["0o600"] * len(files)
+    assert (tmp_path / "access").stat().st_mode & 0o077 == 0
+    assert all(secret not in path.read_text() for path in files)
+    again = Devices(tmp_path / "access")
+    assert again.known(device.id, secret, now_ms=2000) == device
+    assert again.known(device.id, secret[:-1], now_ms=2000) is None
+    assert again.known("other", secret, now_ms=2000) is None
+    assert again.known(device.id, secret, now_ms=1001 + FORGOTTEN_AFTER_MS) is None
+    assert (again.server, again.signing_key) == (access.devices.server, access.devices.signing_key)
+
+
+@pytest.mark.parametrize(
+    "content", ["", "null", "[]", "{", '{"server": "x"}', '{"server":"12345678","signing_key":"short","devices":[]}']
+)
+def test_a_damaged_list_lets_nobody_in_and_is_kept(tmp_path: Path, content: str) -> None:
+    (tmp_path / "devices.json").write_text(content)
+    devices = Devices(tmp_path)
+    assert devices.all() == []
+    assert len(devices.signing_key) == 64
+    if content != "null":
+        assert (tmp_path / "devices.json.damaged").read_text() == content
+
+
+def test_a_file_that_others_could_read_is_closed_and_a_link_is_not_followed(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    path.write_text("{}")
+    path.chmod(0o644)
+    assert secret_file.read(path) == {}
+    assert path.stat().st_mode & 0o777 == 0o600
+    (tmp_path / "link.json").symlink_to(path)
+    with pytest.raises(OSError, match="symbolic"):
+        secret_file.read(tmp_path / "link.json")
+
+
+def test_who_is_removed_is_not_written_back_by_a_list_of_before(tmp_path: Path) -> None:
+    devices = Devices(tmp_path)
+    device, _ = devices.add("Pixel", Role.VIEWER, now_ms=0)
+    late = devices.seen_on_disk(now_ms=100_000)  # on its way to a thread
+    devices.remove(device.id, now_ms=100_001)
+    late()
+    assert Devices(tmp_path).all() == []
+
+
+def test_when_it_was_last_seen_is_written_once_a_minute(tmp_path: Path) -> None:
+    devices = Devices(tmp_path)
+    device, _ = devices.add("Pixel", Role.VIEWER, now_ms=0)
+    assert devices.seen(device.id, now_ms=59_000) is None
+    write = devices.seen(device.id, now_ms=60_000)
+    assert write is not None
+    write()
+    assert Devices(tmp_path).all()[0].seen_ms == 60_000
+
+
+def test_names_are_told_apart_and_the_list_is_bounded(tmp_path: Path) -> None:
+    devices = Devices(None)
+    names = [devices.add("Pixel 7", Role.VIEWER, now_ms=n)[0].name for n in range(MOST + 5)]
+    assert names[:3] == ["Pixel 7", "Pixel 7 2", "Pixel 7 3"]
+    assert len(devices.all()) == MOST
+    assert len({one.name for one in devices.all()}) == MOST
+
+
+def test_a_device_that_cannot_be_kept_is_not_paired(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    access = Access(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 0)
+    token = access.invite()
+    (tmp_path / "access" / "devices.json").unlink()
+    (tmp_path / "access" / "devices.json").mkdir()  # nothing can take its place
+    with pytest.raises(IsADirectoryError):
+        access.pair(token=token, pin=None, name="Pixel", peer="")
+    assert access.devices.all() == []
+    (tmp_path / "access" / "devices.json").rmdir()
+    access.pair(token=token, pin=None, name="Pixel", peer="")  # the invitation was not used up by that
+
+
+# -- invitations of another process ----------------------------------------------------------------------------------
+
+
+def test_an_invitation_laid_into_the_folder_is_taken_once_and_grows_old(tmp_path: Path) -> None:
+    laid = waiting.lay(tmp_path, Role.VIEWER, wall_ms=1_000_000)
+    found = waiting.collect(tmp_path, now_s=50.0, wall_ms=1_060_000)
+    assert [(one.token, one.pin, one.role, one.until_s) for one in found] == [
+        (laid.token, laid.pin, Role.VIEWER, 590.0)
+    ]
+    assert waiting.collect(tmp_path, now_s=50.0, wall_ms=1_060_000) == []
+    waiting.lay(tmp_path, Role.VIEWER, wall_ms=1_000_000)
+    assert waiting.collect(tmp_path, now_s=50.0, wall_ms=1_600_000) == []
+    waiting.lay(tmp_path, Role.VIEWER, wall_ms=9_000_000)  # from the future: ten minutes, not more
+    assert waiting.collect(tmp_path, now_s=50.0, wall_ms=1_600_000)[0].until_s == 650.0
+    (tmp_path / "waiting" / "x.json").write_text('{"token": "short", "pin": "1"}')
+    assert waiting.collect(tmp_path, now_s=50.0, wall_ms=0) == []
+    assert list((tmp_path / "waiting").iterdir()) == []
+
+
+def test_a_server_that_ended_is_not_found(tmp_path: Path) -> None:
+    assert waiting.running(tmp_path) is None
+    waiting.announce(tmp_path, "https://192.168.4.1:8000/")
+    assert waiting.running(tmp_path) == "https://192.168.4.1:8000/"
+    secret_file.write(tmp_path / "running.json", {"pid": 2**22 + 1, "address": "https://x/"})
+    assert waiting.running(tmp_path) is None
+    waiting.announce(tmp_path, "https://x/")
+    waiting.retire(tmp_path)
+    assert waiting.running(tmp_path) is None
+
+
+# -- keys ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [{Role.OPERATOR: "short"}, {Role.OPERATOR: "ä" * 30}, {Role.OPERATOR: "x " * 20}, {Role.OPERATOR: "x" * 600}],
+)
+def test_a_weak_key_is_refused_and_not_told(keys: dict[Role, str]) -> None:
+    with pytest.raises(BadKey) as why:
+        keys_of(keys)
+    assert keys[Role.OPERATOR] not in str(why.value)
+
+
+def test_keys_come_from_the_environment_or_from_files_for_one_user(tmp_path: Path) -> None:
+    path = tmp_path / "key"
+    path.write_text("a-key-from-a-file-of-its-own\n")
+    path.chmod(0o640)
+    with pytest.raises(BadKey, match="chmod 600"):
+        keys_from({"CATGRAPH_KEY_FILE": str(path)})
+    path.chmod(0o600)
+    keys = keys_from({"CATGRAPH_KEY_FILE": str(path), "CATGRAPH_VIEWER_KEY": "v" * 20})
+    who = keys.who("bearer a-key-from-a-file-of-its-own")
+    assert who is not None
+    assert (who.role, who.is_program, who.id) == (Role.OPERATOR, True, "key-operator")
+    assert keys.who("Bearer " + "v" * 20).role is Role.VIEWER  # type: ignore[union-attr]
+    assert "a-key" not in repr(keys)
+    assert "a-key" not in repr(Config(keys=keys))
+    with pytest.raises(BadKey, match="cannot be read"):
+        keys_from({"CATGRAPH_KEY_FILE": str(tmp_path / "none")})
+    with pytest.raises(BadKey, match="the same"):
+        keys_from({"CATGRAPH_KEY": "k" * 20, "CATGRAPH_VIEWER_KEY": "k" * 20})
+    assert keys_from({}).who("Bearer ") is None
+
+
+# -- names -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("host", "is_own"),
+    [
+        *((own, True) for own in ("127.0.0.1", "127.8.9.1", "::1", "localhost", "LOCALHOST", "::ffff:127.0.0.1")),
+        *((far, False) for far in ("0.0.0.0", "::", "192.168.4.1", "", "localhost.example", "127.1", "car")),
+    ],
+)
+def test_what_is_this_machine_alone(host: str, is_own: bool) -> None:
+    assert is_loopback(host) is is_own
+    assert Config(host=host).is_open is is_own
+
+
+def test_a_new_address_of_the_machine_is_found_and_asked_for_seldom() -> None:
+    now_s, addresses, looked = 0.0, {"192.168.4.1"}, 0
+
+    def look_up() -> frozenset[str]:
+        nonlocal looked
+        looked += 1
+        return frozenset(addresses)
+
+    names = Names(["ocu.example.org"], is_open=False, now=lambda: now_s, addresses=look_up)
+    assert names.knows("192.168.4.1:8000")
+    assert names.knows("ocu.example.org")
+    assert not names.knows("192.168.4.2:8000")
+    addresses.add("192.168.4.2")
+    assert not names.knows("192.168.4.2:8000")
+    assert looked == 1
+    now_s = 2.0
+    assert names.knows("192.168.4.2:8000")
+    assert not names.knows("x.ocu.example.org")
+
+
+def test_behind_a_proxy_the_origin_is_the_proxys() -> None:
+    names = Names(["https://ocu.example.org/", "http://plain.example:8080"], is_open=True)
+    assert names.knows("ocu.example.org")
+    assert names.may_ask("https://ocu.example.org", scheme="http", host="ocu.example.org")
+    assert not names.may_ask("https://ocu.example.org", scheme="http", host="localhost")
+    assert not names.may_ask("https://ocu.example.org.evil.example", scheme="http", host="ocu.example.org")
+    assert names.is_behind_tls("OCU.example.org")
+    assert not names.is_behind_tls("plain.example:8080")
+    assert not names.may_ask("", scheme="http", host="x")
+
+
+@pytest.mark.parametrize(
+    "name", ["", "a b", "ftp://x", "https://x/path", "https://u@x", "*.example.org", "x:y", "http://"]
+)
+def test_what_is_no_name_is_refused_before_it_serves(name: str) -> None:
+    with pytest.raises(ValueError, match="is no name"):
+        Names([name], is_open=False)
+
+
+def test_the_odds_of_a_guess_are_as_they_are_told() -> None:
+    """36 tries at most in the life of a PIN, six PINs at most at once."""
+    assert math.isclose(36 * MOST_STANDING / 10**6, 2.16e-4)
