@@ -52,7 +52,7 @@ def lines(said: Announcement, *, draws: bool) -> Iterator[str]:
         yield f"  {vehicle.name}: {vehicle.address or 'waits for an address from the page'}"
     if config.is_open:
         yield "  Only this machine can open it; for phones start it with --host 0.0.0.0."
-    if said.others:
+    if said.others and not config.is_open:
         yield f"  Also: {'  '.join(said.others)}"
     if said.warning:
         yield f"  Mind: {said.warning}."

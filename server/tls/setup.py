@@ -21,7 +21,7 @@ from starlette.types import ASGIApp
 
 from server.tls.authority import Authority
 from server.tls.profile import MEDIA_TYPE, mobileconfig
-from server.tls.steps import PLATFORMS, platform_of
+from server.tls.steps import PLATFORMS, Platform, platform_of
 from server.web.assets import static_dir, templates_dir
 
 CERTIFICATE = "application/x-x509-ca-cert"
@@ -71,8 +71,7 @@ def explaining(authority: Authority, where: Callable[[], Whereabouts]) -> ASGIAp
             secure=found.secure(host),
             setup=address,
             qr=_size(address),
-            platforms=PLATFORMS,
-            likely=platform_of(request.headers.get("user-agent", "")),
+            platforms=_likeliest_first(platform_of(request.headers.get("user-agent", ""))),
             ends=authority.cert.not_valid_after_utc,
         )
         headers = _headers(found.secure(host).rstrip("/"))
@@ -143,6 +142,10 @@ def _headers(secure: str = "") -> dict[str, str]:
         "Referrer-Policy": "no-referrer",
         "Cache-Control": "no-store",
     }
+
+
+def _likeliest_first(id: str) -> list[Platform]:
+    return sorted(PLATFORMS, key=lambda platform: platform.id != id)
 
 
 def _in_lines(fingerprint: str) -> list[str]:
