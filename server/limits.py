@@ -69,15 +69,14 @@ class Allowance:
 
 def nests_deeper(value: Any, most: int) -> bool:
     """Whether lists and objects stand in each other more than `most` deep. Never recurses itself."""
-    level = [value]
-    for _ in range(most + 1):
+    level = [value] if isinstance(value, (dict, list)) else []
+    for _ in range(most):
         level = [
             inner
             for outer in level
-            if isinstance(outer, (dict, list))
             for inner in (outer.values() if isinstance(outer, dict) else outer)
             if isinstance(inner, (dict, list))
         ]
         if not level:
             return False
-    return True
+    return bool(level)

@@ -61,6 +61,12 @@ class PageRequests(H11Protocol):
         self._head_came()
         super().connection_lost(exc)
 
+    def data_received(self, data: bytes) -> None:
+        if self._is_between_requests() and self._is_head_too_long(data):
+            self.send_400_response("The head of this request is too long.")
+            return
+        super().data_received(data)
+
     def handle_events(self) -> None:
         super().handle_events()
         if self._is_between_requests():
@@ -82,6 +88,13 @@ class PageRequests(H11Protocol):
 
     def _is_between_requests(self) -> bool:
         return self.conn.their_state is h11.IDLE
+
+    def _is_head_too_long(self, data: bytes) -> bool:
+        """h11 looks only at a head of which the end has not come yet."""
+        begun = self.conn.trailing_data[0]
+        if len(begun) + len(data) <= self.limits.head_bytes:
+            return False
+        return (begun + data).find(b"\r\n\r\n", 0, self.limits.head_bytes) < 0
 
     def _await_head(self) -> None:
         self._head_due = self.loop.call_later(self.limits.head_s, self._head_did_not_come)
