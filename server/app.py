@@ -39,8 +39,11 @@ from server.web import ground as web_ground
 from server.web import log as alarm_log
 from server.web import mail as web_mail
 from server.web import recordings as web_recordings
+from server.web.assets import static_dir
+from server.web.built import find
 from server.web.ground import Ground
 from server.web.headers import SecurityHeaders
+from server.web.shell import build_of
 from server.web.throttle import Throttle
 
 log = logging.getLogger("catgraph.app")
@@ -83,6 +86,7 @@ class Running:
             "boot": self.boot,
             "vehicle": vehicle,
             "vehicles": list(self.sessions),
+            "build": build_of(find(static_dir())),
             "time_ms": self.wall_ms(),
             "last_event": self.bus.last_event(vehicle),
             "veil_after_s": 2.0,

@@ -41,6 +41,7 @@ class Config:
     found: tuple[Vehicle, ...] = field(default=())  # offered on the connect screen
     maps: tuple[Path, ...] = ()  # MBTiles under the map, the last on top
     site_image: Path | None = None  # above them; its corners stand in a .toml beside it
+    worker: bool = True  # phones keep the page's shell; False: what they kept goes at their next visit
     names: tuple[str, ...] = ()  # what else this server is called: hosts, or origins (https://…) of a proxy before it
     tls: Tls | None = None  # None: off on loopback, else auto
     keys: Keys = field(default_factory=Keys)  # of programs, where devices are paired

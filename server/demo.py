@@ -41,6 +41,8 @@ async def _demo(args: argparse.Namespace) -> int:
         maps=tuple(args.map),
         site_image=args.site_image,
     )
+        tls=option.read(args),
+        worker=not args.no_worker,
     try:
         return await serve(config)
     finally:

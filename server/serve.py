@@ -43,6 +43,8 @@ def run(args: argparse.Namespace) -> int:
             maps=tuple(args.map),
             site_image=args.site_image,
         )
+            tls=option.read(args),
+            worker=not args.no_worker,
         return run_server(serve(config))
     except (CannotServe, ValueError) as why:
         print(f"catgraph: {why}", file=sys.stderr)

@@ -59,6 +59,11 @@ def _default_data() -> Path:
 def run(work: Coroutine[Any, Any, int]) -> int:
     """Runs the server's work to its end; 130 when interrupted."""
     with uvloop_runner() as runner, contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
+    parser.add_argument(
+        "--no-worker",
+        action="store_true",
+        help="phones keep nothing of the page; without the server they then show their browser's own error",
+    )
         return runner.run(work)
     return 130
 

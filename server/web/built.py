@@ -30,6 +30,7 @@ class Built:
     script: str
     style: str
     needed: tuple[str, ...]  # scripts that `script` asks for at once
+    name: str  # of this build: other sources have another
 
 
 def join(esbuild: Path, static: Path) -> None:
@@ -87,7 +88,8 @@ def _find(static: Path, stamps: tuple[tuple[str, int], ...], listed_ns: int) -> 
     # The times stand in the call so that a changed file is read anew; they decide nothing, for a clone has none.
     try:
         listed = json.loads((static / FOLDER / _LIST).read_text(encoding="utf-8"))
-        found = Built(script=listed["script"], style=listed["style"], needed=tuple(listed["needed"]))
+        needed, name = tuple(listed["needed"]), listed["sources"][:12]
+        found = Built(script=listed["script"], style=listed["style"], needed=needed, name=name)
         is_whole = all((static / name).is_file() for name in (found.script, found.style, *found.needed))
         return found if is_whole and listed["sources"] == digest_of_sources(static) else None
     except (OSError, ValueError, KeyError, TypeError):

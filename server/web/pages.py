@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import logging
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -16,7 +18,15 @@ from starlette.responses import FileResponse
 from server.web.api import running, vehicle_of
 from server.web.assets import check_vendor, static_dir, templates_dir
 from server.web.built import ENTRY, STYLES, Built, find
+from server.web.icons import FOLDER as DRAWN
+from server.web.icons import WITHOUT, are_drawn
+from server.web.manifest import manifest as manifest_of
+from server.web.shell import OFFLINE, WORKER, Shell, build_of, shell_of, withdrawn
 from server.web.static_files import StaticText, answer, packed
+
+log = logging.getLogger("catgraph.page")
+
+_HTML = "text/html; charset=utf-8"
 
 
 def parts_of(built: Built | None, asset: Callable[[str], str]) -> dict[str, object]:
@@ -28,7 +38,10 @@ def parts_of(built: Built | None, asset: Callable[[str], str]) -> dict[str, obje
 
 
 def install(app: FastAPI) -> None:
-    """Serves `/`, `/static/…` and the manifest. Raises AssetsMissing when the page's files are not there."""
+    """Serves `/`, `/static/…` and what installs the page on a phone.
+
+    Raises AssetsMissing when the page's files are not there.
+    """
     check_vendor()
     static = static_dir()
     templates = Jinja2Templates(directory=templates_dir())
@@ -44,6 +57,16 @@ def install(app: FastAPI) -> None:
 
     templates.env.globals["asset"] = asset
     app.mount("/static", StaticText(directory=static), name="static")
+
+    if not are_drawn(static):
+        log.warning(WITHOUT)
+
+    def page_of(template: str, request: Request, built: Built | None, **context: object) -> bytes:
+        context |= parts_of(built, asset) | {"build": build_of(built), "icons": are_drawn(static)}
+        return bytes(templates.TemplateResponse(request, template, context).body)
+
+    def shell(request: Request, built: Built) -> Shell:
+        return shell_of(static, built, asset, page_of("offline.html", request, built))
 
     @app.get("/", response_class=HTMLResponse, include_in_schema=False)
     async def page(request: Request, vehicle: str | None = None) -> Response:
@@ -72,8 +95,16 @@ def install(app: FastAPI) -> None:
         return sent
 
     @app.get("/manifest.webmanifest", include_in_schema=False)
-    async def manifest() -> FileResponse:
-        path = static / "manifest.webmanifest"
+    async def manifest(request: Request) -> Response:
+        body = json.dumps(manifest_of(asset, are_drawn=are_drawn(static)), indent=1).encode()
+        return answer(packed(body), request.headers, "application/manifest+json", "no-cache")
+
+    @app.get("/favicon.ico", include_in_schema=False)
+    @app.get("/apple-touch-icon.png", include_in_schema=False)
+    async def asked_by_name(request: Request) -> FileResponse:
+        """Pictures that browsers ask for at these addresses, whatever a page says."""
+        name = "favicon.png" if request.url.path == "/favicon.ico" else "apple-touch-icon.png"
+        path = static / DRAWN / name
         if not path.is_file():
-            raise HTTPException(404, "There is no manifest.")
-        return FileResponse(path, media_type="application/manifest+json")
+            raise HTTPException(404, "This picture was not drawn when catgraph was installed.")
+        return FileResponse(path, media_type="image/png", headers={"Cache-Control": "no-cache"})

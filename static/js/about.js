@@ -90,6 +90,7 @@ export function mountAbout(root, store) {
       ['ROS', frame.session.ros_version === null ? 'unknown' : String(frame.session.ros_version)],
       ['Taken for', frame.session.profile ?? 'unknown'], ['Pages', String(frame.server.pages)], ['Frames skipped', String(frame.server.frames_skipped)],
       ['Server behind', `${fixed(frame.server.loop_lag_ms, 1)} ms`], ['Run', frame.server.boot.slice(0, 8)],
+      ['Without the server', KEEPING[document.documentElement.dataset['shell'] ?? ''] ?? 'not known yet'],
       ['Python', about ? `${about.python}, ${about.system}` : NOT_KNOWN],
       ...['roslibpy', 'fastapi', 'uvicorn', 'numpy', 'Leaflet', 'uPlot'].map((name) => [name, version(name)]),
     ];
@@ -108,3 +109,10 @@ export function mountAbout(root, store) {
   };
 }
 const NOT_KNOWN = '–';
+/** What of this page the phone keeps; shell.js finds out. @type {Record<string, string>} */
+const KEEPING = {
+  kept: 'this phone says so itself: it keeps the page’s shell',
+  missing: 'the browser’s own error: it can keep nothing, or the page came without HTTPS',
+  refused: 'the browser’s own error: it keeps nothing, as while it does not trust the certificate',
+  off: 'the browser’s own error: this server lets phones keep nothing',
+};

@@ -8,14 +8,17 @@ import { deviceName, keptHere } from './device.js';
 import { field, listen, need, show } from './dom.js';
 import { gapWords } from './events.js';
 import { FilesTab } from './files-tab.js';
+import { Handset } from './handset.js';
 import { MapTab } from './map-tab.js';
 import { notices } from './notice.js';
+import { ownName } from './own-name.js';
 import { Page } from './page.js';
 import { Phone } from './phone.js';
+import { Presence } from './presence.js';
 import { ScanTab } from './scan-tab.js';
 import { Screens } from './screens.js';
 import { SettingsTab } from './settings-tab.js';
-import { mountSheets } from './sheet.js';
+import { closeSheet, mountSheets } from './sheet.js';
 import { Store } from './store.js';
 import { Tabs } from './tabs.js';
 import { Voice } from './voice.js';
@@ -23,12 +26,15 @@ import { lossKey, mount as mountDialogs } from './dialogs.js';
 import { mount as mountBadge } from './badge.js';
 import { mount as mountChecks } from './checks.js';
 import { mount as mountConnect } from './connect.js';
+import { Control, mount as mountControl } from './control.js';
 import { mount as mountGauge } from './gauge.js';
+import { mount as mountInstall } from './install.js';
 import { mount as mountNearest } from './nearest.js';
 import { mount as mountPedals } from './pedals.js';
 import { mount as mountPosition } from './position.js';
 import { mount as mountPreferences } from './preferences.js';
 import { mount as mountRail } from './rail.js';
+import { mount as mountReach } from './reach.js';
 import { mount as mountSnackbar } from './snackbar.js';
 import { mount as mountStart } from './start.js';
 import { mount as mountStrip } from './strip.js';
@@ -39,11 +45,15 @@ import { mount as mountVeil } from './veil.js';
 const vehicle = document.documentElement.dataset['vehicle'];
 const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
 
-const store = new Store(() => new WebSocket(address), deviceName(navigator.userAgent, keptHere()));
+const store = new Store(() => new WebSocket(address), deviceName(navigator.userAgent, keptHere()), ownName());
 const voice = new Voice();
 const arming = new Arming(voice, new Phone(store));
 const monitor = need(document, '#monitor');
-const say = notices(field(document, 'snacks'));
+const handset = new Handset();
+const tell = notices(field(document, 'snacks'));
+const control = new Control(store, tell, openPhone);
+/** What was refused because another is in control is said with a key that helps. @type {typeof tell} */
+const say = (sentence, title, way) => tell(sentence, title, way ?? control.wayOf(sentence));
 const page = new Page(store, arming, say);
 
 const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
@@ -60,6 +70,8 @@ page.onShown = () => {
 mountStart(need(document, '#start'), store);
 mountConnect(need(document, '#connect'), store, page);
 mountTopbar(monitor, store, say);
+mountControl(monitor, field(document, 'snacks'), store, control);
+mountReach(need(monitor, '[data-part="reach"]'), store, openPhone);
 mountStrip(monitor, store);
 mountVeil(monitor, store);
 mountGauge(need(monitor, '[data-part="gauge"]'), store);
@@ -69,6 +81,7 @@ mountPosition(need(monitor, '[data-part="position"]'), store);
 mountChecks(need(monitor, '[data-part="checks"]'), store);
 mountTrends(need(monitor, '[data-part="trends"]'), store);
 mountSheets();
+mountInstall(say);
 mountPreferences(voice);
 mountRail(monitor, store, page);
 mountSnackbar(field(document, 'snacks'), store, say);
@@ -85,6 +98,11 @@ function front() {
   });
 }
 
+/** What this phone can do is looked at seldom. */
+function openPhone() {
+  import('./this-phone.js').then(({ openThisPhone }) => openThisPhone(store, arming, handset)).catch(() => say('What shows this phone could not be fetched.', 'Not opened'));
+}
+
 function draw() {
   page.draw();
   show(field(monitor, 'sound-off'), voice.isPossible ? !voice.isRunning : false);
@@ -95,6 +113,12 @@ function speak() {
   voice.say(soundOf(store.heeded, { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
 }
 
+new Presence(store, arming, handset);
+store.on('refused', (answer) => control.note(answer));
+listen(field(need(document, '#sheet-menu'), 'this-phone'), 'click', () => {
+  closeSheet(/** @type {HTMLDialogElement} */ (need(document, '#sheet-menu')));
+  openPhone();
+});
 store.on('draw', draw);
 store.on('beat', speak);
 store.on('tick', speak);
@@ -117,6 +141,8 @@ const unasked = store.on('open', () => {
 });
 store.start();
 draw();
+// What outlasts this visit is seen to once the page stands.
+setTimeout(() => import('./shell.js').then(({ Shell }) => new Shell(store, say)).catch(() => {}), 2000);
 // The screens an operator may want when the server is gone are fetched while it is there, once the page has begun.
 setTimeout(prefetch, 10_000);
 function prefetch() {

@@ -204,7 +204,7 @@
  * @property {string | null} by
  *
  * @typedef {{kind: 'hello', version: string, boot: string, vehicle: string | null, vehicles: string[], time_ms: number,
- *   last_event: number, veil_after_s: number}} Hello
+ *   last_event: number, veil_after_s: number, build?: string}} Hello
  * @typedef {{kind: 'offer', seq: number, of: string[]}} Offer
  * @typedef {{kind: 'events', events: AlarmEvent[], last: number}} Events
  * @typedef {{kind: 'reply', id: string, ok: boolean, reason?: string, problem?: Problem & {suggestion: string | null},

@@ -42,6 +42,8 @@ export class Store {
   /** Frames and scans that could not be read. */
   unreadable = 0;
   log = new EventLog();
+  /** The build of the page that the server has now; '' where it cannot say. */
+  build = '';
   /** The page shows a recording: frames of the live car are none of it, nor the other way round. */
   replaying = false;
   deadMan = new DeadMan();
@@ -274,6 +276,7 @@ export class Store {
     this.frame = frame;
     this.#delay_ms = delay_ms;
     this.heard_ms = Date.now();
+    this.build = hello.build ?? '';
     this.wire.proof(now_ms);
     this.#emit('beat');
     // What asks for the operator is drawn at once; pointers ten times a second, the rest five times and with them.

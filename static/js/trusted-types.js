@@ -3,7 +3,7 @@
 
 /** Leaflet tries once whether the browser knows SVG. */
 const MARKUP = ['<svg/>'];
-const SCRIPTS = ['/service-worker.js'];
+const SCRIPTS = ['/worker.js'];
 
 /** @typedef {{createPolicy(name: string, rules: Record<string, (text: string) => string | null>): unknown}} Factory */
 

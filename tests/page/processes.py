@@ -14,10 +14,11 @@ from pathlib import Path
 
 
 class Process:
-    """One `python -m server …`; `address` is what it printed."""
+    """One `python -m server …`, of the project in `folder` where one is given; `address` is what it printed."""
 
-    def __init__(self, *arguments: str) -> None:
+    def __init__(self, *arguments: str, folder: Path | None = None) -> None:
         self._arguments = arguments
+        self._folder = folder
         self._process: asyncio.subprocess.Process | None = None
         self._reader: asyncio.Task[None] | None = None
         self.address = ""
@@ -29,6 +30,7 @@ class Process:
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
+            cwd=self._folder,
             env={key: value for key, value in os.environ.items() if key != "PYTHONASYNCIODEBUG"},
         )
         out = self._process.stdout
@@ -83,9 +85,9 @@ class Process:
 
 
 @contextlib.asynccontextmanager
-async def running(*arguments: str) -> AsyncIterator[Process]:
+async def running(*arguments: str, folder: Path | None = None) -> AsyncIterator[Process]:
     """A process for the length of the block."""
-    process = await Process(*arguments).start()
+    process = await Process(*arguments, folder=folder).start()
     try:
         yield process
     finally:
