@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import MutableMapping
 from dataclasses import dataclass
 from enum import StrEnum
-
-from starlette.requests import HTTPConnection
+from typing import Any, Protocol
 
 SCOPE_KEY = "catgraph.who"  # in the ASGI scope of a request that was let in
+
+
+class Connection(Protocol):
+    """A request or a socket, as far as it matters here: this file stands beneath the web."""
+
+    scope: MutableMapping[str, Any]
 
 
 class Role(StrEnum):
@@ -34,13 +40,13 @@ class Who:
 LOCAL = Who(id="local", name="this machine", role=Role.OPERATOR)  # everybody, where the server listens on loopback only
 
 
-def who_of(connection: HTTPConnection) -> Who:
+def who_of(connection: Connection) -> Who:
     """Who sent this request or opened this socket. Raises KeyError where nobody looked: that is a mistake of ours, and
     it must not be taken for a permission."""
     found: Who = connection.scope[SCOPE_KEY]
     return found
 
 
-def is_known(connection: HTTPConnection) -> bool:
+def is_known(connection: Connection) -> bool:
     """Whether it is known who asks: everywhere, but for the few things that need nobody."""
     return SCOPE_KEY in connection.scope

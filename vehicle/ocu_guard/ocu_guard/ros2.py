@@ -1,0 +1,89 @@
+"""The guard as a ROS 2 node (Humble and newer): reads topics, ticks, publishes; decides nothing."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import rclpy
+from geometry_msgs.msg import Twist
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node as RosNode
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String, UInt32
+
+from ocu_guard import words
+from ocu_guard.guard import DECELERATION_MPS2, HEARTBEAT_S, Command, Guard
+
+
+class Node(RosNode):
+    """Runs in one thread, so nothing is locked. Ticks by the steady clock: the guard must not stand still with a
+    simulated one."""
+
+    def __init__(self) -> None:
+        super().__init__("ocu_guard")
+        self.declare_parameter("deceleration_mps2", DECELERATION_MPS2)
+        self.declare_parameter("heartbeat_s", HEARTBEAT_S)
+        self._guard = Guard(
+            float(self.get_parameter("deceleration_mps2").value), float(self.get_parameter("heartbeat_s").value)
+        )
+        self._was = ""
+        self._said_s = -1.0
+        self._cmd_vel = self.create_publisher(Twist, words.CMD_VEL, 1)
+        kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._state = self.create_publisher(String, words.STATE, kept)
+        for topic, kind, hear in (
+            (words.CONTROLLER, Twist, self._controller),
+            (words.OPERATOR, Twist, self._operator),
+            (words.HEARTBEAT, UInt32, self._heartbeat),
+            (words.RELEASE, UInt32, self._release),
+            (words.SPEED, Twist, self._speed),
+        ):
+            self.create_subscription(kind, topic, hear, 1)
+        self.create_timer(1 / words.TICK_HZ, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _tick(self) -> None:
+        now_s = time.monotonic()
+        self._publish(self._guard.tick(now_s))
+        state = self._guard.state(now_s)
+        if state != self._was or now_s - self._said_s >= 1 / words.STATE_HZ:
+            self._was, self._said_s = state, now_s
+            message = String()
+            message.data = json.dumps(self._guard.report(now_s))
+            self._state.publish(message)
+
+    def _controller(self, message: Twist) -> None:
+        self._publish(self._guard.controller(time.monotonic(), message.linear.x, message.angular.z))
+
+    def _operator(self, message: Twist) -> None:
+        self._publish(self._guard.operator(time.monotonic(), message.linear.x, message.angular.z))
+
+    def _heartbeat(self, message: UInt32) -> None:
+        self._guard.heartbeat(time.monotonic(), message.data)
+
+    def _release(self, message: UInt32) -> None:
+        self._guard.release(time.monotonic(), message.data)
+
+    def _speed(self, message: Twist) -> None:
+        self._guard.speed(time.monotonic(), message.linear.x)
+
+    def _publish(self, command: Command | None) -> None:
+        if command is None:
+            return
+        message = Twist()
+        message.linear.x = command.speed_mps
+        message.angular.z = command.angle_rad
+        self._cmd_vel.publish(message)
+
+
+def main() -> None:
+    """The node, until ROS ends."""
+    rclpy.init()
+    node = Node()
+    try:
+        rclpy.spin(node)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
