@@ -1,15 +1,16 @@
 """The phones that tell where they are, which of them is compared with the car, and what the comparisons gave.
 
-Several pages may tell a position; one is compared. Until phones have roles the rule is: the first that told a position
-which can be used stays the one for as long as it has one, and for 10 s more; then the next in the order in which they
-came takes over. The car is looked up at the phone's own time, so nothing here depends on how often either speaks.
+Several pages may tell a position; one is compared. It is the one that rides in the car, where the operator said so, and
+then no other takes its place, whatever becomes of it. Else the first that told a position which can be used stays the
+one for as long as it has one, and for 10 s more; then the next in the order in which they came takes over. The car is
+looked up at the phone's own time, so nothing here depends on how often either speaks.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from monitor.agreement import Pair, Tracks, correlate, gate_m, phone_sigma_m
@@ -69,15 +70,19 @@ class PhoneView:
     fix: PhoneFix | None = None  # the newest, usable or not
     measured_s: float = -math.inf
     why: Why | None = None  # why its newest word is no usable fix
+    is_chosen: bool = False  # the operator said that it rides in the car
     comparisons: tuple[Comparison, ...] = ()  # the newest five, oldest first
     tracks: Tracks | None = None  # over the last minute, of places that the gate explains
 
     def is_there(self, now_s: float) -> bool:
-        """Whether a phone is to be compared at all; one that left, or was not heard for a minute, is not."""
-        return self.phone is not None and now_s - self.heard_s <= FORGOTTEN_AFTER_S
+        """Whether a phone is to be compared at all; one that left, or was not heard for a minute, is not, unless it was
+        chosen."""
+        return self.phone is not None and (self.is_chosen or now_s - self.heard_s <= FORGOTTEN_AFTER_S)
 
     def why_not(self, now_s: float) -> Why | None:
         """Why this phone has no position that can be used now; None where it has."""
+        if self.why == "off":
+            return "off"
         if now_s - self.heard_s > SILENT_AFTER_S:
             return "silent"
         if self.why is not None:
@@ -101,6 +106,7 @@ class _Phone:
     label: str = ""
     is_handheld: bool = True
     heard_s: float = -math.inf
+    asked_s: float = -math.inf  # when it was chosen before it was ever heard
     fix: PhoneFix | None = None
     measured_s: float = -math.inf
     why: Why | None = None
@@ -112,6 +118,8 @@ class Phones:
 
     def __init__(self) -> None:
         self.view = NO_PHONE
+        self.views: tuple[PhoneView, ...] = ()  # every phone, in the order in which they came; without comparisons
+        self._rides: str | None = None  # which one the operator chose
         self._phones: dict[str, _Phone] = {}  # in the order in which they came
         self._chosen: str | None = None
         self._trail = Trail()
@@ -123,8 +131,10 @@ class Phones:
 
     def hear(self, word: PhoneWord, now_s: float) -> None:
         """One word of one phone."""
-        self._phones = {n: p for n, p in self._phones.items() if now_s - p.heard_s <= FORGOTTEN_AFTER_S}
-        if word.why == "off":
+        self._phones = {
+            n: p for n, p in self._phones.items() if n == self._rides or now_s - p.heard_s <= FORGOTTEN_AFTER_S
+        }
+        if word.why == "off" and word.phone != self._rides:
             self._phones.pop(word.phone, None)
         elif word.phone in self._phones or len(self._phones) < MOST:
             self._note(word, now_s)
@@ -133,6 +143,18 @@ class Phones:
             if word.measured_s >= self._compared_s + STEP_S:
                 self._waiting = word
                 self._compare()
+        self._look()
+
+    def ride(self, phone: str | None, now_s: float) -> None:
+        """This phone rides in the car: it is compared, and no other. It may be one that has not spoken yet. None: one
+        is found as it comes."""
+        unheard = self._phones.get(self._rides or "")
+        if unheard is not None and unheard.heard_s == -math.inf:
+            del self._phones[unheard.name]  # it was only waited for
+        self._rides = phone
+        if phone is not None and phone not in self._phones:
+            self._phones[phone] = _Phone(name=phone, usable_s=now_s, asked_s=now_s)
+        self._choose(now_s)
         self._look()
 
     def car(self, fix: GpsFix, at_s: float) -> None:
@@ -154,6 +176,9 @@ class Phones:
             phone.usable_s, phone.was_usable = word.measured_s, True
 
     def _choose(self, now_s: float) -> None:
+        if self._rides is not None:
+            self._compare_only(self._rides)
+            return
         chosen = self._phones.get(self._chosen or "")
         if chosen is not None and chosen.was_usable and now_s - chosen.usable_s <= HOLD_S:
             return
@@ -164,7 +189,10 @@ class Phones:
         if found is None:  # none can be compared: told of is the one that ought to be
             rest = sorted(self._phones.values(), key=lambda p: (not p.is_handheld, p.name != self._chosen))
             found = rest[0] if rest else None
-        name = None if found is None else found.name
+        self._compare_only(None if found is None else found.name)
+
+    def _compare_only(self, name: str | None) -> None:
+        """From now on this one is compared; what was found of another is forgotten."""
         if name != self._chosen:
             self._chosen, self._waiting = name, None
             self._comparisons.clear()
@@ -217,22 +245,25 @@ class Phones:
         return True
 
     def _look(self) -> None:
+        self.views = tuple(self._view(phone) for phone in self._phones.values())
         phone = self._phones.get(self._chosen or "")
         if phone is None:
             self.view = NO_PHONE
             return
-        self.view = PhoneView(
+        self.view = replace(self._view(phone), comparisons=tuple(self._comparisons), tracks=self._tracks)
+
+    def _view(self, phone: _Phone) -> PhoneView:
+        return PhoneView(
             phone=phone.name,
             label=phone.label,
             count=len(self._phones),
             is_handheld=phone.is_handheld,
-            heard_s=phone.heard_s,
+            heard_s=max(phone.heard_s, phone.asked_s),
             usable_s=phone.usable_s,
             fix=phone.fix,
             measured_s=phone.measured_s,
             why=phone.why,
-            comparisons=tuple(self._comparisons),
-            tracks=self._tracks,
+            is_chosen=phone.name == self._rides,
         )
 
 

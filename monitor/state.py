@@ -17,6 +17,7 @@ from monitor.motion import Slope, Standstill
 from monitor.phones import NO_PHONE, Phones, PhoneView, PhoneWord
 from monitor.quick import maker
 from monitor.rates import Rate, RateMeter
+from monitor.reach import ReachFacts
 from monitor.recorder import RecorderFacts
 from monitor.repeats import RepeatFollower, Repeats, Wheels
 from monitor.signals import SIGNALS, Signal
@@ -116,12 +117,14 @@ class Snapshot:
     track_m: float | None = None  # distance driven since connecting; None: never had a position
     gps: GpsWatch = field(default_factory=GpsWatch)  # what the newest fixes tell of the receiver
     phone: PhoneView = NO_PHONE  # the operator's phone beside the car
+    phones: tuple[PhoneView, ...] = ()  # every phone that tells where it is, in the order in which they came
     scan_before: Reading[LaserScan] | None = None  # some 0.4 s before the newest
     distance_before: Reading[Distance] | None = None
     standing_since_s: float | None = None  # when the car came to rest by its wheels; None: it moves, or cannot be told
     speed_slope_mps2: float | None = None  # how the wheels' speed changes, over 0.6 s; None: too little heard to tell
     clock_jump: ClockJump | None = None  # the newest since connecting
     recorder: RecorderFacts = field(default_factory=RecorderFacts)
+    reach: ReachFacts | None = None  # whom an alarm would reach; None: nobody is asked, as in a recording
 
     @overload
     def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...
@@ -256,10 +259,12 @@ class State:
         self._gps_follower = GpsFollower()
         self._gps = GpsWatch()
         self._phones = Phones()
+        self._rides: str | None = None
         self._scan_earlier = self._heard["scan"].earlier = Earlier()
         self._distance_earlier = self._heard["distance"].earlier = Earlier()
         self._link = LinkFacts()
         self._recorder = RecorderFacts()
+        self._reach: ReachFacts | None = None
         self._paused = False
         self._paused_since_s: float | None = None
 
@@ -312,6 +317,12 @@ class State:
         self._follow_clock(now_s)
         self._phones.hear(word, now_s)
 
+    def ride(self, phone: str | None, now_s: float) -> None:
+        """Which phone rides in the car, as the operator says; None: nobody says."""
+        self._follow_clock(now_s)
+        self._rides = phone
+        self._phones.ride(phone, now_s)
+
     # What `Snapshot` says of the newest moment, without a snapshot.
 
     def get(self, signal: str) -> Reading[Any] | None:
@@ -361,6 +372,10 @@ class State:
         """What is now known of the recorder."""
         self._recorder = facts
 
+    def reach(self, facts: ReachFacts) -> None:
+        """Whom an alarm would reach now."""
+        self._reach = facts
+
     def set_paused(self, paused: bool, since_s: float | None = None) -> None:
         """Monitoring is paused or goes on. `since_s` is when the pause began, where it was not now."""
         self._paused = paused
@@ -389,12 +404,14 @@ class State:
             track_m=self._track.distance_m,
             gps=self._gps,
             phone=self._phones.view,
+            phones=self._phones.views,
             scan_before=self._scan_earlier.before,
             distance_before=self._distance_earlier.before,
             standing_since_s=self._standstill.since_s if self._is_fresh("speed", now_s) else None,
             speed_slope_mps2=self._slope_mps2,
             clock_jump=self._clock_jump,
             recorder=self._recorder,
+            reach=self._reach,
         )
 
     def glance(self, now_s: float) -> Snapshot:
@@ -415,6 +432,7 @@ class State:
             return  # a message waited a moment between its arrival and here
         self._latest_s = at_s
         self._phones = Phones()  # they speak again within seconds
+        self._phones.ride(self._rides, at_s)
         self._readings = {
             name: replace(reading, received_s=reading.received_s + shift_s) for name, reading in self._readings.items()
         }

@@ -10,6 +10,7 @@ from monitor.signals import SIGNALS
 from monitor.state import Snapshot, TrackPoint
 from server import commands, problems, wire
 from server.address import BadAddress
+from server.control import NotInControl
 from server.reception import Reception
 from server.settings import BadSetting, Conflict
 from server.topics import candidates
@@ -27,6 +28,8 @@ def refusal(why: Exception) -> dict[str, Any]:
                 "reason": f"{problem.title} {problem.hint}".strip(),
                 "problem": problem.as_json() | {"suggestion": why.suggestion},
             }
+        case NotInControl():
+            return {"ok": False, "reason": why.reason, "held_by": why.holder.name if why.holder else None}
         case Refused():
             return {"ok": False, "reason": why.reason}
         case BadSetting():

@@ -8,9 +8,13 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 from pydantic_core import PydanticCustomError
 
 MAX_COMMAND_BYTES = 16 * 1024
+PAGE = r"^[0-9a-z-]{4,40}$"
 Name = Annotated[str, Field(min_length=1, max_length=120)]
 Number = Annotated[int, Field(ge=0, le=2**53)]
-Needs = Literal["operator", "control"]  # any operator, or only the one who is in control
+PageName = Annotated[str, Field(pattern=PAGE)]  # by which a page, and the phone it is on, knows itself
+# Any operator, or only the one who is in control. Slowing the car is to need no more than an operator, letting it go
+# control.
+Needs = Literal["operator", "control"]
 
 
 class _Command(BaseModel):
@@ -108,7 +112,7 @@ class Position(_Command):
 
     needs: ClassVar[Needs] = "operator"
     kind: Literal["position"]
-    phone: Annotated[str, Field(pattern=r"^[0-9a-z-]{4,40}$")]
+    phone: PageName
     handheld: bool
     fix: Fix | None = None
     why: Literal["denied", "unavailable", "timeout", "insecure", "hidden", "off"] | None = None
@@ -120,8 +124,60 @@ class Position(_Command):
         return self
 
 
+class Ride(_Command):
+    """Which phone rides in the car and is compared with it; null: nobody says, one is found."""
+
+    kind: Literal["ride"]
+    phone: PageName | None
+
+
+class TakeControl(_Command):
+    """Control is taken, given, asked for; server/control.py says who may do what."""
+
+    needs: ClassVar[Needs] = "operator"
+    kind: Literal["control"]
+    do: Literal["take", "take_over", "release", "request", "withdraw", "hand_over", "keep"]
+    to: PageName | None = None  # of hand_over and keep: the page
+
+    @model_validator(mode="after")
+    def _says_whom(self) -> Self:
+        if (self.to is not None) != (self.do in ("hand_over", "keep")):
+            raise PydanticCustomError("control", "it says to whom where control is handed over or kept, and only there")
+        return self
+
+
+class PresentWord(_Command):
+    """How a page stands, once a second: whether it is seen, and whether an alarm would be heard from it. It is no
+    order: nothing answers it but its refusal."""
+
+    needs: ClassVar[Needs] = "operator"
+    kind: Literal["present"]
+    visible: bool
+    sound: Literal["ready", "refused", "asks", "missing", "interrupted"]
+    awake: Literal["ready", "refused", "asks", "missing"]
+    vibrates: bool = False
+    battery: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = None
+    charging: bool | None = None
+    lag_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0  # age of its newest state
+    leaves: bool = False  # it is closed, or another page takes its place
+
+
 Command = (
-    Connect | Retry | Disconnect | Pause | Resume | Record | Acknowledge | Shelve | Unshelve | Set | Import | Position
+    Connect
+    | Retry
+    | Disconnect
+    | Pause
+    | Resume
+    | Record
+    | Acknowledge
+    | Shelve
+    | Unshelve
+    | Set
+    | Import
+    | Position
+    | Ride
+    | TakeControl
+    | PresentWord
 )
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
 

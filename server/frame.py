@@ -64,6 +64,8 @@ class Facts:
     track_number: int  # of this run of the server; another number is another track
     topics_judged: int = 0  # subscribed to for their signals
     recording: Mapping[str, Any] = field(default_factory=lambda: {"state": "off", "for_s": None})
+    # Who is in control and whom an alarm reaches: of a recording, nobody.
+    operators: Mapping[str, Any] = field(default_factory=lambda: {"control": {"holder": None}, "reach": None})
 
 
 def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str, Any]:
@@ -84,8 +86,9 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str,
         "limits": catalog.flat(monitor.limits),
         "recording": dict(facts.recording),
         "decelerate": {"state": "not_available", "why": "not configured"},
-        "control": {"holder": None},
+        **facts.operators,
         "phone": phone.as_json(snapshot.phone, facts.now_s),
+        "phones": phone.all_as_json(snapshot.phones, snapshot.phone, facts.now_s),
     }
 
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import re
+import secrets
 from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -31,12 +33,13 @@ EVENTS_A_BATCH = 100
 MAX_PAGES = 500
 MAX_COMPLAINTS = 200  # a page that sends nothing sensible is let go
 MAX_REPLIES = 200  # and so is one that asks and never reads
-FROM_A_REPLAY = ("position",)  # where the phone is, the live monitor must know whatever its page shows
+# Where the phone is, the live monitor must know whatever its page shows; and a page that is asked for control answers.
+FROM_A_REPLAY = ("position", "control")
 TOO_MANY = "Too many orders at once from this page: wait a second."
+NOT_A_VIEWERS = "This device is paired as a viewer: it looks, and changes nothing."
 NOT_FROM_A_REPLAY = "This page replays a recording: nothing is ordered from it. Go back to live first."
 
 
-NOT_A_VIEWERS = "This device is paired as a viewer: it looks, and changes nothing."
 class Page:
     """One page's connection, from its acceptance to its end."""
 
@@ -75,6 +78,7 @@ class Page:
         self._events_unanswered = False
         self._said_hello = False
         self._name = label.NAMELESS  # what the page calls itself: who gave its orders, in the log
+        self._page = secrets.token_hex(8)  # by which it knows itself, and keeps control over a reload
         self._complaints = 0
         self._now = now
         self._messages = Allowance(limits.messages, now())
@@ -164,6 +168,8 @@ class Page:
                 self._watch_scan(message.get("scan") is True)
             case "hello":
                 self._hear_hello(message)
+            case "present":
+                await self._present(message)
             case "replay":
                 await self._replay(message)
             case _:
@@ -171,6 +177,9 @@ class Page:
 
     def _hear_hello(self, message: Mapping[str, Any]) -> None:
         self._name = label.clean(message.get("name")) or self._name
+        page = message.get("page")
+        if isinstance(page, str) and re.fullmatch(commands.PAGE, page) and not self._said_hello:
+            self._page = page
         have = message.get("have_event")
         if type(have) is int and 0 <= have <= self._bus.last_event(self._vehicle) and not self._said_hello:
             self._event = have
@@ -182,6 +191,9 @@ class Page:
         identity = self._identity(message)
         if identity is None:
             return
+        if not self._who.is_operator:  # whatever it is: no command of the union needs less than an operator
+            self._reply(identity, {"ok": False, "reason": NOT_A_VIEWERS})
+            return
         if not self._orders.takes(self._now()):
             self._reply(identity, {"ok": False, "reason": TOO_MANY})
             return
@@ -189,13 +201,32 @@ class Page:
             self._reply(identity, {"ok": False, "reason": NOT_FROM_A_REPLAY})
             return
         try:
-            answer = await self._bus.request(self._vehicle, message | {"by": self._name})
+            answer = await self._bus.request(self._vehicle, message | self._sender)
         except NotServed as why:
-        if not self._who.is_operator:  # whatever it is: no command of the union needs less than an operator
-            self._reply(identity, {"ok": False, "reason": NOT_A_VIEWERS})
-            return
             answer = {"ok": False, "reason": f"{str(why).capitalize()}."}
         self._reply(identity, answer)
+
+    async def _present(self, message: dict[str, Any]) -> None:
+        """How the page stands, once a second: nobody answers it. A viewer's page is not counted on to hear alarms."""
+        if not self._who.is_operator:
+            return
+        try:
+            answer = await self._bus.request(self._vehicle, message | self._sender)
+        except NotServed:
+            return
+        if answer.get("ok") is not True:
+            self._complain(str(answer.get("reason")))
+
+    @property
+    def _sender(self) -> dict[str, Any]:
+        """Who sent what comes on this socket; it stands above whatever the page itself says of that."""
+        return {
+            "by": self._name if self._who is LOCAL else self._who.name,
+            "who": self._who.id,
+            "page": self._page,
+            "replaying": self._seat.is_replaying,
+            "console": False,
+        }
 
     async def _replay(self, message: Mapping[str, Any]) -> None:
         """An order to this page's own replay."""

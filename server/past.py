@@ -72,6 +72,12 @@ def recall(bus: LocalBus, vehicle: str, *, now_s: float, wall_ms: int) -> Past:
     )
 
 
+def phone_chosen(bus: LocalBus, vehicle: str) -> str | None:
+    """The phone that rides in the car, as the operator said last."""
+    newest = bus.find_events(vehicle, change="ride", limit=1)
+    return _text(newest[0].get("phone")) if newest else None
+
+
 def _recent(bus: LocalBus, vehicle: str, wall_ms: int, moment_s: Clock, shelf_s: Clock) -> list[Transition]:
     found: list[Transition] = []
     for event in _backwards(bus, vehicle, None):

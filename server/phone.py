@@ -8,9 +8,11 @@ from typing import Any
 from monitor.agreement import phone_sigma_m
 from monitor.phone_words import why_words
 from monitor.phones import PhoneView, PhoneWord
+from monitor.state import Snapshot
 from monitor.values import PhoneFix
 from server import commands, wire
 
+MOST_SHOWN = 12
 AHEAD_S = 0.25  # by so much the server's time of day may be set back between two frames; more, and nothing is known
 
 
@@ -48,13 +50,63 @@ def as_json(view: PhoneView, now_s: float) -> dict[str, Any] | None:
     """The `phone` of a state; None while no phone tells anything."""
     if not view.is_there(now_s):
         return None
-    why, fix = view.why_not(now_s), view.fix
     newest = view.comparisons[-1] if view.comparisons else None
+    return _place(view, now_s) | {
+        "count": view.count,
+        "choice": _choice(view, now_s),
+        "choice_text": _choice_words(view, now_s),
+        "apart_m": wire.plain(newest.distance_m, 1) if newest else None,
+        "bearing_deg": wire.plain(newest.bearing_deg, 1) if newest else None,
+        "compared_age_s": wire.plain(max(0.0, now_s - newest.at_s), 2) if newest else None,
+        "explained_m": wire.plain(newest.gate_m, 1) if newest else None,
+        "correlation": wire.plain(view.tracks.correlation, 3) if view.tracks else None,
+    }
+
+
+def all_as_json(views: tuple[PhoneView, ...], compared: PhoneView, now_s: float) -> list[dict[str, Any]]:
+    """The `phones` of a state: every one that is there; the one that is compared is never left out."""
+    there = [view for view in views if view.is_there(now_s)]
+    there.sort(key=lambda view: view.phone != compared.phone)
+    return [_place(view, now_s) | {"compared": view.phone == compared.phone} for view in there[:MOST_SHOWN]]
+
+
+def riding_words(snapshot: Snapshot, phone: str | None) -> str:
+    """What the log says when a phone was chosen."""
+    if phone is None:
+        return "No phone is said to ride in the car: the first with a usable position is compared with it."
+    label = next((view.label for view in snapshot.phones if view.phone == phone), "") or "A phone not heard of yet"
+    return f"{label} rides in the car: it is compared with the car's position."
+
+
+def _choice(view: PhoneView, now_s: float) -> str:
+    if view.is_chosen:
+        return "operator"
+    if view.count == 1:
+        return "only"
+    return "first" if view.why_not(now_s) is None else "none"
+
+
+def _choice_words(view: PhoneView, now_s: float) -> str:
+    match _choice(view, now_s):
+        case "operator":
+            return "It was chosen to ride in the car."
+        case "only":
+            return "No phone was chosen to ride in the car: this is the only one."
+        case "first":
+            return (
+                f"No phone was chosen to ride in the car: of {view.count}, this was the first with a usable position."
+            )
+    return f"No phone was chosen to ride in the car, and of {view.count} this one ought to have a position."
+
+
+def _place(view: PhoneView, now_s: float) -> dict[str, Any]:
+    """Where one phone is, or why it cannot tell."""
+    why, fix = view.why_not(now_s), view.fix
     return {
         "id": view.phone,
         "label": view.label or None,
-        "count": view.count,
         "handheld": view.is_handheld,
+        "chosen": view.is_chosen,
         "lat_deg": wire.plain(fix.lat_deg, 8) if fix else None,
         "lon_deg": wire.plain(fix.lon_deg, 8) if fix else None,
         "accuracy_m": wire.plain(fix.accuracy_m, 1) if fix else None,
@@ -67,9 +119,4 @@ def as_json(view: PhoneView, now_s: float) -> dict[str, Any] | None:
         "used": why is None,
         "why": why,
         "why_text": why_words(why, view, now_s).sentence if why else None,
-        "apart_m": wire.plain(newest.distance_m, 1) if newest else None,
-        "bearing_deg": wire.plain(newest.bearing_deg, 1) if newest else None,
-        "compared_age_s": wire.plain(max(0.0, now_s - newest.at_s), 2) if newest else None,
-        "explained_m": wire.plain(newest.gate_m, 1) if newest else None,
-        "correlation": wire.plain(view.tracks.correlation, 3) if view.tracks else None,
     }

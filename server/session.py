@@ -16,16 +16,18 @@ from monitor.runner import Monitor, Refused, Transition
 from monitor.signal_limits import expected_rates
 from monitor.state import LinkFacts, Phase, State
 from monitor.trends import Trends
-from server import address, answers, commands, judging, label, past, phone, problems, wire
+from server import address, answers, commands, judging, past, phone, problems, wire
 from server.address import BadAddress
 from server.bus import LocalBus
 from server.config import Vehicle
 from server.conversation import Conversation
 from server.frame import Facts, state_frame
+from server.gate import Caller, Gate
 from server.judging import TICK_S
 from server.link import RosLink
 from server.logbook import Logbook
 from server.past import Past
+from server.pause import Pause
 from server.problems import Problem
 from server.reception import Reception, Tally
 from server.recording.folder import RecordingsFolder
@@ -87,8 +89,9 @@ class Session:
         self._tasks: set[asyncio.Task[None]] = set()
         self._lag_s = 0.0
         self._state_is_due = False
-        self._paused_since_s: float | None = None
-        self._paused_by: str | None = None
+        self._pause = Pause(self._logbook)
+        self._gate = Gate(self._logbook.note, fence=bus.last_event(vehicle.name))
+        self._rides: str | None = None  # the phone that rides in the car, as the operator in control says
         self._track_number = 0
         self._clear()
 
@@ -106,6 +109,7 @@ class Session:
         self._proved = False
         self._reception = Reception()
         self._state = State(expected_rates(self._tuning.limits))
+        self._state.ride(self._rides, self._now())
         self._track_number += 1  # with the state begins another track
         self._scans = ScanFeed(self.vehicle.name, self._bus)
         self._trends = Trends(self._now())
@@ -210,6 +214,9 @@ class Session:
             self._log_trouble = self._bus.save_events()
         self._watch_link(now_s)
         self._watch_recording(now_s)
+        if self._gate.tick(now_s):
+            self._put_state_soon()
+        self._state.reach(self._gate.facts(now_s))
         self._judge(now_s, None)
         if put:
             self._put_state(now_s)
@@ -234,6 +241,8 @@ class Session:
         before = self._recall()
         self._monitor.number_on(before.transitions)
         self._load.add(before.recent)
+        self._rides = past.phone_chosen(self._bus, self.vehicle.name)
+        self._state.ride(self._rides, self._now())
         for sentence in (self._bus.log_complaint, self._tuning.complaint):
             if sentence:
                 self._logbook.note("restarted", sentence)
@@ -259,19 +268,6 @@ class Session:
         self._clear()
         return before
 
-    def _go_on(self, before: Past) -> None:
-        """A pause outlasts a restart: who ordered it counts on silence. It is said anew, and shown as ever."""
-        if before.paused_s is not None:
-            self._paused_since_s, self._paused_by = before.paused_s, before.paused_by
-            self._state.set_paused(True, before.paused_s)
-            since_ms = round(self._wall_ms() - (self._now() - before.paused_s) * 1000)
-            self._logbook.note(
-                "paused",
-                "The server was restarted and monitoring is still paused: no alarm will come.",
-                by=before.paused_by,
-                since_ms=since_ms,
-            )
-
     # -- commands ----------------------------------------------------------------------------------------------------
 
     async def handle(self, message: Mapping[str, Any]) -> dict[str, Any]:
@@ -296,10 +292,14 @@ class Session:
                 number=self._track_number,
                 after=after if isinstance(after, int) else 0,
             )
-        by = label.clean(message.get("by")) or label.NAMELESS
+        caller = Caller.of(message)
+        by = caller.name
         try:
             command = commands.read(dict(message))
-            self._obey(command, by=by)
+            if isinstance(command, commands.PresentWord):
+                return self._present(command, caller)
+            self._gate.admit(command, caller, self._now())
+            self._obey(command, caller)
             if isinstance(command, commands.Record):
                 await self._recording.demand_settled()
         except answers.REFUSALS as why:
@@ -310,10 +310,17 @@ class Session:
             self._recording.asked(message, by=by, reason=refusal["reason"])
             return refusal
         self._recording.asked(message, by=by)
-        return {"ok": True} | ({"version": self._tuning.settings.version} if commands.is_of_settings(command) else {})
+        version = {"version": self._tuning.settings.version} if commands.is_of_settings(command) else {}
+        fence = self._gate.fence_of(caller)
+        return {"ok": True} | version | ({} if fence is None else {"fence": fence})
 
-    def _obey(self, command: commands.Command, *, by: str) -> None:
-        now_s = self._now()
+    def _present(self, word: commands.PresentWord, caller: Caller) -> dict[str, Any]:
+        if self._gate.hear(word, caller, self._now()):
+            self._put_state_soon()
+        return {"ok": True}
+
+    def _obey(self, command: commands.Command, caller: Caller) -> None:
+        now_s, by = self._now(), caller.name
         match command:
             case commands.Connect():
                 self._connect(command.address, by=by)
@@ -324,9 +331,10 @@ class Session:
             case commands.Disconnect():
                 self._disconnect(by=by)
             case commands.Pause():
-                self._pause(now_s, by=by)
+                self._pause.begin(self._state, now_s, by=by)
             case commands.Resume():
-                self._resume(now_s, by=by)
+                if self._pause.end(self._state, by=by):
+                    self._judge(now_s, None)
             case commands.Record():
                 self._recording.order(command.on, by=by)
                 self._logbook.note("recording", f"Recording {'begins' if command.on else 'ends'}, by hand.", by=by)
@@ -346,12 +354,23 @@ class Session:
                 self._tuned(lines, by=by)
             case commands.Import():
                 self._tuned(self._tuning.replace(command.toml), by=by)
+            case commands.TakeControl():
+                self._gate.obey(command, caller, now_s)
+            case commands.Ride():
+                self._ride(command.phone, now_s, by=by)
             case commands.Position():
                 if self._phase == "idle":
                     raise Refused("No car is monitored: no position is needed.")
                 self._state.hear_phone(phone.word(command, now_s, self._wall_ms(), by), now_s)
                 return  # many phones may speak every second; the next tick judges and tells
         self._put_state(now_s)
+
+    def _ride(self, phone_: str | None, now_s: float, *, by: str) -> None:
+        """From now on this phone is compared with the car, whatever the others tell; it is kept over connections."""
+        self._rides = phone_
+        self._state.ride(phone_, now_s)
+        self._logbook.note("ride", phone.riding_words(self._state.snapshot(now_s), phone_), by=by, phone=phone_)
+        self._judge(now_s, None)
 
     def _tuned(self, lines: Sequence[str], *, by: str | None) -> None:
         """New settings count from this moment on."""
@@ -378,7 +397,7 @@ class Session:
         self._conversation = self._begin(self._link)
         self._link.start()
         if before is not None:
-            self._go_on(before)
+            self._pause.go_on(self._state, before, self._now(), self._wall_ms())
 
     def _disconnect(self, *, by: str) -> None:
         was = self._phase
@@ -391,7 +410,7 @@ class Session:
         self._tell(self._monitor.end(self._now()))
         self._drop_link()
         self._recording.ended()
-        self._paused_since_s = self._paused_by = None
+        self._pause.forget()
         self._clear()
 
     def _drop_link(self) -> None:
@@ -399,19 +418,6 @@ class Session:
         if self._link is not None:
             self._link.stop()
             self._link = None
-
-    def _pause(self, now_s: float, *, by: str) -> None:
-        if self._paused_since_s is None:
-            self._paused_since_s, self._paused_by = now_s, by
-            self._state.set_paused(True)
-            self._logbook.note("paused", "Monitoring is paused: no alarm will come.", by=by)
-
-    def _resume(self, now_s: float, *, by: str) -> None:
-        if self._paused_since_s is not None:
-            self._paused_since_s = self._paused_by = None
-            self._state.set_paused(False)
-            self._logbook.note("resumed", "Monitoring goes on.", by=by)
-            self._judge(now_s, None)
 
     # -- what the link says (LinkListener) ---------------------------------------------------------------------------
 
@@ -600,8 +606,8 @@ class Session:
             address=self._address,
             ros_version=self._conversation.ros_version,
             connected_s=self._connected_s,
-            paused_since_s=self._paused_since_s,
-            paused_by=self._paused_by,
+            paused_since_s=self._pause.since_s,
+            paused_by=self._pause.by,
             held=self._held,
             load=self.alarm_load,
             log_trouble=self._log_trouble,
@@ -623,6 +629,7 @@ class Session:
             recording=self._recording.frame(now_s),
             trends=self._trends.piece(now_s, at_most=TRENDS_A_FRAME),
             track_number=self._track_number,
+            operators=self._gate.as_json(now_s, self._wall_ms()),
         )
         return state_frame(facts, self._state.snapshot(now_s), self._monitor)
 

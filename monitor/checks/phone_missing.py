@@ -1,7 +1,8 @@
 """Has the operator's phone a position, and if not, why?
 
 Only a page that is there is asked for one. A computer on a desk has no receiver and is not blamed for it, unless
-somebody refused it the permission; a page that said farewell, or was not heard for a minute, is no phone any more.
+somebody refused it the permission or chose it to ride in the car; a page
+that said farewell, or was not heard for a minute, is no phone any more.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def find(snapshot: Snapshot, limits: MissingLimits, was_active: bool) -> Finding
     if why is None:
         radius_m = view.fix.accuracy_m if view.fix is not None else 0.0
         return ok(f"The phone knows its position to {radius_m:.0f} m")
-    if not view.is_handheld and why != "denied":
+    if not view.is_handheld and not view.is_chosen and why != "denied":
         return _none("This is no phone: no position is expected of it", was_active)
     words, missing_s = why_words(why, view, now_s), view.missing_s(now_s)
     if missing_s < limits.after_s and not was_active:

@@ -234,6 +234,8 @@ def summary(state: Mapping[str, Any]) -> dict[str, Any]:
         "cut": link["cut"],
         "problem": link["problem"]["title"] if link["problem"] else None,
         "recording": state["recording"],
+        "control": state["control"],
+        "reach": state["reach"],
         "alarms": state["alarms"][:LIVE_ALARMS],
         "alarms_in_all": len(state["alarms"]),
     }

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 router = APIRouter()
 NAME_HEADER = "x-catgraph-name"  # what the caller wants to be called in the log
+FENCE_HEADER = "x-catgraph-fence"  # the number of the lease of control by which a page orders
 VehicleName = Annotated[str | None, Query(description="Which vehicle; the first where it is left out", max_length=40)]
 ReplayToken = Annotated[str | None, Query(description="Of a page's replay, as its state names it", max_length=40)]
 
@@ -68,7 +69,7 @@ async def ask(request: Request, vehicle: str | None, message: dict[str, Any]) ->
     app = running(request)
     by = label.clean(request.headers.get(NAME_HEADER)) or label.of_program(request.headers.get("user-agent"))
     try:
-        answer = await app.bus.request(vehicle_of(app, vehicle), message | {"by": by})
+        answer = await app.bus.request(vehicle_of(app, vehicle), message | _sender(request) | {"by": by})
     except NotServed as why:
         raise HTTPException(503, f"{str(why).capitalize()}.") from None
     if answer.get("ok") is False:
@@ -77,7 +78,6 @@ async def ask(request: Request, vehicle: str | None, message: dict[str, Any]) ->
     return answer
 
 
-async def _ask_either(
 def _sender(request: Request) -> dict[str, Any]:
     """Who sent a request, and by which lease of control: a number, where it gives one."""
     fence = request.headers.get(FENCE_HEADER, "")
@@ -89,6 +89,7 @@ def _sender(request: Request) -> dict[str, Any]:
     }
 
 
+async def _ask_either(
     request: Request, vehicle: str | None, replay: str | None, message: dict[str, Any]
 ) -> dict[str, Any]:
     """What is asked of the live car, or of one page's replay."""
@@ -106,11 +107,12 @@ def _json(body: Any) -> Response:
 
 @router.get("/api/health", tags=["server"], summary="Is the server well?")
 async def health(request: Request) -> dict[str, Any]:
+    """To who is not known it says no more than that it is well, and of which version it is."""
     app = running(request)
-    return {
-        "status": "ok",
     if not is_known(request):
         return {"status": "ok", "version": app.version}
+    return {
+        "status": "ok",
         "version": app.version,
         "boot": app.boot,
         "up_for_s": round(app.now() - app.started_s, 1),

@@ -41,7 +41,12 @@ export class Arming {
   #stayAwake() {
     if (!this.#isAsked || document.hidden || this.screen === 'missing' || (this.#lock && !this.#lock.released)) return;
     navigator.wakeLock.request('screen').then(
-      (lock) => { this.#lock = lock; this.screen = 'ready'; },
+      (lock) => {
+        this.#lock = lock;
+        this.screen = 'ready';
+        // Hidden, the phone takes it back and it is asked for again; while the page is seen it is the battery saver's doing.
+        lock.addEventListener('release', () => { if (!document.hidden) this.screen = 'refused'; });
+      },
       () => { this.screen = 'refused'; },
     );
   }

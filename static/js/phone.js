@@ -1,11 +1,11 @@
 // This phone's position: asked of the browser once the operator armed it, told to the server while a car is monitored.
 
+import { ownName } from './own-name.js';
 import { Teller, whyOf } from './phone-fix.js';
 
 /** @typedef {import('./arming.js').Armed} Armed */
 
 const ARMED = 'catgraph.armed';
-const NAME = 'catgraph.phone';
 const OPTIONS = { enableHighAccuracy: true, maximumAge: 0, timeout: 10000 };
 /** A watch may say nothing while the phone lies still: it is asked again then [ms]. */
 const NUDGE_MS = 2500;
@@ -33,15 +33,6 @@ function keep(name, value) {
   } catch {
     // then a reload is another phone
   }
-}
-
-/** The name under which the server knows this phone, over reconnections and reloads. */
-function ownName() {
-  const before = kept(NAME);
-  if (before) return before;
-  const name = [...crypto.getRandomValues(new Uint8Array(8))].map((byte) => byte.toString(16).padStart(2, '0')).join('');
-  keep(NAME, name);
-  return name;
 }
 
 export class Phone {

@@ -113,8 +113,10 @@
  * @property {Record<string, number>} limits
  * @property {RecordingNow} recording
  * @property {{state: string, why: string | null}} decelerate
- * @property {{holder: string | null}} control
+ * @property {ControlNow} control
+ * @property {ReachNow | null} [reach] whom an alarm would reach; null: of a recording nobody is asked
  * @property {PhoneShown | null} [phone] the operator's phone that is compared with the car
+ * @property {PhonePlace[]} [phones] every phone that tells where it is, or why not; the one that is compared first
  * @property {ReplayAt} [replay] of a recording: what all the rest is of
  * @property {LiveAside | null} [live] in a replay only: what is live meanwhile; null: not known
  *
@@ -131,6 +133,31 @@
  * @property {number | null} [room_gb]
  * @property {{name: string, until_ms: number} | null} [saved] the newest finished file, and the time of day it reaches
  * @property {string | null} [reason] why it does not record
+ *
+ * @typedef {object} ControlNow
+ * @property {string | null} holder the name of who is in control
+ * @property {string | null} [page] the page that is
+ * @property {number | null} [fence] the number of its lease
+ * @property {number | null} [since_ms]
+ * @property {number | null} [renewed_s] since it was renewed last
+ * @property {number} [lapses_s] after so long without a word it lapses
+ * @property {{name: string, page: string, may_return_s: number} | null} [former] whose lease lapsed, and who has it again by coming back
+ * @property {{page: string, name: string, left_s: number}[]} [requests] who asks for it, and how long until silence grants it
+ *
+ * @typedef {object} PageHere
+ * @property {string} page
+ * @property {string} name
+ * @property {boolean} can an alarm would be heard from it now
+ * @property {string | null} why silent, blind, hidden, sound or replay
+ * @property {string | null} why_text
+ * @property {boolean} here it is seen now
+ * @property {string} awake
+ * @property {boolean} vibrates
+ * @property {number | null} battery
+ * @property {boolean | null} charging
+ * @property {number} heard_s
+ *
+ * @typedef {{can: number, of: number, why: string, pages: PageHere[], left_out: number}} ReachNow
  *
  * @typedef {object} ReplayAt
  * @property {string} id
@@ -158,6 +185,8 @@
  * @property {Link['cut']} cut
  * @property {string | null} problem
  * @property {{state: string, for_s: number | null}} recording
+ * @property {ControlNow} [control]
+ * @property {ReachNow | null} [reach]
  * @property {Alarm[]} alarms
  * @property {number} alarms_in_all
  *
@@ -169,10 +198,21 @@
  * @typedef {number | 'none' | null} Step none: messages came and had no number to give; null: none came
  * @typedef {{step_s: number, since: number, first: number, now: number, lowest: Record<string, Step[]>, highest: Record<string, Step[]>}} Trends
  *
- * @typedef {object} PhoneShown
+ * @typedef {PhonePlace & PhoneCompared} PhoneShown
+ *
+ * @typedef {object} PhoneCompared
+ * @property {number} count
+ * @property {'operator' | 'only' | 'first' | 'none'} [choice] who chose it: the operator, or the server for this reason
+ * @property {string} [choice_text]
+ * @property {number | null} apart_m
+ * @property {number | null} [bearing_deg] of the car from the phone
+ * @property {number | null} [compared_age_s]
+ * @property {number | null} explained_m
+ * @property {number | null} correlation
+ *
+ * @typedef {object} PhonePlace
  * @property {string} id
  * @property {string | null} label
- * @property {number} count
  * @property {boolean} handheld
  * @property {number | null} lat_deg
  * @property {number | null} lon_deg
@@ -186,11 +226,8 @@
  * @property {boolean} used
  * @property {string | null} why
  * @property {string | null} why_text
- * @property {number | null} apart_m
- * @property {number | null} [bearing_deg] of the car from the phone
- * @property {number | null} [compared_age_s]
- * @property {number | null} explained_m
- * @property {number | null} correlation
+ * @property {boolean} [compared] with the car
+ * @property {boolean} [chosen] the operator said that it rides in the car
  *
  * @typedef {object} AlarmEvent
  * @property {number} n
@@ -202,13 +239,17 @@
  * @property {Priority} [priority]
  * @property {string} text
  * @property {string | null} by
+ * @property {string} [act] what happened to control
+ * @property {string | null} [by_page]
+ * @property {string | null} [page] who is in control now
+ * @property {string | null} [before_page]
  *
  * @typedef {{kind: 'hello', version: string, boot: string, vehicle: string | null, vehicles: string[], time_ms: number,
- *   last_event: number, veil_after_s: number, build?: string}} Hello
+ *   last_event: number, veil_after_s: number, who?: {id: string, name: string, role: 'viewer' | 'operator'}, build?: string}} Hello
  * @typedef {{kind: 'offer', seq: number, of: string[]}} Offer
  * @typedef {{kind: 'events', events: AlarmEvent[], last: number}} Events
  * @typedef {{kind: 'reply', id: string, ok: boolean, reason?: string, problem?: Problem & {suggestion: string | null},
- *   version?: number, conflict?: boolean, field?: string}} Reply
+ *   version?: number, conflict?: boolean, field?: string, fence?: number, held_by?: string | null}} Reply
  * @typedef {{kind: 'problem', reason: string}} Refusal
  * @typedef {Hello | Offer | State | Events | Reply | Refusal | Timeline | ReplayEnded} Message
  */

@@ -22,11 +22,11 @@ const REPLY_MS = 4000;
  * @typedef {import('./protocol.js').State} State
  * @typedef {import('./protocol.js').AlarmEvent} AlarmEvent
  * @typedef {import('./events.js').Gap} Gap
- * @typedef {'move' | 'draw' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open' | 'replay'} Topic
+ * @typedef {'move' | 'draw' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open' | 'replay' | 'refused'} Topic
  *   move: a fresh frame is to be drawn · draw: five times a second, seen or not by a frame · scan: a new scan ·
- *   beat: a fresh frame came (also while the page is hidden) · tick: time passed (seldom while it is hidden) · log: new events · gap: a blind time is over · open: connected · replay: its time line, or its end
- * @typedef {{ok: boolean, reason?: string, suggestion?: string, version?: number, isConflict?: boolean}} Answer suggestion: an address
- *   that would do; version: of the settings, once changed; isConflict: somebody else changed them in between
+ *   beat: a fresh frame came (also while the page is hidden) · tick: time passed (seldom while it is hidden) · log: new events · gap: a blind time is over · open: connected · refused: an order was, with its answer · replay: its time line, or its end
+ * @typedef {{ok: boolean, reason?: string, suggestion?: string, version?: number, isConflict?: boolean, heldBy?: string}} Answer suggestion: an address
+ *   that would do; version: of the settings, once changed; isConflict: somebody else changed them in between; heldBy: who is in control instead
  */
 
 export class Store {
@@ -59,6 +59,10 @@ export class Store {
   #urgent = '';
   #isUrgent = false;
   #asked = 0;
+  /** What an answer said of this page's lease, until the frames have it. @type {number | null} */
+  #granted = null;
+  /** Who this page is to the server. @type {import('./protocol.js').Hello['who'] | null} */
+  who = null;
   /** @type {Map<string, (answer: Answer) => void>} */
   #waiting = new Map();
   /** @type {Map<Topic, Set<(detail?: any) => void>>} */
@@ -68,9 +72,10 @@ export class Store {
   #looked_ms = 0;
   #lookedWall_ms = 0;
 
-  /** @param {() => WebSocket} dial @param {string} [name] what this phone is called in the log */
-  constructor(dial, name = '') {
+  /** @param {() => import('./wire.js').Socket} dial @param {string} [name] what this phone is called in the log @param {string} [page] by which the server knows this page */
+  constructor(dial, name = '', page = '') {
     this.name = name;
+    this.page = page;
     this.wire = new Wire(
       { opened: () => this.#opened(), text: (text) => this.#heard(text), bytes: (bytes) => this.#heardScan(bytes), closed: () => this.#closed() },
       dial,
@@ -141,12 +146,30 @@ export class Store {
     return this.frame?.session.phase === 'monitoring' || this.frame?.session.phase === 'lost';
   }
 
+  /** This device was let in to look, and no more. */
+  get isViewer() {
+    return this.who?.role === 'viewer';
+  }
+
   /** What must be heard of: the live car, also while a recording is shown. @returns {State | null} */
   get heeded() {
     const { frame } = this;
     if (!frame?.replay) return frame;
     const { live } = frame;
     return live ? { ...frame, alarms: live.alarms, session: { ...frame.session, phase: live.phase, paused: live.paused } } : null;
+  }
+
+  /** Who is in control of the live car, also while a recording is shown. */
+  get control() {
+    const { frame } = this;
+    return (frame?.replay ? frame.live?.control : frame?.control) ?? null;
+  }
+
+  /** The number of the lease by which this page is in control; null: it is not. */
+  get fence() {
+    const { control } = this;
+    const known = control?.page === this.page && this.page ? (control.fence ?? null) : null;
+    return this.#granted !== null && (control?.fence ?? 0) < this.#granted ? this.#granted : known;
   }
 
   /** From now on a recording, or live again. @param {boolean} isReplay */
@@ -183,7 +206,8 @@ export class Store {
   ask(kind, fields = {}, within_ms = REPLY_MS) {
     this.#asked += 1;
     const id = `p${this.#asked}`;
-    if (!this.wire.send({ kind, id, ...fields })) {
+    const { fence } = this;
+    if (!this.wire.send({ kind, id, ...fields, ...(fence === null ? {} : { fence }) })) {
       return Promise.resolve({ ok: false, reason: 'Not sent: the server does not answer.' });
     }
     return new Promise((resolve) => {
@@ -205,6 +229,7 @@ export class Store {
   }
 
   #opened() {
+    this.#granted = null;
     this.#clock.reset();
     if (this.#watchers.size) this.wire.send({ kind: 'watch', scan: true });
   }
@@ -247,6 +272,7 @@ export class Store {
         this.#emit('replay', message);
         break;
       case 'reply':
+        this.#granted = message.fence ?? null;
         this.#answer(message.id, answerOf(message));
         break;
       case 'problem':
@@ -257,9 +283,11 @@ export class Store {
 
   /** @param {import('./protocol.js').Hello} hello */
   #greeted(hello) {
+    this.build = hello.build ?? '';
+    this.who = hello.who ?? null;
     const blind_s = this.heard_ms === null ? 0 : this.silence_s;
     const have_event = this.log.greet(hello.boot, hello.last_event, blind_s, Date.now());
-    this.wire.send({ kind: 'hello', have_event, boot: hello.boot, name: this.name });
+    this.wire.send({ kind: 'hello', have_event, boot: hello.boot, name: this.name, ...(this.page ? { page: this.page } : {}) });
     this.#caughtUp();
     this.#emit('open', hello);
   }
@@ -276,7 +304,6 @@ export class Store {
     this.frame = frame;
     this.#delay_ms = delay_ms;
     this.heard_ms = Date.now();
-    this.build = hello.build ?? '';
     this.wire.proof(now_ms);
     this.#emit('beat');
     // What asks for the operator is drawn at once; pointers ten times a second, the rest five times and with them.
@@ -346,6 +373,7 @@ export class Store {
    * @param {Answer} answer
    */
   #answer(id, answer) {
+    if (!answer.ok && this.#waiting.has(id)) this.#emit('refused', answer);
     this.#waiting.get(id)?.(answer);
     this.#waiting.delete(id);
   }
@@ -370,10 +398,10 @@ export class Store {
  * @param {import('./protocol.js').Reply} reply
  * @returns {Answer}
  */
-function answerOf({ ok, reason, problem, version, conflict }) {
+function answerOf({ ok, reason, problem, version, conflict, held_by }) {
   return {
     ok, ...(reason ? { reason } : {}), ...(problem?.suggestion ? { suggestion: problem.suggestion } : {}),
-    ...(version === undefined ? {} : { version }), ...(conflict ? { isConflict: true } : {}),
+    ...(version === undefined ? {} : { version }), ...(conflict ? { isConflict: true } : {}), ...(held_by ? { heldBy: held_by } : {}),
   };
 }
 

@@ -1,4 +1,4 @@
-// The top bar: the chain with its word and age, the recorder and its key in the menu, who is in control.
+// The top bar: the chain with its word and age, the recorder and its key in the menu. Who is in control: control.js.
 
 import { drawChain } from './chain.js';
 import { field, listen, need, setAttribute, setText, setWords, show } from './dom.js';
@@ -31,8 +31,8 @@ export function mount(root, store, say) {
   /** @type {boolean | null} */
   let order = null;
   const chain = field(root, 'small-chain');
-  const [link, word, wordAge, rec, recFor, who] = ['link', 'word', 'word-age', 'rec', 'rec-for', 'who-name'].map((name) => field(root, name));
-  if (!link || !word || !wordAge || !rec || !recFor || !who) throw new Error('The template lacks the top bar');
+  const [link, word, wordAge, rec, recFor] = ['link', 'word', 'word-age', 'rec', 'rec-for'].map((name) => field(root, name));
+  if (!link || !word || !wordAge || !rec || !recFor) throw new Error('The template lacks the top bar');
 
   function draw() {
     const view = store.chain;
@@ -50,7 +50,6 @@ export function mount(root, store, say) {
     order = frame.replay || !store.isMonitoring ? null : recording.order;
     show(key, order !== null);
     setText(keyWords, order === false ? 'End the recording' : 'Start recording');
-    setText(who, frame.control.holder ?? 'No one');
   }
 
   async function obey() {

@@ -19,6 +19,11 @@ export class Voice {
     return typeof AudioContext === 'function';
   }
 
+  /** Did the phone itself take the sound away, as an iPhone does for a call? */
+  get isInterrupted() {
+    return /** @type {string | undefined} */ (this.#context?.state) === 'interrupted';
+  }
+
   /** Would an alarm be heard now? */
   get isRunning() {
     return this.#context?.state === 'running';
@@ -27,6 +32,9 @@ export class Voice {
   /** Called within a tap: browsers sound only after one. Never waits for the answer, which some never give. */
   arm() {
     if (!this.isPossible) return;
+    // On an iPhone a page's sound obeys the silent switch unless it says that it plays for its own sake (Safari 16.4 on).
+    const { audioSession } = /** @type {{audioSession?: {type: string}}} */ (/** @type {unknown} */ (navigator));
+    if (audioSession) audioSession.type = 'playback';
     this.#context ??= new AudioContext({ latencyHint: 'interactive' });
     if (this.#context.state !== 'running') this.#context.resume().catch(() => {});
   }

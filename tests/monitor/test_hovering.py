@@ -242,6 +242,7 @@ WITHOUT = {
     "log_not_kept": "the disk's own word",
     "recording_stopped": "the recorder's own word",
     "paused_long": "time only grows",
+    "reach": "somebody hears or nobody does; phones that come and go do so more slowly than its delays",
     "clock_jump": "steps, told for ten seconds each",
 }
 

@@ -279,3 +279,62 @@ def test_another_connection_begins_without_phones() -> None:
     state.hear_phone(PhoneWord(phone="one", is_handheld=True, why="denied"), 100.0)
     state.reset()
     assert state.snapshot(100.1).phone is NO_PHONE
+
+
+# -- the phone that rides in the car -----------------------------------------------------------------------------------
+
+
+def test_the_chosen_phone_is_compared_though_another_came_first() -> None:
+    road = Road().drive(2.0).say("one").say("two", aside_m=9.0)
+    assert (road.view.phone, road.view.is_chosen) == ("one", False)
+    road.phones.ride("two", road.now_s)
+    assert (road.view.phone, road.view.is_chosen, road.view.comparisons) == ("two", True, ())
+    road.drive(1.0).say("one").say("two", aside_m=9.0)
+    assert [one.distance_m for one in road.view.comparisons] == pytest.approx([9.0], abs=0.05)
+
+
+@pytest.mark.parametrize("why", ["denied", "hidden", "timeout", "off"])
+def test_no_other_takes_its_place_whatever_becomes_of_it(why: Why) -> None:
+    road = Road().drive(2.0).say("one").say("two")
+    road.phones.ride("two", road.now_s)
+    road.excuse(why, "two")
+    for _ in range(20):
+        road.drive(1.0).say("one")
+    assert road.view.phone == "two"
+    assert road.view.why_not(road.now_s) == ("off" if why == "off" else "silent")
+    assert road.view.is_there(road.now_s + 1000.0)  # it is missed for ever
+
+
+def test_a_phone_that_was_not_heard_of_yet_is_waited_for() -> None:
+    road = Road().drive(2.0).say("one")
+    road.phones.ride("two", road.now_s)
+    assert road.view.phone == "two"
+    assert road.view.why_not(road.now_s + 6.0) == "silent"
+    assert road.view.missing_s(road.now_s + 6.0) == pytest.approx(6.0)
+    road.drive(1.0).say("two")
+    assert road.view.why_not(road.now_s) is None
+    assert len(road.view.comparisons) == 1
+
+
+def test_when_the_choice_is_taken_back_one_is_found_as_before() -> None:
+    road = Road().drive(2.0).say("one")
+    road.phones.ride("two", road.now_s)
+    road.phones.ride(None, road.now_s)
+    assert (road.view.phone, road.view.is_chosen, road.view.count) == ("one", False, 1)  # the one waited for is gone
+
+
+def test_every_phone_is_seen_each_with_its_own_reason() -> None:
+    road = Road().drive(2.0).say("one").say("two", accuracy_m=80.0).excuse("denied", "three")
+    assert [(view.phone, view.why_not(road.now_s)) for view in road.phones.views] == [
+        ("one", None), ("two", "coarse"), ("three", "denied"),
+    ]  # fmt: skip
+    road.excuse("off", "two")
+    assert [view.phone for view in road.phones.views] == ["one", "three"]
+
+
+def test_a_clock_that_goes_back_forgets_the_phones_and_not_the_choice() -> None:
+    state = State()
+    state.ride("two", 100.0)
+    state.hear_phone(PhoneWord(phone="two", is_handheld=True, fix=at(), measured_s=100.0), 100.0)
+    snapshot = state.snapshot(50.0)
+    assert (snapshot.phone.phone, snapshot.phone.is_chosen, snapshot.phone.fix) == ("two", True, None)

@@ -79,6 +79,7 @@ ELSEWHERE = {
     "paused_long": "tests/monitor/checks/test_paused_long.py::test_a_forgotten_pause_is_told_ever_more_seldom",
     "fuel_low": "tests/monitor/checks/test_fuel_low.py::test_it_is_told_once",  # the car publishes none
     "gps_quality": "tests/server/test_judged.py::test_the_strict_setting_rejects_the_cars_own_receiver",
+    "reach": "tests/monitor/checks/test_reach.py::test_a_reload_and_a_tap_raise_nothing_and_15_s_of_silence_do",
     "log_not_kept": "tests/monitor/checks/test_log_not_kept.py",
     "recording_stopped": "tests/monitor/checks/test_recorder.py",
     "recorder_behind": "tests/monitor/checks/test_recorder.py",

@@ -143,6 +143,8 @@ def test_the_state_shows_it_without_a_number_that_is_none() -> None:
         "accuracy_m": 30.2, "sigma_m": 20.0, "alt_m": None, "speed_mps": None, "heading_deg": None,
         "at_ms": 1_700_000_000_000, "age_s": 0.5, "used": True, "why": None, "why_text": None,
         "apart_m": 11.1, "bearing_deg": 180.0, "compared_age_s": 0.5, "explained_m": 74.6, "correlation": None,
+        "chosen": False, "choice": "only",
+        "choice_text": "No phone was chosen to ride in the car: this is the only one.",
     }  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from monitor.check import Verdict
 from monitor.gps_watch import GpsWatch
 from monitor.link import LinkFacts
 from monitor.rates import Rate
+from monitor.reach import ReachFacts
 from monitor.recorder import RecorderFacts
 from monitor.repeats import Repeats
 from monitor.stamps import ClockJump
@@ -243,6 +244,11 @@ ROWS: dict[str, Row | Callable[[str], Row]] = {
         ok=taped(state="recording", left_gb=50.0),
         fault=taped(state="recording", left_gb=0.4),
         unknown=taped(state="recording", left_gb=None),
+    ),
+    "reach": Row(
+        ok=with_more(known(speed=DRIVES), reach=ReachFacts(can=1, of=3, why="sound off")),
+        fault=with_more(known(speed=DRIVES), reach=ReachFacts()),
+        unknown=with_more(known(speed=None), reach=ReachFacts()),
     ),
     "paused_long": Row(
         ok=known(),

@@ -1,0 +1,88 @@
+"""Can any operator hear an alarm while the car moves?
+
+Nobody is needed while the car stands. A page that is reloaded says nothing for a moment, and its sound needs a tap
+again: hence the delay.
+"""
+
+from __future__ import annotations
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Scope,
+    Sound,
+    absent,
+    fault,
+    ok,
+    unknown,
+)
+from monitor.motion import MOVES_ABOVE_MPS
+from monitor.state import Snapshot
+
+RELOADED_S = 15.0  # a page is loaded anew and touched again within this
+
+
+class ReachLimits(Limits):
+    pass
+
+
+def find(snapshot: Snapshot, limits: ReachLimits, was_active: bool) -> Finding:
+    facts = snapshot.reach
+    if facts is None:
+        return absent("Nobody is asked whether alarms are heard", brief="not asked")
+    measured = Quantity(label="Can hear alarms", value=facts.can, unit="")
+    if facts.can > 0:
+        return ok(f"{facts.can} of {facts.of} operators can hear alarms", measured=measured)
+    why = f"none of {facts.of} ({facts.why})" if facts.of else "no operator's phone is here"
+    speed = snapshot.get("speed")
+    if speed is None:
+        return absent(f"Nobody can hear alarms: {why}; whether the car moves is not known", brief="no speed")
+    if not speed.is_fresh(snapshot.now_s):
+        return unknown(f"Nobody can hear alarms: {why}; whether the car moves is not known", short="no speed")
+    if not moves(snapshot, was_active):
+        return ok(f"Nobody can hear alarms: {why}; the car stands", measured=measured)
+    text = f"The car moves at {abs(speed.value.speed_mps):.1f} m/s and nobody can hear alarms: {why}"
+    return fault(text, brief="nobody", measured=measured, causes=("reach",))
+
+
+def moves(snapshot: Snapshot, was_active: bool) -> bool:
+    """Whether the wheels turn; once it is alarmed, until the car has come to rest for two seconds."""
+    speed = snapshot.get("speed")
+    if speed is None:
+        return False
+    fast = abs(speed.value.speed_mps) > MOVES_ABOVE_MPS
+    return fast or (was_active and snapshot.standing_since_s is None)
+
+
+def is_harmless(snapshot: Snapshot, limits: ReachLimits) -> bool:
+    return snapshot.reach is None or snapshot.reach.can > 0
+
+
+CHECKS = (
+    Check(
+        id="reach",
+        label="Alarm reach",
+        order=126,
+        alarm=AlarmSpec(
+            title="No operator hears alarms",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.MEDIUM,
+            needs_ack=True,  # whoever comes back must know that nobody listened
+            on_delay_s=RELOADED_S,
+            off_delay_s=2.0,
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="Open this page on a phone, touch it so that it may sound, and keep it in front.",
+        ),
+        limits=ReachLimits,
+        find=find,
+        is_harmless=is_harmless,
+        scope=Scope.SERVER,
+    ),
+)
