@@ -9,6 +9,7 @@ from server.config import Config, Vehicle
 from server.serving import CannotServe, add_common_arguments, serve
 from server.serving import run as run_server
 from server.simulator.command import CarService
+from server.tls import option
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,9 +41,9 @@ async def _demo(args: argparse.Namespace) -> int:
         found=(Vehicle(name="Simulated car", address=address),),
         maps=tuple(args.map),
         site_image=args.site_image,
-    )
         tls=option.read(args),
         worker=not args.no_worker,
+    )
     try:
         return await serve(config)
     finally:

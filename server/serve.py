@@ -8,6 +8,7 @@ import sys
 from server.config import Config, Vehicle, vehicle_from_text
 from server.serving import CannotServe, add_common_arguments, serve
 from server.serving import run as run_server
+from server.tls import option
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,9 +43,9 @@ def run(args: argparse.Namespace) -> int:
             allowed_hosts=tuple(args.only),
             maps=tuple(args.map),
             site_image=args.site_image,
-        )
             tls=option.read(args),
             worker=not args.no_worker,
+        )
         return run_server(serve(config))
     except (CannotServe, ValueError) as why:
         print(f"catgraph: {why}", file=sys.stderr)

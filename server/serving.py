@@ -5,22 +5,31 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import logging
 import os
 import socket
 import sys
 from collections.abc import Coroutine
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import ifaddr
-import segno
 import uvicorn
 
-from server.app import create_app
-from server.config import Config
+from server.access.invitations import LASTS_S
+from server.announce import Announcement, Pairing, addresses, invitation, lines
+from server.app import Running, create_app
+from server.config import Config, Tls
+from server.tls import option
+from server.tls.authority import TlsRefused
+from server.tls.served import Secured, Server, secure, serve_secured
+from server.tls.setup import Whereabouts
 from server.web import requests
 from server.web.assets import AssetsMissing
 from server.web.mbtiles import MapRefused
+
+log = logging.getLogger("catgraph.serving")
 
 
 class CannotServe(Exception):
@@ -35,6 +44,7 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--data", type=Path, default=_default_data(), help="folder for what is kept (default %(default)s)"
     )
+    option.add_arguments(parser)
     parser.add_argument(
         "--map",
         type=Path,
@@ -49,6 +59,11 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a picture of the site to draw above the maps; its corners stand in FILE.toml beside it, see README",
     )
+    parser.add_argument(
+        "--no-worker",
+        action="store_true",
+        help="phones keep nothing of the page; without the server they then show their browser's own error",
+    )
 
 
 def _default_data() -> Path:
@@ -59,11 +74,6 @@ def _default_data() -> Path:
 def run(work: Coroutine[Any, Any, int]) -> int:
     """Runs the server's work to its end; 130 when interrupted."""
     with uvloop_runner() as runner, contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
-    parser.add_argument(
-        "--no-worker",
-        action="store_true",
-        help="phones keep nothing of the page; without the server they then show their browser's own error",
-    )
         return runner.run(work)
     return 130
 
@@ -80,22 +90,31 @@ def uvloop_runner() -> asyncio.Runner:
 async def serve(config: Config) -> int:
     """Serves until it is ended. Raises CannotServe."""
     try:
+        secured = secure(config)
+        if secured is not None and secured.authority is None:  # who has a certificate for a name may be called by it
+            config = replace(config, names=(*config.names, *map(_bracketed, secured.hosts())))
         app = create_app(config)
+    except TlsRefused as why:
+        raise CannotServe(str(why)) from None
     except (AssetsMissing, MapRefused) as why:
         raise CannotServe(str(why)) from None
     except OSError as why:
         raise CannotServe(f"The data folder {config.data} cannot be used: {why.strerror or why}.") from None
     listening = _listen(config.host, config.port)
     port = listening.getsockname()[1]
-    server = uvicorn.Server(
+    explainer = _listen_to_explain(config, secured, port)
+    server = Server(
         uvicorn.Config(
             app,
             **requests.options(config.limits),
             timeout_graceful_shutdown=2,
         )
     )
-    _announce(config, port)
-    await server.serve(sockets=[listening])
+    _announce(config, port, secured, explainer, app.state.running)
+    if secured is None:
+        await server.serve(sockets=[listening])
+    else:
+        await serve_secured(secured, server, config, listening, explainer)
     return 0
 
 
@@ -113,24 +132,74 @@ def _listen(host: str, port: int) -> socket.socket:
     return listening
 
 
-def _announce(config: Config, port: int) -> None:
-    """The address for people (and, on the first line, for scripts), and a QR code for phones on the same network."""
-    shown = _reachable(config.host)
-    bracketed = f"[{shown}]" if ":" in shown else shown
-    url = f"http://{bracketed}:{port}/"
-    print(f"catgraph listens on {url}", flush=True)
-    for vehicle in config.vehicles:
-        print(f"  {vehicle.name}: {vehicle.address or 'waits for an address from the page'}", flush=True)
-    if shown in ("127.0.0.1", "::1", "localhost"):
-        print("  Only this machine can open it; for phones start it with --host 0.0.0.0.", flush=True)
-    elif sys.stdout.isatty():
-        segno.make(url, error="m").terminal(compact=True)
-    print("  Ctrl-C ends it.", flush=True)
+def _listen_to_explain(config: Config, secured: Secured | None, port: int) -> socket.socket | None:
+    """The plain port beside the page's. Where nobody chose it and it is taken, the page's own port does both."""
+    if secured is None:
+        return None
+    asked = (config.tls or Tls()).setup_port
+    if asked is None and secured.authority is None:
+        return None
+    usual = 0 if config.port == 0 else port + 1 if port < 65535 else port - 1
+    try:
+        return _listen(config.host, usual if asked is None else asked)
+    except CannotServe as why:
+        if asked is not None:
+            raise
+        log.warning("%s The page that explains how a phone is set up is on the page's own port.", why)
+        return None
+
+
+def _announce(
+    config: Config, port: int, secured: Secured | None, explainer: socket.socket | None, running: Running
+) -> None:
+    """Tells people (and, on the first line, scripts) where it is."""
+    said = Announcement(config=config, url=_plain_url(config.host, port))
+    if not config.is_open:
+        said = replace(said, pairing=_pairing(running))
+    if secured is not None:
+        setup_port = explainer.getsockname()[1] if explainer is not None else port
+        where = Whereabouts(hosts=secured.hosts(), port=port, setup_port=setup_port)
+        url, others = addresses(where)
+        said = replace(said, url=url, others=others)
+        if secured.authority is not None:
+            authority = secured.authority
+            said = replace(said, setup=where.setup(), fingerprint=authority.fingerprint, authority=authority.name)
+            said = replace(said, left_out=secured.names.left_out if _is_any(config.host) else ())
+        else:
+            said = replace(said, warning=secured.warning)
+    draws = sys.stdout.isatty()
+    for line in lines(said, draws=draws):
+        print(line, flush=True)
+    running.access.listens_at(said.url)
+    if draws and not config.is_open:
+        running.access.on_paired = lambda name, role: _tell_paired(running, said.url, f"{name} was paired as {role}.")
+
+
+def _tell_paired(running: Running, url: str, what: str) -> None:
+    for line in invitation(url, _pairing(running), f"  {what} The next device:"):
+        print(line, flush=True)
+
+
+def _pairing(running: Running) -> Pairing:
+    next_one = running.access.invitation()
+    return Pairing(token=next_one.token, pin=next_one.pin, minutes=round(LASTS_S / 60))
+
+
+def _plain_url(host: str, port: int) -> str:
+    return f"http://{_bracketed(_reachable(host))}:{port}/"
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
+
+
+def _is_any(host: str) -> bool:
+    return host in ("0.0.0.0", "::", "")
 
 
 def _reachable(host: str) -> str:
     """The address to type into a phone for a server that listens on `host`."""
-    if host not in ("0.0.0.0", "::", ""):
+    if not _is_any(host):
         return host
     for adapter in ifaddr.get_adapters():
         for ip in adapter.ips:
