@@ -41,7 +41,7 @@ class Announcement:
     authority: str | None = None
     left_out: tuple[str, ...] = ()  # addresses and names that our certificate cannot cover
     warning: str | None = None
-    pairing: Pairing | None = None  # None: nobody pairs
+    pairing: Pairing | None = None
 
 
 def lines(said: Announcement, *, draws: bool) -> Iterator[str]:
@@ -75,13 +75,18 @@ def lines(said: Announcement, *, draws: bool) -> Iterator[str]:
 
 def _pairing(said: Announcement, *, draws: bool) -> Iterator[str]:
     step = "2. " if said.setup is not None else ""
-    if said.pairing is not None:
-        pin, minutes = said.pairing.pin, said.pairing.minutes
-        yield f"  {step}Pair a device: {said.url} with PIN {pin}, one device within {minutes} min."
-        if draws:
-            yield from code(f"{said.url}#pair={said.pairing.token}")
-    elif draws and not said.config.is_open:
-        yield from code(said.url)
+    if said.pairing is None or said.config.is_open:
+        return
+    if draws:
+        yield from invitation(said.url, said.pairing, f"  {step}Pair a device:")
+    else:  # what is not read by a person at a terminal ends in a log, where no PIN belongs
+        yield f"  {step}Pair a device: on this machine `catgraph pair` shows a code and a PIN."
+
+
+def invitation(url: str, pairing: Pairing, lead: str) -> Iterator[str]:
+    """How the next device gets in, for a person before a terminal."""
+    yield f"{lead} {url} with PIN {pairing.pin}, one device within {pairing.minutes} min; later: catgraph pair"
+    yield from code(f"{url}#pair={pairing.token}")
 
 
 def code(text: str) -> list[str]:

@@ -35,11 +35,13 @@ def test_its_key_is_for_its_owner_only(tmp_path: Path) -> None:
     assert kept.stat().st_mode & 0o777 == 0o600
 
 
-@pytest.mark.parametrize("content", [b"", b"nothing", b"-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n"])
+@pytest.mark.parametrize(
+    "content", [b"", b"nothing", b"-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n"]
+)
 def test_a_damaged_one_is_never_replaced_in_silence(tmp_path: Path, content: bytes) -> None:
     kept = tmp_path / authority.FILE
     kept.write_bytes(content)
-    with pytest.raises(TlsRefused, match="is damaged.*every phone must be set up anew"):
+    with pytest.raises(TlsRefused, match=r"is damaged.*every phone must be set up anew"):
         load_or_make(tmp_path, host="pit", now=NOW)
     assert kept.read_bytes() == content
 
