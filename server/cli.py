@@ -25,6 +25,7 @@ class _Command:
 
 COMMANDS = {
     "serve": _Command(module="server.serve", help="watch a car and serve the page"),
+    "pair": _Command(module="server.pair", help="a code and a PIN that let one more device into a running server"),
     "demo": _Command(module="server.demo", help="a simulated car, its bridge and the page, in one process"),
     "simulate": _Command(module="server.simulator.command", help="a simulated car behind a rosbridge of its own"),
     "replay": _Command(module="server.bridge.replay", help="a recording behind a rosbridge, at its true speed"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -72,6 +73,12 @@ def is_loopback(host: str) -> bool:
 
 def vehicle_from_text(text: str, *, index: int) -> Vehicle:
     """`NAME=ws://car:9090` or only the address. Raises ValueError with one sentence."""
+def default_data() -> Path:
+    """The folder for what is kept, where none is named."""
+    base = os.environ.get("XDG_DATA_HOME")
+    return (Path(base) if base else Path.home() / ".local" / "share") / "catgraph"
+
+
     name, separator, address = text.partition("=")
     if not separator or "://" in name:
         name, address = ("car" if index == 0 else f"car{index + 1}"), text

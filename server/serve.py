@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 
+from server import map_upstream
+from server.access.keys import keys_from
 from server.config import Config, Vehicle, vehicle_from_text
 from server.serving import CannotServe, add_common_arguments, serve
 from server.serving import run as run_server
@@ -44,6 +47,9 @@ def run(args: argparse.Namespace) -> int:
             maps=tuple(args.map),
             site_image=args.site_image,
             tls=option.read(args),
+            names=tuple(args.name),
+            keys=keys_from(os.environ),
+            map_upstream=map_upstream.read(args),
             worker=not args.no_worker,
         )
         return run_server(serve(config))

@@ -20,7 +20,7 @@ import uvicorn
 from server.access.invitations import LASTS_S
 from server.announce import Announcement, Pairing, addresses, invitation, lines
 from server.app import Running, create_app
-from server.config import Config, Tls
+from server.config import Config, Tls, default_data
 from server.tls import option
 from server.tls.authority import TlsRefused
 from server.tls.served import Secured, Server, secure, serve_secured
@@ -42,7 +42,13 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--port", type=int, default=8000, help="port to listen on, 0 for a free one (default 8000)")
     parser.add_argument(
-        "--data", type=Path, default=_default_data(), help="folder for what is kept (default %(default)s)"
+        "--data", type=Path, default=default_data(), help="folder for what is kept (default %(default)s)"
+    )
+    parser.add_argument(
+        "--name",
+        action="append",
+        default=[],
+        help="what else this server is called by those who open it: a host, or https://HOST of a proxy before it",
     )
     option.add_arguments(parser)
     parser.add_argument(
