@@ -15,10 +15,10 @@ import { fixed } from './words.js';
  * @param {boolean} isSilent
  */
 export function chipOf(control, page, isSilent) {
-  if (isSilent || !control) return { text: '?', label: 'Control: the server does not answer, so nobody knows who is in control', isYou: false };
-  if (control.page && control.page === page) return { text: 'You', label: 'You are in control', isYou: true };
-  if (control.holder) return { text: control.holder, label: `${control.holder} is in control`, isYou: false };
-  return { text: 'No one', label: 'No one is in control', isYou: false };
+  if (isSilent || !control) return { text: '?', label: 'Control: the server does not answer, so nobody knows who is in control', is: 'unknown' };
+  if (control.page && control.page === page) return { text: 'You', label: 'You are in control', is: 'you' };
+  if (control.holder) return { text: control.holder, label: `${control.holder} is in control`, is: 'other' };
+  return { text: 'No one', label: 'No one is in control', is: 'free' };
 }
 
 /**

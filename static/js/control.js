@@ -64,7 +64,7 @@ export function mount(root, snacks, store, control) {
     const chipWords = chipOf(now, store.page, store.isSilent);
     setText(name, chipWords.text);
     setAttribute(chip, 'aria-label', `${chipWords.text}: ${chipWords.label}`);
-    setAttribute(chip, 'data-you', chipWords.isYou || null);
+    setAttribute(chip, 'data-is', chipWords.is);
     const request = store.isSilent ? null : askedOf(now, store.page);
     show(asks, request !== null);
     asking = request?.page ?? '';

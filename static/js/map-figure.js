@@ -4,6 +4,7 @@
 import { offsetOf, placeAt, turned } from './geodesy.js';
 import { setAttribute, svg } from './dom.js';
 import { gridPaths, groundMatrix, pixelOf, round, scaleBar_m, turnedPixels } from './map-layout.js';
+import { OtherPhones } from './map-others.js';
 import { trackPaths } from './map-track.js';
 import { bearingWords, distanceWords } from './map-words.js';
 
@@ -19,6 +20,7 @@ import { bearingWords, distanceWords } from './map-words.js';
  * @property {import('./map-words.js').PhoneOnMap} phone
  * @property {import('./map-words.js').Apart | null} apart
  * @property {import('./map-track.js').Track} track
+ * @property {import('./map-others.js').Other[]} [others] phones beside the one that is compared
  */
 
 /** The track's paths are in metres of a plane that is good so far around [m]; where meridians meet, less far. */
@@ -63,7 +65,8 @@ export class Figure {
     this.apart = svg('text', { class: 'beside' });
     this.bar = path('sc');
     this.barText = svg('text');
-    this.picture = svg('svg', { class: 'mapv', role: 'img' }, this.lines, this.tail, this.around, this.ellipse, this.way, this.carMark, this.phoneMark,
+    this.others = new OtherPhones();
+    this.picture = svg('svg', { class: 'mapv', role: 'img' }, this.lines, this.tail, this.others.root, this.around, this.ellipse, this.way, this.carMark, this.phoneMark,
       this.carName, this.phoneName, this.apart, this.bar, this.barText);
     under.append(this.grid);
     over.append(this.picture);
@@ -75,11 +78,12 @@ export class Figure {
   }
 
   /** @param {Shown} shown */
-  draw({ view, size, car, phone, apart, track }) {
+  draw({ view, size, car, phone, apart, track, others = [] }) {
     this.#drawGrid(view, size);
     this.#drawTrack(view, size, track);
     const [carAt, phoneAt] = [car, phone].map(({ place }) => (place ? pixelOf(place, view, size) : null));
     this.#drawTail(view, size, car, track, carAt ?? null);
+    this.others.draw(others, view, size);
     this.#drawCar(view, car, carAt ?? null);
     this.#drawPhone(view, phone, phoneAt ?? null);
     this.#drawWay(size, apart, carAt ?? null, phoneAt ?? null);

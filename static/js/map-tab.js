@@ -10,8 +10,10 @@ export class MapTab {
    * @param {HTMLElement} panel
    * @param {import('./store.js').Store} store
    * @param {() => boolean} isShown
+   * @param {(sentence: string, title?: string) => void} say
    */
-  constructor(panel, store, isShown) {
+  constructor(panel, store, isShown, say) {
+    this.say = say;
     this.panel = panel;
     this.store = store;
     this.isShown = isShown;
@@ -34,7 +36,7 @@ export class MapTab {
   async #load() {
     try {
       const { mount } = await import('./map.js');
-      mount(this.panel, this.store, this.isShown);
+      mount(this.panel, this.store, this.isShown, this.say);
     } catch (error) {
       console.warn('The map could not be fetched:', error);
       setText(field(this.panel, 'none-words'), 'The map could not be fetched: the server does not answer. Open this tab again.');

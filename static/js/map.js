@@ -9,6 +9,7 @@ import { Ground } from './map-ground.js';
 import { FIRST, between, bounded, fitted, panned, placeBetween, upOf, zoomed } from './map-layout.js';
 import { TrackFeed } from './map-track.js';
 import { apartOf, bearingWords, carOf, distanceWords, phoneOf, pictureWords } from './map-words.js';
+import { othersOn, phonesLine } from './phones-layout.js';
 import { age, fixed } from './words.js';
 
 /**
@@ -30,8 +31,9 @@ const AGAIN_MS = 5000;
  * @param {HTMLElement} root
  * @param {import('./store.js').Store} store
  * @param {() => boolean} isShown
+ * @param {(sentence: string, title?: string) => void} [say]
  */
-export function mount(root, store, isShown) {
+export function mount(root, store, isShown, say = () => {}) {
   const at = (/** @type {string} */ name) => field(root, name);
   const [frameElement, box, none] = [at('map'), at('box'), at('none')];
   const figure = new Figure(at('under'), at('over'));
@@ -47,7 +49,7 @@ export function mount(root, store, isShown) {
   let isPlaced = false;
   let isTooFar = false;
   let size = { width: 0, height: 0 };
-  /** @type {{car: import('./map-words.js').CarShown, phone: import('./map-words.js').PhoneOnMap, apart: import('./map-words.js').Apart | null} | null} */
+  /** @type {{car: import('./map-words.js').CarShown, phone: import('./map-words.js').PhoneOnMap, apart: import('./map-words.js').Apart | null, others: import('./map-others.js').Other[]} | null} */
   let known = null;
   /** The last place of the car on the glass, and where it goes. @type {{from: Place, to: Place, view: View, began_ms: number} | null} */
   let step = null;
@@ -80,7 +82,7 @@ export function mount(root, store, isShown) {
     // A receiver that lost its fix tells no place any more; what is left is where the car was last.
     if (!car.place && before && car.ink !== 'not_published' && car.ink !== 'never') car = { ...car, place: before, isLive: false, label: 'Car was here' };
     const phone = phoneOf(frame, lag_s);
-    known = { car, phone, apart: apartOf(frame, lag_s, car, phone) };
+    known = { car, phone, apart: apartOf(frame, lag_s, car, phone), others: othersOn(frame, lag_s, store.page) };
     if (!isGroundThere && store.now() - asked_ms > AGAIN_MS) {
       asked_ms = store.now();
       ground.load().then(() => { isGroundThere = true; }, () => {});
@@ -143,9 +145,9 @@ export function mount(root, store, isShown) {
     const place = shownPlace();
     view = step ? between(step.view, aim, done) : aim;
     if (done >= 1) step = null;
-    const { phone, apart } = known;
+    const { phone, apart, others } = known;
     const car = place && known.car.place ? { ...known.car, place } : known.car;
-    figure.draw({ view, size, car, phone, apart, track: feed.track });
+    figure.draw({ view, size, car, phone, apart, others, track: feed.track });
     ground.draw(view, size);
     drawNorth();
     if (step) drawSoon();
@@ -191,6 +193,7 @@ export function mount(root, store, isShown) {
     setText(at('allowed'), fixed(apart?.allowed_m ?? null));
     setText(at('allowed-unit'), apart && apart.allowed_m !== null ? 'm' : '');
     readVerdict();
+    readPhones();
     setText(at('by'), ground.words(aim));
     figure.describe(pictureWords(car, phone, apart));
   }
@@ -201,6 +204,16 @@ export function mount(root, store, isShown) {
     if (kind === spoken) return;
     spoken = kind;
     setText(at('spoken'), says);
+  }
+
+  function readPhones() {
+    const { frame } = store;
+    const isThere = (frame?.phones ?? []).length > 0;
+    show(at('phones'), isThere);
+    if (!frame || !isThere) return;
+    const { text, why } = phonesLine(frame, store.page);
+    setWords(at('phones-text'), text);
+    setWords(at('phones-why'), why);
   }
 
   function readVerdict() {
@@ -255,6 +268,9 @@ export function mount(root, store, isShown) {
   const stops = [
     () => sized.disconnect(),
     mountGestures(box, { isFree: () => mode === 'free', pan: (dx, dy) => hand(panned(view, dx, dy)), zoom }),
+    listen(at('phones'), 'click', () => {
+      import('./phones-sheet.js').then(({ openPhones }) => openPhones(store, say)).catch(() => say('What shows the phones could not be fetched.', 'Not opened'));
+    }),
     listen(at('closer'), 'click', () => zoom(KEY_ZOOM)),
     listen(at('wider'), 'click', () => zoom(1 / KEY_ZOOM)),
     listen(at('fit'), 'click', () => choose(mode === 'both' ? 'follow' : 'both')),

@@ -1,0 +1,262 @@
+"""Three browsers at one server: control taken, asked for, handed over, taken over, lost by sleep; who hears alarms."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import re
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from playwright.async_api import Browser, BrowserContext, CDPSession, expect
+
+from tests.page.conftest import PHONE, Phone
+from tests.page.processes import Process, running, server, simulate
+
+NAMES = ("Ann", "Ben", "Cem")
+
+
+class Crew:
+    """Three phones of three people, and what the server says of them."""
+
+    def __init__(self, phones: dict[str, Phone], watch: Process) -> None:
+        self.phones = phones
+        self.watch = watch
+
+    def __getitem__(self, name: str) -> Phone:
+        return self.phones[name]
+
+    def chip(self, name: str) -> Any:
+        return self[name].f("who-name")
+
+    async def state(self) -> dict[str, Any]:
+        async with httpx.AsyncClient() as client:
+            found: dict[str, Any] = (await client.get(f"{self.watch.address}/api/state")).json()
+            return found
+
+    async def until(self, fits: Callable[[dict[str, Any]], bool], within_s: float = 10.0) -> dict[str, Any]:
+        async with asyncio.timeout(within_s):
+            while not fits(state := await self.state()):
+                await asyncio.sleep(0.1)
+        return state
+
+    async def events(self) -> list[dict[str, Any]]:
+        async with httpx.AsyncClient() as client:
+            answer = await client.get(f"{self.watch.address}/api/events", params={"limit": 1000})
+        return [event for event in answer.json()["events"] if event["change"] == "control"]
+
+    async def sheet(self, name: str) -> Any:
+        """Opens who is in control, behind the chip."""
+        await self[name].f("who").tap()
+        sheet = self[name].page.locator("#sheet-control")
+        await expect(sheet).to_be_visible()
+        return sheet
+
+    async def press(self, name: str, key: str) -> None:
+        sheet = await self.sheet(name)
+        await sheet.get_by_role("button", name=key).tap()
+
+
+class Sleep:
+    """A phone that sleeps: nothing of its page runs, its socket stands. Chromium's own freezing is of no use here: the
+    driver keeps every page awake that it drives."""
+
+    def __init__(self, phone: Phone) -> None:
+        self._page = phone.page
+        self._session: CDPSession | None = None
+
+    async def begin(self) -> None:
+        self._session = await self._page.context.new_cdp_session(self._page)
+        await self._session.send("Debugger.enable")
+        await self._session.send("Debugger.pause")
+
+    async def end(self) -> None:
+        assert self._session is not None
+        await self._session.send("Debugger.resume")
+        await self._session.detach()
+
+
+async def hide(phone: Phone, hidden: bool) -> None:
+    """As an operator who turns to another app and back."""
+    await phone.page.evaluate(
+        """(hidden) => {
+          Object.defineProperty(document, 'hidden', { value: hidden, configurable: true });
+          document.dispatchEvent(new Event('visibilitychange'));
+        }""",
+        hidden,
+    )
+
+
+async def opened(browser: Browser, name: str, address: str) -> tuple[BrowserContext, Phone]:
+    context = await browser.new_context(**PHONE)
+    await context.add_init_script(f"localStorage.setItem('catgraph.device', '{name}')")
+    phone = Phone(await context.new_page())
+    await phone.open(address)
+    await phone.live()
+    return context, phone
+
+
+@contextlib.asynccontextmanager
+async def crew(browser: Browser, data: Path, car: Process) -> AsyncIterator[Crew]:
+    contexts, phones = [], {}
+    async with running(*server(data, car.address)) as watch:
+        try:
+            for name in NAMES:
+                context, phones[name] = await opened(browser, name, watch.address)
+                contexts.append(context)
+            yield Crew(phones, watch)
+        finally:
+            for context in contexts:
+                await context.close()
+    assert [said for phone in phones.values() for said in phone.complaints] == []
+
+
+async def holds(one: Crew, name: str) -> None:
+    """Every page that is seen shows who is in control."""
+    for other in NAMES:
+        await expect(one.chip(other)).to_have_text("You" if other == name else name)
+
+
+@pytest.mark.timeout(120)
+async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(browser: Browser, tmp_path: Path) -> None:
+    async with running(*simulate()) as car, crew(browser, tmp_path, car) as one:
+        await expect(one.chip("Ann")).to_have_text("No one")
+        await one["Ann"].f("pause").tap()  # the first order takes it
+        await holds(one, "Ann")
+        await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("Ann is in control.")
+
+        await one["Ben"].f("pause").tap()
+        refused = one["Ben"].page.locator(".snack.note")
+        await expect(refused).to_contain_text("Not resumed")
+        await expect(refused).to_contain_text("Ann is in control.")
+        await refused.get_by_role("button", name="Ask for control").tap()
+        asks = one["Ann"].page.locator(".snack.asks")
+        await expect(asks).to_contain_text(re.compile(r"Ben gets it in (\d+) s unless you keep it\."))
+        await asks.get_by_role("button", name="Keep").tap()
+        await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("Ann keeps control: Ben had asked for it.")
+        await holds(one, "Ann")
+
+        await one.press("Cem", "Ask for control")
+        await expect(one["Cem"].page.locator("#sheet-control")).to_contain_text("silence grants it in")
+        await asks.get_by_role("button", name="Hand over").tap()
+        await holds(one, "Cem")
+        await one["Cem"].page.locator("#sheet-control").get_by_role("button", name="Close").tap()
+
+        await one.press("Cem", "Hand over to Ben")
+        await holds(one, "Ben")
+        await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("Cem handed control over to Ben.")
+
+        sheet = await one.sheet("Ann")
+        await sheet.get_by_role("button", name="Take over …").tap()
+        await expect(sheet).to_contain_text("Take over from Ben?")
+        await expect(one.chip("Ann")).to_have_text("Ben")  # not before it is confirmed
+        await sheet.get_by_role("button", name="Take over", exact=True).tap()
+        await holds(one, "Ann")
+        await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("You lost control")
+        await expect(one["Cem"].page.locator(".snack.note")).to_contain_text("Ann took control over from Ben.")
+        events = await one.events()
+        assert [event["act"] for event in events] == [
+            *("taken", "requested", "kept", "requested", "granted", "handed_over", "taken_over"),
+        ]
+        fences = [event["fence"] for event in events]
+        assert fences == sorted(fences)
+
+
+@pytest.mark.timeout(120)
+async def test_lost_by_sleep_back_again_and_lost_for_good(browser: Browser, tmp_path: Path) -> None:
+    async with running(*simulate()) as car, crew(browser, tmp_path, car) as one:
+        await one.press("Ann", "Take control")
+        await holds(one, "Ann")
+        sleep = Sleep(one["Ann"])
+        await sleep.begin()
+        state = await one.until(lambda s: s["control"]["holder"] is None, 8.0)
+        assert state["control"]["former"]["name"] == "Ann"
+        await expect(one.chip("Ben")).to_have_text("No one")
+        await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("Ann fell silent for 3 s")
+        await sleep.end()
+        await holds(one, "Ann")  # nobody had taken it meanwhile
+        await expect(one["Ann"].page.locator(".snack.note")).to_contain_text("You are in control again")
+
+        await hide(one["Ann"], True)
+        await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("Nobody is in control", timeout=10_000)
+        await one["Ben"].page.locator(".snack.note").get_by_role("button", name="Take control").tap()
+        await expect(one.chip("Ben")).to_have_text("You")
+        await hide(one["Ann"], False)
+        await holds(one, "Ben")
+        assert [event["act"] for event in await one.events()] == ["taken", "lapsed", "returned", "lapsed", "taken"]
+
+
+@pytest.mark.timeout(120)
+async def test_silence_grants_what_is_asked_for_and_a_reload_keeps_it(browser: Browser, tmp_path: Path) -> None:
+    async with running(*simulate()) as car, crew(browser, tmp_path, car) as one:
+        await one.press("Ann", "Take control")
+        await holds(one, "Ann")
+        await one.press("Ben", "Ask for control")
+        await expect(one["Ann"].page.locator(".snack.asks")).to_be_visible()
+        await expect(one.chip("Ben")).to_have_text("You", timeout=14_000)
+        await expect(one["Ann"].page.locator(".snack.asks")).to_be_hidden()
+        await expect(one["Ann"].page.locator(".snack.note")).to_contain_text("Ann did not answer within 10 s")
+        await one["Ben"].page.reload()
+        await one["Ben"].live()
+        await holds(one, "Ben")
+        assert [event["act"] for event in await one.events()] == ["taken", "requested", "granted"]
+
+
+def reach(state: dict[str, Any]) -> tuple[int, int]:
+    return state["reach"]["can"], state["reach"]["of"]
+
+
+@pytest.mark.timeout(120)
+async def test_two_of_three_operators_can_hear_alarms(browser: Browser, tmp_path: Path) -> None:
+    async with running(*simulate()) as car, crew(browser, tmp_path, car) as one:
+        line = one["Ann"].page.locator('[data-part="reach"]')
+        await expect(line).to_contain_text("0 of 3 operators can hear alarms")
+        await expect(line).to_contain_text("3 × sound off")
+        for name in ("Ann", "Ben"):
+            await one[name].f("sound-off").tap()
+        assert reach(await one.until(lambda s: reach(s) == (2, 3))) == (2, 3)
+        await expect(line).to_contain_text("2 of 3 operators can hear alarms")
+        await expect(one["Cem"].page.locator('[data-part="reach"]')).to_contain_text("2 of 3 operators")
+
+        await hide(one["Ann"], True)
+        await one.until(lambda s: reach(s) == (1, 3) and s["reach"]["why"] == "page in the background, sound off")
+        await hide(one["Ann"], False)
+        await one.until(lambda s: reach(s) == (2, 3))
+        sleep = Sleep(one["Ben"])
+        await sleep.begin()
+        state = await one.until(lambda s: reach(s) == (1, 3))
+        assert {page["name"]: page["why"] for page in state["reach"]["pages"]} == {
+            "Ann": None, "Ben": "silent", "Cem": "sound",
+        }  # fmt: skip
+        await sleep.end()
+        await one.until(lambda s: reach(s) == (2, 3))
+        await one["Cem"].page.close()  # a farewell: nobody expects anything of it
+        await one.until(lambda s: reach(s) == (2, 2))
+
+
+@pytest.mark.timeout(120)
+async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
+    browser: Browser, tmp_path: Path
+) -> None:
+    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
+        context, phone = await opened(browser, "Ann", watch.address)
+        try:
+            await expect(phone.page.locator(".snack")).to_contain_text("No operator hears alarms", timeout=40_000)
+            await expect(phone.page.locator(".snack")).to_contain_text("nobody can hear alarms: none of 1 (sound off)")
+            await phone.page.locator('[data-part="reach"]').tap()
+            sheet = phone.page.locator("#sheet-this-phone")
+            await expect(sheet).to_be_visible()
+            await sheet.locator('[data-f="arm"]').tap()
+            await expect(sheet).to_contain_text("This phone sounds alarms while this page is in front.")
+            async with httpx.AsyncClient() as client:
+                async with asyncio.timeout(10):
+                    while True:
+                        alarms = (await client.get(f"{watch.address}/api/alarms")).json()["alarms"]
+                        if [one["active"] for one in alarms if one["id"] == "reach"] == [False]:
+                            break
+                        await asyncio.sleep(0.2)
+        finally:
+            await context.close()
