@@ -9,6 +9,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,7 @@ from server.web.ground import Ground
 from server.web.headers import SecurityHeaders
 from server.web.shell import build_of
 from server.web.throttle import Throttle
+from server.web.upstream import Upstream
 
 log = logging.getLogger("catgraph.app")
 
@@ -105,7 +107,7 @@ def create_app(
     Raises OSError when the data folder cannot be used, AssetsMissing when the page's files are not there,
     MapRefused when a map file cannot be shown.
     """
-    ground = Ground(config.maps, config.site_image)
+    ground = Ground(config.maps, config.site_image, _upstream(config, now=now, wall_ms=wall_ms))
     if config.data is not None:
         config.data.mkdir(parents=True, exist_ok=True)
     journal = Journal(config.data / "events.sqlite" if config.data is not None else None)
@@ -202,6 +204,14 @@ class _Served(FastAPI):
 
     def build_middleware_stack(self) -> ASGIApp:
         return SecurityHeaders(super().build_middleware_stack())
+
+
+def _upstream(
+    config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int]
+) -> Callable[[], Upstream] | None:
+    """Makes the layer of tiles that are fetched, where one is configured."""
+    wanted = config.map_upstream
+    return None if wanted is None else partial(Upstream, wanted, config.data, now=now, wall_s=lambda: wall_ms() / 1000)
 
 
 def _catalog(data: Path | None, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Catalog | None:

@@ -10,6 +10,7 @@ from typing import Literal
 
 from server.access.keys import Keys
 from server.limits import Limits
+from server.map_upstream import MapUpstream
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +43,7 @@ class Config:
     found: tuple[Vehicle, ...] = field(default=())  # offered on the connect screen
     maps: tuple[Path, ...] = ()  # MBTiles under the map, the last on top
     site_image: Path | None = None  # above them; its corners stand in a .toml beside it
+    map_upstream: MapUpstream | None = None  # below the maps; None: no tile is ever fetched
     worker: bool = True  # phones keep the page's shell; False: what they kept goes at their next visit
     names: tuple[str, ...] = ()  # what else this server is called: hosts, or origins (https://…) of a proxy before it
     tls: Tls | None = None  # None: off on loopback, else auto

@@ -17,6 +17,7 @@ from typing import Any
 import ifaddr
 import uvicorn
 
+from server import map_upstream
 from server.access.invitations import LASTS_S
 from server.announce import Announcement, Pairing, addresses, invitation, lines
 from server.app import Running, create_app
@@ -65,6 +66,7 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a picture of the site to draw above the maps; its corners stand in FILE.toml beside it, see README",
     )
+    map_upstream.add_arguments(parser)
     parser.add_argument(
         "--no-worker",
         action="store_true",

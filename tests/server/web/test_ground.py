@@ -38,7 +38,7 @@ def halves(tmp_path: Path) -> Path:
 @asynccontextmanager
 async def asking(**config: Any) -> AsyncIterator[httpx.AsyncClient]:
     app = create_app(Config(**config))
-    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://server") as client:
+    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
         yield client
     app.state.running.ground.close()
 

@@ -1,0 +1,103 @@
+"""How a server of tiles wants to be treated: how long its answers hold, when to ask again, how much. No clock here.
+
+HTTP caching is RFC 9111, Retry-After RFC 9110 10.2.3. Where a server says nothing, tiles hold for seven days.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Mapping
+from email.utils import parsedate_to_datetime
+
+UNSAID_S = 7 * 86_400.0  # for want of a word: the least that OpenStreetMap's rules for its tiles want them kept
+LONGEST_S = 365 * 86_400.0
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 5.0, 300.0  # after a failure; each doubles the one before
+ASKED_PAUSE_S = (1.0, 86_400.0)  # what a Retry-After may ask for
+MOST, WITHIN_S = 1200, 600.0  # tiles: two a second on end is what driving with the map open needs at most
+
+
+def fresh_for_s(headers: Mapping[str, str], wall_s: float) -> float | None:
+    """How long an answer holds from now [s]; None: it must not be kept."""
+    told = {name.lower(): value for name, value in headers.items()}
+    words: dict[str, str] = {}
+    for part in told.get("cache-control", "").lower().split(","):
+        name, _, value = part.strip().partition("=")
+        words.setdefault(name, value.strip('" '))
+    if "no-store" in words:
+        return None
+    if "no-cache" in words:
+        return 0.0
+    for name in ("s-maxage", "max-age"):  # several phones are served from what is kept
+        if name in words:
+            return _bounded((_number(words[name]) or 0.0) - (_number(told.get("age", "")) or 0.0))
+    if "expires" in told:
+        expires_s, date_s = _date_s(told["expires"]), _date_s(told.get("date", ""))
+        return 0.0 if expires_s is None else _bounded(expires_s - (wall_s if date_s is None else date_s))
+    return UNSAID_S
+
+
+def retry_after_s(value: str | None, wall_s: float) -> float | None:
+    """The pause that is asked for [s], within reason; None where none is."""
+    if not value:
+        return None
+    asked_s = _number(value)
+    if asked_s is None:
+        at_s = _date_s(value)
+        asked_s = None if at_s is None else at_s - wall_s
+    return None if asked_s is None else min(max(asked_s, ASKED_PAUSE_S[0]), ASKED_PAUSE_S[1])
+
+
+class Pace:
+    """When the next tile may be asked for. Times are monotonic [s]."""
+
+    def __init__(self) -> None:
+        self.problem: str | None = None  # what went wrong last; None once it is over
+        self._until_s = 0.0
+        self._pause_s = FIRST_PAUSE_S
+        self._asked_s: deque[float] = deque(maxlen=MOST)
+
+    def may_ask(self, now_s: float) -> bool:
+        return now_s >= self._until_s and not self._is_spent(now_s)
+
+    def asked(self, now_s: float) -> None:
+        self._asked_s.append(now_s)
+
+    def well(self) -> None:
+        """It answered as it should."""
+        self.problem = None
+        self._pause_s = FIRST_PAUSE_S
+
+    def failed(self, why: str, now_s: float, wanted_s: float | None = None) -> None:
+        """It did not; `wanted_s` is the pause that it asks for. Two failures at a time count once."""
+        is_new = now_s >= self._until_s
+        self.problem = why
+        self._until_s = max(self._until_s, now_s + (self._pause_s if wanted_s is None else wanted_s))
+        if is_new:
+            self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
+
+    def words(self, now_s: float) -> str | None:
+        """What stands against asking, as one sentence for the operator."""
+        if self.problem is not None:
+            return self.problem
+        if self._is_spent(now_s):
+            return f"{MOST} tiles were fetched within {WITHIN_S / 60:.0f} min: more come later."
+        return None
+
+    def _is_spent(self, now_s: float) -> bool:
+        return len(self._asked_s) == MOST and now_s - self._asked_s[0] < WITHIN_S
+
+
+def _bounded(seconds: float) -> float:
+    return min(max(seconds, 0.0), LONGEST_S)
+
+
+def _number(text: str) -> float | None:
+    return float(text) if re.fullmatch(r"[0-9]{1,12}", text.strip()) else None
+
+
+def _date_s(text: str) -> float | None:
+    try:
+        return parsedate_to_datetime(text).timestamp()
+    except (ValueError, TypeError, OverflowError, IndexError):
+        return None

@@ -1,0 +1,71 @@
+"""A little server of tiles as a process of its own: `python tile_server.py FOLDER [PORT]`.
+
+FOLDER/mood.json says how it answers now; FOLDER/asked.jsonl holds what it was asked: path, headers, how many at once.
+Every tile is a picture of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+import time
+import zlib
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(sys.argv[1])
+LOCK = threading.Lock()
+
+
+def picture(path: str) -> bytes:
+    """Begins as a PNG does; which, is told by its path."""
+    return b"\x89PNG\r\n\x1a\n" + path.encode() + zlib.crc32(path.encode()).to_bytes(4, "big") * 200
+
+
+class Tiles(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    at_once = 0
+
+    def do_GET(self) -> None:
+        mood: dict[str, Any] = json.loads((FOLDER / "mood.json").read_text())
+        with LOCK:
+            Tiles.at_once += 1
+            with (FOLDER / "asked.jsonl").open("a") as asked:
+                told = {"path": self.path, "headers": dict(self.headers), "at_once": Tiles.at_once}
+                asked.write(json.dumps(told) + "\n")
+        try:
+            time.sleep(mood.get("after_s", 0))
+            self.answer(mood)
+        except OSError:
+            pass  # nobody waits any more
+        finally:
+            with LOCK:
+                Tiles.at_once -= 1
+
+    def answer(self, mood: dict[str, Any]) -> None:
+        status, body = mood.get("status", 200), picture(self.path + mood.get("edition", ""))
+        if "etag" in mood and self.headers.get("If-None-Match") == mood["etag"]:
+            status, body = 304, b""
+        elif "body" in mood:
+            body = mood["body"].encode() * mood.get("times", 1)
+        self.send_response(status)
+        for name, value in {"Content-Type": "image/png", **mood.get("headers", {})}.items():
+            self.send_header(name, value)
+        if "etag" in mood:
+            self.send_header("ETag", mood["etag"])
+        self.close_connection = "length" in mood  # as a link that breaks off
+        self.send_header("Content-Length", str(mood.get("length", len(body))))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        pass
+
+
+if __name__ == "__main__":
+    server = ThreadingHTTPServer(("127.0.0.1", int(sys.argv[2]) if len(sys.argv) > 2 else 0), Tiles)
+    server.daemon_threads = True
+    print(server.server_address[1], flush=True)
+    server.serve_forever()
