@@ -169,11 +169,11 @@ def create_app(
                 await running.exports.stop()
             if running.recordings is not None:
                 await running.recordings.stop()
+            running.access.stop()
             journal.close()
             ground.close()
 
     app = _Served(
-            running.access.stop()
         title="catgraph",
         version=running.version,
         description="Operator control unit for a test vehicle: its state, its alarms, its connection.",
@@ -186,11 +186,11 @@ def create_app(
     app.add_middleware(Guard, access=running.access)
     errors.install(app)
     app.include_router(api.router)
+    app.include_router(devices.router)
     app.include_router(alarm_log.router)
     app.include_router(web_exports.router)
     app.include_router(web_recordings.router)
     app.include_router(web_mail.router)
-    app.include_router(devices.router)
     app.include_router(metrics.router)
     app.include_router(web_ground.router)
     app.include_router(notices.router)

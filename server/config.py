@@ -46,8 +46,8 @@ class Config:
     map_upstream: MapUpstream | None = None  # below the maps; None: no tile is ever fetched
     worker: bool = True  # phones keep the page's shell; False: what they kept goes at their next visit
     names: tuple[str, ...] = ()  # what else this server is called: hosts, or origins (https://…) of a proxy before it
-    tls: Tls | None = None  # None: off on loopback, else auto
     keys: Keys = field(default_factory=Keys)  # of programs, where devices are paired
+    tls: Tls | None = None  # None: off on loopback, else auto
     limits: Limits = field(default_factory=Limits)
 
     @property
@@ -73,14 +73,14 @@ def is_loopback(host: str) -> bool:
     return (mapped or address).is_loopback
 
 
-def vehicle_from_text(text: str, *, index: int) -> Vehicle:
-    """`NAME=ws://car:9090` or only the address. Raises ValueError with one sentence."""
 def default_data() -> Path:
     """The folder for what is kept, where none is named."""
     base = os.environ.get("XDG_DATA_HOME")
     return (Path(base) if base else Path.home() / ".local" / "share") / "catgraph"
 
 
+def vehicle_from_text(text: str, *, index: int) -> Vehicle:
+    """`NAME=ws://car:9090` or only the address. Raises ValueError with one sentence."""
     name, separator, address = text.partition("=")
     if not separator or "://" in name:
         name, address = ("car" if index == 0 else f"car{index + 1}"), text

@@ -15,7 +15,6 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-FOLDER = Path(sys.argv[1])
 LOCK = threading.Lock()
 
 
@@ -27,12 +26,13 @@ def picture(path: str) -> bytes:
 class Tiles(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     at_once = 0
+    folder = Path()
 
     def do_GET(self) -> None:
-        mood: dict[str, Any] = json.loads((FOLDER / "mood.json").read_text())
+        mood: dict[str, Any] = json.loads((self.folder / "mood.json").read_text())
         with LOCK:
             Tiles.at_once += 1
-            with (FOLDER / "asked.jsonl").open("a") as asked:
+            with (self.folder / "asked.jsonl").open("a") as asked:
                 told = {"path": self.path, "headers": dict(self.headers), "at_once": Tiles.at_once}
                 asked.write(json.dumps(told) + "\n")
         try:
@@ -65,6 +65,7 @@ class Tiles(BaseHTTPRequestHandler):
 
 
 if __name__ == "__main__":
+    Tiles.folder = Path(sys.argv[1])
     server = ThreadingHTTPServer(("127.0.0.1", int(sys.argv[2]) if len(sys.argv) > 2 else 0), Tiles)
     server.daemon_threads = True
     print(server.server_address[1], flush=True)
