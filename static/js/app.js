@@ -1,7 +1,9 @@
 // The page's beginning: one store, one voice, every panel at its place.
 
 import './trusted-types.js';
+import { thenOf } from './pair-link.js';
 
+import { Admission } from './admission.js';
 import { soundOf } from './alarm-layout.js';
 import { Arming } from './arming.js';
 import { deviceName, keptHere } from './device.js';
@@ -45,7 +47,9 @@ import { mount as mountVeil } from './veil.js';
 const vehicle = document.documentElement.dataset['vehicle'];
 const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
 
-const store = new Store(() => new WebSocket(address), deviceName(navigator.userAgent, keptHere()), ownName());
+/** Where devices are paired, each socket needs a ticket. */
+const admission = document.documentElement.dataset['access'] === 'paired' ? new Admission(address, shut) : null;
+const store = new Store(() => admission?.dial() ?? new WebSocket(address), deviceName(navigator.userAgent, keptHere()), ownName());
 const voice = new Voice();
 const arming = new Arming(voice, new Phone(store));
 const monitor = need(document, '#monitor');
@@ -103,6 +107,33 @@ function openPhone() {
   import('./this-phone.js').then(({ openThisPhone }) => openThisPhone(store, arming, handset)).catch(() => say('What shows this phone could not be fetched.', 'Not opened'));
 }
 
+/** This device is not paired, or was removed just now. @param {import('./admission.js').Refusal} why */
+function shut(why) {
+  if (store.frame) {
+    location.reload(); // nothing of the car stays on a page that may not look any more; the screen then says the reason
+    return;
+  }
+  page.isShut = true;
+  page.draw();
+  import('./pairing.js').then(({ openPairing }) => openPairing(need(document, '#pairing'), {
+    why,
+    name: store.name,
+    onPaired: () => {
+      page.isShut = false;
+      page.draw();
+      admission?.admit();
+    },
+  })).catch(() => say('The screen for pairing could not be fetched from the server. Load the page again.', 'Not paired'));
+}
+
+/** What a viewer may not do is greyed; once somebody is one, it is told so. */
+function greet() {
+  if (!store.isViewer) return;
+  unviewed();
+  import('./viewer.js').then(({ mountViewer }) => mountViewer(store, say)).catch(() => {}); // the server refuses it all the same
+}
+const unviewed = store.on('open', greet);
+
 function draw() {
   page.draw();
   show(field(monitor, 'sound-off'), voice.isPossible ? !voice.isRunning : false);
@@ -110,7 +141,7 @@ function draw() {
 
 function speak() {
   const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
-  voice.say(soundOf(store.heeded, { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
+  voice.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
 }
 
 new Presence(store, arming, handset);
@@ -134,9 +165,12 @@ listen(field(need(document, '#connect'), 'saved'), 'click', () => {
 
 // A link may lead to a moment of a recording.
 const asked = new URLSearchParams(location.search);
+const then = thenOf(asked.get('then'));
 const recording = asked.get('replay');
 const unasked = store.on('open', () => {
   unasked();
+  if (asked.has('then')) history.replaceState(history.state, '', location.pathname);
+  if (then) location.assign(then); // a link in a mail: now that this device is known
   if (recording) import('./replay.js').then(({ openReplay }) => openReplay(recording, store, say, Number(asked.get('t')) || 0)).catch(() => say('What shows a recording could not be fetched.', 'Not replayed'));
 });
 store.start();

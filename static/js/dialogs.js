@@ -99,7 +99,8 @@ export function mount(store, page) {
     if (!standing) return;
     const { kind, alarm } = standing;
     if (kind !== 'alarm') page.answered = lossKey(store.frame, store.isSilent);
-    if (alarm) {
+    if (alarm && store.isViewer) page.closeHere(alarm);
+    else if (alarm) {
       const reply = await store.ask('acknowledge', { alarm: alarm.id, occurrence: alarm.occurrence });
       if (!reply.ok && kind === 'alarm') page.say(reply.reason ?? 'Refused.', 'Not acknowledged');
     }
@@ -110,7 +111,7 @@ export function mount(store, page) {
     const key = lossKey(store.frame, store.isSilent);
     if (page.answered !== null && page.answered !== key && key === 'none') page.answered = null;
     standing = dialogOf({
-      frame: store.frame, isSilent: store.isSilent, silence_s: store.silence_s,
+      frame: page.unclosed(store.frame), isSilent: store.isSilent, silence_s: store.silence_s,
       isChoosing: page.isChoosing, isAnswered: page.answered === key,
     });
     return standing;

@@ -8,6 +8,9 @@ import { share } from './files-share.js';
 import { html, icon, listen, setText, setWords, words } from './dom.js';
 import { timeOfDay } from './words.js';
 
+/** What only an operator may do with a recording, by its icon. */
+const CHANGES = ['mail', 'crit', 'edit', 'info', 'trash'];
+
 /**
  * @typedef {import('./files-layout.js').Recording} Recording
  * @typedef {import('./files-model.js').FilesModel} FilesModel
@@ -91,7 +94,7 @@ export class FileSheet {
    * @param {string} [end] a word at its end
    */
   #item(glyph, label, act, end = '') {
-    const key = html('button', { type: 'button' }, icon(glyph), label, ...(end ? [html('span', { class: 'end' }, ...words(end))] : []));
+    const key = html('button', { type: 'button', 'data-operator': CHANGES.includes(glyph) }, icon(glyph), label, ...(end ? [html('span', { class: 'end' }, ...words(end))] : []));
     listen(key, 'click', act);
     return html('li', {}, key);
   }

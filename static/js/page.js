@@ -7,6 +7,10 @@ import { need, setAttribute, show } from './dom.js';
 export class Page {
   /** The operator went back to the connect screen while the server may go on. */
   isChoosing = false;
+  /** This device is not paired with the server: only the pairing screen is shown. */
+  isShut = false;
+  /** Alarms that a viewer closed on this phone, by name and occurrence. @type {Set<string>} */
+  #closed = new Set();
   /** What link dialog was closed: see lossKey. @type {string | null} */
   answered = null;
   /** A better address, where the server knows one. @type {string | null} */
@@ -23,16 +27,27 @@ export class Page {
     this.store = store;
     this.arming = arming;
     this.say = say;
-    this.screens = ['start', 'connect', 'monitor'].map((name) => need(document, `#${name}`));
+    this.screens = ['pairing', 'start', 'connect', 'monitor'].map((name) => need(document, `#${name}`));
   }
 
   /** Put the right screen in front. */
   draw() {
-    const name = screenOf(this.store, this.isChoosing);
+    const name = screenOf(this.store, this.isChoosing, this.isShut);
     if (document.body.dataset['screen'] === name && this.screens.some((screen) => screen.id === name && !screen.hidden)) return;
     setAttribute(document.body, 'data-screen', name);
     for (const screen of this.screens) show(screen, screen.id === name);
     this.onShown();
+  }
+
+  /** A viewer has seen this alarm: it stays on the strip, and leaves the dialog and the speaker of this phone. @param {import('./protocol.js').Alarm} alarm */
+  closeHere({ id, occurrence }) {
+    this.#closed.add(`${id} ${occurrence}`);
+  }
+
+  /** The frame without the alarms that were closed here. @template {{alarms: import('./protocol.js').Alarm[]} | null} Frame @param {Frame} frame @returns {Frame} */
+  unclosed(frame) {
+    if (!frame || this.#closed.size === 0) return frame;
+    return { ...frame, alarms: frame.alarms.filter(({ id, occurrence }) => !this.#closed.has(`${id} ${occurrence}`)) };
   }
 
   get isMonitorShown() {
@@ -76,7 +91,7 @@ export class Page {
 
   /** Leave a broken link. Where the server itself is gone, only this page leaves. */
   async exit() {
-    if (this.store.isSilent) this.choose();
+    if (this.store.isSilent || this.store.isViewer) this.choose();
     else await this.stop();
   }
 
@@ -94,9 +109,11 @@ export class Page {
 /**
  * @param {Pick<Store, 'frame' | 'isMonitoring'>} store
  * @param {boolean} isChoosing
- * @returns {'start' | 'connect' | 'monitor'}
+ * @param {boolean} [isShut] this device is not paired
+ * @returns {'pairing' | 'start' | 'connect' | 'monitor'}
  */
-export function screenOf(store, isChoosing) {
+export function screenOf(store, isChoosing, isShut = false) {
+  if (isShut) return 'pairing';
   if (!store.frame) return 'start';
   return store.isMonitoring && !isChoosing ? 'monitor' : 'connect';
 }

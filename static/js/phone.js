@@ -160,6 +160,7 @@ export class Phone {
 
   /** @param {object} said */
   #send(said) {
+    if (this.store.isViewer) return false; // the car is compared with an operator's phone
     return this.store.wire.send({ kind: 'position', id: 'position', phone: this.#name, handheld: this.#isHandheld, ...said });
   }
 

@@ -1,5 +1,6 @@
 // The Settings tab: every threshold under its heading, the topics of the signals, the kind of car, the file of all of it.
 
+import { SettingsDevices } from './settings-devices.js';
 import { SettingsFileKeys } from './settings-file.js';
 import { SettingsGroup } from './settings-group.js';
 import { SettingsMail } from './settings-mail.js';
@@ -32,12 +33,13 @@ export function mount(panel, store, say, isShown) {
   const topics = new SettingsTopics(store, model);
   const file = new SettingsFileKeys(store, model, say);
   const mail = new SettingsMail(say);
+  const devices = new SettingsDevices(store, say);
   const phone = html('button', { type: 'button', class: 'key wide' }, icon('phone'), 'Preferences of this phone');
   const all = html('fieldset', { class: 'all' }, groups, none, topics.element, file.element);
   const keys = html('div', { class: 'keys' }, phone);
   panel.replaceChildren(
     html('div', { class: 'find' }, html('div', { class: 'field' }, icon('search'), search), undo), state,
-    all, mail.element, keys,
+    all, mail.element, devices.element, keys,
   );
   /** @type {SettingsGroup[]} */
   let shown = [];
@@ -59,7 +61,7 @@ export function mount(panel, store, say, isShown) {
     const query = search.value.trim();
     if (query === drawnQuery && !isForced) return;
     drawnQuery = query;
-    const hits = shown.reduce((sum, group) => sum + group.filter(query), 0) + topics.filter(query) + file.filter(query) + mail.filter(query);
+    const hits = shown.reduce((sum, group) => sum + group.filter(query), 0) + topics.filter(query) + file.filter(query) + mail.filter(query) + devices.filter(query);
     show(keys, query === '');
     if (!isForced) panel.scrollTop = 0;
     show(none, hits === 0 && query !== '');
@@ -110,6 +112,7 @@ export function mount(panel, store, say, isShown) {
     topics.stop();
     file.stop();
     mail.stop();
+    devices.stop();
     panel.replaceChildren();
   };
 }

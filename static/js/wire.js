@@ -8,6 +8,8 @@ const FIRST_WAIT_MS = 300;
 const LAST_WAIT_MS = 2000;
 
 /**
+ * @typedef {Pick<WebSocket, 'binaryType' | 'send' | 'close'> & {onopen: any, onmessage: any, onclose: any, onerror: any}} Socket
+ *
  * @typedef {object} Ear
  * @property {() => void} opened
  * @property {(text: string) => void} text
@@ -17,7 +19,7 @@ const LAST_WAIT_MS = 2000;
 
 /** One socket at a time. Time is an argument: whoever owns a Wire calls `look` a few times a second. */
 export class Wire {
-  /** @type {WebSocket | null} */
+  /** @type {Socket | null} */
   #socket = null;
   #isOpen = false;
   #proof_ms = 0;
@@ -26,7 +28,7 @@ export class Wire {
 
   /**
    * @param {Ear} ear
-   * @param {() => WebSocket} dial makes a socket that is connecting
+   * @param {() => Socket} dial makes a socket that is connecting
    */
   constructor(ear, dial) {
     this.ear = ear;
@@ -87,7 +89,7 @@ export class Wire {
       this.#isOpen = true;
       this.ear.opened();
     };
-    socket.onmessage = (event) => {
+    socket.onmessage = (/** @type {MessageEvent} */ event) => {
       if (typeof event.data === 'string') this.ear.text(event.data);
       else this.ear.bytes(event.data);
     };

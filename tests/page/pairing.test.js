@@ -1,0 +1,75 @@
+// The pairing screen and the list of devices in words; where a link may lead.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+globalThis.location ??= /** @type {any} */ ({ hash: '', pathname: '/', search: '', origin: 'https://192.168.4.1:8000' });
+globalThis.window ??= /** @type {any} */ ({ addEventListener() {} });
+
+const { digitsOf, pinShown, reasonWords, triedWords, waitWords } = await import('../../static/js/pairing-layout.js');
+const { leftWords, removalWords, seenWords } = await import('../../static/js/devices-layout.js');
+const { thenOf } = await import('../../static/js/pair-link.js');
+const { screenOf } = await import('../../static/js/page.js');
+
+test('a PIN is its digits, however it is typed', () => {
+  for (const [typed, digits, shown] of [['', '', ''], ['12', '12', '12'], ['123', '123', '123'], ['123 4', '1234', '123 4'], ['12-34-56-78', '123456', '123 456'], ['a1', '1', '1']]) {
+    assert.equal(digitsOf(typed), digits);
+    assert.equal(pinShown(digitsOf(typed)), shown);
+  }
+});
+
+test('why it was not let in stands there in words', () => {
+  assert.equal(reasonWords({ code: 'unpaired', detail: 'x' }), '');
+  assert.equal(reasonWords({}), '');
+  assert.equal(reasonWords({ code: 'removed', detail: 'This device was removed by Ann.' }), 'This device was removed by Ann.');
+  assert.deepEqual(triedWords(403, { code: 'wrong', wait_s: 1.2 }), { sentence: 'This PIN is wrong. Read it again from the server.', wait_s: 2, isLinkOver: false });
+  assert.equal(triedWords(403, { code: 'used' }).isLinkOver, true);
+  assert.match(triedWords(429, { code: 'wait', wait_s: 8 }).sentence, /^Too many wrong PINs/);
+  assert.match(triedWords(403, { code: 'expired' }).sentence, /10 minutes/);
+  assert.match(triedWords(0, {}).sentence, /does not answer/);
+  assert.equal(triedWords(503, { detail: 'The disk is full.' }).sentence, 'The disk is full.');
+  assert.equal(triedWords(500, {}).sentence, 'The server refused (500).');
+  assert.equal(waitWords(1), 'Wait 1 second');
+  assert.equal(waitWords(30), 'Wait 30 seconds');
+});
+
+test('a device is here now, or was', () => {
+  const now_ms = 1_790_000_000_000;
+  const ago = (/** @type {number} */ s, sockets = 0) => seenWords({ seen_ms: now_ms - s * 1000, sockets }, now_ms);
+  assert.equal(ago(9999, 1), 'here now');
+  assert.equal(ago(-50), 'here a moment ago');
+  assert.equal(ago(119), 'here a moment ago');
+  assert.equal(ago(120), 'seen 2 minutes ago');
+  assert.equal(ago(3600), 'seen 1 hour ago');
+  assert.equal(ago(86_400 * 3), 'seen 3 days ago');
+});
+
+test('a removal says whose pages end, and that the last operator goes', () => {
+  const device = (/** @type {string} */ id, /** @type {'viewer' | 'operator'} */ role) => ({ id, name: id, role, paired_ms: 0, seen_ms: 0, sockets: 0 });
+  const [a, b] = [device('a', 'operator'), device('b', 'viewer')];
+  assert.equal(removalWords(b, 'a', [a, b])[0], 'Remove b?');
+  assert.doesNotMatch(removalWords(b, 'a', [a, b])[1], /last operator/);
+  assert.equal(removalWords(a, 'a', [a, b])[0], 'Remove this phone?');
+  assert.match(removalWords(a, 'a', [a, b])[1], /last operator/);
+  assert.doesNotMatch(removalWords(a, 'b', [a, device('c', 'operator')])[1], /last operator/);
+});
+
+test('what is left of an invitation', () => {
+  assert.deepEqual([600, 599.2, 61, 59.01, 0, -3].map(leftWords), ['10:00', '10:00', '1:01', '1:00', '0:00', '0:00']);
+});
+
+test('a link leads only to what this server has itself', () => {
+  const here = 'https://192.168.4.1:8000';
+  assert.equal(thenOf('/api/recordings/drive%201/file.mcap?a=b', here), '/api/recordings/drive%201/file.mcap?a=b');
+  assert.equal(thenOf('/docs', here), '/docs');
+  for (const then of [null, '', 'https://evil.example/', '//evil.example/api/', '/\\evil.example', '/api', 'javascript:alert(1)', '/static/x', 'api/x', '/docs.evil', '/@evil.example/api/']) {
+    assert.equal(thenOf(then, here), null, String(then));
+  }
+  assert.equal(thenOf('/api/../static/x', here), '/static/x'); // of this server all the same
+});
+
+test('who is not paired sees nothing else', () => {
+  const watching = /** @type {any} */ ({ frame: {}, isMonitoring: true });
+  assert.equal(screenOf(watching, false, true), 'pairing');
+  assert.equal(screenOf(watching, false), 'monitor');
+});
