@@ -87,13 +87,19 @@ class Viewer:
 
 @contextlib.asynccontextmanager
 async def viewer(
-    base: str, *, vehicle: str | None = None, have_event: int | None = None, name: str | None = None
+    base: str,
+    *,
+    vehicle: str | None = None,
+    have_event: int | None = None,
+    name: str | None = None,
+    page: str | None = None,
 ) -> AsyncIterator[Viewer]:
     """A viewer that reads in the background; `base` is the server's http address."""
     url = base.replace("http://", "ws://") + "/ws" + (f"?vehicle={vehicle}" if vehicle else "")
     async with websockets.connect(url, max_size=2**24) as socket:
         one = Viewer(socket)
-        await one.send({"kind": "hello", "have_event": have_event} | ({"name": name} if name else {}))
+        named = {key: value for key, value in (("name", name), ("page", page)) if value}
+        await one.send({"kind": "hello", "have_event": have_event} | named)
         reading = asyncio.create_task(one.read())
         try:
             yield one
