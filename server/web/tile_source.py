@@ -87,10 +87,7 @@ class TileSource:
             try:
                 return self._read(answer, wall_s, was_kept=etag is not None or modified is not None)
             finally:
-                if answer.closed or answer.length_remaining == 0:
-                    answer.release_conn()
-                else:
-                    answer.close()  # what is left of it is not wanted
+                _leave(answer)
         except NameResolutionError:
             raise SourceTrouble(f"The map's server {self.host} is not found: is there internet?") from None
         except SSLError:
@@ -139,3 +136,13 @@ class TileSource:
             if time.monotonic() > until_s:
                 raise SourceTrouble(f"The map's server {self.host} is too slow.")
         return bytes(pieces)
+
+
+def _leave(answer: urllib3.BaseHTTPResponse) -> None:
+    """The connection is used again where little is left to read, also of an answer without a body; else it is closed."""
+    left = answer.length_remaining
+    if left is not None and left <= _PIECE:
+        answer.drain_conn()
+        answer.release_conn()
+    else:
+        answer.close()
