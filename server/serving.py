@@ -24,6 +24,7 @@ from server.app import Running, create_app
 from server.config import Config, Tls, default_data
 from server.tls import option
 from server.tls.authority import TlsRefused
+from server.tls.probe import Probe
 from server.tls.served import Secured, Server, secure, serve_secured
 from server.tls.setup import Whereabouts
 from server.web import requests
@@ -113,7 +114,7 @@ async def serve(config: Config) -> int:
     explainer = _listen_to_explain(config, secured, port)
     server = Server(
         uvicorn.Config(
-            app,
+            app if secured is None else Probe(app),
             **requests.options(config.limits),
             timeout_graceful_shutdown=2,
         )

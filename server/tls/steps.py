@@ -218,7 +218,7 @@ PLATFORMS = (
                 text="Settings, search for certificates, View Certificates, Authorities, Import. Tick “Trust this CA "
                 "to identify websites”.",
                 screen=_window(
-                    "Downloading Certificate",
+                    "Downloading|Certificate",
                     _row("Trust this CA to|identify websites", "on"),
                     _row("OK", "press"),
                 ),

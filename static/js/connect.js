@@ -3,6 +3,7 @@
 import { openPreferences } from './preferences.js';
 import { closeSheet, openSheet } from './sheet.js';
 import { field, html, icon, listen, need, setAttribute, setText, setWords, show } from './dom.js';
+import { connectRow } from './slow-layout.js';
 import { age } from './words.js';
 
 const KEY = 'catgraph.addresses';
@@ -219,10 +220,12 @@ export function mount(root, store, page) {
       tag(at(what), words.tag, words.kind);
       setText(at(`${what}-cost`), words.cost);
     }
-    tag(at('slowdown'), 'Off', 'unk');
-    setText(at('slowdown-cost'), 'No guard on the car: link loss will NOT slow it');
+    const slow = connectRow(frame?.decelerate, store.isMonitoring);
+    tag(at('slowdown'), slow.tag, slow.kind);
+    setText(at('slowdown-cost'), slow.cost);
   }
 
+  show(at('insecure'), !window.isSecureContext);
   drawFound();
   draw();
   return () => stops.forEach((stop) => stop());

@@ -7,7 +7,7 @@ const secure = body.dataset.secure ?? '';
 /** Whether HTTPS to the server succeeds. What it answers does not matter, and this page may not read it. */
 async function isTrusted() {
   try {
-    await fetch(`${secure}api/health`, { mode: 'no-cors', cache: 'no-store', credentials: 'omit', signal: AbortSignal.timeout(10_000) });
+    await fetch(`${secure}trusted`, { mode: 'no-cors', cache: 'no-store', credentials: 'omit', signal: AbortSignal.timeout(10_000) });
     return true;
   } catch {
     return false;

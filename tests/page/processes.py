@@ -39,7 +39,7 @@ class Process:
             while True:
                 line = (await out.readline()).decode()
                 assert line, f"{self._arguments} ended before it said its address"
-                found = re.search(r"(?:ws|http)://[\d.]+:\d+", line)
+                found = re.search(r"(?:ws|https?)://[^\s/]+:\d+", line)
                 if found:
                     self.address = found.group()
                     break

@@ -25,6 +25,7 @@ from server.tls import doorway
 from server.tls.authority import TlsRefused
 from server.tls.keeper import OwnCertificate
 from server.tls.names import Names, names_of
+from server.tls.probe import Probe
 from server.tls.served import Secured, Server, secure, serve_secured
 from server.web import requests
 from tests.server.tls.certificates import pair
@@ -58,7 +59,9 @@ def listening() -> socket.socket:
 @contextlib.asynccontextmanager
 async def field(secured: Secured, config: Config) -> AsyncIterator[Field]:
     page, explainer = listening(), listening()
-    server = Server(uvicorn.Config(create_app(config), **requests.options(config.limits), timeout_graceful_shutdown=1))
+    server = Server(
+        uvicorn.Config(Probe(create_app(config)), **requests.options(config.limits), timeout_graceful_shutdown=1)
+    )
     task = asyncio.create_task(serve_secured(secured, server, config, page, explainer))
     await server.begun.wait()
     yield Field(secured=secured, port=page.getsockname()[1], setup_port=explainer.getsockname()[1])
@@ -87,6 +90,17 @@ async def test_a_device_that_does_not_is_turned_away(served: Field) -> None:
     async with httpx.AsyncClient() as client:
         with pytest.raises(httpx.ConnectError, match="CERTIFICATE_VERIFY_FAILED"):
             await client.get(f"https://127.0.0.1:{served.port}/")
+
+
+async def test_the_plain_page_may_try_whether_https_succeeds_and_learns_no_more(served: Field) -> None:
+    asked = {"Sec-Fetch-Site": "cross-site", "Sec-Fetch-Mode": "no-cors"}
+    async with served.client() as client:
+        answer = await client.get("/trusted", headers=asked)
+        assert (answer.status_code, answer.content) == (204, b"")
+        assert answer.headers["cross-origin-resource-policy"] == "cross-origin"
+        assert (await client.get("/api/health", headers=asked)).status_code == 403
+        assert (await client.post("/trusted")).status_code in (403, 404, 405)
+        assert (await client.get("/trusted/x")).status_code == 404
 
 
 async def test_the_socket_of_a_page_goes_over_tls_compressed(served: Field) -> None:
