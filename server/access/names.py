@@ -11,6 +11,7 @@ import re
 import socket
 import time
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import ifaddr
@@ -19,6 +20,15 @@ from server.config import is_loopback
 
 _AUTHORITY = re.compile(r"(\[[0-9a-f:.]{2,45}\]|[a-z0-9._-]{1,253})(?::([0-9]{1,5}))?")
 _LOOK_EVERY_S = 2.0
+_PRIVATE = tuple(
+    ipaddress.ip_network(text)
+    for text in "10.0.0.0/8 172.16.0.0/12 192.168.0.0/16 100.64.0.0/10 169.254.0.0/16 fc00::/7 fe80::/10".split()
+)
+
+
+def is_in_container() -> bool:
+    """Whether this machine is one in another, whose addresses it cannot know, though it is reached by them."""
+    return any(Path(mark).exists() for mark in ("/.dockerenv", "/run/.containerenv"))
 
 
 def own_addresses() -> frozenset[str]:
@@ -47,12 +57,16 @@ class Names:
         is_open: bool,
         now: Callable[[], float] = time.monotonic,
         addresses: Callable[[], frozenset[str]] = own_addresses,
+        in_container: bool | None = None,
     ) -> None:
-        """`given`: hosts, or origins of a proxy before it; `is_open`: it is called by names of this machine alone.
+        """`given`: hosts, or origins of a proxy before it; `is_open`: it is called by names of this machine alone;
+        `in_container`: any private address may be that of the machine around it; a stranger can make a name point here,
+        but not an address. None: as it is found.
 
         Raises ValueError with one sentence where one is no name.
         """
         self._is_open = is_open
+        self._in_container = is_in_container() if in_container is None else in_container
         self._now = now
         self._look_up = addresses
         self._addresses: frozenset[str] = frozenset()
@@ -83,10 +97,11 @@ class Names:
 
     def _is_own_address(self, text: str) -> bool:
         try:
-            address = str(ipaddress.ip_address(text))
+            found = ipaddress.ip_address(text)
         except ValueError:
             return False
-        if address in self._addresses:
+        address = str(found)
+        if address in self._addresses or (self._in_container and any(found in network for network in _PRIVATE)):
             return True
         if self._looked_s is None or self._now() - self._looked_s >= _LOOK_EVERY_S:  # a lease of DHCP may be new
             self._looked_s = self._now()

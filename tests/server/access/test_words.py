@@ -348,7 +348,7 @@ def test_a_new_address_of_the_machine_is_found_and_asked_for_seldom() -> None:
         looked += 1
         return frozenset(addresses)
 
-    names = Names(["ocu.example.org"], is_open=False, now=lambda: now_s, addresses=look_up)
+    names = Names(["ocu.example.org"], is_open=False, now=lambda: now_s, addresses=look_up, in_container=False)
     assert names.knows("192.168.4.1:8000")
     assert names.knows("ocu.example.org")
     assert not names.knows("192.168.4.2:8000")
@@ -358,6 +358,26 @@ def test_a_new_address_of_the_machine_is_found_and_asked_for_seldom() -> None:
     now_s = 2.0
     assert names.knows("192.168.4.2:8000")
     assert not names.knows("x.ocu.example.org")
+
+
+@pytest.mark.parametrize(
+    ("host", "is_taken"),
+    [
+        ("192.168.4.9:8000", True),
+        ("[fd00::9]:8000", True),
+        ("100.64.0.9", True),
+        ("8.8.8.8", False),
+        ("[2001:db8::9]", False),
+        ("car.example", False),
+        ("192.168.4.9.example", False),
+    ],
+)
+def test_in_a_container_the_machine_around_it_may_have_any_private_address(host: str, is_taken: bool) -> None:
+    nothing = frozenset[str]()
+    inside = Names([], is_open=False, addresses=lambda: nothing, in_container=True)
+    assert inside.knows(host) is is_taken
+    assert not Names([], is_open=False, addresses=lambda: nothing, in_container=False).knows(host)
+    assert not Names([], is_open=True, addresses=lambda: nothing, in_container=True).knows(host)
 
 
 def test_behind_a_proxy_the_origin_is_the_proxys() -> None:
