@@ -21,6 +21,7 @@ from monitor.reach import ReachFacts
 from monitor.recorder import RecorderFacts
 from monitor.repeats import RepeatFollower, Repeats, Wheels
 from monitor.signals import SIGNALS, Signal
+from monitor.slowing import SlowingFacts
 from monitor.stamps import MANY_WRITERS, ClockJump, StampFollower, merged
 from monitor.tracks import Track, TrackPoint
 from monitor.values import (
@@ -125,6 +126,7 @@ class Snapshot:
     clock_jump: ClockJump | None = None  # the newest since connecting
     recorder: RecorderFacts = field(default_factory=RecorderFacts)
     reach: ReachFacts | None = None  # whom an alarm would reach; None: nobody is asked, as in a recording
+    slowing: SlowingFacts = field(default_factory=SlowingFacts)
 
     @overload
     def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...
@@ -265,6 +267,7 @@ class State:
         self._link = LinkFacts()
         self._recorder = RecorderFacts()
         self._reach: ReachFacts | None = None
+        self._slowing = SlowingFacts()
         self._paused = False
         self._paused_since_s: float | None = None
 
@@ -372,6 +375,14 @@ class State:
         """What is now known of the recorder."""
         self._recorder = facts
 
+    @property
+    def slowing(self) -> SlowingFacts:
+        return self._slowing
+
+    def slow(self, facts: SlowingFacts) -> None:
+        """What is now known of an order to slow the car."""
+        self._slowing = facts
+
     def reach(self, facts: ReachFacts) -> None:
         """Whom an alarm would reach now."""
         self._reach = facts
@@ -412,6 +423,7 @@ class State:
             clock_jump=self._clock_jump,
             recorder=self._recorder,
             reach=self._reach,
+            slowing=self._slowing,
         )
 
     def glance(self, now_s: float) -> Snapshot:

@@ -34,7 +34,7 @@ from server.recovering import recover_left
 from server.session import Session
 from server.settings import SettingsFile
 from server.version import catgraph_version
-from server.web import api, devices, docs, errors, metrics, notices, pages
+from server.web import api, devices, docs, errors, metrics, notices, pages, slow_down
 from server.web import exports as web_exports
 from server.web import ground as web_ground
 from server.web import log as alarm_log
@@ -186,6 +186,7 @@ def create_app(
     app.add_middleware(Guard, access=running.access)
     errors.install(app)
     app.include_router(api.router)
+    app.include_router(slow_down.router)
     app.include_router(devices.router)
     app.include_router(alarm_log.router)
     app.include_router(web_exports.router)
@@ -206,9 +207,7 @@ class _Served(FastAPI):
         return SecurityHeaders(super().build_middleware_stack())
 
 
-def _upstream(
-    config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int]
-) -> Callable[[], Upstream] | None:
+def _upstream(config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Callable[[], Upstream] | None:
     """Makes the layer of tiles that are fetched, where one is configured."""
     wanted = config.map_upstream
     return None if wanted is None else partial(Upstream, wanted, config.data, now=now, wall_s=lambda: wall_ms() / 1000)

@@ -162,6 +162,48 @@ class PresentWord(_Command):
     leaves: bool = False  # it is closed, or another page takes its place
 
 
+class Arm(_Command):
+    """Slow-down may be ordered from now on."""
+
+    kind: Literal["arm"]
+
+
+class Disarm(_Command):
+    kind: Literal["disarm"]
+
+
+class Decelerate(_Command):
+    """Slow the car. `pressed_ago_s`: since the finger let go, when it was sent; `heard_ms` and `held_s` as in a Fix:
+    what took too long on its way is not obeyed. A program gives none of them."""
+
+    needs: ClassVar[Needs] = "operator"
+    kind: Literal["slow_down"]
+    pressed_ago_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 0.0
+    heard_ms: Annotated[float, Field(ge=0, le=2**53, allow_inf_nan=False)] | None = None
+    held_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 0.0
+
+    def late_s(self, wall_ms: float) -> float:
+        """How long ago it was pressed, at least: half of the way there and back belongs to this direction."""
+        way_s = 0.0 if self.heard_ms is None else max(0.0, (wall_ms - self.heard_ms) / 1000 - self.held_s)
+        return self.pressed_ago_s + way_s / 2
+
+
+class Release(_Command):
+    """Whoever drives may drive on: ends the order, or the guard's hold, of this number."""
+
+    kind: Literal["release"]
+    number: Number
+
+
+class Veto(_Command):
+    """Not slowed by itself this time."""
+
+    needs: ClassVar[Needs] = "operator"
+    kind: Literal["veto"]
+    trigger: Name
+
+
+SlowingCommand = Arm | Disarm | Decelerate | Release | Veto
 Command = (
     Connect
     | Retry
@@ -178,6 +220,7 @@ Command = (
     | Ride
     | TakeControl
     | PresentWord
+    | SlowingCommand
 )
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
 

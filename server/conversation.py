@@ -61,6 +61,11 @@ class Conversation:
         self.ros_version: int | None = None
         self.ros_alive: bool | None = None
         self.ros_answered_s: float | None = None
+        self.commanded_on: str | None = (
+            None  # the topic on which the car is commanded: who else publishes there is asked
+        )
+        self.publishers: tuple[str, ...] | None = None  # who does; None: not known
+        self._guard: str | None = None  # a topic that is heard besides
 
     async def go_on(self) -> None:
         """While this opening lasts: looks at what the car offers, and asks whether ROS behind the bridge lives."""
@@ -72,6 +77,8 @@ class Conversation:
                     looked_s, self._look_soon = self._now(), False
                     await self._look(link)
                 alive = await discovery.ask_alive(link)
+                if self.commanded_on is not None:
+                    self.publishers = await discovery.ask_publishers(link, self.commanded_on)
             except LinkDown:
                 return
             if link is not self._link:
@@ -86,6 +93,15 @@ class Conversation:
     def offered(self) -> Mapping[str, str] | None:
         """Topic → type of all the car has, as its bridge spells them; None while the bridge does not say."""
         return self._offer.topics if self._offer is not None else None
+
+    def watch_commands(self, topic: str | None, *, guard: str | None) -> None:
+        """Asks from now on who publishes there; None: nobody commands the car. `guard`: a topic heard as well."""
+        if topic != self.commanded_on:
+            self.commanded_on, self.publishers = topic, None
+        if guard != self._guard:
+            self._guard = guard
+            if self._offer is not None:
+                self._subscribe()
 
     def end(self) -> None:
         """Whatever is still answered is of no interest any more."""
@@ -204,6 +220,8 @@ class Conversation:
                     compression="none" if self._cbor_failed else "cbor",  # it keeps NaN and the infinities apart
                     queue_length=others.QUEUE_LENGTH,
                 )
+        if self._guard is not None:
+            wanted.setdefault(self._guard, Subscription(topic=self._guard, type="std_msgs/String", queue_length=1))
         for row in link.subscriptions:
             if row.topic not in wanted:
                 link.unsubscribe(row.topic)

@@ -13,6 +13,8 @@ from server.source import RosVersion
 from server.topics import ros_version
 
 MAX_TOPICS = 5000
+MAX_PUBLISHERS = 100
+MAX_NAME = 120
 MAX_DETAILS = 100  # types that are asked for one by one
 STANDARD = frozenset(
     f"{name}_msgs"
@@ -69,6 +71,20 @@ async def ask_alive(link: RosLink) -> bool | None:
     except CallFailed:
         return False
     return isinstance(answer, Mapping)
+
+
+async def ask_publishers(link: RosLink, topic: str) -> tuple[str, ...] | None:
+    """The nodes that publish on a topic, but for the bridge, which is also we; None where it does not say. Raises
+    LinkDown."""
+    try:
+        answer = await link.call("/rosapi/publishers", {"topic": topic}, timeout_s=1.0)
+    except CallFailed:
+        return None
+    names = answer.get("publishers") if isinstance(answer, dict) else None
+    if not isinstance(names, list):
+        return None
+    found = {name for name in names[:MAX_PUBLISHERS] if isinstance(name, str)}
+    return tuple(sorted(name[:MAX_NAME] for name in found if "rosbridge" not in name))
 
 
 async def _ask_type(link: RosLink, topic: str) -> str:

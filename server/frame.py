@@ -64,6 +64,9 @@ class Facts:
     track_number: int  # of this run of the server; another number is another track
     topics_judged: int = 0  # subscribed to for their signals
     recording: Mapping[str, Any] = field(default_factory=lambda: {"state": "off", "for_s": None})
+    decelerate: Mapping[str, Any] = field(
+        default_factory=lambda: {"state": "not_available", "why": "Nothing is ordered of a recording."}
+    )
     # Who is in control and whom an alarm reaches: of a recording, nobody.
     operators: Mapping[str, Any] = field(default_factory=lambda: {"control": {"holder": None}, "reach": None})
 
@@ -85,7 +88,7 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str,
         "trends": wire.trends(facts.trends),
         "limits": catalog.flat(monitor.limits),
         "recording": dict(facts.recording),
-        "decelerate": {"state": "not_available", "why": "not configured"},
+        "decelerate": dict(facts.decelerate),
         **facts.operators,
         "phone": phone.as_json(snapshot.phone, facts.now_s),
         "phones": phone.all_as_json(snapshot.phones, snapshot.phone, facts.now_s),

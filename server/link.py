@@ -371,6 +371,12 @@ class RosLink:
             raise LinkDown("not sent: no connection to the car")
         self._socket.sendMessage(frames.encode(operation), isBinary=False)
 
+    def ping(self) -> None:
+        """Asks the bridge for a sign of life, behind all that was sent before. Raises LinkDown."""
+        if self._socket is None or not self.is_open:
+            raise LinkDown("not sent: no connection to the car")
+        self._socket.sendPing()
+
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
         """The values a service answers. Raises LinkDown, also where the link breaks before the answer, or CallFailed
         with the bridge's words."""

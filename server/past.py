@@ -14,6 +14,9 @@ from server.bus import LocalBus
 
 _PORTION = 50
 _ENOUGH = 1000  # events of one alarm; the newest few say where it stands
+ORDER_ENDED = ("released", "ended")
+ORDER_STANDS = ("ordered", "sent", "slows", "not_confirmed", "cut", "resumed")
+LONGEST_HOLD_S = 3600.0  # as the setting allows
 Clock = Callable[[float], float]
 _CHANGES = frozenset(get_args(Change))
 
@@ -26,6 +29,7 @@ class Past:
     paused_s: float | None = None  # since when its monitoring was paused
     paused_by: str | None = None
     settings_version: int = 0  # the highest that the log knows
+    order: Mapping[str, Any] | None = None  # the event of the slow-down that stood when the server ended
     transitions: tuple[Transition, ...] = ()  # of each alarm since it was last at rest, oldest first
     recent: tuple[Transition, ...] = ()  # of all alarms in the last ten minutes, oldest first
 
@@ -67,9 +71,20 @@ def recall(bus: LocalBus, vehicle: str, *, now_s: float, wall_ms: int) -> Past:
         paused_s=moment_s(_number(paused.get("since_ms"), paused["at_ms"])) if paused else None,
         paused_by=_text(paused.get("by")) if paused else None,
         settings_version=int(_number(newest[0].get("settings_version"), 0)) if newest else 0,
+        order=_order(bus, vehicle, wall_ms) if address is not None else None,
         transitions=tuple(told),
         recent=tuple(_recent(bus, vehicle, wall_ms, moment_s, shelf_s)),
     )
+
+
+def _order(bus: LocalBus, vehicle: str, wall_ms: int) -> Mapping[str, Any] | None:
+    """The newest word of a slow-down that nobody has released, if it is not older than anything is ever held."""
+    for event in bus.find_events(vehicle, change="slow_down", limit=_PORTION):
+        if event.get("step") in ORDER_ENDED:
+            return None
+        if event.get("step") in ORDER_STANDS:
+            return event if wall_ms - event["at_ms"] < LONGEST_HOLD_S * 1000 else None
+    return None
 
 
 def phone_chosen(bus: LocalBus, vehicle: str) -> str | None:

@@ -35,6 +35,8 @@ from server.recording.recover import Recovered
 from server.scan_feed import ScanFeed
 from server.session_recording import SessionRecording
 from server.settings import SettingsFile
+from server.slowing.slowing import Slowing
+from server.slowing.way import GUARD_STATE, way_of
 from server.tuning import Tuning
 
 log = logging.getLogger("catgraph.session")
@@ -91,6 +93,14 @@ class Session:
         self._state_is_due = False
         self._pause = Pause(self._logbook)
         self._gate = Gate(self._logbook.note, fence=bus.last_event(vehicle.name))
+        self._slowing = Slowing(
+            self._logbook.note,
+            now=now,
+            wall_ms=wall_ms,
+            snapshot=lambda: self._state.snapshot(self._now()),
+            record=lambda said: self._recording.own("commands", said),
+            number=bus.last_event(vehicle.name),
+        )
         self._rides: str | None = None  # the phone that rides in the car, as the operator in control says
         self._track_number = 0
         self._clear()
@@ -131,6 +141,8 @@ class Session:
         """Begins to tick, and dials where the vehicle's address is known."""
         self._bus.serve(self.vehicle.name, self.handle)
         self._spawn(self._run(), "tick")
+        self._spawn(self._slowing.speak(), "slow-down")
+        self._spawn(self._slowing.beat(), "heartbeat")
         self._recording.prepare()
         self._remember()
         if self.vehicle.address:
@@ -217,9 +229,22 @@ class Session:
         if self._gate.tick(now_s):
             self._put_state_soon()
         self._state.reach(self._gate.facts(now_s))
+        self._watch_slowing()
         self._judge(now_s, None)
         if put:
             self._put_state(now_s)
+
+    def _watch_slowing(self) -> None:
+        """What slows the car hears what the judge knows, and the other way round."""
+        talk = self._conversation
+        way = way_of(phase=self._phase, sources=talk.sources, offered=talk.offered)
+        self._slowing.limits = self._monitor.limits.slow_down
+        self._slowing.rivals = talk.publishers
+        is_paused = self._pause.since_s is not None
+        self._state.slow(
+            self._slowing.tick(way, self._monitor.alarms, ros_version=talk.ros_version, is_paused=is_paused)
+        )
+        talk.watch_commands(way.topic or None, guard=GUARD_STATE if way.has_guard else None)
 
     @property
     def alarm_load(self) -> AlarmLoad:
@@ -358,6 +383,10 @@ class Session:
                 self._gate.obey(command, caller, now_s)
             case commands.Ride():
                 self._ride(command.phone, now_s, by=by)
+            case commands.Arm() | commands.Disarm() | commands.Decelerate() | commands.Release() | commands.Veto():
+                self._slowing.obey(command, by=by)
+                self._watch_slowing()
+                self._judge(now_s, None)
             case commands.Position():
                 if self._phase == "idle":
                     raise Refused("No car is monitored: no position is needed.")
@@ -398,6 +427,8 @@ class Session:
         self._link.start()
         if before is not None:
             self._pause.go_on(self._state, before, self._now(), self._wall_ms())
+            if before.order is not None:
+                self._slowing.resume(before.order)
 
     def _disconnect(self, *, by: str) -> None:
         was = self._phase
@@ -408,6 +439,7 @@ class Session:
     def _end(self) -> None:
         """One car's monitoring is over: its alarms end in the log, and all that is known of it is forgotten."""
         self._tell(self._monitor.end(self._now()))
+        self._slowing.ended()
         self._drop_link()
         self._recording.ended()
         self._pause.forget()
@@ -432,6 +464,7 @@ class Session:
 
     def link_closed(self, problem: Problem) -> None:
         now_s = self._now()
+        self._slowing.link_closed()
         if self._proved:
             if self._phase != "lost":
                 self._phase, self._since_s = "lost", now_s
@@ -473,6 +506,8 @@ class Session:
         talk = self._conversation
         if self._recording.is_on and self._link is not None:
             self._recording.take(topic, talk.type_of(topic), message, now_s, self._link.frame_bytes)
+        if self._slowing.heard(topic, message):
+            return
         if topic in talk.others:
             return  # heard to be recorded: what is judged must not depend on what is recorded
         sources = talk.by_topic.get(topic)
@@ -529,6 +564,8 @@ class Session:
         self._phase, self._since_s, self._problem = "monitoring", now_s, None
         self._recording.link_opened(self.address_url)
         self._recording.link(phase="monitoring", problem=None)
+        if self._link is not None:
+            self._slowing.link_opened(self._link)
         self._after_link_change(now_s)
 
     # -- judging -----------------------------------------------------------------------------------------------------
@@ -630,6 +667,7 @@ class Session:
             trends=self._trends.piece(now_s, at_most=TRENDS_A_FRAME),
             track_number=self._track_number,
             operators=self._gate.as_json(now_s, self._wall_ms()),
+            decelerate=self._slowing.frame(),
         )
         return state_frame(facts, self._state.snapshot(now_s), self._monitor)
 

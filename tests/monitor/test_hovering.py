@@ -15,6 +15,7 @@ import pytest
 
 from monitor import catalog
 from monitor.catalog import CHECKS, AllLimits
+from monitor.checks.slow_down import SlowDownLimits
 from monitor.link import LinkFacts
 from monitor.phones import PhoneWord
 from monitor.recorder import RecorderFacts
@@ -244,6 +245,9 @@ WITHOUT = {
     "paused_long": "time only grows",
     "reach": "somebody hears or nobody does; phones that come and go do so more slowly than its delays",
     "clock_jump": "steps, told for ten seconds each",
+    "slow_down_unconfirmed": "a ramp is over within seconds, with a deadband of a fifth",
+    "slow_down_hold_ended": "time only grows",
+    "slow_down_rivals": "somebody else publishes or nobody does",
 }
 
 # Every threshold there is: what hovers about it, or why nothing can.
@@ -289,6 +293,9 @@ NO_LIMIT = {
     "recording.hold_s": "counted from a loss of the link, of which each is one of its own",
     "recording.quota_gb": "recording stops, and does not begin again by itself",
     "recording.min_free_gb": "recording stops, and does not begin again by itself",
+    "slow_down.deceleration_mps2": "what is ordered; the proof has a deadband",
+    "slow_down.longest_s": "time only grows",
+    **{f"slow_down.{name}": "a switch" for name in SlowDownLimits.model_fields if name.startswith("on_")},
     "gauge.speed_max_mps": "drawn, not judged",
     "gauge.acceleration_max_mps2": "drawn, not judged",
 }

@@ -84,6 +84,9 @@ ELSEWHERE = {
     "recording_stopped": "tests/monitor/checks/test_recorder.py",
     "recorder_behind": "tests/monitor/checks/test_recorder.py",
     "disk_nearly_full": "tests/monitor/checks/test_recorder.py",
+    "slow_down_unconfirmed": "tests/server/slowing/test_slowing.py::test_a_rival_is_named_and_the_order_not_confirmed",
+    "slow_down_rivals": "tests/server/slowing/test_slowing.py::test_a_rival_is_named_and_the_order_not_confirmed",
+    "slow_down_hold_ended": "tests/server/slowing/test_slowing.py::test_a_hold_that_nobody_releases_ends",
     "phone_missing": "tests/monitor/checks/test_phone.py::test_each_reason_is_said_after_10_s",
     "phone_tracks": "tests/monitor/checks/test_phone.py::test_the_correlation_has_a_deadband_and_a_setting",
 }

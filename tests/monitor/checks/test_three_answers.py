@@ -19,6 +19,7 @@ from monitor.rates import Rate
 from monitor.reach import ReachFacts
 from monitor.recorder import RecorderFacts
 from monitor.repeats import Repeats
+from monitor.slowing import SlowingFacts
 from monitor.stamps import ClockJump
 from monitor.state import Reading, Snapshot
 from monitor.values import (
@@ -144,6 +145,19 @@ def ordered(mps: float, slope_mps2: float | None = 0.0, *, age_s: float = 0.0) -
     return with_more(snapshot, readings={**snapshot.readings, "command": command}, speed_slope_mps2=slope_mps2)
 
 
+def slowed(slope_mps2: float, **facts: Any) -> Snapshot:
+    """A car that drives 5 m/s while 2 m/s are ordered."""
+    said: dict[str, Any] = {
+        "is_armed": True,
+        "topic": "/cmd_vel",
+        "ordered_s": NOW_S - 2.0,
+        "sending_s": NOW_S - 2.0,
+        "deceleration_mps2": 1.5,
+        "commanded_mps": 2.0,
+    }
+    return with_more(known(NOW_S, speed=DRIVES), speed_slope_mps2=slope_mps2, slowing=SlowingFacts(**said | facts))
+
+
 def silent_for(seconds: float, *, proved: bool = True) -> Snapshot:
     """All signals as old as that; the bridge answered since, or did not."""
     link = replace(LINK, bridge_heard_s=NOW_S if proved else NOW_S - seconds, last_message_s=NOW_S - seconds)
@@ -250,6 +264,15 @@ ROWS: dict[str, Row | Callable[[str], Row]] = {
         fault=with_more(known(speed=DRIVES), reach=ReachFacts()),
         unknown=with_more(known(speed=None), reach=ReachFacts()),
     ),
+    "slow_down_unconfirmed": Row(
+        ok=slowed(-1.4),
+        fault=slowed(-0.2),
+        unknown=slowed(-0.2, sending_s=NOW_S - 0.4),
+    ),
+    "slow_down_hold_ended": Row(
+        ok=slowed(-1.4), fault=slowed(-1.4, ended_at_longest_s=NOW_S - 1.0), unknown=known(speed=DRIVES)
+    ),
+    "slow_down_rivals": Row(ok=slowed(-1.4), fault=slowed(-1.4, rivals=("/lap_driver",)), unknown=known(speed=DRIVES)),
     "paused_long": Row(
         ok=known(),
         fault=with_more(known(), paused=True, paused_since_s=NOW_S - 301.0),

@@ -1,0 +1,232 @@
+"""Does the car slow when catgraph orders it to? The proof is the car's own wheels, and nothing else.
+
+Half of the ordered deceleration within a second counts as obeyed: a real car follows loosely, and the slope of the
+speed is known over the last 0.6 s. A car that stands, or is no faster than it was told, obeys too.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Sound,
+    absent,
+    fault,
+    ok,
+    threshold,
+    unknown,
+)
+from monitor.motion import STANDS_BELOW_MPS
+from monitor.state import Snapshot
+
+TILE = "Slow-down"
+SHARE = 0.5  # of the ordered deceleration
+WITHIN_S = 1.0  # of the first command
+FOLLOWS_WITHIN_MPS = 0.5  # a car so near the commanded speed follows it, however slowly that falls
+ENDED_TOLD_S = 30.0
+
+
+def _switch(label: str, help: str) -> Any:
+    return threshold(
+        0.0,
+        label,
+        unit="0/1",
+        low=0.0,
+        high=1.0,
+        step=1.0,
+        help=f"{help} 1: after a count-down of 2 s the car is slowed, if slow-down is armed and nobody vetoes.",
+    )
+
+
+def _after(label: str, default_s: float) -> Any:
+    return threshold(default_s, label, unit="s", low=0.0, high=60.0, step=0.1)
+
+
+class SlowDownLimits(Limits):
+    """How the car is slowed; the page, the sender and the checks go by the same."""
+
+    deceleration_mps2: float = threshold(
+        1.5,
+        "Slow down with",
+        unit="m/s²",
+        low=0.3,
+        high=4.6,
+        step=0.1,
+        help="From the measured speed to zero. 4.6 is as hard as the car brakes.",
+    )
+    longest_s: float = threshold(
+        600.0,
+        "Hold at most",
+        unit="s",
+        low=10.0,
+        high=3600.0,
+        step=10.0,
+        help="An order that nobody releases ends after this time, with an alarm: the controllers drive again.",
+    )
+    on_speed: float = _switch("Slow down when too fast", "Speed above its limit for the time below.")
+    on_speed_after_s: float = _after("Too fast for", 3.0)
+    on_obstacle: float = _switch("Slow down before an obstacle", "An obstacle within the stopping distance.")
+    on_obstacle_after_s: float = _after("Obstacle for", 0.3)
+    on_reach: float = _switch("Slow down when nobody hears", "No operator's phone is reachable while the car moves.")
+    on_reach_after_s: float = _after("Nobody reachable for", 10.0)
+    on_rate_speed: float = _switch("Slow down when speed is slow", "Speed comes less often than expected, or not.")
+    on_rate_distance: float = _switch("… when distance is slow", "The nearest object likewise.")
+    on_rate_position: float = _switch("… when position is slow", "The position likewise.")
+    on_rate_scan: float = _switch("… when the laser is slow", "The laser's scans likewise.")
+    on_rate_after_s: float = _after("Too slow for", 2.0)
+
+
+def obeys(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Finding:
+    facts = snapshot.slowing
+    if facts.ordered_s is None:
+        return absent("The car is not ordered to slow down", brief="not ordered")
+    if facts.sending_s is None or facts.commanded_mps is None:
+        return fault(
+            "NOT CONFIRMED: the order does not reach the bridge. Use the physical stop",
+            brief="not sent",
+            causes=("not sent",),
+        )
+    for_s = snapshot.now_s - facts.sending_s
+    speed = snapshot.get("speed")
+    if speed is None or not speed.is_fresh(snapshot.now_s):
+        if for_s < WITHIN_S:
+            return unknown("No speed has come since the order", short="no speed")
+        return fault(
+            "NOT CONFIRMED: no speed comes from the car. Use the physical stop", brief="no speed", causes=("no speed",)
+        )
+    speed_mps = abs(speed.value.speed_mps)
+    text = f"{abs(facts.commanded_mps):.1f} m/s ordered, {speed_mps:.1f} m/s driven"
+    if speed_mps < STANDS_BELOW_MPS:
+        return ok("The car stands, as ordered")
+    if speed_mps - abs(facts.commanded_mps) <= FOLLOWS_WITHIN_MPS * (0.6 if was_active else 1.0):
+        return ok(f"{text}: the car follows")
+    slope_mps2 = snapshot.speed_slope_mps2
+    braking_mps2 = None if slope_mps2 is None else max(0.0, -slope_mps2 if speed.value.speed_mps > 0 else slope_mps2)
+    least_mps2 = SHARE * facts.deceleration_mps2 * (1.2 if was_active else 1.0)
+    limit = Quantity(label="At least", value=least_mps2, unit="m/s²")
+    if braking_mps2 is not None and braking_mps2 >= least_mps2:
+        measured = Quantity(label="Braking", value=braking_mps2, unit="m/s²")
+        return ok(f"{text}: the car slows by {braking_mps2:.1f} m/s²", measured=measured, limit=limit)
+    if for_s < WITHIN_S:
+        return unknown(f"{text}: ordered {for_s:.1f} s ago", short="waiting")
+    if braking_mps2 is None:
+        return fault(f"NOT CONFIRMED: {text}, too few speeds come. Use the physical stop", causes=("no speed",))
+    return fault(
+        f"NOT CONFIRMED: {text}, braking {braking_mps2:.1f} m/s², {least_mps2:.2f} needed. Use the physical stop",
+        brief=f"{speed_mps:.1f} m/s",
+        measured=Quantity(label="Braking", value=braking_mps2, unit="m/s²"),
+        limit=limit,
+        causes=("no braking",),
+    )
+
+
+def is_alone(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Finding:
+    facts = snapshot.slowing
+    if not facts.is_armed:
+        return absent("Slow-down is not armed", brief="not armed")
+    if not facts.rivals:
+        return ok(f"Nobody else publishes on {facts.topic}")
+    names = ", ".join(facts.rivals[:3]) + (f" and {len(facts.rivals) - 3} more" if len(facts.rivals) > 3 else "")
+    return fault(
+        f"{names} also command{'s' if len(facts.rivals) == 1 else ''} the car on {facts.topic}: the last message wins",
+        brief=f"{len(facts.rivals)} more",
+        causes=facts.rivals,
+    )
+
+
+def goes_on(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Finding:
+    facts = snapshot.slowing
+    ended_s = facts.ended_at_longest_s
+    if ended_s is not None and snapshot.now_s - ended_s < ENDED_TOLD_S:
+        return fault(
+            f"The order ended after {limits.longest_s:.0f} s: the car is not held any more", brief="hold ended"
+        )
+    if facts.ordered_s is None:
+        return absent("The car is not held", brief="not ordered")
+    left_s = limits.longest_s - (snapshot.now_s - facts.ordered_s)
+    return ok(f"The car is held for {max(0.0, left_s):.0f} s more")
+
+
+def is_not_ordered(snapshot: Snapshot, limits: SlowDownLimits) -> bool:
+    return snapshot.slowing.ordered_s is None
+
+
+def has_no_rival(snapshot: Snapshot, limits: SlowDownLimits) -> bool:
+    return not snapshot.slowing.rivals
+
+
+def has_not_ended(snapshot: Snapshot, limits: SlowDownLimits) -> bool:
+    return snapshot.slowing.ended_at_longest_s is None
+
+
+CHECKS = (
+    Check(
+        id="slow_down_unconfirmed",
+        label="Car obeys",
+        order=110,
+        group="slow_down",
+        tile=TILE,
+        alarm=AlarmSpec(
+            title="Slow-down NOT CONFIRMED",
+            priority=Priority.CRITICAL,
+            place=Place.DIALOG,
+            sound=Sound.HIGH,
+            needs_ack=True,
+            off_delay_s=1.0,
+            place_after=Place.LIST,
+            actions=(Action.ACKNOWLEDGE,),
+            advice="Use the physical stop: tell the safety driver now.",
+        ),
+        limits=SlowDownLimits,
+        find=obeys,
+        needs=frozenset({"speed"}),
+        is_harmless=is_not_ordered,
+    ),
+    Check(
+        id="slow_down_hold_ended",
+        label="Car held",
+        order=111,
+        group="slow_down",
+        tile=TILE,
+        alarm=AlarmSpec(
+            title="Hold ended by itself",
+            priority=Priority.CRITICAL,
+            place=Place.DIALOG,
+            sound=Sound.HIGH,
+            needs_ack=True,
+            actions=(Action.DECELERATE, Action.ACKNOWLEDGE),
+            advice="The car may drive off: order it again, or tell the safety driver.",
+        ),
+        limits=SlowDownLimits,
+        find=goes_on,
+        is_harmless=has_not_ended,
+    ),
+    Check(
+        id="slow_down_rivals",
+        label="Alone on the topic",
+        order=112,
+        group="slow_down",
+        tile=TILE,
+        alarm=AlarmSpec(
+            title="Others command the car",
+            priority=Priority.WARNING,
+            place=Place.SNACKBAR,
+            sound=Sound.LOW,
+            needs_ack=True,
+            off_delay_s=2.0,
+            actions=(Action.SHELVE, Action.ACKNOWLEDGE),
+            advice="A slow-down may be undone by them: put the guard before the topic, or end them.",
+        ),
+        limits=SlowDownLimits,
+        find=is_alone,
+        is_harmless=has_no_rival,
+    ),
+)

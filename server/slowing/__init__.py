@@ -1,0 +1,1 @@
+"""Slowing the car: the one gate through which anything is published to it."""

@@ -1,0 +1,440 @@
+"""Slows one vehicle: keeps the order, speaks it to the car 20 times a second, and tells what came of it.
+
+What is spoken is made at the moment it goes out, and only while the bridge answers: a ping goes with every command, and
+where neither it nor anything else is answered for 0.3 s the socket is aborted, so that what the system still holds dies
+with it (RFC 793, RST) instead of arriving late.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, Protocol
+
+from monitor.alarm import Alarm, Refused
+from monitor.check import Verdict
+from monitor.checks.slow_down import SlowDownLimits, obeys
+from monitor.slowing import SlowingFacts
+from monitor.state import Snapshot
+from monitor.triggers import COUNTDOWN_S, Due, Triggers
+from server import commands, wire
+from server.link import LinkDown, RosLink
+from server.slowing.guard import GuardWatch
+from server.slowing.mouth import Mouth
+from server.slowing.order import BY_HAND, LATE_S, Car, Order, SlowDown
+from server.slowing.twist import message
+from server.slowing.way import Way
+from server.tuning import PERCENT_A_RAD
+
+log = logging.getLogger("catgraph.slowing")
+
+PERIOD_S = 0.05  # the obstacle stopper lets a command count for 0.2 s
+DOUBT_S = 0.3
+STALL_S = 0.1  # a turn so late was our own fault: what the bridge said meanwhile is still unread
+
+
+class Note(Protocol):
+    """Writes an event of no alarm into the log."""
+
+    def __call__(self, change: str, text: str, *, by: str | None = None, **more: Any) -> None: ...
+
+
+class Slowing:
+    """One vehicle's. `now` is the session's clock, `wall_ms` the time of day; `snapshot` what is known of the car now;
+    `record` keeps what was sent. Everything runs on one loop."""
+
+    def __init__(
+        self,
+        note: Note,
+        *,
+        now: Callable[[], float],
+        wall_ms: Callable[[], int],
+        snapshot: Callable[[], Snapshot],
+        record: Callable[[Mapping[str, Any]], None],
+        number: int,
+    ) -> None:
+        """`number`: no order up to this one is given again, restarts included."""
+        self._note = note
+        self._now = now
+        self._wall_ms = wall_ms
+        self._snapshot = snapshot
+        self._record = record
+        self._life = SlowDown(number)
+        self._mouth = Mouth()
+        self._triggers = Triggers()
+        self._countdown: tuple[Due, float] | None = None
+        self._guard = GuardWatch(self._mouth)
+        self._link: RosLink | None = None
+        self._way = Way(problem="No car is connected.")
+        self._ros_version = 1
+        self._ordered = asyncio.Event()
+        self._turned_s = 0.0
+        self._told_unconfirmed = False
+        self.limits = SlowDownLimits()
+        self.rivals: tuple[str, ...] | None = None  # who else publishes on the topic; None: not known
+
+    # -- the link ----------------------------------------------------------------------------------------------------
+
+    def link_opened(self, link: RosLink) -> None:
+        self._link = link
+        self._mouth.attach(link)
+        if self._life.order is not None:
+            self._speak()
+
+    def link_closed(self) -> None:
+        self._mouth.attach(None)
+        self._cut("the link to the car was lost")
+
+    def ended(self, why: str = "monitoring ended") -> None:
+        """The car is not monitored any more."""
+        order = self._life.end("disconnected", self._now())
+        if order is not None:
+            self._tell(order, "ended", f"The slow-down ended: {why}. Nothing holds the car.")
+        self._guard.farewell()
+        self._mouth.unadvertise_all()
+        self._mouth.attach(None)
+        self._link, self._countdown, self.rivals = None, None, None
+        self._triggers.forget()
+        self._way = Way(problem="No car is connected.")
+
+    def resume(self, order: Mapping[str, Any]) -> None:
+        """An order stood when the server ended, and the same car is dialled again: it stands until it is released."""
+        life = self._life
+        life.armed_by = str(order.get("by") or "before the restart")
+        life.begin(
+            Way(),
+            by=life.armed_by,
+            why=str(order.get("why") or BY_HAND),
+            deceleration_mps2=self.limits.deceleration_mps2,
+            now_s=self._now(),
+            pressed_s=None,
+        )
+        assert life.order is not None
+        text = "The car was being slowed when the server ended: the order stands again, under a new number."
+        self._tell(life.order, "resumed", text)
+        self._ordered.set()
+
+    def heard(self, topic: str, said: Any) -> bool:
+        """A message that may be the guard's own; whether it was."""
+        return self._guard.heard(topic, said, self._now())
+
+    # -- time --------------------------------------------------------------------------------------------------------
+
+    def tick(self, way: Way, alarms: Mapping[str, Alarm], *, ros_version: int | None, is_paused: bool) -> SlowingFacts:
+        """Ten times a second: the way to the car, the rules, the proof. What the checks are to know."""
+        now_s = self._now()
+        self._ros_version = ros_version or self._ros_version
+        self._watch_way(way)
+        self._watch_rules(alarms, now_s, is_paused)
+        order = self._life.order
+        if order is not None:
+            if self._life.is_too_long(self.limits.longest_s, now_s):
+                self._life.end("longest", now_s)
+                self._tell(
+                    order, "ended", f"The slow-down ended after {self.limits.longest_s:.0f} s: nothing holds the car."
+                )
+            else:
+                self._prove(order, now_s)
+        self._guard.tick(way.has_guard, now_s)
+        return self._facts()
+
+    async def speak(self) -> None:
+        """Speaks what is ordered, 20 times a second, for ever: no page, no judge and no disk is waited for."""
+        loop = asyncio.get_running_loop()
+        while True:
+            await self._ordered.wait()
+            due_s = loop.time()
+            while self._life.order is not None:
+                due_s = max(due_s + PERIOD_S, loop.time())
+                await asyncio.sleep(due_s - loop.time())
+                try:
+                    self._speak()
+                except Exception:  # the one net: a fault in one command must not end the others
+                    log.exception("a command to the car failed")
+            self._ordered.clear()
+
+    async def beat(self) -> None:
+        """The operator's heartbeat for the guard, 5 times a second, as long as this server is itself healthy."""
+        while True:
+            await asyncio.sleep(self._guard.PERIOD_S)
+            self._guard.beat(self._now())
+
+    # -- orders ------------------------------------------------------------------------------------------------------
+
+    def obey(self, command: commands.SlowingCommand, *, by: str) -> None:
+        """What an operator orders. Raises Refused; the refusal of a slow-down stands in the log."""
+        match command:
+            case commands.Arm():
+                if self._life.arm(self._way, by):
+                    self._announce_way()
+                    self._note("armed", f"Slow-down armed on {self._way.topic}.{self._rivals_words()}", by=by)
+            case commands.Disarm():
+                if self._life.disarm():
+                    self._countdown = None
+                    self._mouth.unadvertise_all()
+                    self._note("disarmed", "Slow-down is safe: nothing can be ordered.", by=by)
+            case commands.Decelerate():
+                self._order_by_hand(command, by)
+            case commands.Release():
+                self._release(command.number, by)
+            case commands.Veto():
+                self._veto(command.trigger, by)
+
+    def _order_by_hand(self, command: commands.Decelerate, by: str) -> None:
+        now_s = self._now()
+        late_s = command.late_s(self._wall_ms())
+        try:
+            if late_s > LATE_S:
+                raise Refused(f"This was pressed {late_s:.1f} s ago: press again if it still counts.")
+            if self._life.order is None and (self._link is None or not self._link.is_open):
+                raise Refused("Not ordered: there is no link to the car. Use the physical stop.")
+            self._begin(by, BY_HAND, now_s, pressed_s=now_s - late_s - command.pressed_ago_s)
+        except Refused as why:
+            self._note("slow_down", f"Slow-down refused: {why.reason}", by=by, step="refused")
+            raise
+
+    def _begin(self, by: str, why: str, now_s: float, *, pressed_s: float | None) -> None:
+        order = self._life.begin(
+            self._way,
+            by=by,
+            why=why,
+            deceleration_mps2=self.limits.deceleration_mps2,
+            now_s=now_s,
+            pressed_s=pressed_s,
+        )
+        self._countdown = None
+        if order is None:
+            return  # one stands already
+        self._told_unconfirmed = False
+        self._speak()  # first to the car, then to the log
+        self._tell(order, "ordered", f"Slow down with {order.deceleration_mps2:g} m/s², {why}.", by=by)
+        if order.first_sent_s is not None:
+            self._tell(order, "sent", f"The first command is on the bridge: {_said(order)}.")
+        self._ordered.set()
+
+    def _release(self, number: int, by: str) -> None:
+        """Ends the order; where none stands and the guard holds the car by itself, its hold."""
+        if self._life.order is None and self._guard.holds:
+            self._guard.release(number)
+            self._note("slow_down", "The guard on the car is told to release it.", by=by, step="released", hold=number)
+            return
+        order = self._life.release(number)
+        self._guard.release()
+        self._tell(order, "released", "The car is released: whoever drives it commands again.", by=by)
+
+    def _veto(self, trigger: str, by: str) -> None:
+        if self._countdown is None or self._countdown[0].trigger.id != trigger:
+            raise Refused("No count-down runs for this any more.")
+        due, _ = self._countdown
+        self._countdown = None
+        self._triggers.veto(trigger)
+        self._note("slow_down", f"Vetoed: {due.trigger.title}.", by=by, step="vetoed", trigger=trigger)
+
+    # -- within ------------------------------------------------------------------------------------------------------
+
+    def _watch_way(self, way: Way) -> None:
+        """A topic that changes its type or goes disarms: what was confirmed is not so any more. An order goes on."""
+        before, self._way = self._way, way
+        if self._life.armed_by is None or self._life.order is not None:
+            if self._life.order is not None and way.problem is not None:
+                self._way = before  # the order goes on where it began, as soon as there is a link
+            return
+        if way.problem is not None or (way.topic, way.kind) != (before.topic, before.kind):
+            why = way.problem or f"commands go to {way.topic} now."
+            self._life.disarm()
+            self._countdown = None
+            self._note("disarmed", f"Slow-down is not armed any more: {why}")
+        else:
+            self._announce_way()
+
+    def _announce_way(self) -> None:
+        """Advertised before anything is ordered: a publisher needs a moment to find who listens."""
+        way = self._way
+        if way.type is not None and self._link is not None and self._link.is_open:
+            self._mouth.advertise(way.topic, way.type)
+
+    def _watch_rules(self, alarms: Mapping[str, Alarm], now_s: float, is_paused: bool) -> None:
+        due = None if is_paused else self._triggers.look(alarms, self.limits, now_s)
+        if self._life.order is not None or self._life.armed_by is None or self._way.problem is not None:
+            self._countdown = None
+            return
+        if self._countdown is None:
+            if due is not None:
+                self._countdown = (due, now_s)
+                text = (
+                    f"The car is slowed in {COUNTDOWN_S:.0f} s unless somebody vetoes: {due.trigger.title}. {due.text}"
+                )
+                self._note("slow_down", text, step="countdown", trigger=due.trigger.id)
+            return
+        counting, began_s = self._countdown
+        if due is None or due.trigger.id != counting.trigger.id:
+            self._countdown = None
+            self._note("slow_down", f"Count-down ended: {counting.trigger.title} is over.", step="over")
+        elif now_s - began_s >= COUNTDOWN_S:
+            if self._link is None or not self._link.is_open:
+                return  # it begins when the link is back, if the fault still stands
+            self._begin("catgraph", counting.trigger.title, now_s, pressed_s=None)
+
+    def _speak(self) -> None:
+        """One command, now or not at all."""
+        now_s = self._now()
+        was_stalled, self._turned_s = now_s - self._turned_s > STALL_S, now_s
+        order, link = self._life.order, self._link
+        if order is None:
+            return
+        if link is None or not link.is_open:
+            self._cut("the link to the car was lost")
+            return
+        if order.sending_s is not None and not was_stalled and now_s - (link.heard_s or 0.0) > DOUBT_S:
+            self._cut("the bridge does not answer")
+            link.abort()
+            return
+        way = self._way
+        if way.kind is None or way.type is None:
+            self._cut("the command topic is not confirmed yet")  # after a restart the car is asked first
+            return
+        command = self._life.next(self._car(), now_s)
+        assert command is not None
+        said = message(
+            way.kind,
+            command.speed_mps,
+            command.tyre_rad,
+            stamp_ns=self._wall_ms() * 1_000_000,
+            ros_version=self._ros_version,
+        )
+        was_sending = order.sending_s is not None
+        try:
+            self._mouth.publish(way.topic, way.type, said)
+            link.ping()
+        except LinkDown:
+            self._cut("the link to the car was lost")
+            return
+        is_first = self._life.sent(command, now_s)
+        self._record({"topic": way.topic, "type": way.type, "message": said, "by": order.by, "order": order.number})
+        if not is_first and not was_sending:
+            self._tell(order, "resumed", f"Commands reach the bridge again: {_said(order)}.")
+
+    def _cut(self, why: str) -> None:
+        order = self._life.order
+        if self._life.cut() and order is not None:
+            self._tell(
+                order, "cut", f"No command goes out: {why}. It goes on when the link is back, if it still stands."
+            )
+
+    def _car(self) -> Car:
+        snapshot = self._snapshot()
+        speed, steering, ordered = snapshot.get("speed"), snapshot.get("steering"), snapshot.get("command")
+        now_s = snapshot.now_s
+        tyre_rad = None
+        if steering is not None and steering.is_fresh(now_s):
+            tyre_rad = steering.value.percent / PERCENT_A_RAD
+        elif ordered is not None and ordered.is_fresh(now_s):
+            tyre_rad = ordered.value.tyre_angle_rad
+        return Car(
+            speed_mps=speed.value.speed_mps if speed is not None and speed.is_fresh(now_s) else None, tyre_rad=tyre_rad
+        )
+
+    def _prove(self, order: Order, now_s: float) -> None:
+        found = obeys(replace(self._snapshot(), slowing=self._facts()), self.limits, self._told_unconfirmed).verdict
+        if found is Verdict.OK and order.first_sent_s is not None and order.sending_s is not None:
+            if self._life.confirm(now_s):
+                took_s = now_s - order.first_sent_s
+                self._tell(
+                    order, "slows", f"The car slows: shown by its own speed {took_s:.1f} s after the first command."
+                )
+            self._told_unconfirmed = False
+        elif found is Verdict.FAULT and not self._told_unconfirmed:
+            self._told_unconfirmed = True
+            self._tell(order, "not_confirmed", "NOT CONFIRMED: the car does not slow. Use the physical stop.")
+
+    def _facts(self) -> SlowingFacts:
+        order = self._life.order
+        return SlowingFacts(
+            is_armed=self._life.armed_by is not None,
+            topic=self._way.topic,
+            rivals=self.rivals or (),
+            ordered_s=order.ordered_s if order else None,
+            sending_s=order.sending_s if order else None,
+            deceleration_mps2=order.deceleration_mps2 if order else 0.0,
+            commanded_mps=order.last.speed_mps if order and order.last else None,
+            ended_at_longest_s=self._life.ended_at_longest_s,
+        )
+
+    def _rivals_words(self) -> str:
+        if self.rivals is None:
+            return " Who else publishes there is not known."
+        return (
+            f" {', '.join(self.rivals)} also publish{'es' if len(self.rivals) == 1 else ''} there."
+            if self.rivals
+            else ""
+        )
+
+    def _tell(self, order: Order, step: str, text: str, *, by: str | None = None) -> None:
+        last = order.last
+        self._note(
+            "slow_down",
+            text,
+            by=by,
+            step=step,
+            order=order.number,
+            why=order.why,
+            ordered_by=order.by,
+            commanded_mps=wire.plain(last.speed_mps, 2) if last else None,
+            topic=self._way.topic,
+        )
+
+    # -- what pages see ----------------------------------------------------------------------------------------------
+
+    def frame(self) -> dict[str, Any]:
+        """The `decelerate` of a state."""
+        now_s = self._now()
+        way, order, life = self._way, self._life.order, self._life
+        return {
+            "state": life.state(way, now_s),
+            "why": way.problem if order is None else None,
+            "topic": way.topic or None,
+            "type": way.type,
+            "rivals": None if self.rivals is None else list(self.rivals),
+            "armed_by": life.armed_by,
+            "deceleration_mps2": wire.plain(self.limits.deceleration_mps2, 2),
+            "order": None if order is None else self._order(order, now_s),
+            "countdown": None
+            if self._countdown is None
+            else {
+                "trigger": self._countdown[0].trigger.id,
+                "title": self._countdown[0].trigger.title,
+                "text": self._countdown[0].text,
+                "left_s": wire.plain(max(0.0, COUNTDOWN_S - (now_s - self._countdown[1])), 1),
+            },
+            "guard": self._guard.frame(now_s),
+        }
+
+    def _order(self, order: Order, now_s: float) -> dict[str, Any]:
+        def at_ms(moment_s: float | None) -> int | None:
+            return None if moment_s is None else round(self._wall_ms() - (now_s - moment_s) * 1000)
+
+        return {
+            "number": order.number,
+            "by": order.by,
+            "why": order.why,
+            "for_s": wire.plain(now_s - order.ordered_s, 1),
+            "from_mps": wire.plain(order.from_mps, 2),
+            "ordered_mps": wire.plain(order.last.speed_mps, 2) if order.last else None,
+            "deceleration_mps2": wire.plain(order.deceleration_mps2, 2),
+            "sending": order.sending_s is not None,
+            "confirmed": False if self._told_unconfirmed else True if order.slows_s is not None else None,
+            "steps": {
+                "pressed_ms": at_ms(order.pressed_s),
+                "server_ms": at_ms(order.ordered_s),
+                "bridge_ms": at_ms(order.first_sent_s),
+                "slows_ms": at_ms(order.slows_s),
+            },
+            "longest_s": wire.plain(self.limits.longest_s, 0),
+        }
+
+
+def _said(order: Order) -> str:
+    last = order.last
+    return "nothing yet" if last is None else f"{last.speed_mps:.2f} m/s, tyres at {last.tyre_rad:+.3f} rad"
