@@ -17,7 +17,7 @@ from functools import lru_cache
 from pathlib import Path
 
 FOLDER = "built"  # in static/, beside js/ and css/, so that what they name by ../ is found from here too
-STYLES = ("tokens", "frame", "instruments", "map", "sheets", "screens", "settings", "wide")  # in this order
+STYLES = ("tokens", "frame", "instruments", "map", "sheets", "screens", "settings", "slowing", "wide")  # in this order
 ENTRY = "app.js"
 _LIST = "built.json"  # written last
 _TARGET = "es2022"  # private fields and top-level await: every browser of 2022 and later

@@ -1,5 +1,6 @@
 // Which alarm shows where: one rule a place, none an alarm. Pure functions.
 
+import { stripWords } from './slow-layout.js';
 import { fixed, timeOfDay } from './words.js';
 
 /**
@@ -52,16 +53,17 @@ export function layOut(alarms) {
  * watched a car is the loudest alarm of all, for nothing else can be announced; a paused one watches nothing.
  * @param {State | null} frame
  * @param {{isServerLost: boolean, isLossAcknowledged: boolean}} page
- * @returns {SoundName | null}
+ * @returns {SoundName | 'count' | null} count: the car is slowed by itself in a moment, unless somebody vetoes it
  */
 export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
   if (!frame) return null;
   if (isServerLost) return isLossAcknowledged || frame.session.paused ? null : 'high';
+  if (frame.decelerate.countdown) return 'count';
   const asking = frame.alarms.filter((alarm) => alarm.state === 'UNACKED').map((alarm) => alarm.sound);
   return LOUD.find((sound) => asking.includes(sound)) ?? null;
 }
 
-/** @typedef {{kind: 'crit' | 'warn' | 'invert' | '', icon: string, text: string, end: string, opens: 'log' | 'signals'}} Strip */
+/** @typedef {{kind: 'crit' | 'warn' | 'invert' | 'order' | 'armed' | '', icon: string, text: string, end: string, opens: 'log' | 'signals'}} Strip */
 
 /**
  * The one line under the tabs.
@@ -79,6 +81,11 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
   }
   if (isSilent) return { kind: 'invert', icon: 'clock', text: 'Values are not live', end: 'not checked', opens: 'signals' };
   const { standing, worst, shelved } = layOut(frame.alarms);
+  const order = stripWords(frame.decelerate, standing.length);
+  // A critical alarm comes before the order, whose steps stand beneath; all else after it.
+  if (order && order.kind !== 'armed' && worst?.priority !== 'critical') {
+    return { ...order, icon: order.kind === 'crit' ? 'crit' : 'slow', opens: 'log' };
+  }
   if (worst && worst.priority !== 'advisory') {
     const isOne = standing.length === 1 && worst.priority === 'critical';
     const among = isOne ? `${fixed(worst.for_s)} s` : `${1} of ${standing.length}`;
@@ -95,6 +102,7 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
   const unknown = tilesOf(frame.checks).filter((tile) => tile.verdict === 'unknown' && tile.brief !== 'not published').length;
   const counts = `${ok} OK · ${unknown} not checked`;
   if (worst) return { kind: '', icon: 'info', text: worst.title, end: counts, opens: 'log' };
+  if (order) return { ...order, icon: 'slow', opens: 'log' };
   return { kind: '', icon: 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${unknown} not checked` : counts, opens: 'log' };
 }
 

@@ -37,6 +37,7 @@ import { mount as mountPosition } from './position.js';
 import { mount as mountPreferences } from './preferences.js';
 import { mount as mountRail } from './rail.js';
 import { mount as mountReach } from './reach.js';
+import { mount as mountSlowing } from './slowing.js';
 import { mount as mountSnackbar } from './snackbar.js';
 import { mount as mountStart } from './start.js';
 import { mount as mountStrip } from './strip.js';
@@ -61,7 +62,7 @@ const say = (sentence, title, way) => tell(sentence, title, way ?? control.wayOf
 const page = new Page(store, arming, say);
 
 const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
-const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null);
+const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null, say);
 const files = new FilesTab(need(monitor, '[data-panel="files"]'), store, say, () => page.isMonitorShown && tabs.shows('files') && screens.open === null);
 const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
 const screens = new Screens(monitor, store, front);
@@ -90,6 +91,7 @@ mountPreferences(voice);
 mountRail(monitor, store, page);
 mountSnackbar(field(document, 'snacks'), store, say);
 mountDialogs(store, page);
+mountSlowing(monitor, store, control, say); // after the dialogs: its count-down lies over them
 mountBadge(store);
 
 /** The scan is sent and drawn only while its tab is in front and nothing lies over it; Settings is loaded once it is. */
@@ -180,5 +182,5 @@ setTimeout(() => import('./shell.js').then(({ Shell }) => new Shell(store, say))
 // The screens an operator may want when the server is gone are fetched while it is there, once the page has begun.
 setTimeout(prefetch, 10_000);
 function prefetch() {
-  for (const load of [() => import('./log.js'), () => import('./signals.js'), () => import('./scan.js'), () => import('./chart.js')]) load().catch(() => {});
+  for (const load of [() => import('./slow-sheet.js'), () => import('./log.js'), () => import('./signals.js'), () => import('./scan.js'), () => import('./chart.js')]) load().catch(() => {});
 }

@@ -79,6 +79,22 @@ export function faceOf({ speed_max, acceleration_max_mps2, limit }) {
 }
 
 /**
+ * The speed that is ordered now: an arc outside the band from it to the measured one, and its words where the limit's are not.
+ * @param {number} ordered in one unit, as the others
+ * @param {number | null} measured null: not known, so there is no arc
+ * @param {number} speed_max
+ * @param {number | null} limit
+ */
+export function orderMark(ordered, measured, speed_max, limit) {
+  const [to, from] = [speedAngle(ordered, speed_max), measured === null ? null : speedAngle(measured, speed_max)];
+  const isLimitLeft = limit !== null && limit > 0 && speedAngle(limit, speed_max) < 90;
+  return {
+    d: from === null || Math.abs(from - to) < 0.5 ? '' : arc(196, Math.min(from, to), Math.max(from, to)),
+    x: isLimitLeft ? 364 : 16, y: 26, anchor: isLimitLeft ? 'end' : 'start',
+  };
+}
+
+/**
  * How large the digits stand and how wide a block behind them must be.
  * @param {string} digits
  */

@@ -1,8 +1,9 @@
 // The gauge: speed over 180°, acceleration within, the operator's limit at the edge.
 
-import { html, setAttribute, setText, svg } from './dom.js';
-import { accelerationAngle, band, digitsBox, faceOf, speedAngle } from './gauge-layout.js';
+import { html, setAttribute, setText, show, svg } from './dom.js';
+import { accelerationAngle, band, digitsBox, faceOf, orderMark, speedAngle } from './gauge-layout.js';
 import { ABSENT } from './ink.js';
+import { orderOf } from './slow-layout.js';
 import { speedIn, speedUnit, speedWords, spokenSpeedUnit } from './units.js';
 import { age, signed } from './words.js';
 
@@ -30,7 +31,10 @@ export function mount(root, store) {
   const struck = svg('rect', { class: 'struck', y: 146, height: 90 });
   const unit = svg('text', { class: 'unit', y: 240 });
   const note = svg('text', { class: 'note', x: 190, y: 249, 'text-anchor': 'middle' });
-  const top = svg('svg', { viewBox: VIEW, 'aria-hidden': 'true' }, bug,
+  const arc = svg('path', { class: 'ordarc' });
+  const ordered = svg('tspan', { class: 'num' });
+  const order = svg('text', { class: 'ord' }, 'ordered ', ordered);
+  const top = svg('svg', { viewBox: VIEW, 'aria-hidden': 'true' }, bug, arc, order,
     svg('text', { class: 'aval', x: 190, y: 124, 'text-anchor': 'middle' }, acceleration, accelerationUnit), box, speed, struck, unit, note);
   const speedMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Speed', 'aria-valuemin': 0 });
   const accelerationMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Acceleration' });
@@ -107,7 +111,9 @@ export function mount(root, store) {
     setAttribute(unit, 'x', block.unitX);
     setText(unit, isSpeedKnown ? (isBack ? `${unitWord} back` : unitWord) : '');
     setText(note, noteOf(speedInk, isSpeedKnown));
-    meter(speedMeter, isSpeedKnown && speedInk.ink !== 'stale' ? Math.abs(speedIn(speed_mps)) : null, speedIn(scale.speed_max_mps), `${digits} ${spokenSpeedUnit()}`);
+    const isSpeedNow = isSpeedKnown && speedInk.ink !== 'stale';
+    const isOrdered = drawOrder(isSpeedNow ? speed_mps : null, scale);
+    meter(speedMeter, isSpeedNow ? Math.abs(speedIn(speed_mps)) : null, speedIn(scale.speed_max_mps), `${digits} ${spokenSpeedUnit()}${isOrdered}`);
 
     const pushInk = store.ink('acceleration');
     const push = number(store.signal('acceleration')?.value?.acceleration_mps2);
@@ -117,6 +123,19 @@ export function mount(root, store) {
     setText(accelerationUnit, isPushKnown || pushInk.ink !== 'not_published' ? 'm/s²' : '');
     setAttribute(accelerationMeter, 'aria-valuemin', -scale.acceleration_max_mps2);
     meter(accelerationMeter, isPushKnown && pushInk.ink !== 'stale' ? push : null, scale.acceleration_max_mps2, `${signed(push)} metres a second squared`);
+  }
+
+  /** What the car was ordered, beside what it does. @param {number | null} speed_mps @param {ReturnType<typeof scaleOf>} scale */
+  function drawOrder(speed_mps, { speed_max_mps, limit_mps }) {
+    const ordered_mps = number(store.isSilent ? null : orderOf(store.frame?.decelerate)?.ordered_mps);
+    for (const part of [arc, order]) show(part, ordered_mps !== null);
+    if (ordered_mps === null) return '';
+    const mark = orderMark(ordered_mps, speed_mps, speed_max_mps, limit_mps);
+    setAttribute(arc, 'd', mark.d);
+    for (const [name, value] of /** @type {const} */ ([['x', mark.x], ['y', mark.y], ['text-anchor', mark.anchor]])) setAttribute(order, name, value);
+    const [words] = speedWords(ordered_mps);
+    setText(ordered, words);
+    return `, ordered ${words}`;
   }
 
   move();

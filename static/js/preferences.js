@@ -6,7 +6,7 @@ import { chooseSpeedUnit, speedUnit } from './units.js';
 
 /**
  * @typedef {import('./voice.js').Voice} Voice
- * @typedef {import('./voice.js').Loud} Loud
+ * @typedef {Exclude<import('./voice.js').Loud, 'count'>} Loud the alarms’
  */
 
 const PULSES = /** @type {Record<Loud, string>} */ ({ high: 'ten quick pulses', medium: 'three rising pulses', low: 'two falling pulses' });

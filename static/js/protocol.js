@@ -112,7 +112,7 @@
  * @property {Trends} [trends]
  * @property {Record<string, number>} limits
  * @property {RecordingNow} recording
- * @property {{state: string, why: string | null}} decelerate
+ * @property {Decelerate} decelerate
  * @property {ControlNow} control
  * @property {ReachNow | null} [reach] whom an alarm would reach; null: of a recording nobody is asked
  * @property {PhoneShown | null} [phone] the operator's phone that is compared with the car
@@ -133,6 +133,33 @@
  * @property {number | null} [room_gb]
  * @property {{name: string, until_ms: number} | null} [saved] the newest finished file, and the time of day it reaches
  * @property {string | null} [reason] why it does not record
+ *
+ * @typedef {object} Decelerate how the slow-down stands; of a recording as it stood then
+ * @property {string} state not_available, safe, armed, ordered (on the ramp) or holding (zeros are held)
+ * @property {string | null} why it is not available
+ * @property {string | null} [topic] on which it would be commanded
+ * @property {string | null} [type]
+ * @property {string[] | null} [rivals] who else publishes there; null: not known
+ * @property {string | null} [armed_by]
+ * @property {number} [deceleration_mps2] that will be ordered
+ * @property {SlowOrder | null} [order]
+ * @property {{trigger: string, title: string, text: string, left_s: number} | null} [countdown] it is about to begin by itself
+ * @property {Guard | null} [guard] null: none on the car
+ *
+ * @typedef {object} SlowOrder
+ * @property {number} number
+ * @property {string | null} by
+ * @property {string} why "by hand", or the title of the rule that ordered it
+ * @property {number} for_s
+ * @property {number | null} from_mps
+ * @property {number | null} ordered_mps the speed that is ordered now
+ * @property {number} deceleration_mps2
+ * @property {boolean} sending false: its commands do not go out
+ * @property {boolean | null} confirmed by the car's own speed; null: not told yet
+ * @property {{pressed_ms: number | null, server_ms: number | null, bridge_ms: number | null, slows_ms: number | null}} steps
+ * @property {number} [longest_s]
+ *
+ * @typedef {{state: string, why: string, hold: number, age_s: number | null}} Guard
  *
  * @typedef {object} ControlNow
  * @property {string | null} holder the name of who is in control
@@ -187,6 +214,7 @@
  * @property {{state: string, for_s: number | null}} recording
  * @property {ControlNow} [control]
  * @property {ReachNow | null} [reach]
+ * @property {Decelerate} [decelerate]
  * @property {Alarm[]} alarms
  * @property {number} alarms_in_all
  *

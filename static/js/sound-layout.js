@@ -7,9 +7,9 @@
  */
 
 // Notes with their harmonics lie between 300 and 4000 Hz, where a small loudspeaker is loud and an ear is keen.
-const C5 = 523.25, E4 = 329.63, G4 = 392, A4 = 440;
+const C5 = 523.25, E4 = 329.63, G4 = 392, A4 = 440, A5 = 880;
 
-/** @type {Record<'high' | 'medium' | 'low', Burst>} */
+/** @type {Record<'high' | 'medium' | 'low' | 'count', Burst>} */
 const BURSTS = {
   // Ten pulses, 3-2 and again 3-2 after a longer rest.
   high: {
@@ -26,10 +26,12 @@ const BURSTS = {
     pulses: [0, 0.35].map((at_s, i) => ({ at_s, for_s: 0.2, hz: /** @type {number} */ ([A4, E4][i]) })),
     every_s: 20, gain: 0.4, vibration: [],
   },
+  // The count-down: even ticks, four a second, above every alarm's note, so that it is taken for none.
+  count: { pulses: [{ at_s: 0, for_s: 0.1, hz: A5 }, { at_s: 0.25, for_s: 0.1, hz: A5 }], every_s: 0.5, gain: 0.9, vibration: [90, 160, 90] },
 };
 
 /**
- * @param {'high' | 'medium' | 'low'} sound
+ * @param {'high' | 'medium' | 'low' | 'count'} sound
  * @returns {Burst}
  */
 export function burstOf(sound) {
@@ -41,7 +43,7 @@ const HARMONICS = [1, 0.6, 0.5, 0.4, 0.3];
 
 /**
  * One burst and the rest until the next, to be played in a loop: it goes on sounding when the page's script hangs.
- * @param {'high' | 'medium' | 'low'} sound
+ * @param {'high' | 'medium' | 'low' | 'count'} sound
  * @param {number} rate_hz samples a second
  * @returns {Float32Array<ArrayBuffer>} −1…1
  */

@@ -156,7 +156,8 @@ export class Store {
     const { frame } = this;
     if (!frame?.replay) return frame;
     const { live } = frame;
-    return live ? { ...frame, alarms: live.alarms, session: { ...frame.session, phase: live.phase, paused: live.paused } } : null;
+    const decelerate = live?.decelerate ?? { state: 'not_available', why: null };
+    return live ? { ...frame, alarms: live.alarms, decelerate, session: { ...frame.session, phase: live.phase, paused: live.paused } } : null;
   }
 
   /** Who is in control of the live car, also while a recording is shown. */
@@ -411,6 +412,8 @@ function answerOf({ ok, reason, problem, version, conflict, held_by }) {
  */
 function urgentOf(frame) {
   if (!frame) return '';
-  const { session, link, alarms } = frame;
-  return [session.phase, session.paused, link.cut, ...alarms.map((alarm) => `${alarm.id} ${alarm.occurrence} ${alarm.state}`)].join('|');
+  const { session, link, alarms, decelerate } = frame;
+  const { order } = decelerate;
+  const slow = [decelerate.state, order?.number, order?.sending, order?.confirmed, (frame.live?.decelerate ?? decelerate).countdown?.trigger].join(' ');
+  return [session.phase, session.paused, link.cut, slow, ...alarms.map((alarm) => `${alarm.id} ${alarm.occurrence} ${alarm.state}`)].join('|');
 }

@@ -2,7 +2,7 @@
 
 import { burstOf, samplesOf } from './sound-layout.js';
 
-/** @typedef {'high' | 'medium' | 'low'} Loud */
+/** @typedef {'high' | 'medium' | 'low' | 'count'} Loud count: of a slow-down that is about to begin by itself */
 
 export class Voice {
   /** @type {AudioContext | null} */
@@ -41,7 +41,7 @@ export class Voice {
 
   /**
    * Sound this from now on, or be still.
-   * @param {import('./protocol.js').SoundName | null} name
+   * @param {import('./protocol.js').SoundName | 'count' | null} name
    */
   say(name) {
     const sound = name === 'none' ? null : name;

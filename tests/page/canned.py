@@ -103,7 +103,7 @@ def live() -> Json:
             "obstacle.laser_ahead_m": 2.5,
         },
         "recording": {"state": "recording", "for_s": 252.0},
-        "decelerate": {"state": "not_available", "why": "not configured"},
+        "decelerate": slow("not_available", why="/catvehicle/cmd_vel is not on the car."),
         "control": {"holder": "You"},
         "phone": {
             "id": "9c0f", "label": "Pixel 7", "count": 1, "handheld": True, "lat_deg": 32.231828, "lon_deg": -110.95005,
@@ -112,6 +112,27 @@ def live() -> Json:
             "compared_age_s": 0.8, "explained_m": 14.0, "correlation": None,
         },
     }  # fmt: skip
+
+
+def slow(state: str, **more: Any) -> Json:
+    """How the slow-down stands."""
+    return {
+        "state": state, "why": None, "topic": "/catvehicle/cmd_vel", "type": "geometry_msgs/Twist", "rivals": [],
+        "armed_by": None if state in ("not_available", "safe") else "Pixel 7", "deceleration_mps2": 1.5, "order": None,
+        "countdown": None, "guard": None, **more,
+    }  # fmt: skip
+
+
+def slowed(confirmed: bool | None = True, **more: Any) -> Json:
+    """An order of 1.3 s ago as it stands, where it was obeyed: each step later than the one before."""
+    begun_ms = _now_ms() - 1300
+    slows_ms = begun_ms + 420 if confirmed else None
+    steps = {"pressed_ms": begun_ms, "server_ms": begun_ms + 20, "bridge_ms": begun_ms + 30, "slows_ms": slows_ms}
+    order = {
+        "number": 3, "by": "Pixel 7", "why": "by hand", "for_s": 1.3, "from_mps": 4.2, "ordered_mps": 2.2,
+        "deceleration_mps2": 1.5, "sending": True, "confirmed": confirmed, "steps": steps, "longest_s": 600.0, **more,
+    }  # fmt: skip
+    return slow("ordered", order=order)
 
 
 def idle(phase: str = "idle") -> Json:
@@ -258,6 +279,8 @@ class Canned:
         self.state = live()
         self.silent = False
         self.heard: list[Json] = []
+        self.refuses: dict[str, str] = {}  # why, by the kind of command
+        self.role = "operator"
         self.found: list[Json] = [
             {"name": "CATVehicle", "address": "ws://192.168.4.1:9090"},
             {"name": "Simulated car", "address": "ws://127.0.0.1:9091"},
@@ -267,6 +290,7 @@ class Canned:
         self.tile: Callable[[int, int, int], bytes] = lambda z, x, y: b""
         self.app = FastAPI()
         self._watching = False
+        self._page: str | None = None
         templates = Jinja2Templates(directory=templates_dir())
         asset = templates.env.globals["asset"] = lambda name: f"/static/{name}"
         self.app.mount("/static", StaticFiles(directory=static_dir()))
@@ -327,7 +351,8 @@ class Canned:
 
     async def _serve(self, socket: WebSocket) -> None:
         hello = {"kind": "hello", "version": "0.1.0", "boot": "9f00", "vehicle": "car", "vehicles": ["car"]}
-        await socket.send_json(hello | {"time_ms": _now_ms(), "last_event": 117, "veil_after_s": 2.0})
+        who = {"id": "local", "name": "Pixel 7", "role": self.role}
+        await socket.send_json(hello | {"time_ms": _now_ms(), "last_event": 117, "veil_after_s": 2.0, "who": who})
         beat = asyncio.create_task(self._beat(socket))
         try:
             while True:
@@ -335,8 +360,12 @@ class Canned:
                 self.heard.append(message)
                 if message.get("kind") == "watch":
                     self._watching = message["scan"]
+                if message.get("kind") == "hello":
+                    self._page = message.get("page")
                 if "id" in message:
-                    await socket.send_json({"kind": "reply", "id": message["id"], "ok": True})
+                    why = self.refuses.get(message["kind"])
+                    reply = {"kind": "reply", "id": message["id"], "ok": why is None}
+                    await socket.send_json(reply | ({"reason": why} if why else {}))
         finally:
             beat.cancel()
 
@@ -348,6 +377,8 @@ class Canned:
                 state = copy.deepcopy(self.state)
                 state["server"]["time_ms"] = _now_ms()
                 state["trends"] = self._trends(4)
+                if state["control"]["holder"] == "You":
+                    state["control"] |= {"page": self._page, "fence": 1}
                 await socket.send_json({"kind": "offer", "seq": number, "of": ["state"]})
                 await socket.send_json(state)
                 if self._watching:

@@ -2,7 +2,6 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { armWords, bare, foundIn, remembered } from '../../static/js/connect.js';
 import { screenOf } from '../../static/js/page.js';
-import { slowWords } from '../../static/js/rail.js';
 import { details, headline, kindWords } from '../../static/js/signals.js';
 import { tabByHash, tabByKey } from '../../static/js/tabs.js';
 import { savedWords } from '../../static/js/dialogs.js';
@@ -65,7 +64,7 @@ test('the details of a signal tell what was rejected and why', () => {
   assert.equal(kindWords({ ...signal, type: null, topic: null, value: null }), 'no such topic');
 });
 
-test('recording, slow-down and last values', () => {
+test('recording and last values', () => {
   const bar = (/** @type {any} */ recording, isSilent = false) => {
     const { isOn, text, order } = recordingWords({ for_s: 252, reason: null, ...recording }, isSilent);
     return [isOn, text, order];
@@ -82,7 +81,6 @@ test('recording, slow-down and last values', () => {
   assert.equal(savedWords({ state: 'saving', for_s: 9, saved: null }), ' The recording is being saved.');
   assert.equal(savedWords({ state: 'recording', for_s: 9, saved }), '', 'what is not saved is not said to be');
   assert.equal(savedWords({ state: 'off', for_s: null, saved }), '');
-  assert.deepEqual(slowWords({ state: 'not_available', why: 'not configured' }), { title: 'Slow-down off', why: 'not configured' });
   assert.equal(thenWords(state({ signals: { speed: { value: { speed_mps: 4.2 } }, distance: { value: { distance_m: 12.4 } } } })), '4.2 m/s, object at 12.4 m');
   assert.equal(thenWords(null), 'nothing');
 });

@@ -14,7 +14,7 @@ from typing import Any
 from playwright.async_api import Browser, Page, async_playwright
 
 from tests.chromium import FLAGS, find_chromium
-from tests.page.canned import Canned, alarm, idle, live
+from tests.page.canned import Canned, alarm, idle, live, slow, slowed
 from tests.server.web.maps import png
 
 OUT = Path(__file__).resolve().parents[2] / "out" / "screenshots"
@@ -25,6 +25,7 @@ PHONE: dict[str, Any] = {
     "is_mobile": True,
     "reduced_motion": "reduce",  # so that nothing stands half-way
 }
+SIZES = ((320, 640), (915, 412), (1180, 820))
 Scene = Callable[[Canned, Page], Awaitable[None]]
 SCENES: dict[str, Scene] = {}
 # Roboto as on a phone: words take the room they take there.
@@ -107,6 +108,96 @@ async def home_warning(server: Canned, page: Page) -> None:
     state["checks"][4] |= {"verdict": "fault", "brief": "FAULT 6.3 m"}
     state["alarms"] = [alarm("GPS drift", "GPS drift", text="6.3 m from where it stopped 41 s ago; 2.0 m are allowed")]
     server.state = state
+
+
+@scene("slow-down-off")
+async def slow_down_off(server: Canned, page: Page) -> None:
+    server.state = live() | {"decelerate": slow("not_available", why="/catvehicle/cmd_vel is not on the car.")}
+
+
+@scene("slow-down-arm")
+async def slow_down_arm(server: Canned, page: Page) -> None:
+    server.state = live() | {"decelerate": slow("safe", rivals=["/lap_driver"])}
+    await page.wait_for_timeout(400)
+    await page.tap(".board > .rail .slide")
+    await page.wait_for_selector("#sheet-slow[open]")
+
+
+@scene("slow-down-armed")
+async def slow_down_armed(server: Canned, page: Page) -> None:
+    server.state = live() | {"decelerate": slow("armed")}
+
+
+@scene("slow-down-sliding")
+async def slow_down_sliding(server: Canned, page: Page) -> None:
+    await slow_down_armed(server, page)
+    await page.wait_for_selector('.board > .rail .slide[data-kind="armed"]')
+    knob = await page.locator(".board > .rail .slide .knob").bounding_box()
+    assert knob is not None
+    await page.mouse.move(knob["x"] + 30, knob["y"] + 30)
+    await page.mouse.down()
+    await page.mouse.move(knob["x"] + 165, knob["y"] + 20, steps=4)
+
+
+def _slowing(confirmed: bool | None, **more: Any) -> dict[str, Any]:
+    state = live() | {"decelerate": slowed(confirmed, **more)}
+    for name, value in (
+        ("speed", {"speed_mps": 2.9}),
+        ("acceleration", {"acceleration_mps2": -1.4, "source": "speed"}),
+        ("brake", {"percent": 24.0}),
+        ("accelerator", {"percent": 0.0}),
+        ("distance", {"distance_m": 9.6, "none_in_range": False}),
+    ):
+        state["signals"][name]["value"] = value
+    state["nearest"] = {"time_gap_s": 3.3, "stopping_m": 4.3}
+    return state
+
+
+@scene("slow-down-ordered")
+async def slow_down_ordered(server: Canned, page: Page) -> None:
+    server.state = _slowing(True)
+
+
+@scene("slow-down-release")
+async def slow_down_release(server: Canned, page: Page) -> None:
+    await slow_down_ordered(server, page)
+    await page.tap("[data-f=release]")
+
+
+@scene("slow-down-not-confirmed")
+async def slow_down_not_confirmed(server: Canned, page: Page) -> None:
+    server.state = _slowing(False)
+    server.state["signals"]["speed"]["value"] = {"speed_mps": 4.2}
+    server.state["alarms"] = [
+        alarm(
+            "slow_down_unconfirmed", "Slow-down NOT CONFIRMED", priority="critical", place="dialog", sound="high",
+            needs_ack=True, text="The car does not slow: 4.2 m/s, 2.2 m/s ordered", actions=["acknowledge"],
+            trip_text="", advice="Use the physical stop.", raised_ms=at("14:07:31"),
+        )
+    ]  # fmt: skip
+
+
+@scene("slow-down-not-confirmed-seen")
+async def slow_down_not_confirmed_seen(server: Canned, page: Page) -> None:
+    await slow_down_not_confirmed(server, page)
+    server.state["alarms"][0]["state"] = "ACKED"
+
+
+@scene("slow-down-in-dialog")
+async def slow_down_in_dialog(server: Canned, page: Page) -> None:
+    await home_fault(server, page)
+    server.state["decelerate"] = slow("armed")
+
+
+@scene("countdown")
+async def countdown(server: Canned, page: Page) -> None:
+    await home_fault(server, page)
+    server.state["decelerate"] = slow(
+        "armed",
+        countdown={
+            "trigger": "speed", "title": "Speed above limit", "text": "12.6 m/s, limit 11.0 m/s", "left_s": 1.4,
+        },
+    )  # fmt: skip
 
 
 def _cut(state: dict[str, Any], cut: str, **link: Any) -> dict[str, Any]:
@@ -391,14 +482,16 @@ async def take(browser: Browser, name: str, theme: str, size: dict[str, int] | N
 
 
 async def take_all(names: list[str], fonts: Path) -> None:
-    """All pictures, or those whose names are given."""
+    """All pictures, or those whose names are given; with --sizes first, on other screens."""
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(
             executable_path=find_chromium(), args=[*FLAGS], env={**os.environ, "FONTCONFIG_FILE": str(fonts)}
         )
-        for name in names or SCENES:
+        sizes = [{"width": width, "height": height} for width, height in SIZES] if names[:1] == ["--sizes"] else [None]
+        for name in [one for one in names if one != "--sizes"] or SCENES:
             for theme in ("dark", "light"):
-                print(await take(browser, name, theme))
+                for size in sizes:
+                    print(await take(browser, name, theme, size))
         await browser.close()
 
 

@@ -124,9 +124,14 @@ async def test_paused_no_alarm_comes_and_every_tab_says_so(phone: Phone, calm: P
 async def test_the_slow_down_says_why_it_is_off(phone: Phone, calm: Process) -> None:
     await phone.open(calm.address)
     await phone.live()
-    await expect(phone.page.locator(".board > .rail .slide")).to_contain_text("not configured")
-    await phone.page.locator(".board > .rail .slide").tap()
-    await expect(phone.page.locator(".snack.note")).to_contain_text("The safety driver stops the car.")
+    slide = phone.page.locator(".board > .rail .slide")
+    await expect(slide).to_have_attribute("data-kind", "off")
+    why = await slide.locator("[data-f=slow-why]").text_content()
+    await slide.tap()
+    sheet = phone.page.locator("#sheet-slow")
+    await expect(sheet).to_contain_text("Slow-down not available")
+    await expect(sheet).to_contain_text(why or "a reason")
+    await expect(sheet).to_contain_text("The safety driver stops the car.")
 
 
 async def test_texts_that_mean_harm_are_only_text(phone: Phone, tmp_path: Path) -> None:

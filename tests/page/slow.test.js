@@ -1,0 +1,156 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { soundOf, stripOf } from '../../static/js/alarm-layout.js';
+import { orderMark } from '../../static/js/gauge-layout.js';
+import { chainOf } from '../../static/js/link.js';
+import { NOT_CONFIRMED, connectRow, countdownOf, guardWords, orderWords, releaseOf, sheetOf, slideOf, stateWord, stepsOf, stripWords } from '../../static/js/slow-layout.js';
+import { alarm, state } from './frames.js';
+
+/** @typedef {import('../../static/js/slow-layout.js').Seen} Seen */
+
+/** @returns {any} */
+const slow = (/** @type {string} */ name, more = {}) => ({
+  state: name, why: null, topic: '/catvehicle/cmd_vel', type: 'geometry_msgs/Twist', rivals: [], armed_by: 'Ann', deceleration_mps2: 1.5, order: null, countdown: null, guard: null, ...more,
+});
+const STEPS = { pressed_ms: 1000, server_ms: 1020, bridge_ms: 1031, slows_ms: 1420 };
+/** @returns {any} */
+const order = (more = {}) => ({
+  number: 3, by: 'Ann', why: 'by hand', for_s: 2.1, from_mps: 4.2, ordered_mps: 2.2, deceleration_mps2: 1.5, sending: true, confirmed: true, steps: STEPS, longest_s: 600, ...more,
+});
+const ordered = (more = {}, name = 'ordered') => slow(name, { order: order(more) });
+/** @returns {Seen} */
+const seen = (/** @type {any} */ now, more = {}) => ({ now, isSilent: false, isViewer: false, isReplay: false, mayControl: true, holder: null, ...more });
+
+test('the slide: off with the reason, armed, or filled; silent or looked at only, it is off', () => {
+  const words = (/** @type {any} */ now, more = {}) => {
+    const { kind, title, why } = slideOf(seen(now, more));
+    return `${kind}: ${title} ${why}`;
+  };
+  assert.equal(words(slow('not_available', { why: 'No link to the car.' })), 'off: Slow-down off No link to the car');
+  assert.equal(words(slow('safe')), 'off: Slow-down off press to arm');
+  assert.equal(words(slow('safe'), { isViewer: true }), 'off: Slow-down off a viewer only looks');
+  assert.equal(words(slow('armed')), 'armed: Slide to slow down');
+  assert.equal(words(slow('armed'), { isViewer: true }), 'off: Slow-down armed a viewer only looks');
+  assert.equal(words(slow('armed'), { mayControl: false, holder: 'Ben' }), 'armed: Slide to slow down', 'any operator stops the car');
+  assert.equal(words(slow('armed'), { isSilent: true }), 'off: Slow-down off the server does not answer');
+  assert.equal(words(null), 'off: Slow-down off the server does not answer');
+  assert.equal(words(ordered()), 'go: Slowing to 0.0 m/s');
+  assert.equal(words(ordered({ confirmed: null })), 'go: Ordered to 0.0 m/s', 'not told yet is not "slowing"');
+  assert.equal(words(ordered({ confirmed: false })), 'go: Not confirmed physical stop!');
+  assert.equal(words(ordered({ sending: false })), 'go: Not sending to the car now');
+  assert.equal(words(ordered({}, 'holding')), 'go: Holding at 0.0 m/s');
+  assert.equal(words(slow('something new', { why: null })), 'off: Slow-down off not available');
+});
+
+test('one word of its state, never a comfortable one', () => {
+  const word = (/** @type {any} */ now, more = {}) => stateWord(seen(now, more));
+  assert.deepEqual(['not_available', 'safe', 'armed', 'else'].map((name) => word(slow(name))), ['NOT AVAILABLE', 'SAFE', 'ARMED', 'NOT AVAILABLE']);
+  assert.equal(word(slow('armed'), { isSilent: true }), 'NOT KNOWN');
+  assert.deepEqual([true, null, false].map((confirmed) => word(ordered({ confirmed }))), ['SLOWING', 'ORDERED', 'NOT CONFIRMED']);
+  assert.equal(word(ordered({ sending: false })), 'NOT SENDING');
+  assert.equal(word(ordered({}, 'holding')), 'HOLDING');
+});
+
+test('the strip: armed where nothing else stands, the order above warnings, a critical alarm above the order', () => {
+  const strip = (/** @type {any} */ more) => {
+    const frame = state(more);
+    return stripOf(frame, { isSilent: false, paused_s: 0, chain: chainOf({ frame, isSilent: false, silence_s: 0.1, lag_s: 0.1, heard_ms: 0 }) });
+  };
+  const warning = alarm({ id: 'gps', title: 'GPS drift', priority: 'warning', place: 'snackbar' });
+  assert.deepEqual(strip({ decelerate: slow('armed') }), { kind: 'armed', icon: 'slow', text: 'Armed', end: 'an aid, not an emergency stop', opens: 'log' });
+  assert.equal(strip({ decelerate: slow('armed'), alarms: [warning] }).text, 'GPS drift');
+  assert.equal(strip({ decelerate: slow('safe') }).text, 'No alarms');
+  assert.deepEqual(strip({ decelerate: ordered() }), { kind: 'order', icon: 'slow', text: 'Slowing the car', end: '−1.5 m/s² ordered', opens: 'log' });
+  assert.equal(strip({ decelerate: ordered(), alarms: [warning] }).end, '−1.5 m/s² · 1 alarm');
+  assert.equal(strip({ decelerate: ordered(), alarms: [alarm({ state: 'ACKED' })] }).text, 'Speed above limit');
+  assert.equal(strip({ decelerate: ordered(), session: { paused: true } }).kind, 'invert');
+  assert.deepEqual([strip({ decelerate: ordered({ confirmed: false }) }).text, strip({ decelerate: ordered({ confirmed: false }) }).kind], [NOT_CONFIRMED, 'crit']);
+  assert.equal(stripWords(ordered({ confirmed: null }), 0)?.text, 'Slow-down ordered');
+  assert.equal(stripWords(ordered({}, 'holding'), 0)?.end, '0.0 m/s ordered');
+  assert.equal(stripWords(ordered({ sending: false }), 2)?.text, 'Not sending to the car');
+  assert.equal(stripWords(undefined, 0), null);
+});
+
+test('four steps, each with how much later it was; what is not there is not a number', () => {
+  const told = (more = {}) => stepsOf(order(more)).map(({ label, value, mark }) => `${label} ${value} ${mark}`);
+  assert.deepEqual(told().slice(1), ['At the server +0.02 s ok', 'On the bridge +0.03 s ok', 'Car slows +0.42 s ok']);
+  assert.match(told()[0] ?? '', /^Pressed \d\d:\d\d:\d\d ok$/);
+  assert.deepEqual(told({ confirmed: null, steps: { ...STEPS, bridge_ms: null, slows_ms: null } }).slice(2), ['On the bridge – wait', 'Car slows – wait']);
+  assert.equal(told({ confirmed: false })[3], 'Car slows NOT SEEN crit', 'also where it had slowed before');
+  assert.equal(told({ sending: false, steps: { ...STEPS, bridge_ms: null, slows_ms: null }, confirmed: null })[2], 'On the bridge no link crit');
+  assert.equal(told({ steps: { ...STEPS, slows_ms: null } })[3], 'Car slows confirmed ok', 'it stood already');
+  assert.match(told({ why: 'Speed above limit', steps: { ...STEPS, pressed_ms: null } })[0] ?? '', /^By itself /);
+  assert.equal(told({ why: 'Speed above limit', steps: { ...STEPS, pressed_ms: null } })[2], 'On the bridge +0.01 s ok');
+  assert.equal(told({ steps: { pressed_ms: null, server_ms: null, bridge_ms: null, slows_ms: null }, confirmed: null })[0], 'Pressed – wait');
+});
+
+test('the line beneath the steps: who, why and since when; or what is wrong', () => {
+  assert.deepEqual(orderWords(order(), 0.1), { text: 'By Ann from 4.2 m/s, 2.2 s ago', kind: '' });
+  assert.equal(orderWords(order({ why: 'Speed above limit', from_mps: null }), 0).text, 'By itself: Speed above limit, 2.1 s ago');
+  assert.deepEqual(orderWords(order({ confirmed: false, sending: false }), 0), { text: NOT_CONFIRMED, kind: 'crit' });
+  assert.equal(orderWords(order({ sending: false }), 0).kind, 'crit');
+});
+
+test('the count-down ends at 0 and is none once the order stands; its sound is of its own', () => {
+  const countdown = { trigger: 'speed', title: 'Speed above limit', text: '12.4 m/s', left_s: 1.4 };
+  assert.equal(countdownOf(slow('armed', { countdown }), 0.4)?.left_s.toFixed(3), '1.000');
+  assert.equal(countdownOf(slow('armed', { countdown }), 9)?.left_s, 0);
+  assert.equal(countdownOf({ ...ordered(), countdown }, 0), null);
+  assert.equal(countdownOf(null, 0), null);
+  const page = { isServerLost: false, isLossAcknowledged: false };
+  assert.equal(soundOf(state({ decelerate: slow('armed', { countdown }), alarms: [alarm()] }), page), 'count');
+  assert.equal(soundOf(state({ decelerate: slow('armed') }), page), null);
+});
+
+test('the guard: only one that is heard and guards is said to', () => {
+  const says = (/** @type {any} */ guard, lag_s = 0) => guardWords(guard && { why: '', hold: 0, age_s: 0.2, ...guard }, lag_s);
+  assert.match(says(null).text, /link loss will NOT slow the car$/);
+  for (const [name, isSafe] of /** @type {const} */ ([['guarded', true], ['operator', true], ['slowing', true], ['holding', true], ['unguarded', false], ['new', false]])) {
+    const { text, isSafe: told } = says({ state: name });
+    assert.equal(told, isSafe, name);
+    assert.match(text, isSafe ? /^GUARDED/ : /^UNGUARDED.*will NOT slow the car$/);
+  }
+  assert.match(says({ state: 'guarded', age_s: 3.2 }).text, /^Guard not heard for 3\.2 s: link loss may NOT slow the car$/);
+  assert.equal(says({ state: 'guarded' }, 2).isSafe, false, 'the page’s own silence counts');
+  assert.equal(says({ state: 'guarded', age_s: null }).isSafe, false);
+});
+
+test('who may release, and who instead', () => {
+  assert.equal(releaseOf(seen(ordered())).can, true);
+  assert.deepEqual(releaseOf(seen(ordered(), { mayControl: false, holder: 'Ben' })).label, 'Only Ben can release');
+  assert.equal(releaseOf(seen(ordered(), { isViewer: true })).can, false);
+});
+
+test('the sheet: what would be commanded, who competes, and the one thing this page may do', () => {
+  const sheet = (/** @type {any} */ now, more = {}) => sheetOf(seen(now, more), 0);
+  const safe = sheet(slow('safe', { rivals: ['/lap_driver', '/joy'] }));
+  assert.deepEqual([safe.title, safe.act], ['Arm the slow-down?', 'arm']);
+  assert.deepEqual(safe.facts[0], ['Commanded on', '/catvehicle/cmd_vel', false]);
+  assert.deepEqual(safe.facts[2], ['Slows at', '1.5 m/s²', false]);
+  assert.deepEqual(safe.facts[3], ['Others publish there', '/lap_driver, /joy: the last message wins, so the car may not slow', true]);
+  assert.match(safe.aid, /^An aid, not an emergency stop/);
+  assert.equal(safe.isGuarded, false);
+  assert.equal(sheet(slow('safe', { rivals: null })).facts[3]?.[2], true, 'not known is no "none"');
+  assert.equal(sheet(slow('safe')).facts[3]?.[1], 'none');
+  const other = sheet(slow('safe'), { mayControl: false, holder: 'Ben' });
+  assert.deepEqual([other.act, other.says], ['ask', 'Ben is in control, and arms it.']);
+  assert.equal(sheet(slow('armed')).act, 'disarm');
+  assert.match(sheet(slow('armed')).text, /^Armed by Ann\./);
+  assert.deepEqual([sheet(slow('armed'), { isViewer: true }).act, sheet(slow('safe'), { isReplay: true }).act, sheet(slow('safe'), { isSilent: true }).act, sheet(ordered()).act], [null, null, null, null]);
+  const none = sheet(slow('not_available', { why: 'No link to the car.', topic: null }));
+  assert.deepEqual([none.title, none.text, none.facts, none.act], ['Slow-down not available', 'No link to the car.', [], null]);
+});
+
+test('its row on the connect screen', () => {
+  assert.equal(connectRow(slow('armed'), false).tag, 'Off');
+  assert.deepEqual([connectRow(slow('armed'), true).tag, connectRow(slow('safe'), true).tag, connectRow(ordered(), true).tag], ['Armed', 'Off', 'Slowing']);
+  assert.deepEqual(connectRow(slow('not_available', { why: 'No link to the car.' }), true), { tag: 'Not here', kind: 'unk', cost: 'No link to the car' });
+});
+
+test('the gauge: an arc from the ordered to the measured speed, its words away from the limit’s', () => {
+  assert.match(orderMark(2.2, 2.9, 15, 11).d, /^M14\.\d .*A196 196 0 0 1 29\./);
+  assert.equal(orderMark(2.2, null, 15, 11).d, '');
+  assert.equal(orderMark(2.2, 2.2, 15, 11).d, '');
+  assert.equal(orderMark(4, 2, 15, null).d, orderMark(2, 4, 15, null).d, 'faster ordered than driven: the same arc');
+  assert.deepEqual([orderMark(2, 3, 15, 11).anchor, orderMark(2, 3, 15, 4).anchor], ['start', 'end']);
+});
