@@ -3,6 +3,7 @@
 
 import { styled } from './access-style.js';
 import { need } from './dom.js';
+import { isAsked } from './sheet.js';
 
 export const WHY = 'This phone is paired as a viewer. An operator can change that: Settings, Paired devices.';
 
@@ -12,7 +13,7 @@ const KEYS = [
   '#connect [data-f="go"]', '#sheet-stop [data-f="yes"]', '.sheet:is(#sheet-lost, #sheet-mute, #sheet-failed) [data-f="retry"]',
   '.snack:not(.note) .ac .key', '#sheet-shelve [data-minutes]', '#sheet-topic [data-f="list"] button', '#sheet-profile [data-f="list"] button', '#sheet-reset [data-f="yes"]',
   '#panel-settings .set :is(button, input)', '#panel-settings .undo', '#panel-settings .topic', '#panel-settings [data-part="import"]', '#panel-settings [data-part="reset"]',
-  '[data-operator]', '[data-f="files-empty"]', '.outbox [data-do]',
+  '#sheet-control :is([data-f="keys"], .people) button', '#sheet-phones .phones button', '[data-operator]', '[data-f="files-empty"]', '.outbox [data-do]',
 ].join();
 
 /**
@@ -30,7 +31,10 @@ export function mountViewer(store, say) {
     if (!store.isViewer || !(event.target instanceof Element) || !event.target.closest(KEYS)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
-    if (event.type === 'click' || event.type === 'submit') say(WHY, 'A viewer only looks');
+    if (event.type !== 'click' && event.type !== 'submit') return;
+    const sheet = event.target.closest('dialog');
+    if (sheet && isAsked(sheet)) sheet.close(); // what is said stands beneath it
+    say(WHY, 'A viewer only looks');
   };
   for (const type of ['click', 'pointerdown', 'input', 'change', 'submit']) document.addEventListener(type, hold, { capture: true });
 

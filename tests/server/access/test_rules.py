@@ -161,3 +161,9 @@ async def test_a_viewers_socket_orders_nothing(tmp_path: Path) -> None:
                         for one in replies.values()
                     ]
                     assert set(refusals) == {role is Role.VIEWER}
+                    # To turn its own page to a recording changes nothing for anybody.
+                    await page.send(json.dumps({"kind": "replay", "id": "r", "do": "leave"}))
+                    async with asyncio.timeout(10):
+                        while (message := json.loads(await page.recv())).get("id") != "r":
+                            pass
+                    assert message["ok"] is True
