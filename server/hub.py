@@ -35,6 +35,8 @@ MAX_COMPLAINTS = 200  # a page that sends nothing sensible is let go
 MAX_REPLIES = 200  # and so is one that asks and never reads
 # Where the phone is, the live monitor must know whatever its page shows; and a page that is asked for control answers.
 FROM_A_REPLAY = ("position", "control")
+GOING_AWAY = 1001  # a browser closes so when its page is closed, and not when its phone falls asleep (RFC 6455, 7.4.1)
+FAREWELL = {"kind": "present", "visible": False, "sound": "asks", "awake": "asks", "leaves": True}
 TOO_MANY = "Too many orders at once from this page: wait a second."
 NOT_A_VIEWERS = "This device is paired as a viewer: it looks, and changes nothing."
 NOT_FROM_A_REPLAY = "This page replays a recording: nothing is ordered from it. Go back to live first."
@@ -132,6 +134,8 @@ class Page:
         while self._complaints < MAX_COMPLAINTS and len(self._replies) < MAX_REPLIES:
             received = await self._socket.receive()
             if received["type"] == "websocket.disconnect":
+                if received.get("code") == GOING_AWAY:
+                    await self._present(FAREWELL)
                 return
             if not self._messages.takes(self._now()):
                 self._complain("Too many messages at once.")
@@ -206,12 +210,12 @@ class Page:
             answer = {"ok": False, "reason": f"{str(why).capitalize()}."}
         self._reply(identity, answer)
 
-    async def _present(self, message: dict[str, Any]) -> None:
+    async def _present(self, message: Mapping[str, Any]) -> None:
         """How the page stands, once a second: nobody answers it. A viewer's page is not counted on to hear alarms."""
         if not self._who.is_operator:
             return
         try:
-            answer = await self._bus.request(self._vehicle, message | self._sender)
+            answer = await self._bus.request(self._vehicle, {**message, **self._sender})
         except NotServed:
             return
         if answer.get("ok") is not True:

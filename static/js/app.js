@@ -147,7 +147,10 @@ function speak() {
 }
 
 new Presence(store, arming, handset);
-store.on('refused', (answer) => control.note(answer));
+store.on('refused', (answer) => {
+  control.note(answer);
+  if (answer.heldBy) say(answer.reason, 'You are not in control'); // whoever ordered it may say it better
+});
 listen(field(need(document, '#sheet-menu'), 'this-phone'), 'click', () => {
   closeSheet(/** @type {HTMLDialogElement} */ (need(document, '#sheet-menu')));
   openPhone();

@@ -1,7 +1,7 @@
 // Who is in control, on every tab: the chip in the top bar, the request that its holder must answer, and what happened to it.
 
 import { askedOf, chipOf, noticeOf, seconds } from './control-layout.js';
-import { field, html, icon, listen, setAttribute, setText, setWords, show } from './dom.js';
+import { field, html, icon, listen, setAttribute, setText, setWords } from './dom.js';
 
 /** A refusal is answered with a key for so long: another one of the same words is another [ms]. */
 const REFUSED_MS = 3000;
@@ -54,9 +54,8 @@ export function mount(root, snacks, store, control) {
   const text = html('span');
   const keep = html('button', { type: 'button', class: 'key' }, 'Keep');
   const give = html('button', { type: 'button', class: 'key solid' }, 'Hand over');
-  const asks = html('div', { class: 'snack asks', role: 'alert', hidden: true, 'data-f': 'asks' },
+  const asks = html('div', { class: 'snack asks', role: 'alert', 'data-f': 'asks' },
     html('div', { class: 'side' }, icon('operator')), html('div', { class: 'tx' }, html('b', {}, 'Control is asked for'), text), html('div', { class: 'ac' }, keep, give));
-  snacks.prepend(asks);
   let asking = '';
 
   function draw() {
@@ -66,8 +65,9 @@ export function mount(root, snacks, store, control) {
     setAttribute(chip, 'aria-label', `${chipWords.text}: ${chipWords.label}`);
     setAttribute(chip, 'data-is', chipWords.is);
     const request = store.isSilent ? null : askedOf(now, store.page);
-    show(asks, request !== null);
     asking = request?.page ?? '';
+    if (!request) asks.remove();
+    else if (!asks.isConnected) snacks.prepend(asks);
     if (request) setWords(text, `${request.name} gets it in ${seconds(request.left_s - store.lag_s)} unless you keep it.`);
   }
 

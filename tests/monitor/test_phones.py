@@ -298,9 +298,10 @@ def test_no_other_takes_its_place_whatever_becomes_of_it(why: Why) -> None:
     road = Road().drive(2.0).say("one").say("two")
     road.phones.ride("two", road.now_s)
     road.excuse(why, "two")
-    for _ in range(20):
+    for _ in range(70):  # longer than any other phone is remembered
         road.drive(1.0).say("one")
     assert road.view.phone == "two"
+    assert road.view.fix is not None
     assert road.view.why_not(road.now_s) == ("off" if why == "off" else "silent")
     assert road.view.is_there(road.now_s + 1000.0)  # it is missed for ever
 

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import httpx
+import websockets
 
 from server.access.who import Role
 from server.bridge.server import RosBridge
@@ -23,9 +24,10 @@ SEEN = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", 
 
 async def be_seen(one: Viewer) -> None:
     """As a page says it once a second."""
-    while True:
-        await one.send(SEEN)
-        await asyncio.sleep(0.5)
+    with contextlib.suppress(websockets.ConnectionClosed):
+        while True:
+            await one.send(SEEN)
+            await asyncio.sleep(0.5)
 
 
 @contextlib.asynccontextmanager
@@ -105,6 +107,19 @@ async def test_nonsense_about_presence_is_answered(server: str) -> None:
         await ann.send(SEEN | {"sound": "deafening"})
         await ann.until(lambda: any(said["kind"] == "problem" and "sound" in said["reason"] for said in ann.other))
         assert (await ann.state())["reach"]["can"] == 1
+
+
+async def test_a_page_that_is_closed_is_not_waited_for_and_one_that_breaks_off_is(server: str) -> None:
+    async with operator(server, "Ann", "page-ann") as ann:
+        async with operator(server, "Ben", "page-ben") as ben:
+            await ann.state(lambda s: s["reach"]["of"] == 2)
+            await ben.socket.close(code=1001)
+            await ann.state(lambda s: s["reach"]["of"] == 1)
+        async with operator(server, "Cem", "page-cem") as cem:
+            await ann.state(lambda s: s["reach"]["of"] == 2)
+            cem.socket.transport.abort()
+            state = await ann.state(lambda s: s["reach"]["can"] == 1)
+            assert (state["reach"]["of"], state["reach"]["why"]) == (2, "not heard")
 
 
 async def test_nobody_hears_alarms_on_a_server_that_nobody_looks_at(bridge: RosBridge, server: str) -> None:

@@ -62,6 +62,8 @@ def test_two_pages_of_one_device_are_one_operator_who_hears_by_either() -> None:
     reach.hear(one("Ann", "page-1"), replace(READY, is_visible=False), 0.0)
     reach.hear(one("Ann", "page-2"), READY, 0.0)
     assert reach.facts(0.0) == ReachFacts(can=1, of=1, why="")
+    reach.hear(one("Ann", "page-3"), replace(READY, sound="refused"), 0.2)
+    assert reach.facts(0.2) == ReachFacts(can=1, of=1, why="")
     reach.hear(one("Ann", "page-2"), replace(READY, sound="asks"), 0.5)
     assert reach.facts(0.5).can == 0
 
