@@ -20,7 +20,9 @@ _METADATA = frozenset(
 _THIS_NETWORK = ipaddress.ip_network("0.0.0.0/8")
 _EVERYONE = ipaddress.ip_address("255.255.255.255")
 _NAT64 = (ipaddress.ip_network("64:ff9b::/96"), ipaddress.ip_network("64:ff9b:1::/48"))  # RFC 6052, RFC 8215
-_COMPATIBLE = ipaddress.ip_network("::/96")  # IPv4 in IPv6 as of old, RFC 4291 2.5.5.1
+# IPv4 in the last four bytes: as of old (RFC 4291 2.5.5.1), translated (RFC 2765 2.1), tunnelled (RFC 5214).
+_COMPATIBLE = (ipaddress.ip_network("::/96"), ipaddress.ip_network("::ffff:0:0:0/96"))
+_ISATAP = (0x00005EFE, 0x02005EFE)
 
 _NETLOC = re.compile(r"(\[[^\[\]]*\]|[^\[\]:]*)(:[^:]*)?\Z")
 _RUN_ON = re.compile(r"^\[[^\]/?#]*\][^:/?#]")  # a bracket and then no colon
@@ -194,9 +196,11 @@ def _within(address: _IpAddress) -> list[ipaddress.IPv4Address]:
     """The IPv4 addresses that an IPv6 address carries."""
     if not isinstance(address, ipaddress.IPv6Address) or address.is_loopback:
         return []
-    found = [address.ipv4_mapped, address.sixtofour]
-    if address in _COMPATIBLE or any(address in network for network in _NAT64):
-        found.append(ipaddress.IPv4Address(int(address) & 0xFFFFFFFF))
+    found = [address.ipv4_mapped, address.sixtofour, *(address.teredo or ())]
+    bits = int(address)
+    is_carrier = any(address in network for network in (*_COMPATIBLE, *_NAT64))
+    if is_carrier or (bits >> 32 & 0xFFFFFFFF) in _ISATAP:
+        found.append(ipaddress.IPv4Address(bits & 0xFFFFFFFF))
     return [one for one in found if one is not None]
 
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 import argparse
 import importlib
 import io
-import logging
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from server import log_lines
 from server.version import catgraph_version
 
 
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             module.add_arguments(sub)
             sub.set_defaults(run=module.run)
     args = parser.parse_args(given)
-    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s", stream=sys.stderr)
+    log_lines.begin()
     try:
         return int(args.run(args))
     except KeyboardInterrupt:

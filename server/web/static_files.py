@@ -15,12 +15,14 @@ from pathlib import Path
 from stat import S_ISREG
 
 from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 from server.web.built import FOLDER
 
+_LONGEST_NAME = 120
 _YEAR = "public, max-age=31536000, immutable"
 _TYPES = {
     ".js": "text/javascript; charset=utf-8",
@@ -65,6 +67,8 @@ class StaticText(StaticFiles):
         is_named = path.startswith(f"{FOLDER}/") or scope.get("query_string", b"").startswith(b"v=")
         keep = _YEAR if is_named else "no-cache"
         media_type = _TYPES.get(os.path.splitext(path)[1])
+        if "\0" in path or any(len(part) > _LONGEST_NAME for part in path.split(os.sep)):
+            raise HTTPException(404)  # no file is called so, and asking for it is an error of its own kind
         if media_type is not None and scope["method"] == "GET":
             full, stat = self.lookup_path(path)
             if stat is not None and S_ISREG(stat.st_mode):
