@@ -130,6 +130,7 @@ class _BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
         self.was_accepted = False  # by the link, when it opened
         self.was_silent = False
         self.message_data: list[bytes] = []
+        self.pings = self.pongs = 0  # of `RosLink.ping`: sent, and the newest that was answered
         self.heard_s = self.factory.loop.time()
         self._timer: asyncio.TimerHandle | None = None
         super().connection_made(transport)
@@ -149,6 +150,10 @@ class _BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
         self._look(self.factory.loop.time())
         self.factory.link._opened(self)
         self.settled.set()
+
+    def onPong(self, payload: bytes) -> None:
+        if payload.isdigit() and self.pongs < int(payload) <= self.pings:
+            self.pongs = int(payload)
 
     def onClose(self, wasClean: bool, code: int | None, reason: str | None) -> None:
         if self._timer is not None:
@@ -375,7 +380,13 @@ class RosLink:
         """Asks the bridge for a sign of life, behind all that was sent before. Raises LinkDown."""
         if self._socket is None or not self.is_open:
             raise LinkDown("not sent: no connection to the car")
-        self._socket.sendPing()
+        self._socket.pings += 1
+        self._socket.sendPing(b"%d" % self._socket.pings)
+
+    @property
+    def unanswered(self) -> int:
+        """How many of these pings the bridge has not answered: so much of what was sent it may not have read."""
+        return 0 if self._socket is None else self._socket.pings - self._socket.pongs
 
     async def call(self, service: str, arguments: dict[str, Any] | None = None, *, timeout_s: float = 2.0) -> Any:
         """The values a service answers. Raises LinkDown, also where the link breaks before the answer, or CallFailed

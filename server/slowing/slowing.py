@@ -1,8 +1,8 @@
 """Slows one vehicle: keeps the order, speaks it to the car 20 times a second, and tells what came of it.
 
-What is spoken is made at the moment it goes out, and only while the bridge answers: a ping goes with every command, and
-where neither it nor anything else is answered for 0.3 s the socket is aborted, so that what the system still holds dies
-with it (RFC 793, RST) instead of arriving late.
+What is spoken is made at the moment it goes out, and only while the bridge answers. A ping goes behind every command:
+with two unanswered nothing more is said, and where nothing is heard for 0.3 s the socket is aborted, so that what the
+system still holds dies with it (RFC 9293, RST) instead of arriving late.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from monitor.alarm import Alarm, Refused
 from monitor.check import Verdict
 from monitor.checks.slow_down import SlowDownLimits, obeys
 from monitor.slowing import SlowingFacts
-from monitor.state import Snapshot
+from monitor.state import Reading, Snapshot
 from monitor.triggers import COUNTDOWN_S, Due, Triggers
 from server import commands, wire
 from server.link import LinkDown, RosLink
@@ -32,6 +32,8 @@ log = logging.getLogger("catgraph.slowing")
 
 PERIOD_S = 0.05  # the obstacle stopper lets a command count for 0.2 s
 DOUBT_S = 0.3
+FIRST_SPEED_S = 0.5
+UNDER_WAY = 2  # commands of which the bridge has not yet shown that it read them; where it freezes, no more come late
 STALL_S = 0.1  # a turn so late was our own fault: what the bridge said meanwhile is still unread
 
 
@@ -71,6 +73,7 @@ class Slowing:
         self._ros_version = 1
         self._ordered = asyncio.Event()
         self._turned_s = 0.0
+        self._opened_s = 0.0  # the newest opening of the link
         self._told_unconfirmed = False
         self.limits = SlowDownLimits()
         self.rivals: tuple[str, ...] | None = None  # who else publishes on the topic; None: not known
@@ -79,6 +82,7 @@ class Slowing:
 
     def link_opened(self, link: RosLink) -> None:
         self._link = link
+        self._opened_s = self._now()
         self._mouth.attach(link)
         if self._life.order is not None:
             self._speak()
@@ -291,11 +295,16 @@ class Slowing:
             self._cut("the bridge does not answer")
             link.abort()
             return
+        if link.unanswered >= UNDER_WAY:
+            return  # nothing is put behind what may be stuck
         way = self._way
         if way.kind is None or way.type is None:
             self._cut("the command topic is not confirmed yet")  # after a restart the car is asked first
             return
-        command = self._life.next(self._car(), now_s)
+        car = self._car()
+        if car.speed_mps is None and order.ramp is None and now_s - self._opened_s < FIRST_SPEED_S:
+            return  # a link that is back brings a speed at once: the ramp begins at what is measured
+        command = self._life.next(car, now_s)
         assert command is not None
         said = message(
             way.kind,
@@ -328,13 +337,16 @@ class Slowing:
         speed, steering, ordered = snapshot.get("speed"), snapshot.get("steering"), snapshot.get("command")
         now_s = snapshot.now_s
         tyre_rad = None
-        if steering is not None and steering.is_fresh(now_s):
+        if steering is not None and self._is_of_now(steering, now_s):
             tyre_rad = steering.value.percent / PERCENT_A_RAD
-        elif ordered is not None and ordered.is_fresh(now_s):
+        elif ordered is not None and self._is_of_now(ordered, now_s):
             tyre_rad = ordered.value.tyre_angle_rad
-        return Car(
-            speed_mps=speed.value.speed_mps if speed is not None and speed.is_fresh(now_s) else None, tyre_rad=tyre_rad
-        )
+        is_known = speed is not None and self._is_of_now(speed, now_s)
+        return Car(speed_mps=speed.value.speed_mps if speed is not None and is_known else None, tyre_rad=tyre_rad)
+
+    def _is_of_now(self, reading: Reading[Any], now_s: float) -> bool:
+        """Fresh, and not of before the link was lost: meanwhile the car may have done anything."""
+        return reading.is_fresh(now_s) and reading.received_s >= self._opened_s
 
     def _prove(self, order: Order, now_s: float) -> None:
         found = obeys(replace(self._snapshot(), slowing=self._facts()), self.limits, self._told_unconfirmed).verdict

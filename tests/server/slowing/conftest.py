@@ -25,7 +25,12 @@ class Field:
         self.service = service
         self.client = client
         self.heard: list[tuple[float, str, dict[str, Any]]] = []  # what any client published, and when it arrived
-        service.bridge.on_publish.append(lambda topic, kind, said: self.heard.append((time.monotonic(), topic, said)))
+        self.driven: list[float] = []  # how fast the car was then
+        service.bridge.on_publish.append(self._hear)
+
+    def _hear(self, topic: str, kind: str, said: dict[str, Any]) -> None:
+        self.heard.append((time.monotonic(), topic, said))
+        self.driven.append(self.speed_mps)
 
     @property
     def speed_mps(self) -> float:
