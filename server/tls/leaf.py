@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import ipaddress
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from server.tls.authority import BACK as AUTHORITY_BACK
 from server.tls.authority import Authority, clock, private_pem
-from server.tls.names import Names
+from server.tls.names import IpAddress, Names
 
 FILE = "leaf.pem"
 VALID = dt.timedelta(days=397)  # from end to end; browsers refuse more than 398 (Apple, Chrome, since 2020-09-01)
@@ -77,6 +78,13 @@ def why_renew(leaf: Leaf, authority: Authority, names: Names, *, now: dt.datetim
     ):
         return f"it would have ended on {leaf.cert.not_valid_after_utc:%Y-%m-%d}"
     return None
+
+
+def addresses_of(leaf: Leaf) -> list[IpAddress]:
+    """The addresses it is for."""
+    names = leaf.cert.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    found = names.get_values_for_type(x509.IPAddress)
+    return [ip for ip in found if isinstance(ip, ipaddress.IPv4Address | ipaddress.IPv6Address)]
 
 
 def load(folder: Path) -> Leaf | None:

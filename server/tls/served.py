@@ -8,6 +8,7 @@ import functools
 import logging
 import socket
 import sys
+import time
 from collections.abc import Callable, Coroutine
 from contextlib import AsyncExitStack
 from dataclasses import dataclass
@@ -17,11 +18,14 @@ import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.server import ServerState
 
+from server.access.names import is_in_container
 from server.config import Config, Tls
+from server.tls import leaf
 from server.tls.authority import Authority, TlsRefused
 from server.tls.doorway import Doorway, Factory
 from server.tls.keeper import GivenCertificate, OwnCertificate, keep
 from server.tls.names import Names, addresses_now, host_now, names_of
+from server.tls.outside import Outside
 from server.tls.setup import Whereabouts, explaining, leading
 from server.web import requests
 
@@ -51,6 +55,7 @@ class Secured:
     certificate: OwnCertificate | GivenCertificate
     tls: Tls
     host: str  # listened on
+    outside: Outside | None = None  # in a container
     now: Callable[[], dt.datetime] = utc_now
 
     @property
@@ -70,6 +75,13 @@ class Secured:
             return self.certificate.names
         return names_of(_addresses(), host_now())
 
+    def typed(self, host: str | None) -> None:
+        """Somebody came to the plain page by this name."""
+        if self.outside is not None and self.outside.learn(host):
+            said = self.certificate.refresh(self.now())
+            if said is not None:
+                log.warning("%s", said)
+
     def hosts(self) -> tuple[str, ...]:
         """What may stand in the page's address, the likeliest first."""
         if isinstance(self.certificate, GivenCertificate):
@@ -81,12 +93,15 @@ class Secured:
         return tuple(dict.fromkeys([self.host, *all] if self.host in all else all))
 
 
-def secure(config: Config, *, now: Callable[[], dt.datetime] = utc_now) -> Secured | None:
+def secure(
+    config: Config, *, now: Callable[[], dt.datetime] = utc_now, in_container: bool | None = None
+) -> Secured | None:
     """The certificate that `config` asks for; None: plain HTTP. Raises TlsRefused."""
     if not config.is_tls:
         return None
     tls = config.tls or Tls()
     certificate: OwnCertificate | GivenCertificate
+    outside: Outside | None = None
     if tls.mode == "files":
         if tls.cert is None or tls.key is None:
             raise TlsRefused("A given certificate needs its key, and a key its certificate.")
@@ -94,9 +109,13 @@ def secure(config: Config, *, now: Callable[[], dt.datetime] = utc_now) -> Secur
     else:
         if config.data is None:
             raise TlsRefused("An authority of our own needs a data folder to be kept in.")
-        names = functools.partial(_names_now, config.names)
-        certificate = OwnCertificate(config.data / "tls", names, host=host_now(), now=now())
-    return Secured(certificate=certificate, tls=tls, host=config.host, now=now)
+        folder = config.data / "tls"
+        if is_in_container() if in_container is None else in_container:
+            before = leaf.load(folder)
+            outside = Outside(() if before is None else leaf.addresses_of(before), now=time.monotonic)
+        names = functools.partial(_names_now, config.names, outside)
+        certificate = OwnCertificate(folder, names, host=host_now(), now=now())
+    return Secured(certificate=certificate, tls=tls, host=config.host, outside=outside, now=now)
 
 
 async def serve_secured(
@@ -161,7 +180,7 @@ def _plain_app(secured: Secured, port: int, setup_port: int) -> ASGIApp:
     def where() -> Whereabouts:
         return Whereabouts(hosts=secured.hosts(), port=port, setup_port=setup_port)
 
-    return leading(where) if secured.authority is None else explaining(secured.authority, where)
+    return leading(where) if secured.authority is None else explaining(secured.authority, where, secured.typed)
 
 
 def _supervised(work: Callable[[], Coroutine[Any, Any, None]]) -> asyncio.Task[None]:
@@ -184,8 +203,9 @@ async def _cancelled(task: asyncio.Task[None]) -> None:
     await asyncio.wait([task])
 
 
-def _names_now(given: tuple[str, ...]) -> Names:
-    return names_of(addresses_now(), host_now(), given)
+def _names_now(given: tuple[str, ...], outside: Outside | None) -> Names:
+    learnt = outside.addresses if outside is not None else ()
+    return names_of(addresses_now(), host_now(), (*given, *learnt))
 
 
 def _addresses() -> tuple[Any, ...]:

@@ -48,8 +48,10 @@ class Whereabouts:
         return f"[{found}]" if ":" in found else found
 
 
-def explaining(authority: Authority, where: Callable[[], Whereabouts]) -> ASGIApp:
-    """The application that explains `authority`."""
+def explaining(
+    authority: Authority, where: Callable[[], Whereabouts], typed: Callable[[str | None], None] = lambda host: None
+) -> ASGIApp:
+    """The application that explains `authority`; `typed` is told by which name somebody came to its page."""
     static = static_dir()
     templates = Environment(
         loader=FileSystemLoader(templates_dir()), autoescape=select_autoescape(), trim_blocks=True, lstrip_blocks=True
@@ -62,8 +64,9 @@ def explaining(authority: Authority, where: Callable[[], Whereabouts]) -> ASGIAp
     profile = mobileconfig(authority)
 
     def explain(request: Request) -> Response:
-        found = where()
         host = _host_of(request)
+        typed(host)
+        found = where()
         address = found.setup(host)
         drawn = page.render(
             name=authority.name,
