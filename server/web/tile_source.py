@@ -139,7 +139,7 @@ class TileSource:
 
 
 def _leave(answer: urllib3.BaseHTTPResponse) -> None:
-    """The connection is used again where little is left to read, also of an answer without a body; else it is closed."""
+    """The connection is used again where little is left to read, or nothing; else it is closed."""
     left = answer.length_remaining
     if left is not None and left <= _PIECE:
         answer.drain_conn()

@@ -8,7 +8,8 @@ import { MERCATOR_END_DEG, pictureMatrix, tileScale } from './map-layout.js';
  * @typedef {import('./geodesy.js').Place} Place
  * @typedef {import('./map-layout.js').View} View
  * @typedef {import('./map-layout.js').Size} Size
- * @typedef {{title: string, tiles: string, min_zoom: number, max_zoom: number, bounds: [number, number, number, number], attribution: string}} Layer
+ * @typedef {{title: string, tiles: string, min_zoom: number, max_zoom: number, bounds: [number, number, number, number], attribution: string,
+ *   upstream?: {host: string, problem: string | null, kept_bytes: number, limit_bytes: number, evicted: number}}} Layer upstream: where its tiles are fetched
  * @typedef {{source: string, corners: [number, number][], attribution: string}} Picture
  * @typedef {{layers: Layer[], image: Picture | null}} Told as GET /api/map has it
  */
@@ -18,6 +19,8 @@ const LEAFLET = '../vendor/leaflet.js';
 const SHIFT_PX = 64;
 /** Tiles are stretched between this and 1.42 times their size. */
 const LEAST_STRETCH = 0.7;
+/** A layer whose tiles are fetched is asked about so often while a tile of it is missing [ms]. */
+const ASK_EVERY_MS = 10_000;
 
 export class Ground {
   /** @type {import('leaflet').Map | null} */
@@ -29,6 +32,11 @@ export class Ground {
   #layers = [];
   /** @type {Picture | null} */
   #told = null;
+  /** @type {ReturnType<typeof setTimeout> | null} */
+  #asking = null;
+  #asked_ms = -Infinity;
+  /** Tiles that should be fetched and are not there. @type {Set<HTMLImageElement>} */
+  #missing = new Set();
   /** Whether anything lies there. */
   isThere = false;
 
@@ -70,9 +78,42 @@ export class Ground {
       attributionControl: false, zoomControl: false, dragging: false, touchZoom: false, scrollWheelZoom: false, doubleClickZoom: false, boxZoom: false, keyboard: false,
       zoomAnimation: false, fadeAnimation: false, markerZoomAnimation: false, inertia: false, trackResize: false, maxZoom: 24,
     });
-    for (const { tiles, min_zoom, max_zoom, bounds: [west, south, east, north] } of layers) {
-      L.tileLayer(tiles, { minZoom: min_zoom, maxNativeZoom: max_zoom, maxZoom: 24, bounds: [[south, west], [north, east]], updateWhenIdle: false, keepBuffer: 1 }).addTo(this.#map);
+    for (const { tiles, min_zoom, max_zoom, bounds: [west, south, east, north], upstream } of layers) {
+      const layer = L.tileLayer(tiles, { minZoom: min_zoom, maxNativeZoom: max_zoom, maxZoom: 24, bounds: [[south, west], [north, east]], updateWhenIdle: false, keepBuffer: 1 }).addTo(/** @type {import('leaflet').Map} */ (this.#map));
+      if (!upstream) continue;
+      layer.on('tileerror', ({ tile }) => {
+        this.#missing.add(/** @type {HTMLImageElement} */ (tile));
+        this.#askSoon();
+      });
+      const isThere = (/** @type {{tile: HTMLElement}} */ { tile }) => void this.#missing.delete(/** @type {HTMLImageElement} */ (tile));
+      layer.on('tileload', isThere);
+      layer.on('tileunload', isThere);
     }
+  }
+
+  /** Why is a tile missing? And once more for it: the server dials only when it is time to. */
+  #askSoon() {
+    if (this.#asking) return;
+    this.#asking = setTimeout(async () => {
+      this.#asking = null;
+      if (!this.root.isConnected) return;
+      this.#asked_ms = performance.now();
+      const was = this.#problem;
+      try {
+        const answer = await fetch('/api/map');
+        if (answer.ok) this.#layers = /** @type {Told} */ (await answer.json()).layers;
+      } catch {
+        // the server itself is gone: others say so
+      }
+      this.onChange();
+      if (was === null && this.#problem === null) return; // there is no such tile
+      for (const tile of this.#missing) tile.src = String(tile.src); // fetched again; if it fails again, this is asked again
+    }, Math.max(0, this.#asked_ms + ASK_EVERY_MS - performance.now()));
+  }
+
+  /** What stands against fetching tiles, as the server said last. @returns {string | null} */
+  get #problem() {
+    return this.#layers.find(({ upstream }) => upstream?.problem)?.upstream?.problem ?? null;
   }
 
   /** Where to look while no position is known: the middle of what there is. @returns {Place | null} */
@@ -94,7 +135,9 @@ export class Ground {
   words(view) {
     if (!this.isThere) return '';
     const names = [...new Set([...this.#layers, ...(this.#told ? [this.#told] : [])].map(({ attribution }) => attribution).filter(Boolean))].join(' · ');
-    return this.#layers.length && !this.#layers.some((layer) => covers(layer, view)) ? `No map tiles here. ${names}`.trim() : names;
+    const problem = this.#missing.size ? this.#problem : null;
+    const here = this.#layers.length && !this.#layers.some((layer) => covers(layer, view)) ? 'No map tiles here.' : '';
+    return [problem, here, names].filter(Boolean).join(' ');
   }
 
   /** @param {View} view @param {Size} size */

@@ -21,6 +21,7 @@ PHONE: dict[str, Any] = {
     "color_scheme": "dark",
     "has_touch": True,
     "is_mobile": True,
+    "service_workers": "block",  # what keeps the page's shell has its own tests; here every request is the page's
 }
 expect.set_options(timeout=8000)
 
@@ -99,5 +100,8 @@ async def phone(browser: Browser) -> AsyncIterator[Phone]:
     yield phone
     machine.cancel()
     await context.close()
-    lost = re.compile(r"WebSocket connection to|Failed to load resource: net::ERR_(CONNECTION|EMPTY)|ERR_CONNECTION")
+    lost = re.compile(
+        r"Service Worker registration blocked|WebSocket connection to"
+        r"|Failed to load resource: net::ERR_(CONNECTION|EMPTY)|ERR_CONNECTION"
+    )
     assert [said for said in phone.complaints if not lost.search(said)] == []

@@ -21,6 +21,7 @@ from tests.page.roamer import Roamer, roaming
 from tests.server.conftest import serving
 from tests.server.web import maps
 from tests.server.web.maps import png
+from tests.server.web.test_upstream import Source
 
 FIRST = 0.135  # metres a pixel at the first look
 MIDDLE = """() => { const { width, height } = document.querySelector('.mapbox').getBoundingClientRect();
@@ -533,3 +534,32 @@ async def test_tiles_and_the_site_s_picture_lie_where_they_should(phone: Phone, 
             for _ in range(6):
                 await it.f("wider").tap()
             await expect(it.f("by")).to_have_text("No map tiles here. © Plan · Survey")
+
+
+async def test_a_fetched_map_is_drawn_named_and_there_without_internet(phone: Phone, tmp_path: Path) -> None:
+    source = Source(tmp_path / "source")
+    source.start()
+    try:
+        upstream = source.upstream(zoom=(17, 18), attribution="© Testers of maps")
+        async with roaming() as car:
+            async with looking(phone, car, data=tmp_path / "data", map_upstream=upstream) as it:
+                await it.until("() => document.querySelectorAll('.leaflet-tile-loaded').length >= 4")
+                await expect(it.f("by")).to_have_text("© Testers of maps")
+                fetched = len(source.asked)
+                assert {int(one["path"].split("/")[1]) for one in source.asked} == {18}, "no level but the one in sight"
+            source.kill()
+            async with looking(phone, car, data=tmp_path / "data", map_upstream=upstream) as it:
+                await it.until("() => document.querySelectorAll('.leaflet-tile-loaded').length >= 4")
+                await expect(it.f("by")).to_have_text("© Testers of maps")
+                await it.f("wider").tap()
+                await it.f("wider").tap()
+                await expect(it.f("by")).to_have_text(
+                    f"The map's server 127.0.0.1:{source.port} does not answer. © Testers of maps", timeout=15_000
+                )
+                source.start()
+                # It comes back by itself: nobody has to move the map.
+                await expect(it.f("by")).to_have_text("© Testers of maps", timeout=45_000)
+                await it.until("() => document.querySelectorAll('.leaflet-tile-loaded').length >= 9")
+                assert len(source.asked) > fetched
+    finally:
+        source.kill()

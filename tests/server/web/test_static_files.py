@@ -31,7 +31,9 @@ async def test_a_text_comes_small_to_whoever_can_unpack_it_and_is_asked_about_ea
             other = await client.get(path, headers={"Accept-Encoding": "gzip", "If-None-Match": '"yesterday"'})
             assert other.status_code == 200
             is_document = path == "/"
-            assert ("require-trusted-types-for" in small.headers["content-security-policy"]) == is_document  # short for the parts
+            assert (
+                "require-trusted-types-for" in small.headers["content-security-policy"]
+            ) == is_document  # short for the parts
             assert small.headers["x-content-type-options"] == "nosniff"
         head = await client.head("/static/js/store.js")
         assert head.status_code == 200
