@@ -34,7 +34,7 @@ MAX_PAGES = 500
 MAX_COMPLAINTS = 200  # a page that sends nothing sensible is let go
 MAX_REPLIES = 200  # and so is one that asks and never reads
 # Where the phone is, the live monitor must know whatever its page shows; and a page that is asked for control answers.
-FROM_A_REPLAY = ("position", "control")
+FROM_A_REPLAY = ("position", "control", "veto")
 GOING_AWAY = 1001  # a browser closes so when its page is closed, and not when its phone falls asleep (RFC 6455, 7.4.1)
 FAREWELL = {"kind": "present", "visible": False, "sound": "asks", "awake": "asks", "leaves": True}
 TOO_MANY = "Too many orders at once from this page: wait a second."

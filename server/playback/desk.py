@@ -236,6 +236,7 @@ def summary(state: Mapping[str, Any]) -> dict[str, Any]:
         "recording": state["recording"],
         "control": state["control"],
         "reach": state["reach"],
+        "decelerate": state["decelerate"],
         "alarms": state["alarms"][:LIVE_ALARMS],
         "alarms_in_all": len(state["alarms"]),
     }

@@ -40,6 +40,17 @@ export function orderOf(now) {
 }
 
 /**
+ * What a release would end: the order, or a hold of the guard's own; null: nothing holds the car.
+ * @param {Decelerate | null | undefined} now
+ */
+export function holdOf(now) {
+  const order = orderOf(now);
+  if (order) return { number: order.number, isGuards: false };
+  const guard = now?.guard;
+  return guard && (guard.state === 'slowing' || guard.state === 'holding') ? { number: guard.hold, isGuards: true } : null;
+}
+
+/**
  * The slide.
  * @param {Seen} seen
  * @returns {{kind: 'off' | 'armed' | 'go', title: string, why: string, label: string}} off: pressed, it says why, or arms
@@ -79,7 +90,9 @@ function goWords(state, order) {
  */
 export function stripWords(now, standing) {
   const order = orderOf(now);
-  if (!now || (!order && now.state !== 'armed')) return null;
+  if (!now) return null;
+  if (!order && holdOf(now)) return { kind: 'order', text: `The guard ${now.guard?.state === 'slowing' ? 'slows' : 'holds'} the car`, end: 'by itself' };
+  if (!order && now.state !== 'armed') return null;
   if (!order) return { kind: 'armed', text: 'Armed', end: 'an aid, not an emergency stop' };
   if (order.confirmed === false) return { kind: 'crit', text: NOT_CONFIRMED, end: '' };
   const rate = `−${fixed(order.deceleration_mps2)} m/s²`;

@@ -3,7 +3,7 @@
 
 import { field, html, icon, listen, need, setAttribute, setIcon, setText, setWords, show } from './dom.js';
 import { mountSlide } from './slide.js';
-import { countdownOf, guardWords, orderOf, orderWords, releaseOf, slideOf, stateWord, stepsOf } from './slow-layout.js';
+import { countdownOf, guardWords, holdOf, orderOf, orderWords, releaseOf, slideOf, stateWord, stepsOf } from './slow-layout.js';
 
 /** Without an answer by then nobody knows whether the car is slowed; the frames will say [ms]. */
 const ANSWER_MS = 2000;
@@ -108,11 +108,11 @@ export function mount(root, store, control, say) {
 
   function askRelease() {
     const seen = seenOf(store);
-    const order = orderOf(seen.now);
+    const hold = holdOf(seen.now);
     const may = releaseOf(seen);
-    if (!order) return;
+    if (!hold) return;
     if (!may.can) return say(may.why, 'Not released', seen.isViewer ? undefined : { label: 'Ask for control', act: () => void control.order('request') });
-    releaseSheet.dataset['order'] = String(order.number);
+    releaseSheet.dataset['order'] = String(hold.number);
     const standing = store.frame?.alarms.filter((alarm) => alarm.priority === 'critical' && alarm.active) ?? [];
     setWords(field(releaseSheet, 'alarms'), standing.length ? `Still standing: ${standing.map(({ title }) => title).join(', ')}.` : '');
     if (!releaseSheet.open) releaseSheet.showModal();
@@ -130,14 +130,15 @@ export function mount(root, store, control, say) {
       setText(legend, `the car: ${word}`);
       setAttribute(legend, 'data-state', word.toLowerCase());
     }
-    setText(leftLegend, order ? 'slow-down' : 'monitoring');
-    show(field(root, 'stop'), !order);
-    show(field(root, 'pause'), !order || store.frame?.session.paused === true); // to resume is never taken away
+    const hold = seen.isReplay ? null : holdOf(now);
+    setText(leftLegend, hold ? 'slow-down' : 'monitoring');
+    show(field(root, 'stop'), !hold);
+    show(field(root, 'pause'), !hold || store.frame?.session.paused === true); // to resume is never taken away
     const may = releaseOf(seen);
-    show(release, order !== null && !seen.isReplay);
+    show(release, hold !== null);
     setText(releaseWords, may.label);
     setAttribute(release, 'data-barred', !may.can || null);
-    if (releaseSheet.open && (!order || String(order.number) !== releaseSheet.dataset['order'] || !may.can)) releaseSheet.close();
+    if (releaseSheet.open && (!hold || String(hold.number) !== releaseSheet.dataset['order'] || !may.can)) releaseSheet.close();
     drawSteps(order);
     const guard = guardWords(now?.guard, store.lag_s);
     setText(field(home, 'slow-state'), `Slow-down ${word}`);

@@ -3,7 +3,7 @@ import { test } from 'node:test';
 import { soundOf, stripOf } from '../../static/js/alarm-layout.js';
 import { orderMark } from '../../static/js/gauge-layout.js';
 import { chainOf } from '../../static/js/link.js';
-import { NOT_CONFIRMED, connectRow, countdownOf, guardWords, orderWords, releaseOf, sheetOf, slideOf, stateWord, stepsOf, stripWords } from '../../static/js/slow-layout.js';
+import { NOT_CONFIRMED, connectRow, countdownOf, guardWords, holdOf, orderWords, releaseOf, sheetOf, slideOf, stateWord, stepsOf, stripWords } from '../../static/js/slow-layout.js';
 import { alarm, state } from './frames.js';
 
 /** @typedef {import('../../static/js/slow-layout.js').Seen} Seen */
@@ -113,6 +113,16 @@ test('the guard: only one that is heard and guards is said to', () => {
   assert.match(says({ state: 'guarded', age_s: 3.2 }).text, /^Guard not heard for 3\.2 s: link loss may NOT slow the car$/);
   assert.equal(says({ state: 'guarded' }, 2).isSafe, false, 'the page’s own silence counts');
   assert.equal(says({ state: 'guarded', age_s: null }).isSafe, false);
+});
+
+test('a release ends the order, or what the guard holds by itself, by its number', () => {
+  const guard = (/** @type {string} */ name) => ({ state: name, why: 'heartbeat stopped', hold: 7, age_s: 0.1 });
+  assert.deepEqual(holdOf(ordered()), { number: 3, isGuards: false });
+  assert.deepEqual(holdOf(slow('safe', { guard: guard('holding') })), { number: 7, isGuards: true });
+  assert.equal(holdOf(slow('armed', { guard: guard('guarded') })), null);
+  assert.equal(holdOf(null), null);
+  assert.equal(stripWords(slow('safe', { guard: guard('slowing') }), 0)?.text, 'The guard slows the car');
+  assert.equal(stripWords(slow('armed', { guard: guard('holding') }), 0)?.text, 'The guard holds the car');
 });
 
 test('who may release, and who instead', () => {
