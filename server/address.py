@@ -27,6 +27,7 @@ _ISATAP = (0x00005EFE, 0x02005EFE)
 _NETLOC = re.compile(r"(\[[^\[\]]*\]|[^\[\]:]*)(:[^:]*)?\Z")
 _RUN_ON = re.compile(r"^\[[^\]/?#]*\][^:/?#]")  # a bracket and then no colon
 _FEW_SLASHES = re.compile(r"(?i)(wss?):/?(?=[^/\d]|\d+\.)")
+_LOGIN = re.compile(r"(^\s*|//)[^/?#]*@")
 _EXAMPLE = "Type a host and a port, such as 192.168.4.1:9090."
 _IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
@@ -174,6 +175,11 @@ def _wrong_scheme(scheme: str, rest: str) -> BadAddress:
         code="scheme",
         suggestion=better if host else None,
     )
+
+
+def without_login(typed: str) -> str:
+    """What was typed, without the name and password that some addresses begin with: it is written down for good."""
+    return _LOGIN.sub(r"\1…@", typed)
 
 
 def refuse_forbidden(ip: str) -> None:

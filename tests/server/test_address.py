@@ -9,7 +9,7 @@ from autobahn.websocket.util import parse_url
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.address import Address, BadAddress, parse, refuse_forbidden
+from server.address import Address, BadAddress, parse, refuse_forbidden, without_login
 
 DIALLED = {
     "bare host": ("car", "ws://car:9090"),
@@ -147,6 +147,9 @@ FORBIDDEN = [
     "64:ff9b::169.254.169.254",
     "64:ff9b:1::a9fe:a9fe",
     "2002:a9fe:a9fe::1",
+    "::ffff:0:169.254.169.254",
+    "fd00::5efe:169.254.169.254",
+    "2001:0:a9fe:a9fe::1",
 ]
 ALLOWED = [
     "127.0.0.1",
@@ -186,6 +189,20 @@ def test_other_spellings_of_an_address_come_out_of_the_resolver(spelling: str) -
     for ip in found:
         with pytest.raises(BadAddress):
             refuse_forbidden(ip)
+
+
+@pytest.mark.parametrize(
+    ("typed", "kept"),
+    [
+        ("ws://ros:secret@car:9090/x", "ws://…@car:9090/x"),
+        (" ros:secret@car", " …@car"),
+        ("http://a:b@c@d", "http://…@d"),
+        ("car:9090/a@b", "car:9090/a@b"),
+        ("car", "car"),
+    ],
+)
+def test_a_login_that_was_typed_is_not_written_down(typed: str, kept: str) -> None:
+    assert without_login(typed) == kept
 
 
 def answer_to(typed: str) -> Address | str:

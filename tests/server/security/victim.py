@@ -1,0 +1,33 @@
+"""A server to be attacked, as a process of its own: `python -m tests.server.security.victim DATA`. Prints its address;
+what it has to complain of goes to its second stream. It dials nobody but this machine."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import sys
+from pathlib import Path
+
+import uvicorn
+
+from server import log_lines
+from server.app import create_app
+from server.config import Config
+from server.limits import Limits, Rate
+from server.web import requests
+
+ALL = Rate(per_s=1e6, at_once=10**6)  # what is tried here is what comes through
+
+
+async def main(data: Path) -> None:
+    limits = Limits(local_requests=ALL, commands=ALL, messages=ALL)
+    config = Config(data=data, allowed_hosts=("127.0.0.1",), limits=limits)
+    listening = socket.create_server(("127.0.0.1", 0))
+    print(f"http://127.0.0.1:{listening.getsockname()[1]}", flush=True)
+    server = uvicorn.Server(uvicorn.Config(create_app(config), **requests.options(limits)))
+    await server.serve(sockets=[listening])
+
+
+if __name__ == "__main__":
+    log_lines.begin()
+    asyncio.run(main(Path(sys.argv[1])))
