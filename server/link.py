@@ -60,6 +60,7 @@ LOOKUP_TIMEOUT_S = 4.0
 DIAL_TIMEOUT_S = 4.0  # over all addresses of a host, but at least a second for each
 HANDSHAKE_TIMEOUT_S = 3.0
 GOODBYE_S = 0.5
+LAST_WORD_S = 0.2
 FIRST_RETRY_S = 0.2
 LAST_RETRY_S = 2.0
 RETRY_GROWTH = 1.7
@@ -332,14 +333,18 @@ class RosLink:
     def retry_now(self) -> None:
         self._ros.factory.retry_now()
 
-    def stop(self) -> None:
-        """Ends the link for good, and tells the listener nothing more. What was not yet sent is not sent."""
+    def stop(self, *, has_last_word: bool = False) -> None:
+        """Ends the link for good, and tells the listener nothing more. What was not yet sent is not sent;
+        `has_last_word`: but for what was written just now, which gets a moment to arrive."""
         self._stopped = True
         self._ros.factory.stop()
         if self._lookup is not None:
             self._lookup.cancel()
         self._fail_calls("the link was ended")
-        self.abort()
+        if has_last_word and self._socket is not None:
+            self._ros.factory.loop.call_later(LAST_WORD_S, self.abort)
+        else:
+            self.abort()
 
     def abort(self) -> None:
         """Drops the connection without a closing handshake, so that nothing buffered is delivered."""

@@ -439,16 +439,16 @@ class Session:
     def _end(self) -> None:
         """One car's monitoring is over: its alarms end in the log, and all that is known of it is forgotten."""
         self._tell(self._monitor.end(self._now()))
-        self._slowing.ended()
-        self._drop_link()
+        said_farewell = self._slowing.ended()
+        self._drop_link(has_last_word=said_farewell)
         self._recording.ended()
         self._pause.forget()
         self._clear()
 
-    def _drop_link(self) -> None:
+    def _drop_link(self, *, has_last_word: bool = False) -> None:
         self._conversation.end()
         if self._link is not None:
-            self._link.stop()
+            self._link.stop(has_last_word=has_last_word)
             self._link = None
 
     # -- what the link says (LinkListener) ---------------------------------------------------------------------------

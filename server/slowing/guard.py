@@ -59,11 +59,11 @@ class GuardWatch:
         self._count = self._count % (2**32 - 1) + 1
         self._has_beaten = self._say(GUARD_HEARTBEAT, self._count) or self._has_beaten
 
-    def farewell(self) -> None:
-        """Monitoring ends on purpose: the guard is not to slow the car for it."""
-        if self._has_beaten:
-            self._say(GUARD_HEARTBEAT, FAREWELL)
+    def farewell(self) -> bool:
+        """Monitoring ends on purpose: the guard is not to slow the car for it. Whether there was somebody to tell."""
+        said = self._has_beaten and self._say(GUARD_HEARTBEAT, FAREWELL)
         self._is_there, self._has_beaten, self._state, self._heard_s = False, False, None, None
+        return said
 
     def release(self, hold: int | None = None) -> None:
         """The operator lets the controllers drive again; None: of the hold that stands."""

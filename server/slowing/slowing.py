@@ -91,17 +91,19 @@ class Slowing:
         self._mouth.attach(None)
         self._cut("the link to the car was lost")
 
-    def ended(self, why: str = "monitoring ended") -> None:
-        """The car is not monitored any more."""
+    def ended(self, why: str = "monitoring ended") -> bool:
+        """The car is not monitored any more; whether the guard on it was told so just now."""
         order = self._life.end("disconnected", self._now())
         if order is not None:
             self._tell(order, "ended", f"The slow-down ended: {why}. Nothing holds the car.")
-        self._guard.farewell()
-        self._mouth.unadvertise_all()
+        said_farewell = self._guard.farewell()
+        if not said_farewell:
+            self._mouth.unadvertise_all()
         self._mouth.attach(None)
         self._link, self._countdown, self.rivals = None, None, None
         self._triggers.forget()
         self._way = Way(problem="No car is connected.")
+        return said_farewell
 
     def resume(self, order: Mapping[str, Any]) -> None:
         """An order stood when the server ended, and the same car is dialled again: it stands until it is released."""

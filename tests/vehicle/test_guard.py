@@ -8,7 +8,8 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
-from ocu_guard.guard import Command, Guard
+
+from tests.vehicle.conftest import Command, Guard
 
 DT = 0.05
 DRIVING = Command(8.0, 0.1)
