@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format lint types imports tsc node bench soak screenshots clean vendor-missing
+.PHONY: help demo test check format lint types imports tsc node bench soak sbom screenshots clean vendor-missing
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -32,6 +32,10 @@ bench: $(VENV)/.ready-test static/built/built.json ## latency, bytes and load, b
 soak: $(VENV)/.ready-test static/built/built.json ## the long proofs
 	$(PY) -m tests.chromium
 	$(PYTEST) -m soak --timeout 7200
+
+sbom: $(VENV)/.ready-test ## what is shipped of other people's work, as CycloneDX JSON in out/catgraph.cdx.json
+	@mkdir -p out
+	$(PY) sbom.py out/catgraph.cdx.json
 
 screenshots: $(VENV)/.ready-test static/built/built.json ## pictures of the page in its states, for a look and for the README
 	$(PY) -m tests.chromium

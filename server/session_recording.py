@@ -19,6 +19,7 @@ from monitor.check import Limits
 from monitor.recorder import RecorderFacts, RecorderState
 from monitor.runner import Refused
 from server import wire
+from server.address import without_login
 from server.others import Also
 from server.recording import space
 from server.recording.folder import RecordingsFolder, id_of, part_id
@@ -195,6 +196,8 @@ class SessionRecording:
     def asked(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
         """What a page asked for, and why it was refused, if it was. Where a phone is has a channel of its own."""
         said = {name: value for name, value in message.items() if name not in ("id", "by")}
+        if isinstance(said.get("address"), str):
+            said["address"] = without_login(said["address"])
         if message.get("kind") == "position" and reason is None:
             self.own("phone", {"by": by} | {name: value for name, value in said.items() if name != "kind"})
         else:

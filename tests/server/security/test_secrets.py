@@ -97,6 +97,9 @@ async def _live(life: Life, base: str, car: str) -> tuple[dict[str, str], dict[s
         answers["mail test"] = (await phone.post("/api/mail/test", json={})).text
         for typed in (f"ws://ros:{CAR_PASSWORD}@{car}", f"http://ros:{CAR_PASSWORD}@{car}", car):
             answers[f"connect {len(answers)}"] = (await phone.post("/api/connect", json={"address": typed})).text
+        async with asyncio.timeout(15):
+            while (await phone.get("/api/state")).json()["recording"]["state"] != "recording":
+                await asyncio.sleep(0.1)
         answers["wrong key"] = (await phone.get("/api/state", headers={"Authorization": f"Bearer {VIEWER_KEY}x"})).text
         ticket = (await phone.post("/api/ticket")).json()["ticket"]
         answers["socket"] = await _page(base, ticket, f"{cookie.name}={cookie.value}", car)
