@@ -14,6 +14,7 @@ import segno
 from server.config import Config
 from server.tls.setup import Whereabouts
 
+_WHITE_ON_BLACK, _AS_BEFORE = "\x1b[97;40m", "\x1b[0m"  # the blocks are the light modules
 WITHOUT_HTTPS = (
     "Without HTTPS a phone's browser gives this page no position, does not keep the screen awake, installs nothing for",
     "when the server is away, neither shares files nor copies text; and who is on the network can read along.",
@@ -90,10 +91,10 @@ def invitation(url: str, pairing: Pairing, lead: str) -> Iterator[str]:
 
 
 def code(text: str) -> list[str]:
-    """A QR code in half blocks, dark on light whatever the terminal's colours are."""
+    """A QR code in half blocks: black on white, whatever the terminal's colours are, for some readers take no other."""
     out = io.StringIO()
     segno.make(text, error="l").terminal(out, compact=True)
-    return out.getvalue().rstrip("\n").split("\n")
+    return [f"{_WHITE_ON_BLACK}{line}{_AS_BEFORE}" for line in out.getvalue().rstrip("\n").split("\n")]
 
 
 def fingerprint_lines(fingerprint: str) -> list[str]:

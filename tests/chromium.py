@@ -64,6 +64,14 @@ def check_driver() -> None:
             )
 
 
+def bring_readers() -> None:
+    """Install what some tests look with, where it can be; a test that lacks it is skipped, with the reason."""
+    packages = {"certutil": "libnss3-tools", "zbarimg": "zbar-tools"}
+    missing = [package for command, package in packages.items() if shutil.which(command) is None]
+    if missing:
+        _apt_install(*missing)
+
+
 def _driver_starts() -> bool:
     command = [sys.executable, "-m", "playwright", "--version"]
     return subprocess.run(command, capture_output=True, check=False, stdin=subprocess.DEVNULL).returncode == 0
@@ -118,6 +126,7 @@ def main() -> int:
     try:
         path = _found_or_installed()
         check_driver()
+        bring_readers()
     except NoChromium as why:
         print(why, file=sys.stderr)
         return 1

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import segno
 
-from server.announce import Announcement, Pairing, addresses, fingerprint_lines, lines
+from server.announce import Announcement, Pairing, addresses, code, fingerprint_lines, lines
 from server.config import Config, Tls, Vehicle
 from server.tls.setup import Whereabouts
 
@@ -47,6 +48,19 @@ def test_a_log_gets_neither_pin_nor_token_nor_codes() -> None:
     assert "a-token" not in said
     assert "▀" not in said
     assert "catgraph pair" in said
+
+
+@pytest.mark.parametrize("text", ["http://192.168.4.1:8001/", f"https://192.168.4.1:8000/#pair={PAIRING.token}"])
+def test_a_code_is_that_of_its_text_in_colours_of_its_own(text: str) -> None:
+    rows = []
+    for line in code(text):
+        assert line.startswith("\x1b[97;40m")
+        assert line.endswith("\x1b[0m")
+        drawn = line.removeprefix("\x1b[97;40m").removesuffix("\x1b[0m")
+        rows.append([letter not in "█▀" for letter in drawn])  # dark where nothing white is drawn
+        rows.append([letter not in "█▄" for letter in drawn])
+    wanted = [[bool(module) for module in row] for row in segno.make(text, error="l").matrix_iter(border=4)]
+    assert rows[: len(wanted)] == wanted
 
 
 def test_the_token_itself_stands_only_in_the_code() -> None:
