@@ -1,0 +1,112 @@
+"""Every answer carries the headers, whatever it answers: pages, parts, data, nothing new, refusals, mistakes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import httpx
+import pytest
+import websockets
+from fastapi import Request
+
+from server.app import create_app
+from server.config import Config
+from server.web.headers import FOR_ALL, PERMISSIONS, POLICY, POLICY_OF_DATA, POLICY_OF_PARTS
+from tests.server.conftest import serving, serving_app
+from tests.server.recording.made import record
+
+ID = "car_20160601T120000Z"
+ANSWERS = {  # method, path, headers, status, its policy
+    "the page": ("GET", "/", {}, 200, POLICY),
+    "its description": ("GET", "/docs", {}, 200, POLICY),
+    "its worker": ("GET", "/worker.js", {}, None, POLICY),
+    "a part": ("GET", "/static/js/app.js", {}, 200, POLICY_OF_PARTS),
+    "a picture": ("GET", "/static/icons/catgraph.svg", {}, 200, POLICY_OF_PARTS),
+    "no part": ("GET", "/static/js/nothing.js", {}, 404, POLICY_OF_PARTS),
+    "data": ("GET", "/api/state", {}, 200, POLICY_OF_DATA),
+    "what is drawn": ("GET", f"/api/recordings/{ID}/track.svg", {}, None, POLICY_OF_DATA),
+    "a file": ("GET", f"/api/recordings/{ID}/file.mcap", {}, 200, POLICY_OF_DATA),
+    "a part of a file": ("GET", f"/api/recordings/{ID}/file.mcap", {"Range": "bytes=0-9"}, 206, POLICY_OF_DATA),
+    "no part of a file": ("GET", f"/api/recordings/{ID}/file.mcap", {"Range": "bytes=99999999-"}, 416, POLICY_OF_DATA),
+    "counters": ("GET", "/metrics", {}, 200, POLICY_OF_DATA),
+    "no such thing": ("GET", "/nothing", {}, 404, POLICY),
+    "not so": ("PUT", "/", {}, 405, POLICY),
+    "not understood": ("POST", "/api/connect", {"Content-Type": "application/json"}, 422, POLICY_OF_DATA),
+    "done": ("POST", "/api/disconnect", {}, 200, POLICY_OF_DATA),
+    "too long": ("POST", "/api/connect", {"Content-Type": "text/plain"}, 413, POLICY_OF_DATA),
+    "a stranger's page": ("POST", "/api/disconnect", {"Origin": "http://evil.example"}, 403, POLICY_OF_DATA),
+    "another name": ("GET", "/", {"Host": "evil.example"}, None, POLICY),
+}
+
+
+@pytest.mark.parametrize(("method", "path", "sent", "status", "its_policy"), ANSWERS.values(), ids=ANSWERS)
+async def test_every_answer_has_them(
+    method: str, path: str, sent: dict[str, str], status: int | None, its_policy: str, tmp_path: Path
+) -> None:
+    data = tmp_path / "data"
+    record(data / "recordings" / "car" / f"{ID}.mcap", seconds=2.0)
+    async with serving(Config(data=data)) as base, httpx.AsyncClient(base_url=base) as client:
+        answer = await client.request(method, path, headers=sent, content=b"x" * 300_000 if status == 413 else None)
+        assert status in (answer.status_code, None), answer.text
+        _has_all(answer.headers, its_policy)
+        if answer.content:
+            kind = answer.headers["content-type"]
+            assert not kind.startswith("text/") or "charset=utf-8" in kind
+
+
+async def test_what_is_kept_is_renewed_with_them() -> None:
+    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+        for path, its_policy in (("/", POLICY), ("/static/js/app.js", POLICY_OF_PARTS)):
+            first = await client.get(path)
+            again = await client.get(path, headers={"If-None-Match": first.headers["etag"]})
+            assert again.status_code == 304
+            _has_all(again.headers, its_policy)
+
+
+async def test_a_mistake_of_ours_is_answered_with_them() -> None:
+    config = Config()
+    app = create_app(config)
+
+    @app.get("/api/mistake")
+    async def mistake(request: Request) -> None:
+        raise RuntimeError("secret words of a traceback")
+
+    async with serving_app(app, config) as base, httpx.AsyncClient(base_url=base) as client:
+        answer = await client.get("/api/mistake")
+        assert answer.status_code == 500
+        assert answer.json()["detail"] == "The server made a mistake; it is in its log."
+        assert "secret words" not in answer.text
+        _has_all(answer.headers, POLICY_OF_DATA)
+
+
+async def test_a_socket_that_is_refused_is_refused_with_them() -> None:
+    async with serving(Config()) as base:
+        with pytest.raises(websockets.InvalidStatus) as refused:
+            await websockets.connect(f"{base.replace('http', 'ws')}/ws", origin="http://evil.example")  # type: ignore[arg-type]
+        assert refused.value.response.status_code == 403
+
+
+def _has_all(headers: httpx.Headers, its_policy: str) -> None:
+    for name in FOR_ALL:
+        assert headers[name], name
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["content-security-policy"] == its_policy
+    assert ("permissions-policy" in headers) == (its_policy == POLICY)
+    assert ("cross-origin-opener-policy" in headers) == (its_policy == POLICY)
+    assert "default-src 'none'" in its_policy
+    assert "object-src 'none'" in its_policy
+    assert "base-uri 'none'" in its_policy
+    for name in ("strict-transport-security", "access-control-allow-origin", "server", "x-powered-by"):
+        assert name not in headers
+
+
+def test_the_page_may_run_only_its_own_scripts_and_use_only_what_it_needs() -> None:
+    rules = dict(rule.strip().split(" ", 1) for rule in POLICY.split(";"))
+    assert rules["script-src"] == rules["connect-src"] == rules["style-src"] == "'self'"
+    assert rules["require-trusted-types-for"] == "'script'"
+    assert rules["trusted-types"] == "default"
+    assert not [rule for rule in rules.values() if "unsafe" in rule or "*" in rule or "http" in rule]
+    assert "geolocation=(self)" in PERMISSIONS
+    assert "screen-wake-lock=(self)" in PERMISSIONS
+    assert "camera=()" in PERMISSIONS
+    assert "microphone=()" in PERMISSIONS
