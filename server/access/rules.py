@@ -22,7 +22,7 @@ class Needs(Enum):
 
 _READS = "GET HEAD"
 _ANY_METHOD = "*"
-_SHELL = "manifest.webmanifest worker.js offline favicon.ico apple-touch-icon.png ca.crt ca.mobileconfig".split()
+_SHELL = "manifest.webmanifest worker.js offline favicon.ico apple-touch-icon.png".split()
 
 RULES: tuple[tuple[str, str, Needs], ...] = (  # methods, pattern of the whole path, who; the first that fits holds
     (_READS, r"/", Needs.NOBODY),  # the shell of the page: no word of the car is in it
