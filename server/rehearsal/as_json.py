@@ -61,6 +61,16 @@ def as_json(report: Report) -> dict[str, Any]:
         ],
         "other_topics": dict(run.other_topics),
         "alarms": [episode_json(episode) for episode in run.episodes],
+        "slow_downs": [
+            {
+                "trigger": one.trigger,
+                "title": one.title,
+                "text": one.text,
+                "countdown_s": _number(one.countdown_s),
+                "at_s": _number(one.at_s),
+            }
+            for one in run.slowed
+        ],
         "checks": [
             {
                 "label": ribbon.label,

@@ -24,6 +24,7 @@ from server.rehearsal.load import Load, load_of
 from server.rehearsal.ribbons import Coverage, Ribbon, Ribbons, Unchecked
 from server.rehearsal.thresholds import Wishes, tuning_for
 from server.rehearsal.traces import Traces
+from server.rehearsal.would_slow import Slowed, WouldSlow
 from server.simulator.scenarios import Planned
 from server.source import Message
 from server.topics import Source, map_signals
@@ -64,6 +65,7 @@ class Rehearsed:
     crashes: Sequence[Crash]
     faults: Sequence[Laid]
     traces: Traces | None
+    slowed: Sequence[Slowed] = ()  # orders that the rules would have given
     notes: Sequence[str] = field(default_factory=list)
     broke_off: str | None = None  # why the recording could not be read to its end
     damage: Sequence[str] = ()  # what within it could not be read
@@ -124,6 +126,7 @@ class _Run:
         self._ribbons = Ribbons()
         self._coverage = Coverage()
         self._traces = Traces() if with_traces else None
+        self._would_slow = WouldSlow(self._tuning.limits.slow_down)
         self._crashes: dict[str, Crash] = {}
         self._ticks = 0
         self._broke_off: str | None = None
@@ -155,6 +158,7 @@ class _Run:
             crashes=tuple(self._crashes.values()),
             faults=self._faults.laid,
             traces=self._traces,
+            slowed=self._would_slow.slowed,
             notes=self.notes,
             broke_off=self._broke_off,
             damage=self._recording.damage,
@@ -229,6 +233,7 @@ class _Run:
         transitions = judging.judge(monitor, state, now_s, changed)
         if transitions:
             self._diary.note(transitions, monitor.alarms)
+        self._would_slow.look(monitor.alarms, now_s)
         if monitor.crashes:
             self._crashes |= {name: crash for name, crash in monitor.crashes.items() if name not in self._crashes}
         if self._traces is not None:

@@ -16,7 +16,7 @@ _MARKS = {Priority.CRITICAL: "CRITICAL", Priority.WARNING: "warning ", Priority.
 
 def text(report: Report) -> str:
     """The whole summary, without a line break at its end."""
-    parts = [_head(report), _signals(report), _alarms(report), _not_checked(report), _load(report)]
+    parts = [_head(report), _signals(report), _alarms(report), _slowed(report), _not_checked(report), _load(report)]
     if report.before is not None:
         parts.append(_comparison(report))
     parts.append(_notes(report))
@@ -104,6 +104,14 @@ def _episode(episode: Episode) -> Iterator[str]:
         yield f"{'':23}again at {clock(said.at_s)}: {printable(said.text)}"
     if len(episode.said) > 4:
         yield f"{'':23}and {len(episode.said) - 4} times more"
+
+
+def _slowed(report: Report) -> Iterator[str]:
+    if report.run.slowed:
+        yield "Would have slowed the car, armed and without a veto"
+        for one in report.run.slowed:
+            yield f"  {clock(one.at_s):>9}  {printable(one.title)}, after a count-down from {clock(one.countdown_s)}"
+            yield f"{'':23}{printable(one.text)}"
 
 
 def _not_checked(report: Report) -> Iterator[str]:

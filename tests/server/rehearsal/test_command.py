@@ -168,6 +168,24 @@ def test_settings_of_a_file_count(check: Checking, healthy: Path, tmp_path: Path
     assert ending.json["settings"]["changed"] == {"speed_limit.max_mps": 3.0}
 
 
+def test_it_tells_when_the_car_would_have_been_slowed(check: Checking, healthy: Path, tmp_path: Path) -> None:
+    """By a rule that is on, after its time and the count-down; by one that is off never."""
+    rules = tmp_path / "rules.toml"
+    rules.write_text("version = 1\n[limits.slow_down]\non_obstacle = 1\non_obstacle_after_s = 0.5\n")
+    ending = check(healthy, "--inject", "near-object@20+5", "--settings", rules, "--json", "-")
+    (slowed,) = ending.json["slow_downs"]
+    assert slowed["trigger"] == "obstacle"
+    assert slowed["countdown_s"] == pytest.approx(20.5, abs=0.3)
+    assert slowed["at_s"] == pytest.approx(slowed["countdown_s"] + 2.0)
+    page = tmp_path / "page.html"
+    said = check(healthy, "--inject", "near-object@20+5", "--settings", rules, "--html", page).out
+    assert re.search(r"Would have slowed the car.*\n +22\.\d s +Obstacle within the stopping distance", said)
+    assert "Would have slowed the car" in page.read_text()
+    short = check(healthy, "--inject", "near-object@20+1.5", "--settings", rules, "--json", "-")
+    assert short.json["slow_downs"] == []  # gone before the count-down ended
+    assert check(healthy, "--inject", "near-object@20+5", "--json", "-").json["slow_downs"] == []
+
+
 def test_wrong_settings_are_all_named(check: Checking, healthy: Path, tmp_path: Path) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text("[speed_limit]\nmax_mph = 3.0\nmax_mps = 900.0\n[obstacles]\nx = 1\n")
