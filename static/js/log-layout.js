@@ -17,6 +17,7 @@ const CHANGES = /** @type {Record<string, string>} */ ({
   raised: '', recaused: 'again', cleared: 'cleared', acknowledged: 'acknowledged', shelved: 'shelved', unshelved: 'no longer shelved',
   suppressed: 'not announced', unsuppressed: 'announced again',
 });
+const SLOWING = new Set(['armed', 'disarmed', 'slow_down']);
 const DAYS = ['Sunday', 'Monday', 'Tuesday', 'Wednesday', 'Thursday', 'Friday', 'Saturday'];
 const MONTHS = ['January', 'February', 'March', 'April', 'May', 'June', 'July', 'August', 'September', 'October', 'November', 'December'];
 
@@ -25,6 +26,10 @@ const MONTHS = ['January', 'February', 'March', 'April', 'May', 'June', 'July', 
  * @param {AlarmEvent} event
  */
 export function eventWords(event) {
+  if (event.alarm === null && SLOWING.has(event.change)) {
+    const [mark, kind] = event.step === 'not_confirmed' ? ['crit', 'c-crit'] : ['slow', 'c-order'];
+    return { icon: mark, kind, title: event.text || event.change, text: event.by ? `by ${event.by}` : '' };
+  }
   if (event.alarm === null) return { icon: event.change === 'lost' || event.change === 'stalled' ? 'link-off' : 'info', kind: '', title: event.text || event.change, text: event.by ? `by ${event.by}` : '' };
   const change = CHANGES[event.change] ?? event.change;
   const isRise = event.change === 'raised' || event.change === 'recaused' || event.change === 'unsuppressed';

@@ -268,6 +268,7 @@
  * @property {string} text
  * @property {string | null} by
  * @property {string} [act] what happened to control
+ * @property {string} [step] of an order to slow down: ordered, sent, slows, not_confirmed, released …
  * @property {string | null} [by_page]
  * @property {string | null} [page] who is in control now
  * @property {string | null} [before_page]

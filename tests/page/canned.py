@@ -281,6 +281,7 @@ class Canned:
         self.heard: list[Json] = []
         self.refuses: dict[str, str] = {}  # why, by the kind of command
         self.role = "operator"
+        self.address = ""
         self.found: list[Json] = [
             {"name": "CATVehicle", "address": "ws://192.168.4.1:9090"},
             {"name": "Simulated car", "address": "ws://127.0.0.1:9091"},
@@ -393,7 +394,8 @@ class Canned:
         while not server.started:  # uvicorn has no event for it
             await asyncio.sleep(0.02)
         try:
-            yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+            self.address = f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+            yield self.address
         finally:
             server.should_exit = True
             await task

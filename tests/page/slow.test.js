@@ -3,6 +3,7 @@ import { test } from 'node:test';
 import { soundOf, stripOf } from '../../static/js/alarm-layout.js';
 import { orderMark } from '../../static/js/gauge-layout.js';
 import { chainOf } from '../../static/js/link.js';
+import { eventWords } from '../../static/js/log-layout.js';
 import { NOT_CONFIRMED, connectRow, countdownOf, guardWords, holdOf, orderWords, releaseOf, sheetOf, slideOf, stateWord, stepsOf, stripWords } from '../../static/js/slow-layout.js';
 import { alarm, state } from './frames.js';
 
@@ -155,6 +156,12 @@ test('its row on the connect screen', () => {
   assert.equal(connectRow(slow('armed'), false).tag, 'Off');
   assert.deepEqual([connectRow(slow('armed'), true).tag, connectRow(slow('safe'), true).tag, connectRow(ordered(), true).tag], ['Armed', 'Off', 'Slowing']);
   assert.deepEqual(connectRow(slow('not_available', { why: 'No link to the car.' }), true), { tag: 'Not here', kind: 'unk', cost: 'No link to the car' });
+});
+
+test('in the log: each step by its mark, one that was not confirmed as what it is', () => {
+  const row = (/** @type {any} */ more) => eventWords({ n: 1, at_ms: 0, alarm: null, by: 'Ann', text: 'Slow-down ordered.', change: 'slow_down', ...more });
+  assert.deepEqual(row({ step: 'ordered' }), { icon: 'slow', kind: 'c-order', title: 'Slow-down ordered.', text: 'by Ann' });
+  assert.deepEqual([row({ step: 'not_confirmed' }).icon, row({ change: 'armed' }).icon, row({ change: 'paused' }).icon], ['crit', 'slow', 'info']);
 });
 
 test('the gauge: an arc from the ordered to the measured speed, its words away from the limit’s', () => {

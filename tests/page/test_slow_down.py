@@ -1,0 +1,449 @@
+"""The slow-down under a thumb: what orders it and what never does, who arms it and who releases, proof and veto."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+import pytest_asyncio
+from axe_playwright_python.async_playwright import Axe
+from playwright.async_api import Browser, CDPSession, Locator, expect
+
+from tests.page.canned import Canned, alarm, live, slow, slowed
+from tests.page.conftest import PHONE, Phone
+from tests.page.processes import running, server, simulate
+from tests.page.test_barriers import HANGS_OVER
+
+RAIL, DIALOG = ".board > .rail .slide", "#sheet-alarm .slide"
+COUNTDOWN = {"trigger": "speed", "title": "Speed above limit", "text": "12.6 m/s, limit 11.0 m/s", "left_s": 1.4}
+SPEEDING = alarm(
+    "speed_limit", "Speed above limit", priority="critical", place="dialog", sound="high", needs_ack=True,
+    text="12.6 m/s, limit 11.0 m/s", actions=["acknowledge", "decelerate"], advice="The driver must slow the car.",
+)  # fmt: skip
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def car() -> AsyncIterator[Canned]:
+    """A server whose slow-down is armed, and this page in control."""
+    server = Canned()
+    server.state = live() | {"decelerate": slow("armed")}
+    async with server.running():
+        yield server
+
+
+class Thumb:
+    """Real touches on the page, as the browser gets them from a screen."""
+
+    def __init__(self, phone: Phone, cdp: CDPSession) -> None:
+        self.phone = phone
+        self._cdp = cdp
+
+    def slide(self, where: str = RAIL) -> Locator:
+        return self.phone.page.locator(where)
+
+    async def touch(self, kind: str, *places: Sequence[float]) -> None:
+        points = [{"x": place[0], "y": place[1], "id": n} for n, place in enumerate(places)]
+        await self._cdp.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    async def along(self, where: str = RAIL) -> tuple[float, float, float]:
+        """The middle of the knob at rest, and how far it goes to the right."""
+        await expect(self.slide(where)).to_have_attribute("data-kind", "armed")
+        box = await self.slide(where).bounding_box()
+        assert box is not None
+        return box["x"] + 34, box["y"] + box["height"] / 2, box["width"] - 68
+
+    async def drag(self, share: float, where: str = RAIL, end: tuple[float, float] | None = None) -> None:
+        """From the knob so far of its way, then to `end` where that is given, and up."""
+        x, y, way = await self.along(where)
+        await self.touch("touchStart", (x, y))
+        for part in (0.25, 0.5, 0.75, 1.0):
+            await self.touch("touchMove", (x + part * share * way, y))
+        if end:
+            await self.touch("touchMove", end)
+        await self.touch("touchEnd")
+
+
+@pytest_asyncio.fixture(loop_scope="module")
+async def thumb(phone: Phone, car: Canned) -> Thumb:
+    await phone.open(car.address)
+    await phone.live()
+    await phone.page.locator("#monitor .top .rec").tap()
+    return Thumb(phone, await phone.page.context.new_cdp_session(phone.page))
+
+
+def heard(car: Canned, kind: str) -> list[dict[str, Any]]:
+    return [one for one in car.heard if one["kind"] == kind]
+
+
+async def until_heard(thumb: Thumb, car: Canned, kind: str) -> dict[str, Any]:
+    for _ in range(80):
+        if found := heard(car, kind):
+            return found[-1]
+        await thumb.phone.page.wait_for_timeout(50)
+    raise AssertionError(f"no {kind} among {[one['kind'] for one in car.heard]}")
+
+
+async def nothing_ordered(thumb: Thumb, car: Canned) -> None:
+    await thumb.phone.page.wait_for_timeout(300)
+    assert heard(car, "slow_down") == []
+    await expect(thumb.slide()).to_have_attribute("data-kind", "armed")
+
+
+async def test_slid_and_let_go_it_is_ordered_with_what_proves_that_it_is_new(thumb: Thumb, car: Canned) -> None:
+    await expect(thumb.phone.f("strip")).to_have_text("Armedan aid, not an emergency stop")
+    await expect(thumb.phone.f("legend-car")).to_have_text("the car: ARMED")
+    await thumb.drag(0.95)
+    said = await until_heard(thumb, car, "slow_down")
+    assert 0 <= said["pressed_ago_s"] < 0.5
+    assert 0 <= said["held_s"] < 1
+    assert said["heard_ms"] > 1e12
+    car.state["decelerate"] = slowed()
+    await expect(thumb.slide()).to_have_attribute("data-kind", "go")
+    await expect(thumb.slide()).to_have_text("Slowing to 0.0 m/s", use_inner_text=True)
+    await expect(thumb.phone.f("strip")).to_have_text("Slowing the car−1.5 m/s² ordered")
+    await expect(thumb.phone.page.locator(".gauge .ord")).to_have_text("ordered 2.2")
+    await expect(thumb.phone.page.locator(".gauge .ordarc")).to_have_attribute("d", re.compile("^M.*A196"))
+    steps = thumb.phone.page.locator(".order li")
+    await expect(steps).to_have_text(
+        [re.compile(r"^Pressed\d\d:\d\d:\d\d$"), "At the server+0.02 s", "On the bridge+0.03 s", "Car slows+0.42 s"]
+    )
+    await expect(thumb.phone.f("order-line")).to_have_text(re.compile(r"By Pixel 7 from 4\.2 m/s, \d\.\d s ago"))
+    await expect(thumb.phone.f("stop")).to_be_hidden()
+    assert len(heard(car, "slow_down")) == 1
+
+
+async def test_too_short_it_springs_back(thumb: Thumb, car: Canned) -> None:
+    await thumb.drag(0.7)
+    await expect(thumb.slide()).to_have_text("Slide it to the end", use_inner_text=True)
+    await nothing_ordered(thumb, car)
+    assert await thumb.slide().locator(".knob").evaluate("one => one.style.transform") == ""
+
+
+async def test_a_tap_orders_nothing(thumb: Thumb, car: Canned) -> None:
+    x, y, way = await thumb.along()
+    for place in ((x, y), (x + way / 2, y), (x + way, y)):
+        await thumb.touch("touchStart", place)
+        await thumb.touch("touchEnd")
+    await expect(thumb.slide()).to_have_text("Do not tap: slide it", use_inner_text=True)
+    await nothing_ordered(thumb, car)
+
+
+async def test_two_fingers_order_nothing_whichever_came_first(thumb: Thumb, car: Canned) -> None:
+    x, y, way = await thumb.along()
+    await thumb.touch("touchStart", (x, y), (200, 300))  # both at once
+    await thumb.touch("touchMove", (x + way, y), (200, 300))
+    await thumb.touch("touchEnd")
+    await thumb.touch("touchStart", (200, 300))  # a palm lies on the gauge
+    await thumb.touch("touchStart", (200, 300), (x, y))
+    await thumb.touch("touchMove", (200, 300), (x + way, y))
+    await thumb.touch("touchEnd")
+    await thumb.touch("touchStart", (x, y))  # it comes during the slide
+    await thumb.touch("touchMove", (x + way / 2, y))
+    await thumb.touch("touchStart", (x + way / 2, y), (200, 300))
+    await thumb.touch("touchMove", (x + way, y), (200, 300))
+    await thumb.touch("touchEnd")
+    await nothing_ordered(thumb, car)
+    await thumb.drag(1.0)  # and afterwards it works as ever
+    await until_heard(thumb, car, "slow_down")
+
+
+async def test_what_goes_beyond_hits_no_other_key(thumb: Thumb, car: Canned) -> None:
+    pause = await thumb.phone.f("pause").bounding_box()
+    assert pause is not None
+    await thumb.drag(0.6, end=(pause["x"] + 20, pause["y"] + 20))  # back over the other keys
+    await nothing_ordered(thumb, car)
+    assert heard(car, "pause") == []
+    tab = await thumb.phone.page.locator("#tab-settings").bounding_box()
+    assert tab is not None
+    await thumb.drag(1.0, end=(tab["x"] + 30, tab["y"] + 30))  # right enough, and far too high
+    await until_heard(thumb, car, "slow_down")
+    await expect(thumb.phone.page.locator("#tab-home")).to_have_attribute("aria-selected", "true")
+
+
+async def test_from_the_keyboard_enter_is_held_for_a_second(thumb: Thumb, car: Canned) -> None:
+    keys = thumb.phone.page.keyboard
+    await thumb.slide().focus()
+    await keys.press("Enter", delay=300)
+    await nothing_ordered(thumb, car)
+    await keys.down("Enter")
+    await until_heard(thumb, car, "slow_down")
+    await thumb.phone.page.wait_for_timeout(1300)
+    await keys.up("Enter")
+    assert len(heard(car, "slow_down")) == 1  # held on, it is one order
+
+
+async def test_under_the_left_thumb_it_is_slid_to_the_left(thumb: Thumb, car: Canned) -> None:
+    await thumb.phone.page.evaluate("document.documentElement.dataset.hand = 'left'")
+    box = await thumb.slide().bounding_box()
+    assert box is not None
+    y = box["y"] + box["height"] / 2
+    for begin, end in ((box["x"] + 34, box["x"] + box["width"] - 34), (box["x"] + box["width"] - 34, box["x"] + 34)):
+        assert heard(car, "slow_down") == []
+        await thumb.touch("touchStart", (begin, y))
+        await thumb.touch("touchMove", ((begin + end) / 2, y))
+        await thumb.touch("touchMove", (end, y))
+        await thumb.touch("touchEnd")
+    await until_heard(thumb, car, "slow_down")
+
+
+async def test_a_refusal_is_unmistakable(thumb: Thumb, car: Canned) -> None:
+    car.refuses["slow_down"] = "It came 0.4 s late."
+    await thumb.drag(1.0)
+    note = thumb.phone.page.locator(".snack.note")
+    await expect(note).to_contain_text("NOT slowed")
+    await expect(note).to_contain_text("It came 0.4 s late. Use the physical stop.")
+    await expect(thumb.slide()).to_have_attribute("data-kind", "armed")
+
+
+async def test_off_it_says_why_or_arms(thumb: Thumb, car: Canned) -> None:
+    car.state["decelerate"] = slow("not_available", why="/catvehicle/cmd_vel is not on the car.")
+    await expect(thumb.slide()).to_contain_text("/catvehicle/cmd_vel is not on the car")
+    await expect(thumb.phone.f("legend-car")).to_have_text("the car: NOT AVAILABLE")
+    await thumb.slide().tap()
+    sheet = thumb.phone.page.locator("#sheet-slow")
+    await expect(sheet).to_contain_text("Slow-down not available")
+    await expect(sheet.locator("[data-act]")).to_have_count(0)
+    car.state["decelerate"] = slow("safe", rivals=["/lap_driver"])
+    await expect(sheet).to_contain_text("Arm the slow-down?")
+    for words in (
+        "geometry_msgs/Twist", "/lap_driver: the last message wins, so the car may not slow", "1.5 m/s²",
+        "An aid, not an emergency stop", "No guard on the car: link loss will NOT slow the car.",
+    ):  # fmt: skip
+        await expect(sheet).to_contain_text(words)
+    await expect(thumb.phone.f("legend-car")).to_have_text("the car: SAFE")
+    car.refuses["arm"] = "The type of /catvehicle/cmd_vel is not known."
+    await sheet.get_by_role("button", name="Arm").tap()
+    await expect(sheet).to_contain_text("The type of /catvehicle/cmd_vel is not known.")
+    car.refuses.clear()
+    await sheet.get_by_role("button", name="Arm").tap()
+    await expect(sheet).to_be_hidden()
+    assert heard(car, "arm")[-1]["fence"] == 1
+
+
+async def test_who_is_not_in_control_asks_for_it(thumb: Thumb, car: Canned) -> None:
+    car.state |= {"decelerate": slow("safe"), "control": {"holder": "Ben", "page": "another", "fence": 7}}
+    await expect(thumb.phone.f("who-name")).to_have_text("Ben")
+    await thumb.slide().tap()
+    sheet = thumb.phone.page.locator("#sheet-slow")
+    await expect(sheet).to_contain_text("Ben is in control, and arms it.")
+    await sheet.get_by_role("button", name="Ask for control").tap()
+    assert (await until_heard(thumb, car, "control"))["do"] == "request"
+    await sheet.get_by_role("button", name="Close").tap()
+    car.state["decelerate"] = slow("armed")
+    await thumb.drag(1.0)  # any operator slows the car
+    await until_heard(thumb, car, "slow_down")
+    car.state["decelerate"] = slowed()
+    await expect(thumb.phone.f("release")).to_have_text("Only Ben can release")
+    await thumb.phone.f("release").tap()
+    await expect(thumb.phone.page.locator(".snack.note")).to_contain_text("Ben is in control")
+    assert heard(car, "release") == []
+
+
+async def test_the_car_is_released_only_once_that_is_confirmed(thumb: Thumb, car: Canned) -> None:
+    car.state |= {"decelerate": slowed(), "alarms": [SPEEDING | {"state": "ACKED"}]}
+    await thumb.phone.f("release").tap()
+    sheet = thumb.phone.page.locator("#sheet-release")
+    await expect(sheet).to_contain_text("it may speed up")
+    await expect(sheet).to_contain_text("Still standing: Speed above limit.")
+    await sheet.get_by_role("button", name="Keep slowing").tap()
+    await expect(sheet).to_be_hidden()
+    assert heard(car, "release") == []
+    await thumb.phone.f("release").tap()
+    car.state["decelerate"] = slowed(number=4)  # another order: what was asked is not about it
+    await expect(sheet).to_be_hidden()
+    await thumb.phone.f("release").tap()
+    await sheet.get_by_role("button", name="Release the car").tap()
+    assert (await until_heard(thumb, car, "release"))["number"] == 4
+    car.state["decelerate"] = slow("armed")
+    await expect(thumb.phone.f("stop")).to_be_visible()
+    await expect(thumb.phone.f("release")).to_be_hidden()
+
+
+async def test_in_the_dialog_of_an_alarm(thumb: Thumb, car: Canned) -> None:
+    car.state |= {"decelerate": slow("safe"), "alarms": [SPEEDING]}
+    sheet = thumb.phone.page.locator("#sheet-alarm")
+    await thumb.slide(DIALOG).tap()
+    await expect(sheet).to_contain_text("Not slowed: the slow-down is not armed")
+    await expect(sheet).to_contain_text("Use the physical stop.")
+    assert heard(car, "slow_down") == []
+    car.state["decelerate"] = slow("armed")
+    boxes = [await thumb.slide(DIALOG).bounding_box(), await thumb.slide().bounding_box()]
+    assert boxes[0] == boxes[1]  # at the same pixels as in the rail
+    await thumb.drag(0.95, DIALOG)
+    await until_heard(thumb, car, "slow_down")
+    car.state["decelerate"] = slowed()
+    await expect(thumb.slide(DIALOG)).to_have_text("Slowing to 0.0 m/s", use_inner_text=True)
+    await expect(sheet).to_be_visible()  # slowing the car acknowledges nothing
+
+
+async def test_what_comes_by_itself_counts_down_above_everything_and_can_be_vetoed(thumb: Thumb, car: Canned) -> None:
+    car.state |= {"decelerate": slow("armed", countdown=COUNTDOWN)}
+    banner = thumb.phone.page.locator("#sheet-countdown")
+    await expect(banner).to_contain_text("Speed above limit")
+    await expect(banner).to_contain_text(re.compile(r"Slows the car in 1\.[0-4] s"))
+    car.state["alarms"] = [SPEEDING]  # a dialog comes after it
+    await expect(thumb.phone.page.locator("#sheet-alarm")).to_be_visible()
+    await thumb.phone.page.wait_for_timeout(400)
+    veto = banner.get_by_role("button", name="Veto")
+    assert await veto.evaluate(
+        "one => { const box = one.getBoundingClientRect(); "
+        "return document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2) === one; }"
+    )
+    await thumb.phone.page.keyboard.press("Escape")
+    await thumb.phone.page.keyboard.press("Enter")
+    await thumb.phone.page.wait_for_timeout(300)
+    assert heard(car, "veto") == []  # leaving it, or a key that was meant for something else, is no veto
+    await expect(banner).to_be_visible()
+    await veto.tap()
+    assert (await until_heard(thumb, car, "veto"))["trigger"] == "speed"
+    await expect(banner).to_be_hidden()
+
+
+async def test_an_order_that_the_car_does_not_follow_is_on_every_tab(thumb: Thumb, car: Canned) -> None:
+    car.state["decelerate"] = slowed(None)
+    await expect(thumb.phone.f("strip")).to_contain_text("Slow-down ordered")
+    car.state["decelerate"] = slowed(False)
+    for tab in ("map", "settings", "home"):
+        await thumb.phone.page.locator(f"#tab-{tab}").tap()
+        await expect(thumb.phone.f("strip")).to_have_text("NOT CONFIRMED – use the physical stop")
+        await expect(thumb.phone.f("order-line")).to_have_text("NOT CONFIRMED – use the physical stop")
+    await expect(thumb.phone.page.locator(".order li").last).to_have_text("Car slowsNOT SEEN")
+    await expect(thumb.phone.f("legend-car")).to_have_text("the car: NOT CONFIRMED")
+
+
+async def test_a_viewer_sees_all_of_it_and_orders_nothing(browser: Browser, car: Canned) -> None:
+    car.role = "viewer"
+    context = await browser.new_context(**PHONE)
+    phone = Phone(await context.new_page())
+    try:
+        await phone.open(car.address)
+        await phone.live()
+        slide = phone.page.locator(RAIL)
+        await expect(slide).to_have_text("Slow-down armed a viewer only looks", use_inner_text=True)
+        await slide.tap(force=True)  # it says of itself that it is disabled
+        await expect(phone.page.locator(".snack.note")).to_contain_text("viewer")
+        car.state["decelerate"] = slowed()
+        await phone.f("release").tap()
+        await expect(phone.page.locator(".snack.note")).to_contain_text("Not released")
+        car.state["decelerate"] = slow("armed", countdown=COUNTDOWN)
+        await expect(phone.page.locator("#sheet-countdown")).to_contain_text("An operator may veto it.")
+        await expect(phone.page.locator("#sheet-countdown [data-f=veto]")).to_be_hidden()
+        assert not any(heard(car, kind) for kind in ("slow_down", "release", "veto", "arm"))
+    finally:
+        await context.close()
+    assert phone.complaints == []
+
+
+async def test_when_the_server_falls_silent_nothing_is_armed_any_more(thumb: Thumb, car: Canned) -> None:
+    car.silent = True
+    await expect(thumb.slide()).to_contain_text("the server does not answer")
+    await expect(thumb.phone.f("legend-car")).to_have_text("the car: NOT KNOWN")
+    car.silent = False
+    await expect(thumb.slide()).to_have_attribute("data-kind", "armed")
+
+
+STATES: dict[str, dict[str, Any]] = {
+    "not available": {"decelerate": slow("not_available", why="/catvehicle/cmd_vel is not on the car.")},
+    "armed": {"decelerate": slow("armed")},
+    "slowing": {"decelerate": slowed()},
+    "not sending": {"decelerate": slowed(None, sending=False)},
+    "not confirmed": {"decelerate": slowed(False)},
+    "not mine": {"decelerate": slowed(), "control": {"holder": "Pixel 7 of the test track", "page": "another"}},
+}
+
+
+@pytest.mark.parametrize("size", [(320, 640), (412, 915), (915, 412), (1180, 820)], ids=str)
+async def test_it_hangs_over_no_edge(thumb: Thumb, car: Canned, size: tuple[int, int]) -> None:
+    page = thumb.phone.page
+    await page.set_viewport_size({"width": size[0], "height": size[1]})
+    for name, state in STATES.items():
+        car.state |= {"control": {"holder": "You"}} | state
+        await page.wait_for_timeout(400)
+        assert await page.evaluate(HANGS_OVER) == [], name
+        assert await page.evaluate("document.documentElement.scrollWidth") <= size[0], name
+        box = await thumb.slide().bounding_box()
+        assert box is not None
+        assert box["height"] >= 56, name
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+async def test_nobody_is_kept_out(thumb: Thumb, car: Canned, theme: Any) -> None:
+    page = thumb.phone.page
+    await page.emulate_media(color_scheme=theme, reduced_motion="reduce")
+
+    async def clean(what: str) -> None:
+        await page.wait_for_timeout(400)
+        found = (await Axe().run(page)).response["violations"]
+        assert [(one["id"], one["nodes"][0]["html"]) for one in found] == [], what
+
+    for name, state in STATES.items():
+        car.state |= {"control": {"holder": "You"}} | state
+        await clean(name)
+    car.state |= {"control": {"holder": "You"}, "decelerate": slowed()}
+    await expect(thumb.phone.f("release")).to_have_text("Release the car")
+    await thumb.phone.f("release").tap()
+    await clean("release")
+    await page.keyboard.press("Escape")
+    car.state["decelerate"] = slow("safe", rivals=["/lap_driver"])
+    await expect(thumb.slide()).to_have_attribute("data-kind", "off")
+    await thumb.slide().tap()
+    await expect(page.locator("#sheet-slow")).to_be_visible()
+    await clean("arming")
+    await page.keyboard.press("Escape")
+    car.state["decelerate"] = slow("armed", countdown=COUNTDOWN)
+    await expect(page.locator("#sheet-countdown")).to_be_visible()
+    await clean("count-down")
+
+
+async def armed_by_hand(phone: Phone, address: str) -> Thumb:
+    """A real server and the simulated car: armed as an operator does, while the car drives."""
+    await phone.open(address)
+    await phone.live()
+    await phone.page.locator("#monitor .top .rec").tap()
+    slide = phone.page.locator(RAIL)
+    await expect(slide).to_contain_text("press to arm", timeout=15_000)
+    await slide.tap()
+    sheet = phone.page.locator("#sheet-slow")
+    await expect(sheet).to_contain_text("/catvehicle/cmd_vel")
+    await sheet.get_by_role("button", name="Arm").tap()
+    await expect(slide).to_have_attribute("data-kind", "armed")
+    async with asyncio.timeout(30):
+        while not re.fullmatch(r"[3-9]\.\d|1\d\.\d", await phone.speed()):
+            await asyncio.sleep(0.1)
+    return Thumb(phone, await phone.page.context.new_cdp_session(phone.page))
+
+
+@pytest.mark.timeout(120)
+async def test_the_simulated_car_slows_holds_and_is_released(phone: Phone, tmp_path: Path) -> None:
+    async with running(*simulate()) as sim, running(*server(tmp_path, sim.address)) as watch:
+        thumb = await armed_by_hand(phone, watch.address)
+        await thumb.drag(1.0)
+        await expect(thumb.slide()).to_have_attribute("data-kind", "go")
+        await expect(phone.page.locator(".order li[data-mark=ok]")).to_have_count(4)
+        after_s = [
+            float(text[1:-2]) for text in await phone.page.locator(".order li b").all_inner_texts() if "+" in text
+        ]
+        assert after_s == sorted(after_s)
+        assert after_s[-1] < 2.0  # from the press to the car's own speed
+        await expect(phone.f("legend-car")).to_have_text("the car: HOLDING", timeout=20_000)
+        await expect(phone.page.locator(".gauge .speed")).to_have_text(re.compile(r"^[−]?0\.\d$"), timeout=20_000)
+        await phone.acknowledge_all()
+        await phone.f("release").tap()
+        await phone.page.locator("#sheet-release").get_by_role("button", name="Release the car").tap()
+        await expect(phone.f("release")).to_be_hidden()
+        await expect(phone.f("stop")).to_be_visible()
+
+
+@pytest.mark.timeout(120)
+async def test_with_another_who_commands_too_it_is_not_confirmed(phone: Phone, tmp_path: Path) -> None:
+    competing = simulate("--competing-controller")
+    async with running(*competing) as sim, running(*server(tmp_path, sim.address)) as watch:
+        thumb = await armed_by_hand(phone, watch.address)
+        await thumb.drag(1.0)
+        await expect(phone.f("order-line")).to_have_text("NOT CONFIRMED – use the physical stop")
+        await expect(phone.page.locator("#sheet-alarm")).to_be_visible()
+        await expect(phone.f("legend-car")).to_have_text("the car: NOT CONFIRMED")
