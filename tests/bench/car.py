@@ -14,7 +14,7 @@ from typing import Any
 from server.bridge.server import RosBridge
 from server.serving import uvloop_runner
 from server.simulator.car import SimulatedCar
-from server.simulator.messages import VEL
+from server.simulator.messages import CMD_VEL, VEL
 from server.source import Json
 from tests.bench.orders import obey, options
 
@@ -40,6 +40,8 @@ class Car:
         self.topics = [published.topic for published in drive.published]
         self.messages_per_s = len(self._tape) / TAPE_S
         self._calm = asyncio.Event()  # a calm speed was published since
+        self._commanded: list[tuple[int, float]] = []  # when a command arrived [ns], and its speed
+        self.bridge.on_publish.append(self._hear)
 
     async def drive(self) -> None:
         """Plays for ever, each message at its time."""
@@ -70,6 +72,15 @@ class Car:
             self._publish_speed(speed_mps)
         return sent
 
+    async def commanded(self) -> list[tuple[int, float]]:
+        """The commands that arrived since this was last asked: when [ns, CLOCK_MONOTONIC], and their speed [m/s]."""
+        commanded, self._commanded = self._commanded, []
+        return commanded
+
+    def _hear(self, topic: str, type: str, message: Json) -> None:
+        if topic == CMD_VEL.topic:
+            self._commanded.append((time.monotonic_ns(), message["linear"]["x"]))
+
     async def counts(self) -> dict[str, int]:
         """What the bridge has sent and dropped so far."""
         return {"sent": self.bridge.sent, "dropped": self.bridge.dropped, "bytes": self.bridge.bytes_sent}
@@ -92,7 +103,7 @@ async def main(beams: int | None = None) -> None:
         "messages_per_s": car.messages_per_s,
     }
     try:
-        await obey({"probe": car.probe, "counts": car.counts}, hello)
+        await obey({"probe": car.probe, "counts": car.counts, "commanded": car.commanded}, hello)
     finally:
         driving.cancel()
         await car.bridge.stop()
