@@ -60,7 +60,7 @@ async def clip(request: Request, id: Id, body: Annotated[ClipRequest, Body()]) -
     except NotYet as why:
         raise Problem(422, str(why), field="at_ms") from None
     except TooMany as why:
-        raise HTTPException(503, str(why), headers={"Retry-After": "30"}) from None
+        raise HTTPException(429, str(why), headers={"Retry-After": "30"}) from None
 
 
 @router.get("/api/recordings/{id}/export/{format}", summary="A recording in another format", response_class=Response)
@@ -107,7 +107,7 @@ async def _begun(request: Request, id: str, format: str) -> Job:
     except NoSuchRecording as why:
         raise HTTPException(404, str(why)) from None
     except TooMany as why:
-        raise HTTPException(503, str(why), headers={"Retry-After": "30"}) from None
+        raise HTTPException(429, str(why), headers={"Retry-After": "30"}) from None
 
 
 def _found(request: Request, id: str) -> Job:
