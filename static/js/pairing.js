@@ -99,6 +99,7 @@ export function openPairing(root, { why, name, onPaired }) {
     pin.value = '';
     setWords(says, sentence);
     draw();
+    says.scrollIntoView({ block: 'nearest' }); // on a small screen it lies beneath the digits
   }
 
   function waiting_s() {
@@ -118,5 +119,5 @@ export function openPairing(root, { why, name, onPaired }) {
 
   styled().then(draw, draw);
   draw();
-  /** @type {HTMLElement | null} */ (root.querySelector('h1'))?.focus();
+  /** @type {HTMLElement | null} */ (root.querySelector('h1'))?.focus({ preventScroll: true });
 }
