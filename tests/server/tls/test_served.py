@@ -120,6 +120,7 @@ async def test_without_tls_nothing_but_the_plain_page_is_served(served: Field, p
     async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{getattr(served, port)}") as client:
         answer = await client.get(path)
         assert (answer.status_code, answer.headers["location"]) == (303, "/")
+        assert (await client.post(path)).headers["location"] == "/"
         page = await client.get("/")
         assert "Let this device trust the server" in page.text
         assert f"https://127.0.0.1:{served.port}/" in page.text

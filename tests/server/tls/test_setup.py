@@ -61,8 +61,10 @@ async def test_the_profile_holds_the_certificate_and_no_more() -> None:
 
 def test_a_second_installation_replaces_the_first_and_another_server_s_does_not() -> None:
     other = authority.make(host="pit", now=NOW)
-    ids = [plistlib.loads(mobileconfig(one))["PayloadIdentifier"] for one in (OURS, OURS, other)]
-    assert ids[0] == ids[1] != ids[2]
+    profiles = [plistlib.loads(mobileconfig(one)) for one in (OURS, OURS, other)]
+    for name in ("PayloadIdentifier", "PayloadUUID"):
+        for ids in ([one[name] for one in profiles], [one["PayloadContent"][0][name] for one in profiles]):
+            assert ids[0] == ids[1] != ids[2]
 
 
 @pytest.mark.parametrize(
