@@ -144,6 +144,7 @@ export function mount(root, store, control, say) {
     setText(field(home, 'slow-state'), `Slow-down ${word}`);
     setWords(field(home, 'slow-guard'), now?.state === 'not_available' && now.why && !seen.isSilent ? `${now.why} ${guard.text}.` : `${guard.text}.`);
     setAttribute(home, 'data-state', word.toLowerCase());
+    show(home, !seen.isReplay); // of a recording it would say what holds of no car
   }
 
   /** @param {import('./protocol.js').SlowOrder | null} order */
