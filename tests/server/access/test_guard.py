@@ -41,8 +41,8 @@ async def refused(served: Served, **how: str) -> bool:
 
 
 async def closed(page: websockets.ClientConnection) -> tuple[int, str]:
-    """The code and the reason with which the server closes it, within 2 s."""
-    async with asyncio.timeout(2):
+    """The code and the reason with which the server closes it, soon."""
+    async with asyncio.timeout(6):
         with contextlib.suppress(websockets.ConnectionClosed):
             while True:
                 await page.recv()
