@@ -1,10 +1,12 @@
 // Who is in control, on every tab: the chip in the top bar, the request that its holder must answer, and what happened to it.
 
 import { askedOf, chipOf, noticeOf, seconds } from './control-layout.js';
-import { field, html, icon, listen, setAttribute, setText, setWords } from './dom.js';
+import { field, html, icon, listen, need, setAttribute, setText, setWords } from './dom.js';
 
 /** A refusal is answered with a key for so long: another one of the same words is another [ms]. */
 const REFUSED_MS = 3000;
+/** What happened to control waits so long for its turn to be said, and is then no news any more [ms]. */
+const NEWS_MS = 20_000;
 
 /**
  * @typedef {import('./store.js').Store} Store
@@ -57,8 +59,11 @@ export function mount(root, snacks, store, control) {
   const asks = html('div', { class: 'snack asks', role: 'alert', 'data-f': 'asks' },
     html('div', { class: 'side' }, icon('operator')), html('div', { class: 'tx' }, html('b', {}, 'Control is asked for'), text), html('div', { class: 'ac' }, keep, give));
   let asking = '';
+  /** @type {{notice: NonNullable<ReturnType<typeof noticeOf>>, at_ms: number} | null} */
+  let news = null;
 
   function draw() {
+    speak();
     const { control: now } = store;
     const chipWords = chipOf(now, store.page, store.isSilent);
     setText(name, chipWords.text);
@@ -74,10 +79,19 @@ export function mount(root, snacks, store, control) {
   /** @param {import('./protocol.js').AlarmEvent[]} events */
   function tell(events) {
     const notice = events.filter((event) => event.change === 'control').map((event) => noticeOf(event, store.page)).findLast((one) => one !== null);
-    if (!notice) return;
-    const { offers } = notice;
+    if (notice) news = { notice, at_ms: store.now() };
+    speak();
+  }
+
+  /** It takes no other notice's place: that this page was blind, or why an order was refused, is told first. */
+  function speak() {
+    if (!news || snacks.querySelector('.note:not([data-of="control"])')) return;
+    const { notice: { title, text: words, offers }, at_ms } = news;
+    news = null;
+    if (store.now() - at_ms > NEWS_MS) return;
     const way = offers ? { label: offers === 'take' ? 'Take control' : 'Ask for it', act: () => void control.order(offers) } : undefined;
-    control.say(notice.text, notice.title, way);
+    control.say(words, title, way);
+    setAttribute(need(snacks, '.note'), 'data-of', 'control');
   }
 
   draw();

@@ -10,6 +10,9 @@ import { pixelOf, round } from './map-layout.js';
  * @typedef {{group: SVGElement, around: SVGElement, mark: SVGElement, name: SVGElement}} Drawn
  */
 
+/** A name takes about so much room, and the keys at the right edge [px]. */
+const NAME_PX = 240;
+
 export class OtherPhones {
   /** @type {Map<string, Drawn>} */
   #drawn = new Map();
@@ -41,7 +44,9 @@ export class OtherPhones {
     setAttribute(drawn.around, 'r', round((one.accuracy_m ?? 0) / view.mpp));
     const isSeen = at[0] > -20 && at[0] < size.width + 20 && at[1] > -20 && at[1] < size.height + 20;
     setAttribute(drawn.name, 'display', isSeen ? null : 'none');
-    setAttribute(drawn.name, 'transform', `translate(${x} ${round(at[1] + 26)})`);
+    const isRight = at[0] > size.width - NAME_PX; // beside it: above and below stand the names of car and phone
+    setAttribute(drawn.name, 'text-anchor', isRight ? 'end' : 'start');
+    setAttribute(drawn.name, 'transform', `translate(${round(at[0] + (isRight ? -14 : 14))} ${round(at[1] + 5)})`);
     if (drawn.name.textContent !== one.label) drawn.name.textContent = one.label;
   }
 
@@ -49,7 +54,7 @@ export class OtherPhones {
   #make(id) {
     const around = svg('circle', { class: 'phacc' });
     const mark = svg('g', { class: 'phone-mark' }, svg('circle', { class: 'ph', r: 9 }), svg('circle', { class: 'phd', r: 3 }));
-    const name = svg('text', { class: 'name' });
+    const name = svg('text', { class: 'whose' });
     const drawn = { group: svg('g', { 'data-phone': id }, around, mark, name), around, mark, name };
     this.root.append(drawn.group);
     this.#drawn.set(id, drawn);

@@ -2,6 +2,7 @@
 
 import { bearing_deg, distance_m, placeOf } from './geodesy.js';
 import { ellipseOf } from './map-layout.js';
+import { nameOf } from './phones-layout.js';
 import { age, fixed, heading } from './words.js';
 
 /**
@@ -74,22 +75,24 @@ function carSays(ink, age_s, isLost) {
  * The phone as the newest frame has it.
  * @param {State} frame
  * @param {number} lag_s age of the frame at the glass
+ * @param {string} [page] this page
  * @returns {PhoneOnMap}
  */
-export function phoneOf(frame, lag_s) {
+export function phoneOf(frame, lag_s, page = '') {
   const phone = frame.phone ?? null;
   if (!phone) return { place: null, isLive: false, age_s: null, accuracy_m: null, label: '', says: 'No phone tells its position.' };
   const age_s = phone.age_s === null ? null : phone.age_s + lag_s;
   const place = placeOf(phone);
   // A coarse fix is one of now all the same; every other reason says that there is none of now.
   const isLive = place !== null && (phone.used || phone.why === 'coarse') && age_s !== null && age_s <= PHONE_LIVES_S;
+  const name = phone.count > 1 ? nameOf(phone, page) : 'Phone'; // among several each has its own
   const whose = phone.count > 1 && phone.label ? ` It is of ${phone.label}, one of ${phone.count} phones.` : '';
   let says = '';
   if (phone.why_text) says = `${phone.why_text}.`;
   else if (place && !isLive) says = `The phone’s newest fix is ${age(age_s)} s old.`;
   return {
     place, isLive, age_s, accuracy_m: phone.accuracy_m,
-    label: isLive ? `Phone ±${metres(phone.accuracy_m ?? 0)}` : `Phone STALE ${age(age_s)} s`,
+    label: isLive ? `${name} ±${metres(phone.accuracy_m ?? 0)}` : `${name} STALE ${age(age_s)} s`,
     says: `${says}${whose}`.trim(),
   };
 }

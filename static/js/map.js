@@ -81,7 +81,7 @@ export function mount(root, store, isShown, say = () => {}) {
     let car = carOf(frame, (signal) => store.ink(signal));
     // A receiver that lost its fix tells no place any more; what is left is where the car was last.
     if (!car.place && before && car.ink !== 'not_published' && car.ink !== 'never') car = { ...car, place: before, isLive: false, label: 'Car was here' };
-    const phone = phoneOf(frame, lag_s);
+    const phone = phoneOf(frame, lag_s, store.page);
     known = { car, phone, apart: apartOf(frame, lag_s, car, phone), others: othersOn(frame, lag_s, store.page) };
     if (!isGroundThere && store.now() - asked_ms > AGAIN_MS) {
       asked_ms = store.now();

@@ -5,6 +5,7 @@ import { test } from 'node:test';
 
 import { askedOf, chipOf, noticeOf, reachOf, seconds, sheetOf } from '../../static/js/control-layout.js';
 import { isApple } from '../../static/js/handset.js';
+import { phoneOf } from '../../static/js/map-words.js';
 import { nameOf, othersOn, phoneRow, phonesLine } from '../../static/js/phones-layout.js';
 import { rowsOf, verdictOf } from '../../static/js/this-phone-layout.js';
 
@@ -136,4 +137,11 @@ test('the others on the map: live, stale, and none without a place', () => {
   assert.equal(shown(at('bbbb', { used: false, why: 'coarse', accuracy_m: 80 }))?.isLive, true);
   assert.equal(shown(at('bbbb', { lat_deg: null, lon_deg: null })), undefined);
   assert.equal(shown(at('bbbb', { compared: true })), undefined); // drawn as the phone
+});
+
+test('among several the phone that is compared has its own name too', () => {
+  const label = (count, page) => phoneOf({ phone: { ...at('bbbb', { compared: true }), count }, phones: [] }, 0, page).label;
+  assert.equal(label(1, 'aaaa'), 'Phone ±5 m');
+  assert.equal(label(2, 'aaaa'), 'phone bbbb ±5 m');
+  assert.equal(label(2, 'bbbb'), 'You ±5 m');
 });

@@ -178,7 +178,8 @@ async def test_lost_by_sleep_back_again_and_lost_for_good(browser: Browser, tmp_
         await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("Ann fell silent for 3 s")
         await sleep.end()
         await holds(one, "Ann")  # nobody had taken it meanwhile
-        await expect(one["Ann"].page.locator(".snack.note")).to_contain_text("You are in control again")
+        again = one["Ann"].page.locator(".snack.note")
+        await expect(again).to_contain_text("You are in control again", timeout=20_000)  # first, that it was blind
 
         await hide(one["Ann"], True)
         await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("Nobody is in control", timeout=10_000)
@@ -261,3 +262,42 @@ async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
                         await asyncio.sleep(0.2)
         finally:
             await context.close()
+
+
+@pytest.mark.timeout(120)
+async def test_each_phone_has_its_marker_and_the_one_that_rides_is_compared(browser: Browser, tmp_path: Path) -> None:
+    """Ann tells a position, Ben was not allowed to; Ann, in control, says that Ben's rides in the car."""
+    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
+        one = Crew({}, watch)
+        contexts = []
+        try:
+            for name in ("Ann", "Ben"):
+                context, one.phones[name] = await opened(browser, name, watch.address)
+                contexts.append(context)
+            await contexts[0].grant_permissions(["geolocation"])
+            position = (await one.state())["signals"]["position"]["value"]
+            here = {"latitude": position["lat_deg"], "longitude": position["lon_deg"], "accuracy": 6.0}
+            await contexts[0].set_geolocation(here)
+            for name in ("Ann", "Ben"):
+                await one[name].f("sound-off").tap()
+            state = await one.until(lambda s: len(s["phones"]) == 2 and s["phones"][0]["accuracy_m"] == 6.0)
+            assert [(phone["label"], phone["compared"]) for phone in state["phones"]] == [("Ann", True), ("Ben", False)]
+            assert state["phone"]["choice"] == "first"
+
+            await one["Ann"].page.locator("#tab-map").tap()
+            await one["Ann"].f("phones").tap()
+            sheet = one["Ann"].page.locator("#sheet-phones")
+            await expect(sheet).to_contain_text("of 2, this was the first with a usable position")
+            bens = sheet.get_by_role("button", name="Ben")
+            await expect(bens).to_contain_text("The phone was not allowed to tell it.")
+            await bens.tap()
+            await expect(bens).to_contain_text("In the car")
+            await sheet.get_by_role("button", name="Close").tap()
+            state = await one.until(lambda s: s["phone"]["choice"] == "operator")
+            assert (state["phone"]["label"], state["phone"]["why"]) == ("Ben", "denied")  # no other takes its place
+            await expect(one["Ann"].page.locator(".others .whose")).to_contain_text("You")
+            await expect(one["Ann"].f("phones")).to_contain_text("Ben rides in the car")
+            await expect(one.chip("Ben")).to_have_text("Ann")
+        finally:
+            for context in contexts:
+                await context.close()

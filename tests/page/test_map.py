@@ -386,7 +386,7 @@ async def test_both_are_brought_into_sight_and_the_heading_up(phone: Phone) -> N
 async def test_keys_are_large_named_and_worked_by_a_keyboard(phone: Phone) -> None:
     async with roaming() as car, looking(phone, car) as it:
         names = []
-        for key in await it.page.locator("#panel-map button").all():
+        for key in await it.page.locator("#panel-map .map button").all():
             box = await key.bounding_box()
             assert min(box["width"], box["height"]) >= 56
             names.append(await key.get_attribute("aria-label"))
@@ -435,7 +435,7 @@ async def test_no_width_breaks_the_map(phone: Phone, size: tuple[int, int], tmp_
         )
         assert over == []
         place = await it.page.locator("#panel-map .map").bounding_box()
-        for key in await it.page.locator("#panel-map button").all():
+        for key in await it.page.locator("#panel-map .map button").all():
             box = await key.bounding_box()
             assert box["y"] >= place["y"]
             assert box["y"] + box["height"] <= place["y"] + place["height"]
