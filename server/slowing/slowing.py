@@ -11,18 +11,19 @@ import asyncio
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 from monitor.alarm import Alarm, Refused
 from monitor.check import Verdict
 from monitor.checks.slow_down import SlowDownLimits, obeys
 from monitor.slowing import SlowingFacts
 from monitor.state import Reading, Snapshot
-from monitor.triggers import COUNTDOWN_S, Due, Triggers
 from server import commands, wire
 from server.link import LinkDown, RosLink
+from server.slowing.countdown import Countdown
 from server.slowing.guard import GuardWatch
 from server.slowing.mouth import Mouth
+from server.slowing.note import Note
 from server.slowing.order import BY_HAND, LATE_S, Car, Order, SlowDown
 from server.slowing.twist import message
 from server.slowing.way import Way
@@ -35,12 +36,6 @@ DOUBT_S = 0.3
 FIRST_SPEED_S = 0.5
 UNDER_WAY = 2  # commands of which the bridge has not yet shown that it read them; where it freezes, no more come late
 STALL_S = 0.1  # a turn so late was our own fault: what the bridge said meanwhile is still unread
-
-
-class Note(Protocol):
-    """Writes an event of no alarm into the log."""
-
-    def __call__(self, change: str, text: str, *, by: str | None = None, **more: Any) -> None: ...
 
 
 class Slowing:
@@ -65,8 +60,7 @@ class Slowing:
         self._record = record
         self._life = SlowDown(number)
         self._mouth = Mouth()
-        self._triggers = Triggers()
-        self._countdown: tuple[Due, float] | None = None
+        self._countdown = Countdown(note)
         self._guard = GuardWatch(self._mouth)
         self._link: RosLink | None = None
         self._way = Way(problem="No car is connected.")
@@ -100,8 +94,8 @@ class Slowing:
         if not said_farewell:
             self._mouth.unadvertise_all()
         self._mouth.attach(None)
-        self._link, self._countdown, self.rivals = None, None, None
-        self._triggers.forget()
+        self._link, self.rivals = None, None
+        self._countdown.forget()
         self._way = Way(problem="No car is connected.")
         return said_farewell
 
@@ -178,7 +172,7 @@ class Slowing:
                     self._note("armed", f"Slow-down armed on {self._way.topic}.{self._rivals_words()}", by=by)
             case commands.Disarm():
                 if self._life.disarm():
-                    self._countdown = None
+                    self._countdown.stop()
                     self._mouth.unadvertise_all()
                     self._note("disarmed", "Slow-down is safe: nothing can be ordered.", by=by)
             case commands.Decelerate():
@@ -186,7 +180,7 @@ class Slowing:
             case commands.Release():
                 self._release(command.number, by)
             case commands.Veto():
-                self._veto(command.trigger, by)
+                self._countdown.veto(command.trigger, by=by)
 
     def _order_by_hand(self, command: commands.Decelerate, by: str) -> None:
         now_s = self._now()
@@ -210,7 +204,7 @@ class Slowing:
             now_s=now_s,
             pressed_s=pressed_s,
         )
-        self._countdown = None
+        self._countdown.stop()
         if order is None:
             return  # one stands already
         self._told_unconfirmed = False
@@ -230,14 +224,6 @@ class Slowing:
         self._guard.release()
         self._tell(order, "released", "The car is released: whoever drives it commands again.", by=by)
 
-    def _veto(self, trigger: str, by: str) -> None:
-        if self._countdown is None or self._countdown[0].trigger.id != trigger:
-            raise Refused("No count-down runs for this any more.")
-        due, _ = self._countdown
-        self._countdown = None
-        self._triggers.veto(trigger)
-        self._note("slow_down", f"Vetoed: {due.trigger.title}.", by=by, step="vetoed", trigger=trigger)
-
     # -- within ------------------------------------------------------------------------------------------------------
 
     def _watch_way(self, way: Way) -> None:
@@ -250,7 +236,7 @@ class Slowing:
         if way.problem is not None or (way.topic, way.kind) != (before.topic, before.kind):
             why = way.problem or f"commands go to {way.topic} now."
             self._life.disarm()
-            self._countdown = None
+            self._countdown.stop()
             self._note("disarmed", f"Slow-down is not armed any more: {why}")
         else:
             self._announce_way()
@@ -262,26 +248,10 @@ class Slowing:
             self._mouth.advertise(way.topic, way.type)
 
     def _watch_rules(self, alarms: Mapping[str, Alarm], now_s: float, is_paused: bool) -> None:
-        due = None if is_paused else self._triggers.look(alarms, self.limits, now_s)
-        if self._life.order is not None or self._life.armed_by is None or self._way.problem is not None:
-            self._countdown = None
-            return
-        if self._countdown is None:
-            if due is not None:
-                self._countdown = (due, now_s)
-                text = (
-                    f"The car is slowed in {COUNTDOWN_S:.0f} s unless somebody vetoes: {due.trigger.title}. {due.text}"
-                )
-                self._note("slow_down", text, step="countdown", trigger=due.trigger.id)
-            return
-        counting, began_s = self._countdown
-        if due is None or due.trigger.id != counting.trigger.id:
-            self._countdown = None
-            self._note("slow_down", f"Count-down ended: {counting.trigger.title} is over.", step="over")
-        elif now_s - began_s >= COUNTDOWN_S:
-            if self._link is None or not self._link.is_open:
-                return  # it begins when the link is back, if the fault still stands
-            self._begin("catgraph", counting.trigger.title, now_s, pressed_s=None)
+        can_begin = self._life.order is None and self._life.armed_by is not None and self._way.problem is None
+        over = self._countdown.look(alarms, self.limits, now_s, can_begin=can_begin and not is_paused)
+        if over is not None and self._link is not None and self._link.is_open:  # else once the link is back
+            self._begin("catgraph", over.trigger.title, now_s, pressed_s=None)
 
     def _speak(self) -> None:
         """One command, now or not at all."""
@@ -414,14 +384,7 @@ class Slowing:
             "armed_by": life.armed_by,
             "deceleration_mps2": wire.plain(self.limits.deceleration_mps2, 2),
             "order": None if order is None else self._order(order, now_s),
-            "countdown": None
-            if self._countdown is None
-            else {
-                "trigger": self._countdown[0].trigger.id,
-                "title": self._countdown[0].trigger.title,
-                "text": self._countdown[0].text,
-                "left_s": wire.plain(max(0.0, COUNTDOWN_S - (now_s - self._countdown[1])), 1),
-            },
+            "countdown": self._countdown.frame(now_s),
             "guard": self._guard.frame(now_s),
         }
 
