@@ -78,7 +78,8 @@ def test_no_call_finds_a_mistake(victim: Victim, calls: int) -> None:
         schema = schemathesis.openapi.from_dict(client.get("/openapi.json").json())
         operations = [found.ok() for found in schema.get_all_operations()]
         assert len(operations) > 40
-        each = math.ceil(calls / len(operations) / (2 if calls > 1000 else 1))
+        # A route with nothing to fill in is called a few times and no more: the others make up for it.
+        each = math.ceil(1.4 * calls / len(operations) / (2 if calls > 1000 else 1))
         answers: Counter[int] = Counter()
         for number, operation in enumerate(operations):
             modes = [GenerationMode.NEGATIVE, GenerationMode.POSITIVE]
