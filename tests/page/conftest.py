@@ -92,9 +92,9 @@ class Phone:
 
 
 @pytest_asyncio.fixture(loop_scope="module")
-async def phone(browser: Browser) -> AsyncIterator[Phone]:
+async def phone(browser: Browser, request: pytest.FixtureRequest) -> AsyncIterator[Phone]:
     """A fresh phone; at the end its console must be clean but for the lost connections a test made."""
-    context = await browser.new_context(**PHONE)
+    context = await browser.new_context(**{**PHONE, **getattr(request, "param", {})})
     phone = Phone(await context.new_page())
     machine = asyncio.create_task(phone.watch_machine())
     yield phone

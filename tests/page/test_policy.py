@@ -86,6 +86,7 @@ def forbidden_at_once() -> str:
     }}"""
 
 
+@pytest.mark.parametrize("phone", [{"service_workers": "allow"}], indirect=True, ids=["workers allowed"])
 async def test_what_the_page_never_does_is_refused(phone: Phone, forbidden_at_once: str) -> None:
     await phone.page.add_init_script(NOTE_VIOLATIONS)
     async with serving(Config()) as address:
