@@ -1,4 +1,4 @@
-"""Two operators and one car: anybody may slow it, only the one in control arms and releases; what is late is refused."""
+"""Two operators and one car: anybody slows it, only the one in control arms and releases; what is late is refused."""
 
 from __future__ import annotations
 
