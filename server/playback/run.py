@@ -21,6 +21,7 @@ from server import judging, wire
 from server.bridge.names import BadName, canonical_name
 from server.frame import Facts, state_frame
 from server.judging import TICK_S
+from server.playback.slowed import SlowDownTold, Slowed
 from server.playback.told import NewSettings, Pause, Told
 from server.reception import Reception
 from server.recording.read import Recording
@@ -70,6 +71,7 @@ class Known:
     last_message_s: float | None = None
     paused_s: float | None = None
     paused_by: str | None = None
+    slowed: Slowed = field(default_factory=Slowed)
 
 
 class Drive:
@@ -239,6 +241,7 @@ class Run:
     def _judge(self, now_s: float, changed: tuple[str, ...] | None) -> None:
         known = self.known
         known.state.link(self._link(now_s))
+        known.state.slow(known.slowed.facts(now_s, self._ways.tuning.limits.slow_down))
         self._tell(judging.judge(known.monitor, known.state, now_s, changed))
 
     def _tell(self, transitions: tuple[Transition, ...]) -> None:
@@ -257,6 +260,8 @@ class Run:
             case Pause():
                 known.paused_s, known.paused_by = (now_s, word.by) if word.is_paused else (None, None)
                 known.state.set_paused(word.is_paused, known.paused_s)
+            case SlowDownTold():
+                known.slowed = known.slowed.after(word, now_s)
             case PhoneWord():
                 known.state.hear_phone(word, now_s)
             case NewSettings():
@@ -343,7 +348,7 @@ class Run:
         frame["session"]["name"] = name
         # Whatever is not in the file is nobody's silence: the band tells of it, and each value keeps its age.
         frame["link"] |= {"cut": None, "since_ms": None, "problem": None, "topics_subscribed": len(ways.published)}
-        frame["decelerate"] = {"state": "not_available", "why": "this is a replay"}
+        frame["decelerate"] = known.slowed.as_json(now_s, self.drive.start_s, ways.tuning.limits.slow_down)
         if self.drive.told.has_alarms:
             frame["alarms"] = [wire.alarm(alarm, now_s, wall_ms) for alarm in self._told_standing()]
         return frame

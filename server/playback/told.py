@@ -15,6 +15,8 @@ from monitor.phones import PhoneWord
 from server import phone
 from server.commands import Position
 from server.past import transition_of
+from server.playback import slowed
+from server.playback.slowed import SlowDownTold
 from server.recording.read import Recording
 
 ALARMS, PHONE, SETTINGS = "/catgraph/alarms", "/catgraph/phone", "/catgraph/settings"
@@ -36,7 +38,7 @@ class NewSettings:
     toml: str
 
 
-Word = Transition | Pause | NewSettings | PhoneWord
+Word = Transition | Pause | NewSettings | PhoneWord | SlowDownTold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +102,8 @@ def _of_event(event: Mapping[str, Any], at_s: float, start_s: float) -> Word | N
     if change in ("paused", "resumed"):
         by = event.get("by")
         return Pause(is_paused=change == "paused", by=by if isinstance(by, str) else None)
+    if (told := slowed.read(event)) is not None:
+        return told
     if not isinstance(event.get("alarm"), str):
         return None
     return transition_of(event, lambda at_ms: at_ms / 1000 - start_s, lambda until_ms: until_ms / 1000 - start_s)
