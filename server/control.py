@@ -109,17 +109,8 @@ class Control:
             return []
         acts = []
         if now_s - lease.renewed_s > LEASE_S:
-            was = lease.holder
-            self.lease, self.lapsed = None, Lapsed(holder=was, at_s=now_s)
             silent_s = now_s - lease.renewed_s
-            acts.append(
-                self._act("lapsed", f"{was.name} fell silent for {silent_s:.0f} s: nobody is in control.", None, was)
-            )
-            if self.requests:
-                one = self.requests[0].of
-                acts.append(
-                    self._grant("granted", one, None, now_s, None, f"{one.name}, who asked for it, is in control.")
-                )
+            acts += self._lapse(f"{lease.holder.name} fell silent for {silent_s:.0f} s", now_s)
         elif self.requests and now_s - self.requests[0].asked_s >= ANSWER_S:
             one = self.requests[0].of
             text = f"{one.name} is in control: {lease.holder.name} did not answer within {ANSWER_S:.0f} s."
@@ -138,6 +129,13 @@ class Control:
         away_s = now_s - self.lapsed.at_s + LEASE_S
         text = f"{operator.name} is back after {away_s:.0f} s and in control again: nobody had taken it."
         return self._grant("returned", operator, None, now_s, None, text)
+
+    def leave(self, operator: Operator, now_s: float) -> list[Act]:
+        """This page was closed or loaded anew: nobody needs to wait for its lease to run out. One that is loaded anew
+        is back within the time in which it has it again."""
+        if not operator.is_same(self.holder):
+            return []
+        return self._lapse(f"{operator.name} left", now_s)
 
     # -- what an operator does ---------------------------------------------------------------------------------------
 
@@ -219,6 +217,18 @@ class Control:
         return acts
 
     # -- within ------------------------------------------------------------------------------------------------------
+
+    def _lapse(self, why: str, now_s: float) -> list[Act]:
+        """The lease ends because nobody renews it; the first who asked for it has it, else nobody."""
+        assert self.lease is not None
+        was = self.lease.holder
+        self.lease, self.lapsed = None, Lapsed(holder=was, at_s=now_s)
+        acts = [self._act("lapsed", f"{why}: nobody is in control.", None, was)]
+        if self.requests:
+            one = self.requests[0].of
+            text = f"{one.name}, who asked for it, is in control."
+            acts.append(self._grant("granted", one, None, now_s, None, text))
+        return acts
 
     def _demand(self, by: Operator, fence: int | None) -> None:
         """Only the holder does this."""

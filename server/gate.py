@@ -126,7 +126,10 @@ class Gate:
             return False
         if word.leaves:
             self._reach.leave(operator)
-            return False
+            acts = self._control.leave(operator, now_s)
+            for act in acts:
+                self._tell(act)
+            return bool(acts)
         said = Present(
             is_visible=word.visible,
             sound=word.sound,

@@ -203,7 +203,7 @@ async def test_silence_grants_what_is_asked_for_and_a_reload_keeps_it(browser: B
         await one["Ben"].page.reload()
         await one["Ben"].live()
         await holds(one, "Ben")
-        assert [event["act"] for event in await one.events()] == ["taken", "requested", "granted"]
+        assert [event["act"] for event in await one.events()] == ["taken", "requested", "granted", "lapsed", "returned"]
 
 
 def reach(state: dict[str, Any]) -> tuple[int, int]:

@@ -179,15 +179,32 @@ def test_control_is_handed_only_to_a_page_that_is_seen() -> None:
     assert car.shown(1.0)["holder"] == "Ben"
 
 
-def test_a_farewell_leaves_control_to_time() -> None:
+def test_a_page_that_is_closed_keeps_nobody_waiting_and_one_that_is_loaded_anew_has_control_again() -> None:
     car = Vehicle()
-    car.see(ANN, now_s=0.0)
+    car.see(ANN, BEN, now_s=0.0)
     car.do(ANN, "take", 0.0)
     car.see(ANN, now_s=1.0, leaves=True)
-    assert car.gate.facts(1.0).of == 0
-    assert car.shown(2.9)["holder"] == "Ann"  # a reload is back before
-    car.see(ANN, now_s=2.9)
-    assert not car.gate.tick(5.0)
+    assert car.gate.facts(1.0).of == 1
+    assert car.shown(1.0)["holder"] is None
+    car.see(ANN, now_s=2.5)
+    assert car.shown(2.5)["holder"] == "Ann"
+    assert car.acts == ["taken", "lapsed", "returned"]
+    car.see(BEN, now_s=2.9)
+    car.see(ANN, now_s=3.0, leaves=True)
+    car.gate.admit(PAUSE, BEN, 3.1)
+    car.see(ANN, now_s=3.2)
+    assert car.shown(3.2)["holder"] == "Ben"
+    car.see(ANN, now_s=3.3, leaves=True)  # it holds nothing
+    assert car.shown(3.3)["holder"] == "Ben"
+
+
+def test_whoever_asked_has_control_as_soon_as_the_holder_has_left() -> None:
+    car = Vehicle()
+    car.see(ANN, BEN, now_s=0.0)
+    car.do(ANN, "take", 0.0)
+    car.do(BEN, "request", 1.0)
+    car.see(ANN, now_s=2.0, leaves=True)
+    assert car.shown(2.0)["holder"] == "Ben"
 
 
 def test_a_page_that_shows_a_replay_keeps_control_and_hears_no_alarm() -> None:
