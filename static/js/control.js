@@ -7,6 +7,8 @@ import { field, html, icon, listen, need, setAttribute, setText, setWords } from
 const REFUSED_MS = 3000;
 /** What happened to control waits so long for its turn to be said, and is then no news any more [ms]. */
 const NEWS_MS = 20_000;
+/** What happened longer before it was told is no news [ms]. */
+const FRESH_MS = 5000;
 
 /**
  * @typedef {import('./store.js').Store} Store
@@ -78,7 +80,8 @@ export function mount(root, snacks, store, control) {
 
   /** @param {import('./protocol.js').AlarmEvent[]} events */
   function tell(events) {
-    const notice = events.filter((event) => event.change === 'control').map((event) => noticeOf(event, store.page)).findLast((one) => one !== null);
+    const now_ms = store.frame?.server.time_ms ?? Infinity; // a page that was just loaded is told old news: who has control now, the bar says
+    const notice = events.filter((event) => event.change === 'control' && now_ms - event.at_ms <= FRESH_MS).map((event) => noticeOf(event, store.page)).findLast((one) => one !== null);
     if (notice) news = { notice, at_ms: store.now() };
     speak();
   }
