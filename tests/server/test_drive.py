@@ -145,6 +145,7 @@ def _assert_as_rehearsed(file: Path, events: list[dict[str, Any]], one: Viewer) 
     rehearsed = {(row.alarm_id, row.change, row.occurrence): row.at_s for row in run.transitions}
     during = {name for name, at_s in live.items() if at_s <= run.to_s}  # then the replay falls silent, and that is told
     assert rehearsed
+    during = {one for one in during if one[0] != "reach"}  # nobody listens here, which no recording can tell
     assert during == set(rehearsed)
     for name, at_s in rehearsed.items():
         assert live[name] == pytest.approx(at_s, abs=TICK_S + JITTER_S), name
