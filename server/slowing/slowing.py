@@ -68,6 +68,7 @@ class Slowing:
         self._ordered = asyncio.Event()
         self._turned_s = 0.0
         self._opened_s = 0.0  # the newest opening of the link
+        self._sent_s = 0.0  # the newest command
         self._told_unconfirmed = False
         self.limits = SlowDownLimits()
         self.rivals: tuple[str, ...] | None = None  # who else publishes on the topic; None: not known
@@ -190,7 +191,7 @@ class Slowing:
                 raise Refused(f"This was pressed {late_s:.1f} s ago: press again if it still counts.")
             if self._life.order is None and (self._link is None or not self._link.is_open):
                 raise Refused("Not ordered: there is no link to the car. Use the physical stop.")
-            self._begin(by, BY_HAND, now_s, pressed_s=now_s - late_s - command.pressed_ago_s)
+            self._begin(by, BY_HAND, now_s, pressed_s=now_s - late_s)
         except Refused as why:
             self._note("slow_down", f"Slow-down refused: {why.reason}", by=by, step="refused")
             raise
@@ -263,11 +264,13 @@ class Slowing:
         if link is None or not link.is_open:
             self._cut("the link to the car was lost")
             return
-        if order.sending_s is not None and not was_stalled and now_s - (link.heard_s or 0.0) > DOUBT_S:
+        is_stuck = link.unanswered >= UNDER_WAY
+        proved_s = min(link.heard_s or 0.0, self._sent_s if is_stuck else now_s)
+        if order.sending_s is not None and not was_stalled and now_s - proved_s > DOUBT_S:
             self._cut("the bridge does not answer")
             link.abort()
             return
-        if link.unanswered >= UNDER_WAY:
+        if is_stuck:
             return  # nothing is put behind what may be stuck
         way = self._way
         if way.kind is None or way.type is None:
@@ -292,6 +295,7 @@ class Slowing:
         except LinkDown:
             self._cut("the link to the car was lost")
             return
+        self._sent_s = now_s
         is_first = self._life.sent(command, now_s)
         self._record({"topic": way.topic, "type": way.type, "message": said, "by": order.by, "order": order.number})
         if not is_first and not was_sending:
