@@ -126,10 +126,10 @@ class Gate:
             return False
         if word.leaves:
             self._reach.leave(operator)
-            acts = self._control.leave(operator, now_s)
-            for act in acts:
-                self._tell(act)
-            return bool(acts)
+            given_up = self._control.leave(operator, now_s)
+            for released in given_up:
+                self._tell(released)
+            return bool(given_up)
         said = Present(
             is_visible=word.visible,
             sound=word.sound,
