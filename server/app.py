@@ -204,7 +204,10 @@ class _Served(FastAPI):
     """Every answer has the headers: those of a bug too, which Starlette gives outside of all that is added to it."""
 
     def build_middleware_stack(self) -> ASGIApp:
-        return SecurityHeaders(super().build_middleware_stack())
+        config: Config = self.state.running.config
+        return SecurityHeaders(
+            super().build_middleware_stack(), is_strict=config.tls is not None and config.tls.mode == "files"
+        )
 
 
 def _upstream(config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Callable[[], Upstream] | None:

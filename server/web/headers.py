@@ -1,13 +1,14 @@
 """Headers every answer carries, errors included: what a page of ours may load and use, and who may embed it.
 
-There is no Strict-Transport-Security: it would bind a host's name to HTTPS for a year, on phones that trust only this
-server's own authority. Reinstalled, or started once with `--tls off`, the server could then not be reached from any of
-them, and the browser would not even let its user go on. The plain listener only explains; docs/security.md says more.
+Strict-Transport-Security comes with a certificate that was given to us (`--tls CERT KEY`), and only then: it binds a
+host's name to HTTPS for a year, on phones that trust else only this server's own authority. Reinstalled, or started once
+with `--tls off`, the server could then not be reached from any of them, and the browser would not even let its user go
+on. The plain listener only explains; docs/security.md says more.
 """
 
 from __future__ import annotations
 
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 POLICY = "; ".join(
@@ -57,20 +58,25 @@ FOR_DOCUMENTS = {
     "Origin-Agent-Cluster": "?1",
     "Permissions-Policy": PERMISSIONS,
 }
+STRICT = {"Strict-Transport-Security": "max-age=31536000"}  # a year; of this name alone, its siblings are not ours
 _STARTS = ("http.response.start", "websocket.http.response.start")  # the second refuses a WebSocket
 
 
 class SecurityHeaders:
     """Around all of the app, so that no answer leaves without; pure ASGI, so that nothing is buffered."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, *, is_strict: bool = False) -> None:
+        """`is_strict`: whoever came over HTTPS is to come so for a year."""
         self._app = app
+        self._is_strict = is_strict
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
         told = FOR_ALL | _of(scope["path"])
+        if self._is_strict and scope["scheme"] in ("https", "wss") and not _is_of_this_machine(scope):
+            told = told | STRICT
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] in _STARTS:
@@ -80,6 +86,12 @@ class SecurityHeaders:
             await send(message)
 
         await self._app(scope, receive, send_with_headers)
+
+
+def _is_of_this_machine(scope: Scope) -> bool:
+    """Whether it was asked for as localhost, a name that all servers of a machine share."""
+    host = Headers(scope=scope).get("host", "")
+    return host.rpartition(":")[0] == "localhost" or host == "localhost"
 
 
 def _of(path: str) -> dict[str, str]:

@@ -10,6 +10,7 @@ import { deviceName, keptHere } from './device.js';
 import { field, listen, need, show } from './dom.js';
 import { gapWords } from './events.js';
 import { FilesTab } from './files-tab.js';
+import { forgetWork } from './forget.js';
 import { Handset } from './handset.js';
 import { MapTab } from './map-tab.js';
 import { notices } from './notice.js';
@@ -111,6 +112,7 @@ function openPhone() {
 
 /** This device is not paired, or was removed just now. @param {import('./admission.js').Refusal} why */
 function shut(why) {
+  if (why.code === 'removed') forgetWork(keptHere());
   if (store.frame) {
     location.reload(); // nothing of the car stays on a page that may not look any more; the screen then says the reason
     return;

@@ -1,6 +1,7 @@
 // The pairing screen and the list of devices in words; where a link may lead.
 
 import assert from 'node:assert/strict';
+import { readdir, readFile } from 'node:fs/promises';
 import { test } from 'node:test';
 
 globalThis.location ??= /** @type {any} */ ({ hash: '', pathname: '/', search: '', origin: 'https://192.168.4.1:8000' });
@@ -9,6 +10,7 @@ globalThis.window ??= /** @type {any} */ ({ addEventListener() {} });
 const { digitsOf, pinShown, reasonWords, triedWords, waitWords } = await import('../../static/js/pairing-layout.js');
 const { leftWords, removalWords, seenWords } = await import('../../static/js/devices-layout.js');
 const { thenOf } = await import('../../static/js/pair-link.js');
+const { forgetWork, OF_THE_WORK } = await import('../../static/js/forget.js');
 const { screenOf } = await import('../../static/js/page.js');
 
 test('a PIN is its digits, however it is typed', () => {
@@ -72,4 +74,21 @@ test('who is not paired sees nothing else', () => {
   const watching = /** @type {any} */ ({ frame: {}, isMonitoring: true });
   assert.equal(screenOf(watching, false, true), 'pairing');
   assert.equal(screenOf(watching, false), 'monitor');
+});
+
+test('a device that was removed forgets cars and people, and keeps how its owner likes to look', () => {
+  const all = new Map([...OF_THE_WORK, 'theme', 'hand', 'speed-unit'].map((name) => [`catgraph.${name}`, 'x']));
+  forgetWork({ removeItem: (key) => { all.delete(key); } });
+  assert.deepEqual([...all.keys()], ['catgraph.theme', 'catgraph.hand', 'catgraph.speed-unit']);
+  forgetWork(null);
+  forgetWork({ removeItem: () => { throw new Error('refused'); } });
+});
+
+test('whatever a page keeps is either forgotten, or is of the phone alone', async () => {
+  const OF_THE_PHONE = ['device', 'range', 'speed-unit', 'tab', 'theme', 'hand'];
+  const OF_THE_TAB = ['phone', 'armed']; // gone with it
+  const folder = new URL('../../static/js/', import.meta.url);
+  const texts = await Promise.all((await readdir(folder)).filter((name) => name.endsWith('.js')).map((name) => readFile(new URL(name, folder), 'utf8')));
+  const kept = new Set(texts.flatMap((text) => [...text.matchAll(/'catgraph\.([a-z-]+)'/g)].map(([, name]) => name)));
+  assert.deepEqual([...kept].sort(), [...OF_THE_WORK, ...OF_THE_PHONE, ...OF_THE_TAB].sort());
 });

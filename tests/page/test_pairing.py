@@ -187,12 +187,14 @@ async def test_an_operator_pairs_another_changes_its_role_and_removes_it(browser
         await row.locator('[data-role-key="operator"]').tap()
         await expect(guest.f("pause")).not_to_have_attribute("aria-disabled", "true", timeout=12_000)
 
+        await guest.page.evaluate("localStorage.setItem('catgraph.mail-to', 'ann@example.org')")
         await row.locator("[data-f=remove]").tap()
         removal = boss.page.locator("#sheet-removal")
         await expect(removal).to_contain_text("Its pages end now")
         await removal.locator("[data-f=yes]").tap()
         await expect(guest.page.locator("#pairing")).to_contain_text("This device was removed by")
         await expect(guest.page.locator("#monitor")).to_be_hidden()
+        assert await guest.page.evaluate("localStorage.getItem('catgraph.mail-to')") is None
         await expect(group.locator("li")).to_have_count(1)
 
 

@@ -225,8 +225,12 @@ async def test_a_given_certificate_is_served_and_plain_http_is_led_to_it(tmp_pat
         async with httpx.AsyncClient(verify=context) as client:
             answer = await client.get(f"https://localhost:{one.port}/api/health")
             assert answer.json()["status"] == "ok"
+            assert "strict-transport-security" not in answer.headers  # localhost is a name of every server here
+            named = await client.get(f"https://localhost:{one.port}/api/health", headers={"Host": "car.example.org"})
+            assert named.headers["strict-transport-security"] == "max-age=31536000"
             led = await client.get(f"http://127.0.0.1:{one.port}/anything?x=1")
             assert (led.status_code, led.headers["location"]) == (303, f"https://localhost:{one.port}/")
+            assert "strict-transport-security" not in led.headers
 
 
 @pytest.mark.parametrize(
