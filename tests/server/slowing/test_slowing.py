@@ -12,6 +12,7 @@ import pytest
 from tests.server.slowing.conftest import field, simulated, watching
 
 pytestmark = pytest.mark.slow
+RATES_KNOWN_S = 7.0  # a car's own rate is learned from its first 5 s; what is slow from the beginning is its rate
 
 
 async def test_it_is_armed_ordered_proven_held_and_released() -> None:
@@ -180,6 +181,37 @@ async def test_a_rule_counts_down_and_may_be_vetoed(veto: bool) -> None:
         state = await car.until(lambda state: state["decelerate"]["order"], 4.0)
         assert state["decelerate"]["order"]["why"] == "Speed above limit"
         assert (await car.steps())[:3] == ["countdown", "ordered", "sent"]
+
+
+@pytest.mark.parametrize(
+    ("trigger", "switched_on", "scenario", "why"),
+    [
+        ("obstacle", {"on_obstacle": 1.0}, "near-object", "Obstacle within the stopping distance"),
+        ("reach", {"on_reach": 1.0, "on_reach_after_s": 0.5}, None, "No operator's phone reachable"),
+        ("rate.speed", {"on_rate_speed": 1.0, "on_rate_after_s": 0.2}, "slow-rate", "Speed below its expected rate"),
+        ("rate.position", {"on_rate_position": 1.0}, "stale-gps", "Position below its expected rate"),
+    ],
+)
+async def test_each_rule_slows_the_car(
+    trigger: str, switched_on: dict[str, float], scenario: str | None, why: str
+) -> None:
+    """The speed limit is in the test above; nothing but what is switched on orders anything."""
+    async with field() as car:
+        await car.armed()
+        if scenario is not None:
+            await asyncio.sleep(RATES_KNOWN_S if trigger.startswith("rate") else 0.0)
+            car.service.start_scenario(scenario, 15.0)
+            await asyncio.sleep(1.5)
+            assert (await car.slow())["countdown"] is None  # off until somebody switches it on
+        limits = {f"slow_down.{name}": value for name, value in switched_on.items()}
+        assert (await car.client.patch("/api/settings", json={"values": limits})).is_success
+        state = await car.until(lambda state: state["decelerate"]["countdown"])
+        assert state["decelerate"]["countdown"]["trigger"] == trigger
+        assert car.speeds == []
+        state = await car.until(lambda state: state["decelerate"]["order"], 4.0)
+        assert state["decelerate"]["order"]["why"] == why
+        began_mps = car.driven[0]
+        await car.until(lambda _: car.speed_mps < began_mps - 1.0)
 
 
 async def test_a_hold_that_nobody_releases_ends() -> None:
