@@ -13,7 +13,8 @@ import pytest
 
 from server.bridge.server import RosBridge
 from tests.server.cars import driving
-from tests.server.slowing.conftest import field
+from tests.server.slowing.conftest import field, simulated, watching
+from tests.server.slowing.deaf import one_way
 
 TOPIC = "/catvehicle/cmd_vel"
 LATE_S = 0.3
@@ -102,3 +103,32 @@ async def test_the_ramp_goes_on_from_the_speed_that_is_measured(fault: str) -> N
         first = next(index for index, (at_s, _, _) in enumerate(car.heard) if at_s >= cut_s)
         assert after[0] == pytest.approx(car.driven[first], abs=0.5)
         assert all(b < a + 0.05 for a, b in itertools.pairwise(after[1:]))
+
+
+@pytest.mark.slow
+async def test_a_bridge_that_talks_on_and_reads_no_command_is_doubted_and_dialled_anew() -> None:
+    async with simulated() as (service, direct), one_way(int(direct.rpartition(":")[2])) as (way, address):
+        async with watching(service, address) as car:
+            await car.armed()
+            assert (await car.post("order")).is_success
+            await car.until(lambda state: state["decelerate"]["order"]["sending"])
+            await asyncio.sleep(0.3)
+            way.deafen()
+            began_s = time.monotonic()
+            await car.until(lambda state: not state["decelerate"]["order"]["sending"], 1.0)
+            assert time.monotonic() - began_s < 0.6  # though the car's speed came all the time
+            cut = (await car.events())[-1]
+            assert (cut["step"], cut["text"].split(".")[0]) == (
+                "cut",
+                "No command goes out: the bridge does not answer",
+            )
+            before = len(car.speeds)
+            await asyncio.sleep(1.0)
+            assert len(car.speeds) == before
+            way.listen()
+            listens_s = time.monotonic()
+            await car.until(lambda state: state["decelerate"]["order"]["sending"])
+            await car.until(lambda _: len(car.speeds) > before)
+            at_s, first_mps = car.speeds[before]
+            assert at_s > listens_s
+            assert first_mps == pytest.approx(car.driven[before], abs=0.5)  # made anew, none of those that were held up
