@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import re
+import time
 from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 import pytest_asyncio
 from axe_playwright_python.async_playwright import Axe
@@ -17,6 +19,8 @@ from tests.page.canned import Canned, alarm, live, slow, slowed
 from tests.page.conftest import PHONE, Phone
 from tests.page.processes import running, server, simulate
 from tests.page.test_barriers import HANGS_OVER
+from tests.vehicle.conftest import Guard
+from tests.vehicle.over_bridge import run_controller, run_guard, task
 
 RAIL, DIALOG = ".board > .rail .slide", "#sheet-alarm .slide"
 COUNTDOWN = {"trigger": "speed", "title": "Speed above limit", "text": "12.6 m/s, limit 11.0 m/s", "left_s": 1.4}
@@ -400,7 +404,7 @@ async def test_nobody_is_kept_out(thumb: Thumb, car: Canned, theme: Any) -> None
     await clean("count-down")
 
 
-async def armed_by_hand(phone: Phone, address: str) -> Thumb:
+async def armed_by_hand(phone: Phone, address: str, topic: str = "/catvehicle/cmd_vel") -> Thumb:
     """A real server and the simulated car: armed as an operator does, while the car drives."""
     await phone.open(address)
     await phone.live()
@@ -409,7 +413,7 @@ async def armed_by_hand(phone: Phone, address: str) -> Thumb:
     await expect(slide).to_contain_text("press to arm", timeout=15_000)
     await slide.tap()
     sheet = phone.page.locator("#sheet-slow")
-    await expect(sheet).to_contain_text("/catvehicle/cmd_vel")
+    await expect(sheet).to_contain_text(topic)
     await sheet.get_by_role("button", name="Arm").tap()
     await expect(slide).to_have_attribute("data-kind", "armed")
     async with asyncio.timeout(30):
@@ -448,3 +452,74 @@ async def test_with_another_who_commands_too_it_is_not_confirmed(phone: Phone, t
         await expect(phone.f("order-line")).to_have_text("NOT CONFIRMED – use the physical stop")
         await expect(phone.page.locator("#sheet-alarm")).to_be_visible()
         await expect(phone.f("legend-car")).to_have_text("the car: NOT CONFIRMED")
+
+
+@pytest.mark.timeout(120)
+async def test_a_rule_counts_down_on_the_page_and_whoever_lets_it_run_has_slowed_the_car(
+    phone: Phone, tmp_path: Path
+) -> None:
+    async with running(*simulate()) as sim, running(*server(tmp_path, sim.address)) as watch:
+        thumb = await armed_by_hand(phone, watch.address)
+        limits = {"slow_down.on_speed": 1.0, "slow_down.on_speed_after_s": 0.5, "speed_limit.max_mps": 2.0}
+        async with httpx.AsyncClient(base_url=watch.address) as client:
+            assert (await client.patch("/api/settings", json={"values": limits})).is_success
+            countdown = phone.page.locator("#sheet-countdown")
+            await expect(countdown).to_contain_text("Speed above limit")
+            await countdown.locator("[data-f=veto]").tap()
+            await expect(countdown).to_be_hidden()
+            await phone.page.wait_for_timeout(2500)
+            await expect(thumb.slide()).to_have_attribute("data-kind", "armed")  # vetoed: nothing was ordered
+            for most_mps in (30.0, 2.0):  # the fault goes, and comes again
+                values = {"values": {"speed_limit.max_mps": most_mps}}
+                assert (await client.patch("/api/settings", json=values)).is_success
+                await asyncio.sleep(3.0 if most_mps > 2.0 else 0.0)
+            await expect(countdown).to_be_visible()
+            await expect(thumb.slide()).to_have_attribute("data-kind", "go")  # nobody vetoed
+            await expect(countdown).to_be_hidden()
+            await expect(phone.page.locator(".order")).to_contain_text("Speed above limit")
+            await expect(phone.page.locator(".order li[data-mark=ok]").last).to_contain_text("Car slows")
+
+
+@pytest.mark.timeout(120)
+async def test_a_guard_on_the_car_is_shown_and_what_it_holds_is_released_by_hand(phone: Phone, tmp_path: Path) -> None:
+    guard = Guard()
+    bare = simulate("--no-obstacle-stopper", "--scenario", "controller-silent@0+600")
+    async with running(*bare) as sim:
+        port = int(sim.address.rpartition(":")[2])
+        async with task(run_guard(port, guard)), task(run_controller(port)):
+            async with running(*server(tmp_path, sim.address)) as watch:
+                await armed_by_hand(phone, watch.address, "/ocu_guard/cmd_vel")
+                await expect(phone.f("slow-guard")).to_have_text(
+                    "GUARDED: the guard on the car slows it when the link is lost."
+                )
+                await watch.kill()
+                await asyncio.sleep(1.6)
+                assert guard.state(time.monotonic()) in ("slowing", "holding")
+            async with running(*server(tmp_path, sim.address)) as watch:
+                await phone.open(watch.address)
+                await phone.live()
+                await expect(phone.f("slow-guard")).to_contain_text("GUARDED: the guard holds the car", timeout=20_000)
+                await phone.acknowledge_all()
+                await phone.f("release").tap()
+                await phone.page.locator("#sheet-release").get_by_role("button", name="Release the car").tap()
+                await expect(phone.f("slow-guard")).to_contain_text("slows it when the link is lost")
+
+
+@pytest.mark.timeout(120)
+async def test_a_phone_that_is_lost_mid_press_orders_nothing_then_or_later(phone: Phone, tmp_path: Path) -> None:
+    async with running(*simulate()) as sim, running(*server(tmp_path, sim.address)) as watch:
+        thumb = await armed_by_hand(phone, watch.address)
+        x, y, way = await thumb.along()
+        await thumb.touch("touchStart", (x, y))
+        for share in (0.3, 0.6, 1.0):
+            await thumb.touch("touchMove", (x + share * way, y))
+        watch.freeze()  # nothing of the phone comes through
+        await phone.page.wait_for_timeout(2500)
+        await thumb.touch("touchEnd")
+        watch.thaw()
+        await expect(thumb.slide()).to_have_attribute("data-kind", "armed", timeout=15_000)
+        await phone.page.wait_for_timeout(1000)
+        async with httpx.AsyncClient(base_url=watch.address) as client:
+            assert (await client.get("/api/state")).json()["decelerate"]["order"] is None
+            events = (await client.get("/api/events", params={"limit": 1000})).json()["events"]
+            assert [event["step"] for event in events if event["change"] == "slow_down"] in ([], ["refused"])
