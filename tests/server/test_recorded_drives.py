@@ -73,6 +73,7 @@ OVER_THE_DRIVE: dict[str, tuple[list[str], float] | None] = {
     "clock-slow": (["clock_offset"], 11.0),
     "diagnostics-error": None,
     "diagnostics-warning": None,
+    "controller-silent": None,
     "all-silent": (["car_silent"], 1.5),
     "bridge-frozen": (["link_lost"], 2.5),
     "bridge-killed": (["link_lost"], 0.5),
