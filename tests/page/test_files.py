@@ -383,7 +383,7 @@ async def test_nothing_hangs_over_the_edge(opened: Phone, size: tuple[int, int])
     assert await opened.page.evaluate("document.documentElement.scrollWidth") <= size[0]
     assert await opened.page.evaluate(HANGS_OVER) == []
     await row(opened, name_of(5)).get_by_role("button").tap()
-    await opened.page.evaluate("Promise.all(document.getAnimations().map((one) => one.finished))")
+    await sheet(opened).evaluate("one => Promise.all(one.getAnimations().map((it) => it.finished)).then(() => null)")
     box = await sheet(opened).bounding_box()
     close = await sheet(opened).get_by_role("button", name="Close").bounding_box()
     assert box is not None
