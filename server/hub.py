@@ -26,6 +26,7 @@ from server.limits import MAX_DEPTH, Allowance, Limits, nests_deeper
 from server.playback import orders
 from server.playback.desk import Desk, NoReplay
 from server.playback.seat import Seat
+from server.turns import Turns
 
 log = logging.getLogger("catgraph.hub")
 
@@ -57,9 +58,10 @@ class Page:
         server: Callable[[], Mapping[str, Any]],
         limits: Limits,
         now: Callable[[], float],
+        turns: Turns,
         replay: orders.Open | None = None,
     ):
-        """`replay`: the recording with which the page begins."""
+        """`turns`: of all pages, for what is new to all of them. `replay`: the recording with which the page begins."""
         self._socket = socket
         self._bus = bus
         self._vehicle = vehicle
@@ -83,6 +85,7 @@ class Page:
         self._page = secrets.token_hex(8)  # by which it knows itself, and keeps control over a reload
         self._complaints = 0
         self._now = now
+        self._turns = turns
         self._messages = Allowance(limits.messages, now())
         self._orders = Allowance(limits.commands, now())
         self.skipped = 0  # frames that were replaced by newer ones before this page could take them
@@ -97,6 +100,7 @@ class Page:
             pass  # it left, perhaps while something was being sent
         finally:
             unwatch()
+            self._turns.leave(self._wake)
             if self._opening is not None:
                 self._opening.cancel()
                 await asyncio.gather(self._opening, return_exceptions=True)
@@ -111,13 +115,14 @@ class Page:
     def _something_new(self, kind: str) -> None:
         if kind == "events":
             self._events_due = True
+            self._turns.queue(self._wake, is_urgent=True)
         elif kind == "scan" and self._seat.is_replaying:
             return
         elif self._offered or (kind == "scan" and not self._watches_scan):
             if kind == "state":
                 self.skipped += 1
-            return
-        self._wake.set()
+        else:
+            self._turns.queue(self._wake)
 
     def _something_replayed(self, kind: str) -> None:
         if kind == "failed" or not self._offered:
@@ -163,7 +168,7 @@ class Page:
             case "take":
                 self._offered = False
                 self._take = True
-                self._wake.set()
+                self._turns.queue(self._wake)
             case "have":
                 self._events_unanswered = False
                 self._events_due = True
@@ -377,6 +382,7 @@ class Hub:
         self._desk = desk
         self._server = server
         self._pages: set[Page] = set()
+        self._turns = Turns()
         self._by_device: Counter[str] = Counter()
 
     @property
@@ -411,6 +417,7 @@ class Hub:
             server=self._server,
             limits=self._limits,
             now=self._now,
+            turns=self._turns,
             replay=replay,
         )
         self._pages.add(page)

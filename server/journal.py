@@ -22,6 +22,7 @@ from server import journal_file
 log = logging.getLogger("catgraph.journal")
 
 _PORTION = 100  # events a transaction: one that is refused has cost little
+RECENT = 200  # events of a vehicle that are told from memory: every page asks for each of them as it comes
 MAX_UNSAVED = 10_000  # events of a vehicle that wait in memory for the disk; some 5 MB
 T = TypeVar("T")
 
@@ -37,6 +38,7 @@ class Journal:
         self.complaint = opened.complaint  # what was found wrong at the start and put right, for the log
         self._last = dict(opened.last)
         self._unsaved: dict[str, deque[dict[str, Any]]] = {}
+        self._recent: dict[str, deque[dict[str, Any]]] = {}  # of this run, without a gap up to the newest
         self._lost = 0
         self._why = opened.why
         if self._why:
@@ -61,6 +63,7 @@ class Journal:
         numbered = [{"n": n, **event} for n, event in enumerate(events, self.last(vehicle) + 1)]
         if numbered:
             self._last[vehicle] = numbered[-1]["n"]
+            self._recent.setdefault(vehicle, deque(maxlen=RECENT)).extend(numbered)
             waiting = self._unsaved.setdefault(vehicle, deque())
             waiting.extend(numbered)
             self.save()
@@ -97,6 +100,11 @@ class Journal:
 
     def after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
         """The events that follow number `n`, in order, at most `limit`."""
+        if n >= self.last(vehicle):
+            return []
+        recent = self._recent.get(vehicle, ())
+        if recent and recent[0]["n"] <= n + 1:
+            return [event for event in recent if event["n"] > n][:limit]
         found = self._read("vehicle = ? AND n > ? ORDER BY n LIMIT ?", (vehicle, n, limit))
         waiting = [event for event in self._unsaved.get(vehicle, ()) if event["n"] > n]
         return [*found, *waiting][:limit]

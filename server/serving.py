@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import contextlib
+import gc
 import logging
 import os
 import socket
@@ -120,11 +121,19 @@ async def serve(config: Config) -> int:
         )
     )
     _announce(config, port, secured, explainer, app.state.running)
+    _settle_memory()
     if secured is None:
         await server.serve(sockets=[listening])
     else:
         await serve_secured(secured, server, config, listening, explainer)
     return 0
+
+
+def _settle_memory() -> None:
+    """What was loaded until now stays for good, and is not searched for circles again: a full search took 76 ms on a
+    laptop, in which nothing else ran, no alarm and no command."""
+    gc.collect()
+    gc.freeze()
 
 
 def _listen(host: str, port: int) -> socket.socket:
