@@ -179,6 +179,7 @@ class Session:
             self._lag_s = max(0.0, loop.time() - due_s)
             if self._lag_s > SICK_LOOP_S and self._phase == "monitoring":
                 await self._catch_up()
+            await self._slowing.go_first()
             try:
                 self.tick(put=self._lag_s <= SICK_LOOP_S)
             except Exception:  # the one net: a fault in a tick must not end the ticking

@@ -39,6 +39,9 @@ START_S = 1_790_000_000.0  # seconds since 1970, when nobody says otherwise
 START_STATION_M = 300.0  # half a minute before the bends and the stop
 STEP_HZ = 100  # of the motion
 CONTROL_HZ = 20  # commands, and the by-wire readings
+RIVAL_HZ = (
+    100  # of a driver who competes: at the rate of another, mere chance would say whose command is mostly the last
+)
 GPS_HZ = 10
 GPS_LATENCY_S = 0.02
 
@@ -93,6 +96,7 @@ class SimulatedCar:
         self._driver = Driver(START_STATION_M, driver_rng)
         self._stack = Stack(has_stopper=has_stopper)
         self._gives_way = gives_way
+        self._insists_on: MotionCommand | None = None
         self._client_until_s = -math.inf
         self._blocked_at_m: float | None = None
         self._hurried_s = 0.0
@@ -186,6 +190,8 @@ class SimulatedCar:
             groups.append(("laser", SICK_HZ, 0.0047))
         else:
             groups += [("laser", DENSE_HZ, 0.0187), ("nearest", SICK_HZ, 0.0047)]
+        if not self._gives_way:
+            groups.append(("rival", RIVAL_HZ, 0.0009))
         return sorted((phase + tick / rate, name) for name, rate, phase in groups for tick in range(rate))
 
     def _go_on(self, until_s: float) -> None:
@@ -218,6 +224,8 @@ class SimulatedCar:
                 return self._nearest(self._laser.ranges_m(now, beams), beams)
             case "gps":
                 return self._gps(now)
+            case "rival":
+                return self._insist()
             case _:
                 return (self._writer.diagnostics(self.now_s, self._components()),)
 
@@ -233,6 +241,7 @@ class SimulatedCar:
         orders = self.scenarios.orders
         if Order.SILENCE in orders:
             self._client_until_s = max(self._client_until_s, self._elapsed_s)  # it takes the wheel anew afterwards
+            self._insists_on = None
         elif not self._gives_way or self._elapsed_s >= self._client_until_s:
             if self._elapsed_s >= self._client_until_s > -math.inf:
                 self._driver.resume(now)
@@ -240,8 +249,17 @@ class SimulatedCar:
             self._set_the_stage(now, orders)
             command = self._driver.command(now, self._elapsed_s, 1 / CONTROL_HZ, orders, self._blocked_at_m)
             self._stack.hear(command, self._elapsed_s)
+            self._insists_on = command
             messages.append(writer.twist(CMD_VEL, at_s, command.speed_mps, command.tyre_rad))
         return messages
+
+    def _insist(self) -> Iterable[Message]:
+        """A driver who competes says the last command again and again."""
+        command = self._insists_on
+        if command is None:
+            return ()
+        self._stack.hear(command, self._elapsed_s)
+        return (self._writer.twist(CMD_VEL, self.now_s, command.speed_mps, command.tyre_rad),)
 
     def _set_the_stage(self, now: Motion, orders: set[Order]) -> None:
         """Lets the obstacle come and go, and ends a hurry that has shown what it should."""

@@ -31,6 +31,7 @@ from server.tuning import PERCENT_A_RAD
 
 log = logging.getLogger("catgraph.slowing")
 
+A_TICK_S = 0.01  # a tick of the judge, with the state it makes, holds up the loop for less than this
 PERIOD_S = 0.05  # the obstacle stopper lets a command count for 0.2 s
 DOUBT_S = 0.3
 FIRST_SPEED_S = 0.5
@@ -67,6 +68,7 @@ class Slowing:
         self._ros_version = 1
         self._ordered = asyncio.Event()
         self._turned_s = 0.0
+        self._due_s = 0.0  # the next command, by the loop's clock
         self._opened_s = 0.0  # the newest opening of the link
         self._sent_s = 0.0  # the newest command
         self._told_unconfirmed = False
@@ -146,15 +148,25 @@ class Slowing:
         loop = asyncio.get_running_loop()
         while True:
             await self._ordered.wait()
-            due_s = loop.time()
             while self._life.order is not None:
-                due_s = max(due_s + PERIOD_S, loop.time())
-                await asyncio.sleep(due_s - loop.time())
+                left_s = self._due_s - loop.time()
+                if left_s > 0.0:
+                    await asyncio.sleep(left_s)
+                    continue  # one that was ordered meanwhile has its own time
+                self._due_s = max(self._due_s + PERIOD_S, loop.time())
                 try:
                     self._speak()
                 except Exception:  # the one net: a fault in one command must not end the others
                     log.exception("a command to the car failed")
             self._ordered.clear()
+
+    async def go_first(self) -> None:
+        """Waits where a command is due before a tick would be over: its evenness is worth a later look at the car."""
+        if self._life.order is None:
+            return
+        left_s = self._due_s - asyncio.get_running_loop().time()
+        if 0.0 < left_s < A_TICK_S:
+            await asyncio.sleep(left_s + 0.0005)  # its timer was set first, and so it goes first
 
     async def beat(self) -> None:
         """The operator's heartbeat for the guard, 5 times a second, as long as this server is itself healthy."""
@@ -210,6 +222,7 @@ class Slowing:
             return  # one stands already
         self._told_unconfirmed = False
         self._speak()  # first to the car, then to the log
+        self._due_s = asyncio.get_running_loop().time() + PERIOD_S
         self._tell(order, "ordered", f"Slow down with {order.deceleration_mps2:g} m/s², {why}.", by=by)
         if order.first_sent_s is not None:
             self._tell(order, "sent", f"The first command is on the bridge: {_said(order)}.")

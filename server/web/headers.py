@@ -1,9 +1,9 @@
 """Headers every answer carries, errors included: what a page of ours may load and use, and who may embed it.
 
 Strict-Transport-Security comes with a certificate that was given to us (`--tls CERT KEY`), and only then: it binds a
-host's name to HTTPS for a year, on phones that trust else only this server's own authority. Reinstalled, or started once
-with `--tls off`, the server could then not be reached from any of them, and the browser would not even let its user go
-on. The plain listener only explains; docs/security.md says more.
+host's name to HTTPS for a year, on phones that trust else only this server's own authority. Reinstalled, or started
+once with `--tls off`, the server could then not be reached from any of them, and the browser would not even let its
+user go on. The plain listener only explains; docs/security.md says more.
 """
 
 from __future__ import annotations
