@@ -7,7 +7,6 @@ import asyncio
 import contextlib
 import gc
 import logging
-import os
 import socket
 import sys
 from collections.abc import Coroutine
@@ -74,11 +73,6 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="phones keep nothing of the page; without the server they then show their browser's own error",
     )
-
-
-def _default_data() -> Path:
-    base = os.environ.get("XDG_DATA_HOME")
-    return (Path(base) if base else Path.home() / ".local" / "share") / "catgraph"
 
 
 def run(work: Coroutine[Any, Any, int]) -> int:
