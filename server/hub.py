@@ -81,6 +81,7 @@ class Page:
         self._events_due = False
         self._events_unanswered = False
         self._said_hello = False
+        self._is_counted = False
         self._name = label.NAMELESS  # what the page calls itself: who gave its orders, in the log
         self._page = secrets.token_hex(8)  # by which it knows itself, and keeps control over a reload
         self._complaints = 0
@@ -176,7 +177,7 @@ class Page:
             case "watch":
                 self._watch_scan(message.get("scan") is True)
             case "hello":
-                self._hear_hello(message)
+                await self._hear_hello(message)
             case "present":
                 await self._present(message)
             case "replay":
@@ -184,11 +185,13 @@ class Page:
             case _:
                 await self._command(message)
 
-    def _hear_hello(self, message: Mapping[str, Any]) -> None:
-        self._name = label.clean(message.get("name")) or self._name
+    async def _hear_hello(self, message: Mapping[str, Any]) -> None:
         page = message.get("page")
         if isinstance(page, str) and re.fullmatch(commands.PAGE, page) and not self._said_hello:
+            if self._is_counted:
+                await self._present(FAREWELL)  # it told how it stands before it told who it is: that was nobody else
             self._page = page
+        self._name = label.clean(message.get("name")) or self._name
         have = message.get("have_event")
         if type(have) is int and 0 <= have <= self._bus.last_event(self._vehicle) and not self._said_hello:
             self._event = have
@@ -219,6 +222,7 @@ class Page:
         """How the page stands, once a second: nobody answers it. A viewer's page is not counted on to hear alarms."""
         if not self._who.is_operator:
             return
+        self._is_counted = True
         try:
             answer = await self._bus.request(self._vehicle, {**message, **self._sender})
         except NotServed:

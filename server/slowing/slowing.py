@@ -82,7 +82,7 @@ class Slowing:
         self._opened_s = self._now()
         self._mouth.attach(link)
         if self._life.order is not None:
-            self._speak()
+            self._speak_at_once()
 
     def link_closed(self) -> None:
         self._mouth.attach(None)
@@ -221,8 +221,7 @@ class Slowing:
         if order is None:
             return  # one stands already
         self._told_unconfirmed = False
-        self._speak()  # first to the car, then to the log
-        self._due_s = asyncio.get_running_loop().time() + PERIOD_S
+        self._speak_at_once()  # first to the car, then to the log
         self._tell(order, "ordered", f"Slow down with {order.deceleration_mps2:g} m/s², {why}.", by=by)
         if order.first_sent_s is not None:
             self._tell(order, "sent", f"The first command is on the bridge: {_said(order)}.")
@@ -266,6 +265,11 @@ class Slowing:
         over = self._countdown.look(alarms, self.limits, now_s, can_begin=can_begin and not is_paused)
         if over is not None and self._link is not None and self._link.is_open:  # else once the link is back
             self._begin("catgraph", over.trigger.title, now_s, pressed_s=None)
+
+    def _speak_at_once(self) -> None:
+        """Out of turn; the next one is due a period from now."""
+        self._speak()
+        self._due_s = asyncio.get_running_loop().time() + PERIOD_S
 
     def _speak(self) -> None:
         """One command, now or not at all."""

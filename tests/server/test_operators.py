@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import httpx
+import orjson
 import websockets
 
 from server.access.who import Role
@@ -215,3 +216,15 @@ async def test_a_viewer_is_never_in_control_and_not_counted_on(tmp_path: Path) -
             assert one.states[-1]["reach"]["of"] == 0
             seen.cancel()
             reading.cancel()
+
+
+async def test_a_page_that_tells_how_it_stands_before_who_it_is_is_counted_once(server: str) -> None:
+    async with websockets.connect(f"{server.replace('http', 'ws')}/ws") as raw, viewer(server) as looks_on:
+        await raw.send(orjson.dumps(SEEN).decode())
+        state = await looks_on.state(lambda s: s["reach"]["of"] == 1)
+        before = state["reach"]["pages"][0]["page"]
+        await raw.send(orjson.dumps({"kind": "hello", "name": "Ann", "page": "page-ann"}).decode())
+        await raw.send(orjson.dumps(SEEN).decode())
+        state = await looks_on.state(lambda s: "page-ann" in [there["page"] for there in s["reach"]["pages"]])
+        assert state["reach"]["of"] == 1
+        assert before not in [there["page"] for there in state["reach"]["pages"]]
