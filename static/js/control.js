@@ -9,6 +9,8 @@ const REFUSED_MS = 3000;
 const NEWS_MS = 20_000;
 /** What happened longer before it was told is no news [ms]. */
 const FRESH_MS = 5000;
+/** A page that wakes has more to tell at once, and the last to speak would take the place of the others [ms]. */
+const SETTLES_MS = 400;
 
 /**
  * @typedef {import('./store.js').Store} Store
@@ -90,6 +92,7 @@ export function mount(root, snacks, store, control) {
   function speak() {
     if (!news || snacks.querySelector('.note:not([data-of="control"])')) return;
     const { notice: { title, text: words, offers }, at_ms } = news;
+    if (store.now() - at_ms < SETTLES_MS) return;
     news = null;
     if (store.now() - at_ms > NEWS_MS) return;
     const way = offers ? { label: offers === 'take' ? 'Take control' : 'Ask for it', act: () => void control.order(offers) } : undefined;
