@@ -439,6 +439,7 @@ class Catalog:
             "problem": problem,
             "damage": found.get("damage", []),
             "left_out": found.get("left_out", []),
+            "ros_version": found.get("ros_version"),
             "ended": found.get("ended"),
             "ended_why": found.get("ended_why"),
             "is_clip": found.get("is_clip", False),

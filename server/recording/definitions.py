@@ -38,3 +38,9 @@ def distribution(version: RosVersion, distro: str | None) -> dict[str, Any]:
     usual = "noetic" if version == 1 else "humble"
     store = names.get((distro or usual).lower(), names[usual])
     return dict(get_typestore(store).fielddefs)
+
+
+def times() -> dict[str, Any]:
+    """Definitions in ROS 2 may leave out what every recording contains."""
+    every = distribution(2, None)
+    return {name: every[name] for name in ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")}

@@ -20,7 +20,7 @@ from server.web.ranges import file_answer
 router = APIRouter(tags=["recordings"])
 Id = Annotated[str, InPath(max_length=100, description="The recording's `id` in the list")]
 JobId = Annotated[str, InPath(max_length=40, description="`job` of the answer that began it")]
-Format = Literal["bag", "csv", "gpx", "geojson", "html"]
+Format = Literal["bag", "ros2", "csv", "gpx", "geojson", "html"]
 
 
 class ExportRequest(BaseModel):

@@ -25,6 +25,7 @@ import { speedWords } from './units.js';
  * @property {string | null} problem why it cannot be read
  * @property {string[]} damage what of it cannot be read
  * @property {string[]} [left_out] topics that were not recorded
+ * @property {1 | 2 | null} [ros_version] null: not read yet, or unreadable
  * @property {string | null} ended closed, recovered, or null where nobody says
  * @property {string | null} ended_why
  * @property {boolean} is_clip

@@ -20,6 +20,7 @@ const CHANGES = ['mail', 'crit', 'edit', 'info', 'trash'];
 /** What a recording can be had as: the name by which the server makes it, what it is called, and what it is for. */
 const FORMATS = /** @type {const} */ ([
   ['bag', 'ROS 1 bag', 'for rosbag and rqt'],
+  ['ros2', 'ROS 2 bag', 'for ros2 bag and rosbags, zipped'],
   ['csv', 'CSV tables', 'one for each signal, zipped'],
   ['gpx', 'GPX track', 'for maps and watches'],
   ['geojson', 'GeoJSON track', 'for QGIS and web maps'],
@@ -195,7 +196,7 @@ export class FileSheet {
     const kind = KINDS[row.format] ?? ['File', 'as it is'];
     const asItIs = html('a', { href: addressOf(row.id, '/file.mcap'), download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, kind[0]), html('small', {}, kind[1])), html('span', { class: 'end' }, ...words(sizeWords(row.size_bytes))));
     listen(asItIs, 'click', () => setTimeout(() => closeSheet(this.sheet)));
-    const made = row.state === 'read' ? FORMATS.filter(([format]) => format !== row.format) : [];
+    const made = row.state === 'read' ? FORMATS.filter(([format]) => format !== row.format && (format !== 'ros2' || row.ros_version === 2)) : [];
     this.#show(`Download ${this.name}`, [html('p', { class: 'sub' }, 'Other forms than the file itself are made when they are asked for.')], [html('ul', { class: 'menu-list' }, html('li', {}, asItIs),
       ...made.map(([format, label, use]) => {
         const key = html('button', { type: 'button', 'data-format': format }, icon('download'), html('span', { class: 'tx' }, html('b', {}, label), html('small', {}, use)));

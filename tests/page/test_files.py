@@ -260,6 +260,7 @@ async def test_another_form_is_made_while_one_waits_and_can_be_cancelled(opened:
     await expect(sheet(opened).get_by_role("progressbar")).to_be_visible()
     await sheet(opened).get_by_role("button", name="Cancel").tap()
     await expect(sheet(opened).get_by_role("button", name="GPX track")).to_be_visible()
+    await expect(sheet(opened).get_by_role("button", name="ROS 2 bag")).to_have_count(0)  # this drive is of ROS 1
     async with opened.page.expect_download(timeout=40_000) as coming:
         await sheet(opened).get_by_role("button", name="GPX track").tap()
     await (await coming.value).save_as(tmp_path / "it.gpx")

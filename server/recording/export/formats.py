@@ -29,6 +29,14 @@ FORMATS: dict[str, Form] = {
             options=("compression", "with_own"),
         ),
         Form(
+            name="ros2",
+            what="ROS 2 bag, zipped",
+            ending="ros2.zip",
+            media_type="application/zip",
+            writer="server.recording.export.ros2_bag:write_ros2_bag",
+            options=("name", "with_own"),
+        ),
+        Form(
             name="csv",
             what="tables, zipped",
             ending="csv.zip",

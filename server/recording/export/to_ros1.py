@@ -17,7 +17,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from server.recording.definitions import definitions_of
+from server.recording.definitions import definitions_of, times
 from server.recording.errors import Undecodable
 from server.recording.export.ros1_definition import md5sum
 from server.recording.source import Channel, FileSource
@@ -82,7 +82,7 @@ def _names(store: Typestore, type: str) -> list[str]:
 
 def _from_cdr(channel: Channel, source: FileSource) -> Ros1Form:
     type = channel.type
-    here = _store({**_times(), **definitions_of(channel, 2, source.distro)})
+    here = _store({**times(), **definitions_of(channel, 2, source.distro)})
     if type not in here.fielddefs:
         raise Undecodable(f"the definition of {type} is missing")
     try:
@@ -173,12 +173,6 @@ def _store(definitions: dict[str, Any]) -> Typestore:
 @cache
 def _noetic() -> Typestore:
     return get_typestore(Stores.ROS1_NOETIC)
-
-
-def _times() -> dict[str, Any]:
-    """ROS 2 definitions may leave out what every recording contains."""
-    every = _noetic().fielddefs
-    return {name: every[name] for name in ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")}
 
 
 def _same(raw: bytes) -> bytes:

@@ -117,6 +117,7 @@ async def test_refusals(client: httpx.AsyncClient) -> None:
     assert problem(await client.post(f"/api/recordings/{DRIVE}/exports", json={"format": "mcap"}), 422)
     assert problem(await client.get("/api/exports/0123"), 404) == "There is no such export: it is kept for an hour."
     assert problem(await client.delete("/api/exports/0123"), 404)
+    assert "take the ROS 1 bag" in problem(await client.get(f"/api/recordings/{DRIVE}/export/ros2"), 422)
     said = problem(await client.get(f"/api/recordings/{STILL}/export/gpx"), 422)
     assert said == "No position was recorded in this drive: there is no track to export."
     failed = await over(client, await begin(client, "gpx", STILL))
