@@ -14,7 +14,7 @@ PROJECT = Path(__file__).resolve().parents[1]
 
 
 def pytest_configure() -> None:
-    """What is started in the background ignores Ctrl-C, and so would every process that a test starts and interrupts."""
+    """What is started in the background ignores Ctrl-C, and so would what a test starts and interrupts."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
