@@ -20,7 +20,11 @@ demo: $(VENV)/.ready static/built/built.json ## a simulated car, its bridge and 
 test: $(VENV)/.ready-test static/built/built.json ## all of the tests: what must pass before a change goes in
 	$(PY) -m tests.chromium
 	$(MAKE) --no-print-directory format lint types imports tsc node
-	$(PYTEST) -m "not soak"
+	status=0; \
+	$(PYTEST) -n 2 -m "$(FAST)" || status=$$?; \
+	$(PYTEST) -n 2 -m "slow and not browser and not soak" || status=$$?; \
+	$(PYTEST) -m "browser and not soak" || status=$$?; \
+	exit $$status
 
 check: $(VENV)/.ready-test ## the fast half of the tests, without a browser
 	$(MAKE) --no-print-directory format lint types imports tsc node

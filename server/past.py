@@ -31,6 +31,7 @@ class Past:
     settings_version: int = 0  # the highest that the log knows
     order: Mapping[str, Any] | None = None  # the event of the slow-down that stood when the server ended
     transitions: tuple[Transition, ...] = ()  # of each alarm since it was last at rest, oldest first
+    stood: tuple[Mapping[str, Any], ...] = ()  # the newest event of each alarm that was not at rest
     recent: tuple[Transition, ...] = ()  # of all alarms in the last ten minutes, oldest first
 
     @property
@@ -60,10 +61,11 @@ def recall(bus: LocalBus, vehicle: str, *, now_s: float, wall_ms: int) -> Past:
 
     address, paused = _monitored(bus, vehicle)
     newest = bus.find_events(vehicle, limit=1)
+    alarms = [_since_rest(bus, vehicle, alarm) for alarm in bus.alarms_told(vehicle)]
     told = [
         transition
-        for alarm in bus.alarms_told(vehicle)
-        for event in _since_rest(bus, vehicle, alarm)
+        for events in alarms
+        for event in events
         if (transition := transition_of(event, moment_s, shelf_s)) is not None
     ]
     return Past(
@@ -73,6 +75,7 @@ def recall(bus: LocalBus, vehicle: str, *, now_s: float, wall_ms: int) -> Past:
         settings_version=int(_number(newest[0].get("settings_version"), 0)) if newest else 0,
         order=_order(bus, vehicle, wall_ms) if address is not None else None,
         transitions=tuple(told),
+        stood=tuple(events[-1] for events in alarms if events and events[-1].get("state") != AlarmState.NORMAL),
         recent=tuple(_recent(bus, vehicle, wall_ms, moment_s, shelf_s)),
     )
 

@@ -290,6 +290,7 @@ class Session:
         if before.address != target.url:
             self._end()
             return None
+        self._recording.remember(before.stood)
         self._drop_link()
         self._clear()
         return before

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import math
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from server.recording.folder import RecordingsFolder, id_of, part_id
 from server.recording.own import Own
 from server.recording.recorder import Part, Recorder, Status
 from server.recording.space import Allowance
+from server.recording.standing import Stood
 from server.source import RosVersion
 from server.tuning import Tuning
 from server.version import catgraph_version
@@ -81,6 +82,7 @@ class SessionRecording:
         self._recorder: Recorder | None = None
         self._tape: _Tape | None = None
         self._early: list[tuple[float, Own, dict[str, Any]]] = []  # what was said while nothing was recorded, and when
+        self._stood = Stood()  # the alarms, by what was written of them, or would have been
         self._definitions: dict[str, str] = {}
         self._anchor = (0.0, 0)  # a moment of `now`, and the time of day then [ns]: spacing stays true in a part
         self._is_monitoring = False
@@ -189,8 +191,11 @@ class SessionRecording:
         tape = self._tape
         if tape is not None and tape.is_open and self._recorder is not None:
             self._recorder.own(channel, said, self._ns(self._now()))
+            self._note(channel, said)
         elif self._folder is not None:
             self._early.append((self._now(), channel, {"time_ms": self._wall_ms(), **said}))
+            for _, old, words in self._early[:-EARLY_AT_MOST]:
+                self._note(old, words)
             del self._early[:-EARLY_AT_MOST]
 
     def asked(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
@@ -207,6 +212,10 @@ class SessionRecording:
         """Numbered events of the log."""
         for event in numbered:
             self.own("alarms", event)
+
+    def remember(self, stood: Iterable[Mapping[str, Any]]) -> None:
+        """Events of alarms that stand since before the server was started."""
+        self._stood.note_all(stood)
 
     def settings(self) -> None:
         """All settings, as they are in force now."""
@@ -358,6 +367,11 @@ class SessionRecording:
         self._anchor = now_s, wall_ms * 1_000_000
         version: RosVersion = 2 if self.ros_version == 2 else 1
         settings = self._settings()
+        early, self._early = self._early, []
+        since_s = tape.began_s - EARLY_S if tape.part == 1 else -math.inf
+        for at_s, channel, said in early:
+            if at_s < since_s:
+                self._note(channel, said)
         part = Part(
             path=self._folder.place(self._vehicle, part_id(tape.id, tape.part)),
             version=version,
@@ -371,6 +385,7 @@ class SessionRecording:
                 "started_by": tape.by or "",
                 "profile": str(settings["profile"]),
                 "settings": str(settings["toml"]),
+                **self._stood.as_metadata(),
             },
         )
         self.prepare()
@@ -380,12 +395,14 @@ class SessionRecording:
         self._recorder.begin(part)
         if self._definitions:
             self._recorder.learn(self._definitions)
-        early, self._early = self._early, []
         self.own("settings", settings)
-        since_s = tape.began_s - EARLY_S if tape.part == 1 else -math.inf
         for at_s, channel, said in early:
             if at_s >= since_s:
                 self.own(channel, said)
+
+    def _note(self, channel: Own, said: Mapping[str, Any]) -> None:
+        if channel == "alarms":
+            self._stood.note(said)
 
     def _close(self, why: str) -> None:
         tape = self._tape

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
-import orjson
 from pydantic import ValidationError
 
 from monitor.alarm import Transition
@@ -18,6 +17,7 @@ from server.past import transition_of
 from server.playback import slowed
 from server.playback.slowed import SlowDownTold
 from server.recording.read import Recording
+from server.recording.standing import read_standing
 
 ALARMS, PHONE, SETTINGS = "/catgraph/alarms", "/catgraph/phone", "/catgraph/settings"
 MOST = 50_000  # rows of one channel: a day of a phone; a file that holds more is not of our making
@@ -57,7 +57,7 @@ def read_told(recording: Recording) -> Told:
     left_out = 0
     metadata: Mapping[str, str] = getattr(recording, "metadata", {})
     at_first: str | None = metadata.get("settings") or None
-    events = [(0.0, event) for event in _standing(metadata)] + list(_rows(recording, ALARMS))
+    events = [(0.0, event) for event in read_standing(metadata)] + list(_rows(recording, ALARMS))
     for at_s, row in events:
         word = _of_event(row, at_s, recording.start_s)
         if word is not None:
@@ -86,15 +86,6 @@ def _rows(recording: Recording, topic: str) -> Iterator[tuple[float, Mapping[str
     own = getattr(recording, "own", None)
     if own is not None:
         yield from ((at_s - recording.start_s, row) for at_s, row in islice(own(topic), MOST))
-
-
-def _standing(metadata: Mapping[str, str]) -> list[Mapping[str, Any]]:
-    """The events that stood when a clip's part of the drive began."""
-    try:
-        rows = orjson.loads(metadata.get("standing", "[]"))
-    except orjson.JSONDecodeError:
-        return []
-    return [row for row in rows if isinstance(row, dict)] if isinstance(rows, list) else []
 
 
 def _of_event(event: Mapping[str, Any], at_s: float, start_s: float) -> Word | None:

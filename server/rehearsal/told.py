@@ -10,11 +10,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-import orjson
-
 from monitor.alarm import Transition
 from monitor.alarm_spec import Priority
 from server.recording.read import Recording
+from server.recording.standing import read_standing
 from server.rehearsal.episodes import Episode, Said
 from server.rehearsal.load import Load, load_of
 
@@ -54,7 +53,8 @@ def told_by(recording: Recording) -> Told | None:
     if not recording.metadata:
         return None
     start_s = recording.start_s
-    events = [*_standing(recording), *(event for _, event in recording.own("/catgraph/alarms") if _is_event(event))]
+    stood = [event for event in read_standing(recording.metadata) if _is_event(event)]
+    events = [*stood, *(event for _, event in recording.own("/catgraph/alarms") if _is_event(event))]
     entries = [_entry(event, start_s) for event in events]
     return Told(
         entries=entries[:MOST_ENTRIES],
@@ -66,15 +66,6 @@ def told_by(recording: Recording) -> Told | None:
         clip_of=recording.metadata.get("clip_of") or None,
         clip_at_s=_clip_at_s(recording),
     )
-
-
-def _standing(recording: Recording) -> list[dict[str, Any]]:
-    """Of a clip: the newest event of each alarm that stood when it begins."""
-    try:
-        found = orjson.loads(recording.metadata.get("standing") or "[]")
-    except orjson.JSONDecodeError:
-        return []
-    return [event for event in found if _is_event(event)] if isinstance(found, list) else []
 
 
 def _is_event(event: Any) -> bool:

@@ -16,6 +16,8 @@ from server.config import Config, Vehicle
 from server.others import choose
 from server.recording.folder import RecordingsFolder
 from server.recording.read import open_recording
+from server.recording.standing import read_standing
+from server.rehearsal.told import told_by
 from tests.page.processes import Process
 from tests.server.cars import driving
 from tests.server.conftest import serving
@@ -140,6 +142,56 @@ async def test_case_04_a_lost_link_saves_and_lists_what_was_recorded_and_its_ret
             assert recording.count > 5
             sessions.add(recording.metadata["session"])
     assert len(sessions) == 1
+
+
+async def test_a_second_part_tells_which_alarms_stand_when_it_begins(bridge: RosBridge, tmp_path: Path) -> None:
+    async with watched(bridge, tmp_path) as (_, one), driving(bridge):
+        assert (await one.ask(kind="set", values={"speed_limit.max_mps": 3.0}))["ok"]
+        await one.state(lambda s: any(a["id"] == "speed_limit" for a in s["alarms"]), within_s=SOON_S)
+        await bridge.kill()
+        await one.state(recording_is("held"), SOON_S)
+        await bridge.revive()
+        await one.state(lambda s: s["recording"]["part"] == 2 and s["recording"]["messages"] > 5, within_s=SOON_S)
+    first, second = files(tmp_path)
+    with open_recording([tmp_path / "recordings" / "car" / first]) as recording:
+        assert read_standing(recording.metadata) == []
+        (raised,) = (
+            said
+            for _, said in recording.own("/catgraph/alarms")
+            if (said["alarm"], said["change"]) == ("speed_limit", "raised")
+        )
+    with open_recording([tmp_path / "recordings" / "car" / second]) as recording:
+        stood = {event["alarm"]: event for event in read_standing(recording.metadata)}
+        assert stood["speed_limit"]["occurrence"] == raised["occurrence"]
+        numbers = {said["n"] for _, said in recording.own("/catgraph/alarms")}
+        assert not numbers & {event["n"] for event in stood.values()}, "none is told twice"
+        told = told_by(recording)
+        assert told is not None
+        assert [e.raised_s for e in told.episodes if e.alarm_id == "speed_limit"] == [0.0]
+
+
+async def test_alarms_of_before_a_restart_stand_when_a_recording_begins(bridge: RosBridge, tmp_path: Path) -> None:
+    address = bridge.address  # type: ignore[attr-defined]
+    arguments = ("serve", "--port", "0", "--data", str(tmp_path), f"--vehicle=car={address}")
+    async with driving(bridge):
+        process = await Process(*arguments).start()
+        async with viewer(process.address) as one:
+            assert (await one.ask(kind="set", values={"speed_limit.max_mps": 3.0}))["ok"]
+            state = await one.state(lambda s: any(a["id"] == "speed_limit" for a in s["alarms"]), within_s=SOON_S)
+            (alarm,) = (a for a in state["alarms"] if a["id"] == "speed_limit")
+        await process.kill()
+        await asyncio.sleep(1.1)  # names are made of seconds
+        process = await Process(*arguments).start()
+        async with viewer(process.address) as one:
+            state = await one.state(lambda s: s["recording"]["messages"] > 20, within_s=SOON_S)
+            name = state["recording"]["name"]
+            assert [a["occurrence"] for a in state["alarms"] if a["id"] == "speed_limit"] == [alarm["occurrence"]]
+            assert (await one.ask(kind="disconnect"))["ok"]
+            await one.state(recording_is("off"), SOON_S)
+        await process.kill()
+    with open_recording([tmp_path / "recordings" / "car" / f"{name}.mcap"]) as recording:
+        stood = {event["alarm"]: event["occurrence"] for event in read_standing(recording.metadata)}
+    assert stood["speed_limit"] == alarm["occurrence"]
 
 
 async def test_a_link_that_returns_too_late_begins_another_recording(bridge: RosBridge, tmp_path: Path) -> None:

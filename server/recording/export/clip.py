@@ -8,7 +8,7 @@ it was cut from, and the alarms that stood.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,12 +24,12 @@ from server.recording.own import own_schema
 from server.recording.read import Recording
 from server.recording.schemas import Schema, TypeBook
 from server.recording.source import Channel, Damage
+from server.recording.standing import Stood, read_standing
 from server.recording.write import PartFile
 
 BEFORE_S = AFTER_S = 30.0
 LONGEST_S = 3600.0  # before and after: beyond that it is a drive and no clip
 _ALARMS, _SETTINGS, _LINK = f"{OWN}alarms", f"{OWN}settings", f"{OWN}link"
-_STANDING = ("UNACKED", "ACKED", "RTN_UNACKED", "SHELVED")
 _HELD = 5000  # messages written and not yet handed to the system: a few MB
 _LATCHED = {"offered_qos_profiles": "- durability: transient_local"}  # as the readers look for it
 
@@ -89,13 +89,14 @@ def first_raised_ns(recording: Recording, alarm: str) -> int | None:
 class _Before:
     """What was so when the clip begins."""
 
-    standing: dict[str, Mapping[str, Any]]  # alarm → its newest event
+    stood: Stood
     latest: dict[tuple[int, int], Raw]  # file and channel → the last message of settings, link and latched topics
     settings: str | None
 
 
 def _before(recording: Recording, from_ns: int, progress: Progress) -> _Before:
-    found = _Before({}, {}, recording.metadata.get("settings"))
+    found = _Before(Stood(), {}, recording.metadata.get("settings"))
+    found.stood.note_all(read_standing(recording.metadata))
 
     def matters(channel: Channel) -> bool:
         return channel.is_latched or channel.topic in (_ALARMS, _SETTINGS, _LINK)
@@ -104,7 +105,7 @@ def _before(recording: Recording, from_ns: int, progress: Progress) -> _Before:
         recording, wanted=matters, end_ns=from_ns - 1, progress=lambda part: progress(part * _LOOKING)
     ):
         if raw.channel.topic == _ALARMS:
-            _note_standing(found.standing, raw.data)
+            found.stood.note(_json(raw.data))
             continue
         if raw.channel.topic == _SETTINGS:
             found.settings = _toml(raw.data) or found.settings
@@ -114,18 +115,6 @@ def _before(recording: Recording, from_ns: int, progress: Progress) -> _Before:
 
 
 _LOOKING = 0.4  # of the work: the rest is copying
-
-
-def _note_standing(standing: dict[str, Mapping[str, Any]], data: bytes) -> None:
-    event = _json(data)
-    alarm = event.get("alarm")
-    if not isinstance(alarm, str):
-        return
-    state = event.get("state")
-    if state in _STANDING or (state is None and event.get("change") in ("raised", "recaused")):
-        standing[alarm] = event
-    elif state is not None or event.get("change") == "cleared":
-        standing.pop(alarm, None)
 
 
 def _copy(recording: Recording, file: PartFile, window: Window, before: _Before, progress: Progress) -> Outcome:
@@ -189,7 +178,6 @@ def _schema(recording: Recording, channel: Channel, books: dict[int, TypeBook]) 
 
 def _metadata(recording: Recording, window: Window, before: _Before, clip_of: str) -> dict[str, str]:
     kept = {name: text for name, text in recording.metadata.items() if name not in ("ended", "why", "closed_ms")}
-    standing = [*before.standing.values()]
     return {
         "vehicle": "car",
         **kept,
@@ -199,7 +187,7 @@ def _metadata(recording: Recording, window: Window, before: _Before, clip_of: st
         "clip_at_ms": str(window.at_ns // 1_000_000),
         "clip_from_ms": str(window.from_ns // 1_000_000),
         "clip_to_ms": str(window.to_ns // 1_000_000),
-        "standing": orjson.dumps(standing).decode(),
+        **before.stood.as_metadata(),
     }
 
 
