@@ -24,6 +24,7 @@ class Tuning:
         self._recognised = GENERIC
         self.settings: Settings = file.read()
         self.complaint = file.complaint
+        self._limits: tuple[Settings, Profile, AllLimits] | None = None  # as they follow from those two
         self._told = self.in_force()
 
     @property
@@ -33,7 +34,11 @@ class Tuning:
 
     @property
     def limits(self) -> AllLimits:
-        return self.settings.limits(self.profile)
+        """Asked for many times a tick, and made anew only when what they follow from is another."""
+        known, profile = self._limits, self.profile
+        if known is None or known[0] is not self.settings or known[1] is not profile:
+            known = self._limits = (self.settings, profile, self.settings.limits(profile))
+        return known[2]
 
     def recognise(self, topics: Mapping[str, str], ros: int | None) -> bool:
         """Looks at what the car offers; True when it is now taken for another kind of car."""

@@ -31,6 +31,7 @@ from server.tuning import PERCENT_A_RAD
 
 log = logging.getLogger("catgraph.slowing")
 
+WATCHED_S = 0.0015  # before a command is due the loop is asked again and again: its timers know whole milliseconds
 A_TICK_S = 0.01  # a tick of the judge, with the state it makes, holds up the loop for less than this
 PERIOD_S = 0.05  # the obstacle stopper lets a command count for 0.2 s
 DOUBT_S = 0.3
@@ -68,7 +69,7 @@ class Slowing:
         self._ros_version = 1
         self._ordered = asyncio.Event()
         self._turned_s = 0.0
-        self._due_s = 0.0  # the next command, by the loop's clock
+        self._due_s = 0.0  # the next command
         self._opened_s = 0.0  # the newest opening of the link
         self._sent_s = 0.0  # the newest command
         self._told_unconfirmed = False
@@ -145,15 +146,14 @@ class Slowing:
 
     async def speak(self) -> None:
         """Speaks what is ordered, 20 times a second, for ever: no page, no judge and no disk is waited for."""
-        loop = asyncio.get_running_loop()
         while True:
             await self._ordered.wait()
             while self._life.order is not None:
-                left_s = self._due_s - loop.time()
+                left_s = self._due_s - self._now()
                 if left_s > 0.0:
-                    await asyncio.sleep(left_s)
+                    await asyncio.sleep(max(0.0, left_s - WATCHED_S))
                     continue  # one that was ordered meanwhile has its own time
-                self._due_s = max(self._due_s + PERIOD_S, loop.time())
+                self._due_s = max(self._due_s + PERIOD_S, self._now())
                 try:
                     self._speak()
                 except Exception:  # the one net: a fault in one command must not end the others
@@ -164,9 +164,9 @@ class Slowing:
         """Waits where a command is due before a tick would be over: its evenness is worth a later look at the car."""
         if self._life.order is None:
             return
-        left_s = self._due_s - asyncio.get_running_loop().time()
+        left_s = self._due_s - self._now()
         if 0.0 < left_s < A_TICK_S:
-            await asyncio.sleep(left_s + 0.0005)  # its timer was set first, and so it goes first
+            await asyncio.sleep(left_s + 0.001)
 
     async def beat(self) -> None:
         """The operator's heartbeat for the guard, 5 times a second, as long as this server is itself healthy."""
@@ -269,7 +269,7 @@ class Slowing:
     def _speak_at_once(self) -> None:
         """Out of turn; the next one is due a period from now."""
         self._speak()
-        self._due_s = asyncio.get_running_loop().time() + PERIOD_S
+        self._due_s = self._now() + PERIOD_S
 
     def _speak(self) -> None:
         """One command, now or not at all."""

@@ -40,7 +40,7 @@ class Car:
         self.topics = [published.topic for published in drive.published]
         self.messages_per_s = len(self._tape) / TAPE_S
         self._calm = asyncio.Event()  # a calm speed was published since
-        self._commanded: list[tuple[int, float]] = []  # when a command arrived [ns], and its speed
+        self._commanded: dict[str, list[tuple[int, float]]] = {}  # topic → when a command arrived [ns], and its speed
         self.bridge.on_publish.append(self._hear)
 
     async def drive(self) -> None:
@@ -72,14 +72,12 @@ class Car:
             self._publish_speed(speed_mps)
         return sent
 
-    async def commanded(self) -> list[tuple[int, float]]:
+    async def commanded(self, topic: str = CMD_VEL.topic) -> list[tuple[int, float]]:
         """The commands that arrived since this was last asked: when [ns, CLOCK_MONOTONIC], and their speed [m/s]."""
-        commanded, self._commanded = self._commanded, []
-        return commanded
+        return self._commanded.pop(topic, [])
 
     def _hear(self, topic: str, type: str, message: Json) -> None:
-        if topic == CMD_VEL.topic:
-            self._commanded.append((time.monotonic_ns(), message["linear"]["x"]))
+        self._commanded.setdefault(topic, []).append((time.monotonic_ns(), message["linear"]["x"]))
 
     async def counts(self) -> dict[str, int]:
         """What the bridge has sent and dropped so far."""

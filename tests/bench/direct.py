@@ -20,6 +20,7 @@ from tests.bench.orders import obey, options
 
 LIMIT_MPS = 11.0
 AFTER_A_GAP_S = 1.5
+_STANDING = {"linear": {"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
 STALE_S = 0.1  # older than a page's state may be
 
 
@@ -97,6 +98,21 @@ class Direct:
         """All watchers stop reading for so long; answers how old what each then reads is."""
         return await asyncio.gather(*(self._gap(watcher, seconds) for watcher in self._watchers))
 
+    async def metronome(self, url: str, topic: str, seconds: float, period_s: float) -> None:
+        """A bare client that says one Twist a period, and does nothing else."""
+        socket = await open_socket(url)
+        loop = asyncio.get_running_loop()
+        try:
+            socket.send(orjson.dumps({"op": "advertise", "topic": topic, "type": "geometry_msgs/Twist"}))
+            due_s = loop.time()
+            ends_s = due_s + seconds
+            while due_s < ends_s:
+                await asyncio.sleep(max(0.0, due_s - loop.time()))
+                socket.send(orjson.dumps({"op": "publish", "topic": topic, "msg": _STANDING}))
+                due_s += period_s
+        finally:
+            socket.abort()
+
     async def leave(self) -> None:
         for socket in self._sockets():
             socket.abort()
@@ -125,6 +141,7 @@ async def main() -> None:
         "begin": direct.begin,
         "report": direct.report,
         "gap": direct.gap,
+        "metronome": direct.metronome,
         "leave": direct.leave,
     }
     try:

@@ -19,11 +19,11 @@ from server.web import requests
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Real sockets, processes and clocks on two busy cores: what fails is tried once more, and the summary says so."""
+    """Real sockets, processes and clocks on two busy cores: what fails is tried again, twice at most, and the summary says so."""
     here = Path(__file__).parent
     for item in items:
         if here in item.path.parents:
-            item.add_marker(pytest.mark.flaky(reruns=1, reruns_delay=1))
+            item.add_marker(pytest.mark.flaky(reruns=2, reruns_delay=1))
 
 
 @contextlib.asynccontextmanager

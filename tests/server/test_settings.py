@@ -253,6 +253,19 @@ def test_a_default_of_the_new_kind_of_car_is_not_kept() -> None:
     assert str(refused.value) == "There is no profile named ?."
 
 
+def test_thresholds_are_made_once_and_again_with_each_change_and_each_kind_of_car() -> None:
+    tuning = Tuning(SettingsFile(None))
+    first = tuning.limits
+    assert tuning.limits is first
+    tuning.change(values={LIMIT: 9.0}, topics={}, profile=None, version=None)
+    assert (first.speed_limit.max_mps, tuning.limits.speed_limit.max_mps) == (11.0, 9.0)
+    tuning.change(values={LIMIT: None}, topics={}, profile=None, version=None)
+    assert tuning.limits.speed_limit.max_mps == 11.0
+    before = tuning.limits
+    assert tuning.recognise(REAL, 1)  # whose profile may have defaults of its own
+    assert tuning.limits is not before
+
+
 def test_the_topics_that_can_carry_a_signal_are_those_of_a_type_it_reads() -> None:
     found = candidates(
         {
