@@ -19,7 +19,7 @@ from server.web import requests
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Real sockets, processes and clocks on two busy cores: what fails is tried again, twice at most, and the summary says so."""
+    """Real sockets, processes, clocks on two busy cores: what fails is tried again, and the summary says so."""
     here = Path(__file__).parent
     for item in items:
         if here in item.path.parents:
