@@ -199,7 +199,7 @@ export class FileSheet {
     const made = row.state === 'read' ? FORMATS.filter(([format]) => format !== row.format && (format !== 'ros2' || row.ros_version === 2)) : [];
     this.#show(`Download ${this.name}`, [html('p', { class: 'sub' }, 'Other forms than the file itself are made when they are asked for.')], [html('ul', { class: 'menu-list' }, html('li', {}, asItIs),
       ...made.map(([format, label, use]) => {
-        const key = html('button', { type: 'button', 'data-format': format }, icon('download'), html('span', { class: 'tx' }, html('b', {}, label), html('small', {}, use)));
+        const key = html('button', { type: 'button', 'data-format': format, 'data-operator': true }, icon('download'), html('span', { class: 'tx' }, html('b', {}, label), html('small', {}, use)));
         listen(key, 'click', () => this.#make(format, label));
         return html('li', {}, key);
       }))], [this.#key('Back', () => this.#actions())]);
