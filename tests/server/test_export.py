@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import orjson
@@ -17,6 +18,7 @@ from server.cli import main
 from server.recording.export import ExportRefused, make_export
 from server.recording.export.formats import FORMATS
 from server.recording.read import open_recording
+from tests.server.recording.bags import Drive, write_ros2
 from tests.server.recording.made import BEGAN_MS, record
 
 ID = "car_20260921T141320Z"
@@ -28,7 +30,7 @@ def drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return record(tmp_path / "in" / f"{ID}.mcap", alarms=[(5.0, "critical")])
 
 
-@pytest.mark.parametrize("format", sorted(FORMATS))
+@pytest.mark.parametrize("format", sorted({*FORMATS} - {"ros2"}))
 def test_every_format_lands_beside_you_under_the_recording_s_name(
     drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], format: str
 ) -> None:
@@ -41,6 +43,19 @@ def test_every_format_lands_beside_you_under_the_recording_s_name(
     assert main(["export", str(drive), "--format", format]) == 2
     assert capsys.readouterr().err == f"catgraph export: {out.name} is there already: name the file with --out.\n"
     assert main(["export", str(drive), "--format", format, "--out", out.name]) == 0  # who names it means it
+
+
+def test_a_ros_2_bag_is_made_of_a_drive_from_ros_2_and_of_no_other(
+    drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", str(drive), "--format", "ros2"]) == 2
+    said = capsys.readouterr().err
+    assert said == (
+        "catgraph export: This drive was recorded from ROS 1, and its messages are ROS 1's: take the ROS 1 bag.\n"
+    )
+    bag = write_ros2(tmp_path / "drive", Drive(messages=[(0.0, "/n", "std_msgs/msg/Int32", {"data": 7})]))
+    assert main(["export", str(bag), "--format", "ros2"]) == 0
+    assert zipfile.ZipFile(tmp_path / "drive.ros2.zip").namelist() == ["drive/drive.mcap", "drive/metadata.yaml"]
 
 
 @pytest.mark.parametrize(
