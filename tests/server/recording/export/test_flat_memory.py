@@ -54,7 +54,7 @@ def test_a_longer_drive_takes_no_more(tmp_path: Path) -> None:
 @pytest.mark.timeout(3600)
 def test_an_hour_exports_to_everything_with_little_memory(tmp_path: Path) -> None:
     hour = drive(tmp_path / "hour.mcap", 3600.0)
-    peaks = {name: peak_mb(hour, name, tmp_path) for name in FORMATS}
+    peaks = {name: peak_mb(hour, name, tmp_path) for name in FORMATS if name != "ros2"}
     peaks |= {f"bag, {packed}": peak_mb(hour, "bag", tmp_path, "--compression", packed) for packed in ("bz2", "lz4")}
     peaks["clip"] = peak_mb(hour, "mcap", tmp_path, "--at", "3000")
     print(f"peak MB of an hour of driving ({hour.stat().st_size / 1e6:.0f} MB): {peaks}")
@@ -65,6 +65,6 @@ def test_an_hour_exports_to_everything_with_little_memory(tmp_path: Path) -> Non
 @pytest.mark.timeout(3600)
 def test_an_hour_of_ros_2_becomes_a_bag_with_little_memory(tmp_path: Path) -> None:
     hour = drive(tmp_path / "hour.mcap", 3600.0, version=2)
-    peaks = {name: peak_mb(hour, name, tmp_path) for name in ("bag", "csv")}
+    peaks = {name: peak_mb(hour, name, tmp_path) for name in ("bag", "ros2", "csv")}
     print(f"peak MB of an hour of driving, ROS 2 ({hour.stat().st_size / 1e6:.0f} MB): {peaks}")
     assert max(peaks.values()) <= MOST_MB, peaks
