@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import re
 import socket as sockets
 import time
@@ -19,6 +20,7 @@ from server.access.access import Access
 from server.access.guard import Guard
 from server.access.who import Role
 from server.config import Config
+from server.limits import Limits
 from tests.server.access.pairs import OPERATOR_KEY, VIEWER_KEY, Served, config, cookie_of, keyed, paired_server
 from tests.server.conftest import serving
 
@@ -460,3 +462,37 @@ async def test_on_this_machine_alone_nobody_pairs_and_still_no_strangers_page_co
         for origin in stranger_origins(host):
             with pytest.raises(websockets.InvalidStatus):
                 await websockets.connect(f"ws://{host}/ws", additional_headers={"Origin": origin})
+
+
+async def test_one_device_opens_so_many_pages_and_another_still_gets_in() -> None:
+    of = config(limits=Limits(pages=3))
+    async with (
+        paired_server(of) as served,
+        served.paired(Role.OPERATOR) as greedy,
+        served.paired(Role.OPERATOR, "Galaxy") as other,
+        contextlib.AsyncExitStack() as stack,
+    ):
+
+        async def page(browser: httpx.AsyncClient) -> websockets.ClientConnection:
+            socket = served.socket(await served.ticket(browser), cookie=cookie_of(browser))
+            opened: websockets.ClientConnection = await stack.enter_async_context(socket)
+            return opened
+
+        pages = [await page(greedy) for _ in range(3)]
+        for one in pages:
+            assert json.loads(await one.recv())["kind"] == "hello"
+        assert await closed(await page(greedy)) == (1013, "too many pages")
+        assert json.loads(await (await page(other)).recv())["kind"] == "hello"
+        await pages[0].close()
+        async with asyncio.timeout(6):
+            while (await closed_at_once(await page(greedy))) is not None:  # the place of the one that left is free soon
+                pass
+
+
+async def closed_at_once(page: websockets.ClientConnection) -> int | None:
+    """The code with which it was closed instead of a hello; None: it was not."""
+    try:
+        await page.recv()
+    except websockets.ConnectionClosed:
+        return page.close_code
+    return None
