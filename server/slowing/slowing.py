@@ -166,7 +166,7 @@ class Slowing:
             return
         left_s = self._due_s - self._now()
         if 0.0 < left_s < A_TICK_S:
-            await asyncio.sleep(left_s + 0.001)
+            await asyncio.sleep(left_s + 0.001)  # by then the command, which is watched for, has gone
 
     async def beat(self) -> None:
         """The operator's heartbeat for the guard, 5 times a second, as long as this server is itself healthy."""
