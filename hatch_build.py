@@ -36,7 +36,7 @@ class PageHook(BuildHookInterface):
                 if not self._vendor_is_current():
                     fill(self._vendor, Path(self.root), modules)
                     self._assets.write_stamp(self._vendor, Path(self.root))
-                self._built.join(modules / ".bin" / "esbuild", self._static)
+                self._built.join(modules / ".bin", self._static)
                 self._draw(modules)
         if version == "standard":  # an editable install reads them from the project's root instead
             build_data["force_include"].update({"static": "server/static", "templates": "server/templates"})

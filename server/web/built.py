@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -21,6 +22,7 @@ STYLES = ("tokens", "frame", "instruments", "map", "sheets", "screens", "setting
 ENTRY = "app.js"
 _LIST = "built.json"  # written last
 _TARGET = "es2022"  # private fields and top-level await: every browser of 2022 and later
+_CONFIG = Path(__file__).with_name("rollup.config.mjs")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,34 +35,32 @@ class Built:
     name: str  # of this build: other sources have another
 
 
-def join(esbuild: Path, static: Path) -> None:
-    """Makes static/built from static/js and static/css. Raises SystemExit with esbuild's words where it cannot."""
+def join(tools: Path, static: Path) -> None:
+    """Makes static/built from static/js and static/css, with what lies in node_modules/.bin.
+
+    Raises SystemExit with the tool's words where it cannot.
+    """
     into = static / FOLDER
     into.mkdir(exist_ok=True)
     sources = digest_of_sources(static)
     for old in into.iterdir():
         old.unlink()
     with tempfile.TemporaryDirectory(prefix="catgraph-page-") as folder:
-        style = Path(folder, "page.css")
+        joined, style = Path(folder, "joined"), Path(folder, "page.css")
+        entry = {"CATGRAPH_ENTRY": str(static / "js" / ENTRY), "CATGRAPH_INTO": str(joined)}
+        _run([str(tools / "rollup"), "--config", str(_CONFIG), "--silent"], {**os.environ, **entry})
+        told = json.loads((joined / "joined.json").read_text(encoding="utf-8"))
+        small = ["--minify", f"--target={_TARGET}", f"--outdir={into}", "--log-level=error"]
+        _run([str(tools / "esbuild"), *map(str, sorted(joined.glob("*.js"))), "--format=esm", *small])
         imports = (f"@import {json.dumps(str(static / 'css' / f'{name}.css'))};" for name in STYLES)
         style.write_text("\n".join(imports), encoding="utf-8")
-        meta = Path(folder, "meta.json")
-        names = ["--entry-names=[name]-[hash]", "--chunk-names=[name]-[hash]"]
-        apart = ["--external:../vendor/*", "--external:../fonts/*"]
-        options = ["--bundle", "--minify", f"--target={_TARGET}", f"--outdir={into}", *names, *apart]
-        script = [str(static / "js" / ENTRY), "--format=esm", "--splitting", f"--metafile={meta}"]
-        for one in (script, [str(style)]):
-            done = subprocess.run([str(esbuild), *one, *options], capture_output=True, text=True, check=False)
-            if done.returncode:
-                raise SystemExit(f"The page's files could not be joined:\n{done.stderr}")
-        told = json.loads(meta.read_text(encoding="utf-8"))["outputs"]
-    outputs = {Path(name).name: about for name, about in told.items()}
-    begin = next(name for name, about in outputs.items() if Path(about.get("entryPoint", "")).name == ENTRY)
+        own = ["--bundle", "--entry-names=[name]-[hash]", "--external:../fonts/*"]
+        _run([str(tools / "esbuild"), str(style), *own, *small])
     listed = {
         "sources": sources,
-        "script": f"{FOLDER}/{begin}",
+        "script": f"{FOLDER}/{told['script']}",
         "style": f"{FOLDER}/{next(path.name for path in into.glob('page-*.css'))}",
-        "needed": [f"{FOLDER}/{name}" for name in _needed(begin, outputs)],
+        "needed": [f"{FOLDER}/{name}" for name in told["needed"]],
     }
     (into / _LIST).write_text(json.dumps(listed), encoding="utf-8")
 
@@ -77,7 +77,7 @@ def find(static: Path) -> Built | None:
 
 def digest_of_sources(static: Path) -> str:
     """Hash of all that the joined files are made of, and of how."""
-    digest = hashlib.sha256(f"{STYLES} {_TARGET} {sys.modules[__name__].__doc__}".encode())
+    digest = hashlib.sha256(f"{STYLES} {_TARGET} {sys.modules[__name__].__doc__}".encode() + _CONFIG.read_bytes())
     for path in _sources(static):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
@@ -100,20 +100,14 @@ def _sources(static: Path) -> list[Path]:
     return sorted([*(static / "js").glob("*.js"), *(static / "css").glob("*.css")])
 
 
-def _needed(begin: str, outputs: dict[str, dict[str, list[dict[str, str]]]]) -> list[str]:
-    found: dict[str, None] = {}
-    waiting = [begin]
-    while waiting:
-        for one in outputs[waiting.pop(0)].get("imports", []):
-            name = Path(one["path"]).name
-            if one.get("kind") == "import-statement" and name in outputs and name not in found:
-                found[name] = None
-                waiting.append(name)
-    return list(found)
+def _run(command: list[str], environment: dict[str, str] | None = None) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    if done.returncode:
+        raise SystemExit(f"The page's files could not be joined:\n{done.stderr}{done.stdout}")
 
 
 def main(arguments: Iterable[str]) -> None:
-    """`python -m server.web.built ESBUILD`: joins the files of this project, where they are not current."""
+    """`python -m server.web.built TOOLS`: joins the files of this project, where they are not current."""
     static = Path(__file__).resolve().parents[2] / "static"
     if find(static) is None:
         join(Path(next(iter(arguments))), static)

@@ -26,7 +26,7 @@ def copy(into: Path) -> Path:
 def build(house: Path) -> None:
     """Joins the page anew, as an update does."""
     (house / "static" / "built").mkdir(exist_ok=True)
-    join(MODULES / ".bin" / "esbuild", house / "static")
+    join(MODULES / ".bin", house / "static")
 
 
 def change(house: Path, word: str) -> None:

@@ -17,7 +17,7 @@ from server.web.built import STYLES, find, join
 from server.web.pages import parts_of
 from tests.server.conftest import serving
 
-ESBUILD = Path(__file__).parents[3] / "node_modules" / ".bin" / "esbuild"
+TOOLS = Path(__file__).parents[3] / "node_modules" / ".bin"
 NODE = shutil.which("node") or "node"
 
 
@@ -37,13 +37,13 @@ def static(tmp_path: Path) -> Path:
     for name in STYLES:
         (tmp_path / "css" / f"{name}.css").write_text(f".{name} {{ color: red; }}\n")
     (tmp_path / "css" / "tokens.css").write_text("@font-face { font-family: n; src: url('../fonts/n.woff2'); }\n")
-    join(ESBUILD, tmp_path)
+    join(TOOLS, tmp_path)
     return tmp_path
 
 
 def test_what_is_installed_here_is_current() -> None:
     built = find(static_dir())
-    assert built is not None, "run `make test`, or `python -m server.web.built node_modules/.bin/esbuild`"
+    assert built is not None, "run `make test`, or `python -m server.web.built node_modules/.bin`"
     assert all((static_dir() / name).is_file() for name in (built.script, built.style, *built.needed))
 
 
@@ -94,7 +94,7 @@ def test_a_damaged_folder_is_no_folder(static: Path, what: str) -> None:
 def test_what_cannot_be_joined_is_said_with_the_reason(static: Path) -> None:
     (static / "js" / "later.js").write_text("import './nowhere.js';\n")
     with pytest.raises(SystemExit, match=r"nowhere\.js"):
-        join(ESBUILD, static)
+        join(TOOLS, static)
     assert find(static) is None
 
 
