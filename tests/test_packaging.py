@@ -60,7 +60,11 @@ def test_javascript_packages_are_pinned_without_naming_a_registry() -> None:
 
 def test_the_vendored_files_come_with_their_licences() -> None:
     packages = {source.partition("/")[0] for source in PACKAGE["vendor"]}
-    tools = {"esbuild", "@rollup/wasm-node", "@resvg/resvg-wasm"}  # join files and draw icons, and leave nothing of themselves in them
+    tools = {
+        "esbuild",
+        "@rollup/wasm-node",
+        "@resvg/resvg-wasm",
+    }  # join files and draw icons, and leave nothing of themselves in them
     assert packages == set(PACKAGE["dependencies"]) - tools
     assert all(any(f"{name}/LICENSE" == source for source in PACKAGE["vendor"]) for name in packages)
 

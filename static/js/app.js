@@ -9,6 +9,7 @@ import { Arming } from './arming.js';
 import { deviceName, keptHere } from './device.js';
 import { field, listen, need, show } from './dom.js';
 import { gapWords } from './events.js';
+import { takeEarly } from './early-socket.js';
 import { FilesTab } from './files-tab.js';
 import { forgetWork } from './forget.js';
 import { Handset } from './handset.js';
@@ -51,7 +52,7 @@ const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.h
 
 /** Where devices are paired, each socket needs a ticket. */
 const admission = document.documentElement.dataset['access'] === 'paired' ? new Admission(address, shut) : null;
-const store = new Store(() => admission?.dial() ?? new WebSocket(address), deviceName(navigator.userAgent, keptHere()), ownName());
+const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), deviceName(navigator.userAgent, keptHere()), ownName());
 const voice = new Voice();
 const arming = new Arming(voice, new Phone(store));
 const monitor = need(document, '#monitor');

@@ -129,6 +129,22 @@ export function show(element, isShown) {
 }
 
 /**
+ * Keep an attribute of `element` as something else is: a rule of style that asked for it (`:has()`) would be asked anew for
+ * every element with every frame.
+ * @param {Element} element
+ * @param {string} name
+ * @param {() => boolean} isSo
+ * @param {Node[]} seen what it depends on
+ * @param {MutationObserverInit} changes of theirs
+ */
+export function mirror(element, name, isSo, seen, changes) {
+  const look = () => setAttribute(element, name, isSo());
+  const observer = new MutationObserver(look);
+  for (const one of seen) observer.observe(one, changes);
+  look();
+}
+
+/**
  * Listen, and get the way to stop listening.
  * @param {EventTarget} target
  * @param {string} type

@@ -1,6 +1,6 @@
 // A word of the page itself: something was refused, a blind time is over. It goes by itself, and takes no place of an alarm.
 
-import { html, icon, words } from './dom.js';
+import { html, icon, mirror, words } from './dom.js';
 
 const STAYS_MS = 8000;
 const OFFERS_MS = 15_000; // what can be pressed must be found and reached first
@@ -12,6 +12,8 @@ const OFFERS_MS = 15_000; // what can be pressed must be found and reached first
  * @returns {(sentence: string, title?: string, way?: Way) => void}
  */
 export function notices(root) {
+  const isCovering = () => root.querySelector('.snack:not([hidden])') !== null;
+  mirror(document.body, 'data-snack', isCovering, [root], { childList: true, subtree: true, attributeFilter: ['hidden'] });
   return (sentence, title = '', way = undefined) => {
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close' }, icon('close'));
     const text = html('div', { class: 'tx' }, ...(title ? [html('b', {}, ...words(title))] : []), html('span', {}, ...words(sentence)));

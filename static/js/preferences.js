@@ -80,7 +80,7 @@ function choose(theme) {
 }
 
 /**
- * Kept on this phone; theme.js puts it in force before the page is painted.
+ * Kept on this phone; early.js puts it in force before the page is painted.
  * @param {string} name
  * @param {string} value
  * @param {string} usual what holds without a choice

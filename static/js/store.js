@@ -77,7 +77,7 @@ export class Store {
     this.name = name;
     this.page = page;
     this.wire = new Wire(
-      { opened: () => this.#opened(), text: (text) => this.#heard(text), bytes: (bytes) => this.#heardScan(bytes), closed: () => this.#closed() },
+      { opened: () => this.#opened(), text: (text, at_ms) => this.#heard(text, at_ms), bytes: (bytes) => this.#heardScan(bytes), closed: () => this.#closed() },
       dial,
     );
   }
@@ -239,8 +239,8 @@ export class Store {
     for (const id of [...this.#waiting.keys()]) this.#answer(id, { ok: false, reason: 'The connection to the server broke.' });
   }
 
-  /** @param {string} text */
-  #heard(text) {
+  /** @param {string} text @param {number} [at_ms] when it came */
+  #heard(text, at_ms = this.now()) {
     const message = readMessage(text);
     if (!message) {
       this.unreadable += 1;
@@ -248,7 +248,7 @@ export class Store {
     }
     switch (message.kind) {
       case 'hello':
-        this.#clock.note(message.time_ms, this.now());
+        this.#clock.note(message.time_ms, at_ms);
         this.#greeted(message);
         break;
       case 'offer':
@@ -256,7 +256,7 @@ export class Store {
         this.wire.send({ kind: 'take', seq: message.seq });
         break;
       case 'state':
-        this.#state(message);
+        this.#state(message, at_ms);
         break;
       case 'events': {
         const fresh = this.log.take(message.events);
@@ -293,9 +293,8 @@ export class Store {
     this.#emit('open', hello);
   }
 
-  /** @param {State} frame */
-  #state(frame) {
-    const now_ms = this.now();
+  /** @param {State} frame @param {number} now_ms when it came */
+  #state(frame, now_ms) {
     if ((frame.replay !== undefined) !== this.replaying) {
       this.wire.proof(now_ms);
       return; // under way while the page turned, or while a recording is opened again
@@ -304,7 +303,7 @@ export class Store {
     if (!this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service
     this.frame = frame;
     this.#delay_ms = delay_ms;
-    this.heard_ms = Date.now();
+    this.heard_ms = Date.now() - (this.now() - now_ms);
     this.wire.proof(now_ms);
     this.#emit('beat');
     // What asks for the operator is drawn at once; pointers ten times a second, the rest five times and with them.

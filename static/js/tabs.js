@@ -4,6 +4,8 @@ import { field, listen, setAttribute } from './dom.js';
 
 export const TABS = /** @type {const} */ (['home', 'map', 'scan', 'files', 'settings']);
 const REMEMBERED = 'catgraph.tab';
+/** From this width on tabs may stand side by side (wide.css): below it no size need be asked for, which has all laid out. */
+const SIDE_BY_SIDE = '(min-width: 760px)';
 /** So long after the last finger and the last movement the tabs are at rest [ms]. */
 const FOLD_AFTER_MS = 700;
 
@@ -66,9 +68,10 @@ export class Tabs {
 
   /** The pager has a size only once it is shown: put the tab in front where it belongs, without a movement. */
   place() {
-    if (!this.pager.clientWidth) return;
+    const isFirst = this.index === 0 && !this.#isPlaced; // it is there already: no need to have it all laid out for that
+    if (!isFirst && !this.pager.clientWidth) return;
+    if (!isFirst) this.pager.scrollTo({ left: this.#leftOf(this.index), behavior: 'instant' });
     this.#isPlaced = true;
-    this.pager.scrollTo({ left: this.#leftOf(this.index), behavior: 'instant' });
     this.#still();
     this.#fold();
     this.onFront();
@@ -113,6 +116,7 @@ export class Tabs {
   /** Is any of this tab to be seen? On a wide screen several stand side by side. @param {string} tab */
   shows(tab) {
     if (this.front === tab) return true;
+    if (!matchMedia(SIDE_BY_SIDE).matches) return false;
     const panel = this.panels[TABS.indexOf(/** @type {any} */ (tab))];
     if (!panel || !this.pager.clientWidth || panel.clientWidth > this.pager.clientWidth - 40) return false;
     const left = this.#leftOf(this.panels.indexOf(panel)) - this.pager.scrollLeft;

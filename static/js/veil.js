@@ -2,7 +2,7 @@
 // instruments.css) that every fresh frame rewinds, so that it comes even when this script hangs.
 
 import { drawBigChain } from './chain.js';
-import { field, html, setAttribute, setText, setWords, show, words } from './dom.js';
+import { field, html, mirror, need, setAttribute, setText, setWords, show, words } from './dom.js';
 import { speedWords } from './units.js';
 import { age, fixed, timeOfDay } from './words.js';
 
@@ -47,6 +47,8 @@ export function mount(root, store) {
   const [title, sentence, then, recName, rec] = ['veil-title', 'veil-words', 'veil-then', 'veil-rec-name', 'veil-rec'].map((name) => field(root, name));
   const chain = field(veil, 'chain');
   if (!title || !sentence || !then || !recName || !rec) throw new Error('The template lacks the veil');
+  const sheets = ['#sheet-lost', '#sheet-mute'].map((id) => need(document, id)); // they say it all
+  mirror(veil, 'data-told', () => sheets.some((sheet) => sheet.hasAttribute('open')), sheets, { attributeFilter: ['open'] });
   let beat = 0;
   let rewound_ms = -Infinity;
   let told = '';

@@ -12,7 +12,7 @@ const LAST_WAIT_MS = 2000;
  *
  * @typedef {object} Ear
  * @property {() => void} opened
- * @property {(text: string) => void} text
+ * @property {(text: string, at_ms?: number) => void} text at_ms: when it came, where that was before now [ms, monotonic]
  * @property {(bytes: ArrayBuffer) => void} bytes
  * @property {() => void} closed
  */
@@ -89,8 +89,8 @@ export class Wire {
       this.#isOpen = true;
       this.ear.opened();
     };
-    socket.onmessage = (/** @type {MessageEvent} */ event) => {
-      if (typeof event.data === 'string') this.ear.text(event.data);
+    socket.onmessage = (/** @type {{data: any, at_ms?: number}} */ event) => {
+      if (typeof event.data === 'string') this.ear.text(event.data, event.at_ms);
       else this.ear.bytes(event.data);
     };
     socket.onclose = () => this.#drop(performance.now());

@@ -456,7 +456,7 @@ async def test_the_map_is_fetched_when_it_comes_near_and_leaflet_only_for_tiles(
     asked: list[str] = []
     phone.page.on("request", lambda request: asked.append(request.url))
     async with roaming() as car, looking(phone, car, tab="home") as it:
-        map_script = re.compile(r"/js/map\.js|/built/map-\w+\.js")  # as it is written, or joined
+        map_script = re.compile(r"/js/map\.js|/built/map-[\w-]+\.js")  # as it is written, or joined
         assert [url for url in asked if map_script.search(url) or re.search(r"leaflet|/api/map|track", url)] == []
         await phone.page.locator("[data-tab=map]").tap()
         await expect(it.svg(".car-mark")).to_be_visible()

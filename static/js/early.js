@@ -1,0 +1,48 @@
+// Before the first paint: the theme and the hand this phone's operator chose (without a choice the phone's own theme holds),
+// and the socket to the server is dialled while the page's script is still on its way. early-socket.js takes it over.
+(() => {
+  const root = document.documentElement;
+  try {
+    const theme = localStorage.getItem('catgraph.theme');
+    if (theme === 'dark' || theme === 'light') root.dataset.theme = theme;
+    if (localStorage.getItem('catgraph.hand') === 'left') root.dataset.hand = 'left';
+  } catch {
+    // no storage: the phone's setting holds
+  }
+
+  const { access, vehicle } = root.dataset;
+  if (!access) return; // the page for when the server does not answer
+  /** @type {import('./early-socket.js').Early} */
+  const early = { told: [], hear: null, socket: null };
+  /** @type {any} */ (globalThis).catgraphEarly = early;
+  ticketOf(access).then(dial).catch(() => tell('close'));
+
+  /** Where devices are paired, a socket needs one. @param {string} way @returns {Promise<string | null>} */
+  async function ticketOf(way) {
+    if (way !== 'paired') return null;
+    const answer = await fetch('/api/ticket', { method: 'POST', cache: 'no-store', signal: AbortSignal.timeout(4000) });
+    return (await answer.json()).ticket;
+  }
+
+  /** @param {string | null} ticket */
+  function dial(ticket) {
+    if (ticket === undefined) throw new Error('no ticket'); // why, is asked and said once the page is there
+    const address = new URL('/ws', location.href);
+    address.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
+    if (vehicle) address.searchParams.set('vehicle', vehicle);
+    if (ticket !== null) address.searchParams.set('ticket', ticket);
+    const socket = new WebSocket(address);
+    early.socket = socket;
+    socket.binaryType = 'arraybuffer';
+    socket.onopen = () => tell('open');
+    socket.onmessage = ({ data }) => tell('message', data);
+    socket.onclose = () => tell('close');
+  }
+
+  /** @param {'open' | 'message' | 'close'} type @param {string | ArrayBuffer} [data] */
+  function tell(type, data) {
+    const told = { type, data, at_ms: performance.now() };
+    if (early.hear) early.hear(told);
+    else early.told.push(told);
+  }
+})();
