@@ -7,7 +7,7 @@ import { Admission } from './admission.js';
 import { soundOf } from './alarm-layout.js';
 import { Arming } from './arming.js';
 import { deviceName, keptHere } from './device.js';
-import { field, listen, need, show } from './dom.js';
+import { breath, field, listen, need, show } from './dom.js';
 import { gapWords } from './events.js';
 import { takeEarly } from './early-socket.js';
 import { FilesTab } from './files-tab.js';
@@ -47,146 +47,166 @@ import { mount as mountTopbar } from './topbar.js';
 import { mount as mountTrends } from './trends.js';
 import { mount as mountVeil } from './veil.js';
 
-const vehicle = document.documentElement.dataset['vehicle'];
-const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
+begin();
 
-/** Where devices are paired, each socket needs a ticket. */
-const admission = document.documentElement.dataset['access'] === 'paired' ? new Admission(address, shut) : null;
-const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), deviceName(navigator.userAgent, keptHere()), ownName());
-const voice = new Voice();
-const arming = new Arming(voice, new Phone(store));
-const monitor = need(document, '#monitor');
-const handset = new Handset();
-const tell = notices(field(document, 'snacks'));
-const control = new Control(store, tell, openPhone);
-/** What was refused because another is in control is said with a key that helps. @type {typeof tell} */
-const say = (sentence, title, way) => tell(sentence, title, way ?? control.wayOf(sentence));
-const page = new Page(store, arming, say);
+/** Part after part, with a breath between: as one piece it would keep a slow phone from everything else for a fifth of a second. */
+async function begin() {
+  const vehicle = document.documentElement.dataset['vehicle'];
+  const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
 
-const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
-const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null, say);
-const files = new FilesTab(need(monitor, '[data-panel="files"]'), store, say, () => page.isMonitorShown && tabs.shows('files') && screens.open === null);
-const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
-const screens = new Screens(monitor, store, front);
-const tabs = new Tabs(monitor, front);
-page.onShown = () => {
-  tabs.place();
-  front();
-};
+  /** Where devices are paired, each socket needs a ticket. */
+  const admission = document.documentElement.dataset['access'] === 'paired' ? new Admission(address, shut) : null;
+  const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), deviceName(navigator.userAgent, keptHere()), ownName());
+  const voice = new Voice();
+  const arming = new Arming(voice, new Phone(store));
+  const monitor = need(document, '#monitor');
+  const handset = new Handset();
+  const tell = notices(field(document, 'snacks'));
+  const control = new Control(store, tell, openPhone);
+  /** What was refused because another is in control is said with a key that helps. @type {typeof tell} */
+  const say = (sentence, title, way) => tell(sentence, title, way ?? control.wayOf(sentence));
+  const page = new Page(store, arming, say);
 
-mountStart(need(document, '#start'), store);
-mountConnect(need(document, '#connect'), store, page);
-mountTopbar(monitor, store, say);
-mountControl(monitor, field(document, 'snacks'), store, control);
-mountReach(need(monitor, '[data-part="reach"]'), store, openPhone);
-mountStrip(monitor, store);
-mountVeil(monitor, store);
-mountGauge(need(monitor, '[data-part="gauge"]'), store);
-mountNearest(need(monitor, '[data-part="nearest"]'), store);
-mountPedals(need(monitor, '[data-part="pedals"]'), store);
-mountPosition(need(monitor, '[data-part="position"]'), store);
-mountChecks(need(monitor, '[data-part="checks"]'), store);
-mountTrends(need(monitor, '[data-part="trends"]'), store);
-mountSheets();
-mountInstall(say);
-mountPreferences(voice);
-mountRail(monitor, store, page);
-mountSnackbar(field(document, 'snacks'), store, say);
-mountDialogs(store, page);
-mountSlowing(monitor, store, control, say); // after the dialogs: its count-down lies over them
-mountBadge(store);
+  await breath();
+  const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
+  const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null, say);
+  const files = new FilesTab(need(monitor, '[data-panel="files"]'), store, say, () => page.isMonitorShown && tabs.shows('files') && screens.open === null);
+  const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
+  const screens = new Screens(monitor, store, front);
+  const tabs = new Tabs(monitor, front);
+  page.onShown = () => {
+    tabs.place();
+    front();
+    unfold();
+  };
 
-/** The scan is sent and drawn only while its tab is in front and nothing lies over it; Settings is loaded once it is. */
-function front() {
-  queueMicrotask(() => {
-    scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null);
-    map.look();
-    files.look();
-    settings.look();
-  });
-}
+  await breath();
+  mountStart(need(document, '#start'), store);
+  mountConnect(need(document, '#connect'), store, page);
+  mountTopbar(monitor, store, say);
+  mountControl(monitor, field(document, 'snacks'), store, control);
+  mountReach(need(monitor, '[data-part="reach"]'), store, openPhone);
+  mountStrip(monitor, store);
+  mountVeil(monitor, store);
+  await breath();
+  mountGauge(need(monitor, '[data-part="gauge"]'), store);
+  mountNearest(need(monitor, '[data-part="nearest"]'), store);
+  mountPedals(need(monitor, '[data-part="pedals"]'), store);
+  mountPosition(need(monitor, '[data-part="position"]'), store);
+  mountChecks(need(monitor, '[data-part="checks"]'), store);
+  mountTrends(need(monitor, '[data-part="trends"]'), store);
+  await breath();
+  mountSheets();
+  mountInstall(say);
+  mountPreferences(voice);
+  mountRail(monitor, store, page);
+  mountSnackbar(field(document, 'snacks'), store, say);
+  mountDialogs(store, page);
+  mountSlowing(monitor, store, control, say); // after the dialogs: its count-down lies over them
+  mountBadge(store);
 
-/** What this phone can do is looked at seldom. */
-function openPhone() {
-  import('./this-phone.js').then(({ openThisPhone }) => openThisPhone(store, arming, handset)).catch(() => say('What shows this phone could not be fetched.', 'Not opened'));
-}
-
-/** This device is not paired, or was removed just now. @param {import('./admission.js').Refusal} why */
-function shut(why) {
-  if (why.code === 'removed') forgetWork(keptHere());
-  if (store.frame) {
-    location.reload(); // nothing of the car stays on a page that may not look any more; the screen then says the reason
-    return;
+  /** What lies under the fold of Home comes after what is seen first, a part at a time. */
+  async function unfold() {
+    if (!page.isMonitorShown) return;
+    for (const part of monitor.querySelectorAll('[data-late][hidden]')) {
+      await new Promise((resolve) => { requestAnimationFrame(resolve); });
+      await breath();
+      show(part, true);
+    }
   }
-  page.isShut = true;
-  page.draw();
-  import('./pairing.js').then(({ openPairing }) => openPairing(need(document, '#pairing'), {
-    why,
-    name: store.name,
-    onPaired: () => {
-      page.isShut = false;
-      page.draw();
-      admission?.admit();
-    },
-  })).catch(() => say('The screen for pairing could not be fetched from the server. Load the page again.', 'Not paired'));
-}
 
-/** What a viewer may not do is greyed; once somebody is one, it is told so. */
-function greet() {
-  if (!store.isViewer) return;
-  unviewed();
-  import('./viewer.js').then(({ mountViewer }) => mountViewer(store, say)).catch(() => {}); // the server refuses it all the same
-}
-const unviewed = store.on('open', greet);
+  /** The scan is sent and drawn only while its tab is in front and nothing lies over it; Settings is loaded once it is. */
+  function front() {
+    queueMicrotask(() => {
+      scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null);
+      map.look();
+      files.look();
+      settings.look();
+    });
+  }
 
-function draw() {
-  page.draw();
-  show(field(monitor, 'sound-off'), voice.isPossible ? !voice.isRunning : false);
-}
+  /** What this phone can do is looked at seldom. */
+  function openPhone() {
+    import('./this-phone.js').then(({ openThisPhone }) => openThisPhone(store, arming, handset)).catch(() => say('What shows this phone could not be fetched.', 'Not opened'));
+  }
 
-function speak() {
-  const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
-  voice.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
-}
+  /** This device is not paired, or was removed just now. @param {import('./admission.js').Refusal} why */
+  function shut(why) {
+    if (why.code === 'removed') forgetWork(keptHere());
+    if (store.frame) {
+      location.reload(); // nothing of the car stays on a page that may not look any more; the screen then says the reason
+      return;
+    }
+    page.isShut = true;
+    page.draw();
+    import('./pairing.js').then(({ openPairing }) => openPairing(need(document, '#pairing'), {
+      why,
+      name: store.name,
+      onPaired: () => {
+        page.isShut = false;
+        page.draw();
+        admission?.admit();
+      },
+    })).catch(() => say('The screen for pairing could not be fetched from the server. Load the page again.', 'Not paired'));
+  }
 
-new Presence(store, arming, handset);
-store.on('refused', (answer) => {
-  control.note(answer);
-  if (answer.heldBy) say(answer.reason, 'You are not in control'); // whoever ordered it may say it better
-});
-listen(field(need(document, '#sheet-menu'), 'this-phone'), 'click', () => {
-  closeSheet(/** @type {HTMLDialogElement} */ (need(document, '#sheet-menu')));
-  openPhone();
-});
-store.on('draw', draw);
-store.on('beat', speak);
-store.on('tick', speak);
-store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
-// Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
-for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
-listen(document, 'keydown', () => { document.documentElement.dataset['keys'] = ''; }, { capture: true });
-listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
-listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
-listen(field(need(document, '#connect'), 'saved'), 'click', () => {
-  import('./files-board.js').then(({ openSaved }) => openSaved(store, say, page)).catch(() => say('The recordings could not be fetched from the server. Try again.', 'Not opened'));
-});
+  /** What a viewer may not do is greyed; once somebody is one, it is told so. */
+  function greet() {
+    if (!store.isViewer) return;
+    unviewed();
+    import('./viewer.js').then(({ mountViewer }) => mountViewer(store, say)).catch(() => {}); // the server refuses it all the same
+  }
+  const unviewed = store.on('open', greet);
 
-// A link may lead to a moment of a recording.
-const asked = new URLSearchParams(location.search);
-const then = thenOf(asked.get('then'));
-const recording = asked.get('replay');
-const unasked = store.on('open', () => {
-  unasked();
-  if (asked.has('then')) history.replaceState(history.state, '', location.pathname);
-  if (then) location.assign(then); // a link in a mail: now that this device is known
-  if (recording) import('./replay.js').then(({ openReplay }) => openReplay(recording, store, say, Number(asked.get('t')) || 0)).catch(() => say('What shows a recording could not be fetched.', 'Not replayed'));
-});
-store.start();
-draw();
-// What outlasts this visit is seen to once the page stands.
-setTimeout(() => import('./shell.js').then(({ Shell }) => new Shell(store, say)).catch(() => {}), 2000);
-// The screens an operator may want when the server is gone are fetched while it is there, once the page has begun.
-setTimeout(prefetch, 10_000);
-function prefetch() {
-  for (const load of [() => import('./slow-sheet.js'), () => import('./log.js'), () => import('./signals.js'), () => import('./scan.js'), () => import('./chart.js')]) load().catch(() => {});
+  function draw() {
+    page.draw();
+    show(field(monitor, 'sound-off'), voice.isPossible ? !voice.isRunning : false);
+  }
+
+  function speak() {
+    const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
+    voice.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
+  }
+
+  new Presence(store, arming, handset);
+  store.on('refused', (answer) => {
+    control.note(answer);
+    if (answer.heldBy) say(answer.reason, 'You are not in control'); // whoever ordered it may say it better
+  });
+  listen(field(need(document, '#sheet-menu'), 'this-phone'), 'click', () => {
+    closeSheet(/** @type {HTMLDialogElement} */ (need(document, '#sheet-menu')));
+    openPhone();
+  });
+  store.on('draw', draw);
+  store.on('beat', speak);
+  store.on('tick', speak);
+  store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
+  // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
+  for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
+  listen(document, 'keydown', () => { document.documentElement.dataset['keys'] = ''; }, { capture: true });
+  listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
+  listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
+  listen(field(need(document, '#connect'), 'saved'), 'click', () => {
+    import('./files-board.js').then(({ openSaved }) => openSaved(store, say, page)).catch(() => say('The recordings could not be fetched from the server. Try again.', 'Not opened'));
+  });
+
+  // A link may lead to a moment of a recording.
+  const asked = new URLSearchParams(location.search);
+  const then = thenOf(asked.get('then'));
+  const recording = asked.get('replay');
+  const unasked = store.on('open', () => {
+    unasked();
+    if (asked.has('then')) history.replaceState(history.state, '', location.pathname);
+    if (then) location.assign(then); // a link in a mail: now that this device is known
+    if (recording) import('./replay.js').then(({ openReplay }) => openReplay(recording, store, say, Number(asked.get('t')) || 0)).catch(() => say('What shows a recording could not be fetched.', 'Not replayed'));
+  });
+  store.start();
+  draw();
+  // What outlasts this visit is seen to once the page stands.
+  setTimeout(() => import('./shell.js').then(({ Shell }) => new Shell(store, say)).catch(() => {}), 2000);
+  // The screens an operator may want when the server is gone are fetched while it is there, once the page has begun.
+  setTimeout(prefetch, 10_000);
+  function prefetch() {
+    for (const load of [() => import('./slow-sheet.js'), () => import('./log.js'), () => import('./signals.js'), () => import('./scan.js'), () => import('./chart.js')]) load().catch(() => {});
+  }
 }

@@ -144,6 +144,12 @@ export function mirror(element, name, isSo, seen, changes) {
   look();
 }
 
+/** Lets the browser do what waits, so that no single task keeps a finger or a picture waiting for long. @returns {Promise<void>} */
+export function breath() {
+  const { scheduler } = /** @type {{scheduler?: {yield?: () => Promise<void>}}} */ (globalThis);
+  return scheduler?.yield?.() ?? new Promise((resolve) => { setTimeout(resolve); });
+}
+
 /**
  * Listen, and get the way to stop listening.
  * @param {EventTarget} target
