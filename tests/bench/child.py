@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +81,11 @@ class Child:
         cpu_ns, began_ns = self.ask("cpu"), time.monotonic_ns()
         time.sleep(for_s)
         return 100.0 * (self.ask("cpu") - cpu_ns) / (time.monotonic_ns() - began_ns)
+
+    def keep_to(self, cores: Collection[int]) -> None:
+        """All of its threads on these processors from now on."""
+        for thread in os.listdir(f"/proc/{self._process.pid}/task"):
+            os.sched_setaffinity(int(thread), cores)
 
     def stop(self) -> None:
         """Ends it, by force where it does not end by itself."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -80,6 +81,20 @@ class Rig:
         child = self._child("direct", "direct")
         with self._settled(child, url=car.hello["url"], topics=car.hello["topics"], **more) as direct:
             yield direct
+
+    @contextlib.contextmanager
+    def apart(self) -> Iterator[None]:
+        """Until the block ends the server has a processor of its own, as where phones and the car have theirs."""
+        cores = sorted(os.sched_getaffinity(0))
+        others = [child for name, child in self._children.items() if name != "server"]
+        self.server.keep_to(cores[-1:])
+        for child in others:
+            child.keep_to(cores[:-1] or cores)
+        try:
+            yield
+        finally:
+            for child in (self.server, *others):
+                child.keep_to(cores)
 
     @contextlib.contextmanager
     def relay(self) -> Iterator[Child]:
