@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from pathlib import Path
 
 import orjson
 import psutil
 import pytest
+from websockets.sync.client import connect
+from websockets.sync.server import serve
 
 from tests.bench.__main__ import main
 from tests.bench.child import Child, Failed
 from tests.bench.rig import QUICK, Rig
 from tests.bench.rows.latency import latencies_ms
 from tests.bench.table import Group, Row, printed
+from tests.bench.wire import Wire
 
 MS = 1_000_000
 
@@ -52,6 +57,31 @@ def test_a_process_that_does_not_start_says_why() -> None:
     with pytest.raises(Failed, match="No module named"):
         Child("nowhere")
     assert started_since(before) == []
+
+
+def test_commands_are_timed_as_they_come_to_the_port_and_nothing_else_is() -> None:
+    """Short and long frames of a real client; another topic and another port are none of ours."""
+    with serve(lambda one: list(one), "127.0.0.1", 0) as bridge, serve(lambda one: list(one), "127.0.0.1", 0) as other:
+        for server in (bridge, other):
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            wire = Wire(bridge.socket.getsockname()[1])
+        except PermissionError:
+            pytest.skip("looking at packets needs a right that is not ours")
+        began_ns = time.time_ns()
+        for server in (other, bridge):
+            with connect(f"ws://127.0.0.1:{server.socket.getsockname()[1]}", compression=None) as client:
+                for text in ("", "a" * 200):
+                    for topic in ("/ours", "/theirs"):
+                        client.send(orjson.dumps({"op": "publish", "topic": topic, "msg": {"data": text}}).decode())
+        ended_ns = time.time_ns()
+        time.sleep(0.1)
+        wire.stop()
+        bridge.shutdown()
+        other.shutdown()
+    arrived = wire.published("/ours")
+    assert len(arrived) == 2
+    assert began_ns < arrived[0] <= arrived[1] < ended_ns
 
 
 def test_alarms_are_matched_with_their_speeds() -> None:

@@ -1,0 +1,95 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { takeEarly } from '../../static/js/early-socket.js';
+import { Wire } from '../../static/js/wire.js';
+
+/** @typedef {import('../../static/js/early-socket.js').Early} Early */
+
+class Socket {
+  /** @type {string[]} */
+  sent = [];
+  isClosed = false;
+
+  /** @param {string} text */
+  send(text) {
+    this.sent.push(text);
+  }
+
+  close() {
+    this.isClosed = true;
+  }
+}
+
+/** What early.js leaves behind. @param {Early['told']} told */
+function dialled(told) {
+  const socket = new Socket();
+  const early = /** @type {Early} */ ({ told, hear: null, socket: /** @type {any} */ (socket) });
+  /** @type {any} */ (globalThis).catgraphEarly = early;
+  return { early, socket };
+}
+
+/** A wire that takes it over, and dials by itself after that. */
+function wired() {
+  /** @type {unknown[]} */
+  const heard = [];
+  const dials = { count: 0 };
+  const wire = new Wire(
+    {
+      opened: () => heard.push('open'), closed: () => heard.push('closed'),
+      text: (text, at_ms) => heard.push([text, at_ms]), bytes: (bytes) => heard.push(bytes.byteLength),
+    },
+    () => {
+      dials.count += 1;
+      return takeEarly() ?? /** @type {any} */ (new Socket());
+    },
+  );
+  return { wire, heard, dials };
+}
+
+test('what came before the script is heard first, in its order and with the moment when it came', async () => {
+  const { early, socket } = dialled([
+    { type: 'open', at_ms: 10 }, { type: 'message', data: 'hello', at_ms: 20 }, { type: 'message', data: new ArrayBuffer(3), at_ms: 30 },
+  ]);
+  const { wire, heard } = wired();
+  wire.look(100);
+  assert.deepEqual(heard, []); // whoever dials hears nothing before it listens
+  await Promise.resolve();
+  early.hear?.({ type: 'message', data: 'later', at_ms: 110 });
+  assert.deepEqual(heard, ['open', ['hello', 20], 3, ['later', 110]]);
+  assert.equal(wire.send({ kind: 'hello' }), true);
+  assert.deepEqual(socket.sent, ['{"kind":"hello"}']);
+});
+
+test('one that opens after it was taken over is as any other', async () => {
+  const { early } = dialled([]);
+  const { wire, heard } = wired();
+  wire.look(0);
+  await Promise.resolve();
+  assert.equal(wire.send({}), false);
+  early.hear?.({ type: 'open', at_ms: 5 });
+  early.hear?.({ type: 'message', data: 'hello', at_ms: 6 });
+  early.hear?.({ type: 'close', at_ms: 7 });
+  assert.deepEqual(heard, ['open', ['hello', 6], 'closed']);
+});
+
+test('one that failed is not taken over, and none is taken twice', () => {
+  dialled([{ type: 'close', at_ms: 5 }]);
+  assert.equal(takeEarly(), null);
+  dialled([]);
+  assert.notEqual(takeEarly(), null);
+  assert.equal(takeEarly(), null);
+});
+
+test('one that was given up while its ticket was under way is hung up when it opens', async () => {
+  const { early, socket } = dialled([]);
+  const { wire, heard } = wired();
+  early.socket = null; // the ticket is asked for
+  wire.look(0);
+  await Promise.resolve();
+  wire.look(6000); // given up, and dialled anew
+  wire.look(9000);
+  early.socket = /** @type {any} */ (socket);
+  early.hear?.({ type: 'open', at_ms: 9100 });
+  assert.equal(socket.isClosed, true);
+  assert.deepEqual(heard, []);
+});
