@@ -288,6 +288,8 @@ class Canned:
         ]
         self.ground: Json = {"layers": [], "image": None}
         self.log: list[Json] = []  # newest first
+        self.timeline: Json | None = None  # of the recording that a page asks to replay
+        self.mails: list[Json] = []
         self.tile: Callable[[int, int, int], bytes] = lambda z, x, y: b""
         self.app = FastAPI()
         self._watching = False
@@ -340,6 +342,18 @@ class Canned:
             names = {"vehicles": ["car"], "tags": ["wet"]}
             return {"recordings": drives(), "next": None, "found": kept, "all": kept} | more | names
 
+        @self.app.get("/api/recordings/{name}")
+        async def recording(name: str) -> Json:
+            return next(one for one in drives() if one["id"] == name)
+
+        @self.app.get("/api/mail/settings")
+        async def mail_settings() -> Json:
+            return {"is_complete": True, "limit_mb": 18}
+
+        @self.app.get("/api/mail")
+        async def mails() -> Json:
+            return {"mails": self.mails, "next": None, "trouble": None}
+
         @self.app.get("/api/trends")
         async def minute() -> Json:
             return self._trends(299)
@@ -367,6 +381,8 @@ class Canned:
                     why = self.refuses.get(message["kind"])
                     reply = {"kind": "reply", "id": message["id"], "ok": why is None}
                     await socket.send_json(reply | ({"reason": why} if why else {}))
+                if message.get("kind") == "replay" and self.timeline is not None:
+                    await socket.send_json(self.timeline)
         finally:
             beat.cancel()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import sys
 import tempfile
@@ -430,6 +431,85 @@ async def files(server: Canned, page: Page) -> None:
 async def files_menu(server: Canned, page: Page) -> None:
     await files(server, page)
     await page.tap('[data-id="car_2"]')
+
+
+@scene("replay")
+async def replay(server: Canned, page: Page) -> None:
+    """The speed above its limit, four minutes into a recording that is paused there."""
+    state = live()
+    start_ms, at_s, length_s = at("14:05:05"), 246.0, 512.0
+    for name, value in (
+        ("speed", {"speed_mps": 12.1}),
+        ("acceleration", {"acceleration_mps2": 0.4, "source": "speed"}),
+        ("accelerator", {"percent": 31.0}),
+        ("steering", {"percent": 2.0}),
+        ("bearing", {"bearing_rad": -0.0175}),
+        ("distance", {"distance_m": 18.7, "none_in_range": False}),
+    ):
+        state["signals"][name]["value"] = value
+    state["nearest"] = {"time_gap_s": 1.5, "stopping_m": 17.9}
+    state["checks"][0] |= {"verdict": "fault", "brief": "FAULT 12.1 m/s"}
+    state["live"] = {
+        "phase": "monitoring", "name": "CATVehicle", "paused": False, "cut": None, "problem": None, "alarms": [],
+        "alarms_in_all": 0, "recording": {"state": "recording", "for_s": 698.0}, "control": state["control"],
+        "reach": None, "decelerate": state["decelerate"],
+    }  # fmt: skip
+    state["replay"] = {
+        "id": "car_0", "token": "0", "at_s": at_s, "at_ms": start_ms + round(at_s * 1000), "start_ms": start_ms,
+        "end_ms": start_ms + round(length_s * 1000), "length_s": length_s, "is_playing": False, "rate": 1.0,
+        "reached_rate": None, "is_seeking": False, "is_settled": True, "silent_s": 0.0, "seek": 1,
+        "alarms_from": "recording", "settings_from": "recording", "hangs_s": None,
+    }  # fmt: skip
+    marks = ((237.0, "critical", "Speed above limit"), (368.0, "warning", "GPS drift"), (446.0, "critical", "Obstacle"))
+    speeds = [max(0.0, 6.0 + 5.5 * math.sin(n / 19.0) + 1.2 * math.sin(n / 5.0)) for n in range(128)]
+    server.timeline = {
+        "kind": "timeline", "length_s": length_s, "done_s": length_s, "is_done": True, "bucket_s": 4.0,
+        "speed_mps": speeds, "gaps": [], "marks_left_out": 0, "notes": [],
+        "marks": [
+            {"at_s": at_s, "alarm": title, "title": title, "priority": priority, "text": ""}
+            for at_s, priority, title in marks
+        ],
+    }  # fmt: skip
+    state["alarms"] = [
+        alarm("Speed", "Speed above limit", priority="critical", state="ACKED", text="12.1 m/s, limit 11.0 m/s")
+    ]
+    server.state = state
+    await page.goto(f"{server.address}/?replay=car_0&t={at_s:.0f}")
+    await page.wait_for_selector("#monitor:not([hidden])")
+    await page.tap(".gauge")  # any touch lets the page sound
+
+
+@scene("mail")
+async def mail(server: Canned, page: Page) -> None:
+    await files_menu(server, page)
+    await page.tap("dialog[open] >> text=E-mail")
+    await page.wait_for_selector("#sheet-mail[open]")
+    await page.fill("#mail-to", "ann@example.org, bob@example.org")
+
+
+@scene("outbox")
+async def outbox(server: Canned, page: Page) -> None:
+    def part(state: str, said: str, refused: str | None = None) -> dict[str, Any]:
+        told = {"address": "ann@example.org", "state": "refused" if refused else "accepted", "said": refused or ""}
+        return {
+            "part": 1, "parts": 1, "state": state, "said": said, "attempts": 1,
+            "next_ms": at("14:21:00") if state == "queued" else None, "recipients": [told],
+        }  # fmt: skip
+
+    told = (
+        ("queued", "The mail server does not answer; tried again by itself.", "14:07:02", "Lap 3", 57.1, None),
+        ("sent", "Taken by the mail server.", "13:40:10", "Rehearsal lot", 99.4, None),
+        ("failed", "Every recipient was refused.", "11:12:44", "Lap 1", 16.2, "550 no such user"),
+    )
+    server.mails = [
+        {"n": 3 - i, "ordered_ms": at(clock), "recordings": ["car_0"], "format": "mcap", "to": ["ann@example.org"],
+         "subject": subject, "state": state, "said": said, "is_ready": True, "share": None, "way": "attached",
+         "size_bytes": round(size * 1e6), "parts": [part(state, said, refused)]}
+        for i, (state, said, clock, subject, size, refused) in enumerate(told)
+    ]  # fmt: skip
+    await mail(server, page)
+    await page.tap("[data-f=mail-outbox]")
+    await page.wait_for_selector("#sheet-outbox[open] [data-mail]")
 
 
 @scene("settings")
