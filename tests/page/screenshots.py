@@ -327,7 +327,7 @@ async def connect_saved(server: Canned, page: Page) -> None:
     server.state = idle() | {"recording": {"state": "off", "for_s": None}}
     await page.wait_for_selector("#connect:not([hidden])")
     await page.tap("#connect [data-f=saved]")
-    await page.wait_for_selector(".saved-board .file")
+    await page.wait_for_selector(".saved-board .file:not([hidden])")
 
 
 @scene("connect-failed")
