@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -26,18 +27,21 @@ from server.slowing.mouth import Mouth
 from server.slowing.note import Note
 from server.slowing.order import BY_HAND, LATE_S, Car, Order, SlowDown
 from server.slowing.twist import message
+from server.slowing.urgency import Urgency
 from server.slowing.way import Way
 from server.tuning import PERCENT_A_RAD
 
 log = logging.getLogger("catgraph.slowing")
 
-WATCHED_S = 0.0015  # before a command is due the loop is asked again and again: its timers know whole milliseconds
+WATCHED_S = 0.0025  # before a command is due the loop is asked again and again: its timers know whole milliseconds
+KEPT_S = 0.001  # and at last kept, so that nothing is begun that would not be over in time
 A_TICK_S = 0.01  # a tick of the judge, with the state it makes, holds up the loop for less than this
 PERIOD_S = 0.05  # the obstacle stopper lets a command count for 0.2 s
 DOUBT_S = 0.3
 FIRST_SPEED_S = 0.5
 UNDER_WAY = 2  # commands of which the bridge has not yet shown that it read them; where it freezes, no more come late
 STALL_S = 0.1  # a turn so late was our own fault: what the bridge said meanwhile is still unread
+_URGENCY = Urgency()  # the loop's thread is one for all vehicles
 
 
 class Slowing:
@@ -148,17 +152,23 @@ class Slowing:
         """Speaks what is ordered, 20 times a second, for ever: no page, no judge and no disk is waited for."""
         while True:
             await self._ordered.wait()
-            while self._life.order is not None:
-                left_s = self._due_s - self._now()
-                if left_s > 0.0:
-                    await asyncio.sleep(max(0.0, left_s - WATCHED_S))
-                    continue  # one that was ordered meanwhile has its own time
-                self._due_s = max(self._due_s + PERIOD_S, self._now())
-                try:
-                    self._speak()
-                except Exception:  # the one net: a fault in one command must not end the others
-                    log.exception("a command to the car failed")
+            with _URGENCY.held():
+                await self._speak_on()
             self._ordered.clear()
+
+    async def _speak_on(self) -> None:
+        """As long as an order stands."""
+        while self._life.order is not None:
+            left_s = self._due_s - self._now()
+            if left_s > KEPT_S:
+                await asyncio.sleep(max(0.0, left_s - WATCHED_S))
+                continue  # one that was ordered meanwhile has its own time
+            _keep(left_s)
+            self._due_s = max(self._due_s + PERIOD_S, self._now())
+            try:
+                self._speak()
+            except Exception:  # the one net: a fault in one command must not end the others
+                log.exception("a command to the car failed")
 
     async def go_first(self) -> None:
         """Waits where a command is due before a tick would be over: its evenness is worth a later look at the car."""
@@ -431,6 +441,13 @@ class Slowing:
             },
             "longest_s": wire.plain(self.limits.longest_s, 0),
         }
+
+
+def _keep(seconds: float) -> None:
+    """Lets the loop do nothing else: to sleep, and to be woken, takes longer than is left."""
+    ends_s = time.perf_counter() + seconds
+    while time.perf_counter() < ends_s:
+        pass
 
 
 def _said(order: Order) -> str:

@@ -15,6 +15,7 @@ import orjson
 
 from server.serving import uvloop_runner
 from server.simulator.messages import SCAN, VEL
+from server.slowing.urgency import Urgency
 from tests.bench.lean_socket import LeanSocket, open_socket
 from tests.bench.orders import obey, options
 
@@ -106,10 +107,11 @@ class Direct:
             socket.send(orjson.dumps({"op": "advertise", "topic": topic, "type": "geometry_msgs/Twist"}))
             due_s = loop.time()
             ends_s = due_s + seconds
-            while due_s < ends_s:
-                await asyncio.sleep(max(0.0, due_s - loop.time()))
-                socket.send(orjson.dumps({"op": "publish", "topic": topic, "msg": _STANDING}))
-                due_s += period_s
+            with Urgency().held():
+                while due_s < ends_s:
+                    await asyncio.sleep(max(0.0, due_s - loop.time()))
+                    socket.send(orjson.dumps({"op": "publish", "topic": topic, "msg": _STANDING}))
+                    due_s += period_s
         finally:
             socket.abort()
 
