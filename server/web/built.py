@@ -20,6 +20,7 @@ from pathlib import Path
 FOLDER = "built"  # in static/, beside js/ and css/, so that what they name by ../ is found from here too
 STYLES = ("tokens", "frame", "instruments", "map", "sheets", "screens", "settings", "slowing", "wide")  # in this order
 ENTRY = "app.js"
+THREADS = ("scan-painter",)  # scripts of threads, each joined for itself
 _LIST = "built.json"  # written last
 _TARGET = "es2022"  # private fields and top-level await: every browser of 2022 and later
 _CONFIG = Path(__file__).with_name("rollup.config.mjs")
@@ -47,15 +48,23 @@ def join(tools: Path, static: Path) -> None:
         old.unlink()
     with tempfile.TemporaryDirectory(prefix="catgraph-page-") as folder:
         joined, style = Path(folder, "joined"), Path(folder, "page.css")
-        entry = {"CATGRAPH_ENTRY": str(static / "js" / ENTRY), "CATGRAPH_INTO": str(joined)}
+        small = ["--minify", f"--target={_TARGET}", f"--outdir={into}", "--log-level=error"]
+        own = ["--bundle", "--entry-names=[name]-[hash]"]
+        threads = [str(static / "js" / f"{name}.js") for name in THREADS]
+        _run([str(tools / "esbuild"), *threads, *own, "--format=esm", *small])
+        entry = {
+            "CATGRAPH_ENTRY": str(static / "js" / ENTRY),
+            "CATGRAPH_INTO": str(joined),
+            "CATGRAPH_THREADS": json.dumps(
+                {f"{name}.js": next(path.name for path in into.glob(f"{name}-*.js")) for name in THREADS}
+            ),
+        }
         _run([str(tools / "rollup"), "--config", str(_CONFIG), "--silent"], {**os.environ, **entry})
         told = json.loads((joined / "joined.json").read_text(encoding="utf-8"))
-        small = ["--minify", f"--target={_TARGET}", f"--outdir={into}", "--log-level=error"]
         _run([str(tools / "esbuild"), *map(str, sorted(joined.glob("*.js"))), "--format=esm", *small])
         imports = (f"@import {json.dumps(str(static / 'css' / f'{name}.css'))};" for name in STYLES)
         style.write_text("\n".join(imports), encoding="utf-8")
-        own = ["--bundle", "--entry-names=[name]-[hash]", "--external:../fonts/*"]
-        _run([str(tools / "esbuild"), str(style), *own, *small])
+        _run([str(tools / "esbuild"), str(style), *own, "--external:../fonts/*", *small])
     listed = {
         "sources": sources,
         "script": f"{FOLDER}/{told['script']}",

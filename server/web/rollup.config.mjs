@@ -16,11 +16,20 @@ const list = {
   },
 };
 
+/** The address of a script for a thread of its own, which is joined before: it holds the hash of what is in it. */
+const threads = {
+  name: 'threads',
+  transform(code) {
+    for (const [plain, hashed] of Object.entries(JSON.parse(env.CATGRAPH_THREADS))) code = code.replaceAll(`'./${plain}'`, `'./${hashed}'`);
+    return { code, map: null };
+  },
+};
+
 export default {
   input: env.CATGRAPH_ENTRY,
   external: /\.\.\/vendor\//,
   makeAbsoluteExternalsRelative: false,
-  plugins: [list],
+  plugins: [threads, list],
   output: {
     dir: env.CATGRAPH_INTO,
     format: 'es',

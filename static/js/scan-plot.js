@@ -5,9 +5,6 @@ import { bearingOf, rangeOf } from './scan-frame.js';
 import { codeWords, namedSectors, plotScale, pointsOf, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
 import { fixed } from './words.js';
 
-const COLOURS = /** @type {const} */ (['panel', 'line', 'ink', 'ink2', 'you', 'hatch', 'raise']);
-/** Pixels of the canvas for one of CSS: 20 pictures a second are carried to the glass, and finer than this nobody sees. */
-const FINEST = 2;
 const NAMES_SHOWN = 4;
 const HATCH = { apart_px: 10, width_px: 2.5 };
 
@@ -22,70 +19,50 @@ const HATCH = { apart_px: 10, width_px: 2.5 };
  * @property {{x_m: number, y_m: number, isSeen: boolean} | null} mark the return that the operator marked
  */
 
+/**
+ * @typedef {object} Picture all that one drawing needs
+ * @property {import('./scan-frame.js').Scan} scan
+ * @property {Around} around
+ * @property {number} width [CSS px]
+ * @property {number} height [CSS px]
+ * @property {number} dpr pixels of the canvas for one of CSS
+ * @property {import('./scan-theme.js').Theme} theme
+ *
+ * @typedef {HTMLCanvasElement | OffscreenCanvas} Surface
+ * @typedef {CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D} Pen
+ */
+
 export class ScanPlot {
-  #ground = document.createElement('canvas');
+  #ground = surface(1, 1);
   #groundKey = '';
-  /** @type {Record<typeof COLOURS[number], string>} */
-  #colour = /** @type {any} */ ({});
-  #font = '';
+  #hatchingKey = '';
   /** @type {CanvasPattern | null} */
   #hatching = null;
-  #hatchingKey = '';
-  /** Width and height [CSS px]: asked anew at each scan, they would have the whole page laid out first. */
-  #size = { width: 0, height: 0 };
-  #watcher = new ResizeObserver(() => this.#measure());
+  /** @type {import('./scan-theme.js').Theme['colour']} */
+  #colour = /** @type {any} */ ({});
+  #font = '';
+  #width = 0;
 
-  /** @param {HTMLCanvasElement} canvas */
+  /** @param {Surface} canvas */
   constructor(canvas) {
     this.canvas = canvas;
-    this.#watcher.observe(canvas);
-    this.readTheme();
   }
 
-  /** Unmount. */
-  stop() {
-    this.#watcher.disconnect();
-  }
-
-  #measure() {
-    this.#size = { width: this.canvas.clientWidth, height: this.canvas.clientHeight };
-  }
-
-  /** Colours and font as the style sheet has them now. */
-  readTheme() {
-    const style = getComputedStyle(document.documentElement);
-    const probe = document.createElement('i');
-    this.canvas.after(probe);
-    for (const name of COLOURS) {
-      probe.className = `probe ${name}`;
-      this.#colour[name] = getComputedStyle(probe).color;
-    }
-    probe.remove();
-    this.#font = style.getPropertyValue('--digits').trim() || 'sans-serif';
-    this.#groundKey = this.#hatchingKey = '';
-  }
-
-  /**
-   * @param {import('./scan-frame.js').Scan} scan
-   * @param {Around} around
-   */
-  draw(scan, around) {
-    if (!this.#size.width) this.#measure();
-    const { width, height } = this.#size;
-    const dpr = Math.min(window.devicePixelRatio || 1, FINEST);
-    if (!width || !height) return;
+  /** @param {Picture} picture */
+  draw({ scan, around, width, height, dpr, theme }) {
+    const [w, h] = [Math.round(width * dpr), Math.round(height * dpr)];
     for (const canvas of [this.canvas, this.#ground]) {
-      const [w, h] = [Math.round(width * dpr), Math.round(height * dpr)];
-      if (canvas.width !== w || canvas.height !== h) {
-        canvas.width = w;
-        canvas.height = h;
-        this.#groundKey = '';
-      }
+      if (canvas.width === w && canvas.height === h) continue;
+      canvas.width = w;
+      canvas.height = h;
+      this.#groundKey = '';
     }
-    const g = this.canvas.getContext('2d', { alpha: false });
+    const g = penOf(this.canvas, { alpha: false });
     if (!g) return;
+    ({ colour: this.#colour, font: this.#font } = theme);
+    this.#width = width;
     const { reach_m } = around;
-    this.#drawGround(width, height, dpr, reach_m);
+    this.#drawGround(width, height, dpr, reach_m, theme.key);
     g.setTransform(1, 0, 0, 1, 0, 0);
     g.drawImage(this.#ground, 0, 0);
     g.setTransform(dpr, 0, 0, dpr, 0, 0);
@@ -94,7 +71,7 @@ export class ScanPlot {
     const { tyre_angle_rad, wider_m } = scan.judged;
     const corridor = around.car ? { ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad } : null;
     if (corridor) this.#stoppingStrip(g, scale, corridor, scan.judged.stopping_m);
-    this.#hatch(g, scale, sectors, width + height, dpr);
+    this.#hatch(g, scale, sectors, width + height, dpr, theme.key);
     if (corridor) this.#corridor(g, scale, corridor, reach_m, scan.judged.stopping_m, around.limit_m);
     this.#rings(g, scale, reach_m);
     this.#names(g, scale, reach_m, sectors, width);
@@ -104,12 +81,12 @@ export class ScanPlot {
     this.#car(g, scale, height);
   }
 
-  /** Rings and spokes. @param {number} width @param {number} height @param {number} dpr @param {number} reach_m */
-  #drawGround(width, height, dpr, reach_m) {
-    const key = `${width} ${height} ${dpr} ${reach_m}`;
+  /** Rings and spokes. @param {number} width @param {number} height @param {number} dpr @param {number} reach_m @param {string} look */
+  #drawGround(width, height, dpr, reach_m, look) {
+    const key = `${width} ${height} ${dpr} ${reach_m} ${look}`;
     if (key === this.#groundKey) return;
     this.#groundKey = key;
-    const g = this.#ground.getContext('2d');
+    const g = penOf(this.#ground);
     if (!g) return;
     const { cx, cy, k, at } = plotScale(width, height, reach_m);
     g.setTransform(dpr, 0, 0, dpr, 0, 0);
@@ -132,7 +109,7 @@ export class ScanPlot {
     g.stroke();
   }
 
-  /** The part of the corridor that the car needs to stop. @param {CanvasRenderingContext2D} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number | null} stopping_m */
+  /** The part of the corridor that the car needs to stop. @param {Pen} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number | null} stopping_m */
   #stoppingStrip(g, scale, corridor, stopping_m) {
     if (!stopping_m) return;
     const { left, right } = edgesOf(corridor, 0, Math.min(stopping_m, endOf(corridor, scale.far_m)));
@@ -143,8 +120,8 @@ export class ScanPlot {
     g.fill();
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {Scale} scale @param {import('./scan-layout.js').Sector[]} sectors @param {number} far @param {number} dpr */
-  #hatch(g, { cx, cy }, sectors, far, dpr) {
+  /** @param {Pen} g @param {Scale} scale @param {import('./scan-layout.js').Sector[]} sectors @param {number} far @param {number} dpr @param {string} look */
+  #hatch(g, { cx, cy }, sectors, far, dpr, look) {
     if (!sectors.length) return;
     g.beginPath();
     for (const { from_rad, to_rad } of sectors) {
@@ -155,19 +132,18 @@ export class ScanPlot {
     }
     g.fillStyle = this.#colour.panel;
     g.fill();
-    const hatching = this.#hatchingOf(g, dpr);
+    const hatching = this.#hatchingOf(g, dpr, look);
     if (hatching) g.fillStyle = hatching;
     g.fill();
   }
 
-  /** Diagonal lines as a pattern, made once a theme. @param {CanvasRenderingContext2D} g @param {number} dpr */
-  #hatchingOf(g, dpr) {
-    const key = String(dpr);
+  /** Diagonal lines as a pattern, made once a theme. @param {Pen} g @param {number} dpr @param {string} look */
+  #hatchingOf(g, dpr, look) {
+    const key = `${dpr} ${look}`;
     if (key === this.#hatchingKey) return this.#hatching;
     const side = Math.round(HATCH.apart_px * dpr);
-    const tile = document.createElement('canvas');
-    tile.width = tile.height = side;
-    const t = tile.getContext('2d');
+    const tile = surface(side, side);
+    const t = penOf(tile);
     if (!t) return null;
     t.strokeStyle = this.#colour.hatch;
     t.lineWidth = HATCH.width_px * dpr;
@@ -183,7 +159,7 @@ export class ScanPlot {
     return this.#hatching;
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number} reach_m @param {number | null} stopping_m @param {number | null} limit_m */
+  /** @param {Pen} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number} reach_m @param {number | null} stopping_m @param {number | null} limit_m */
   #corridor(g, scale, corridor, reach_m, stopping_m, limit_m) {
     const colour = this.#colour;
     const end_m = endOf(corridor, scale.far_m);
@@ -212,7 +188,7 @@ export class ScanPlot {
 
   /**
    * A line across the corridor; gives its ends on the plot.
-   * @param {CanvasRenderingContext2D} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number} way_m @param {string} colour @param {number} width @param {number} beyond_px
+   * @param {Pen} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number} way_m @param {string} colour @param {number} width @param {number} beyond_px
    */
   #across(g, scale, corridor, way_m, colour, width, beyond_px) {
     const { left, right } = edgesOf(corridor, way_m, way_m);
@@ -229,13 +205,13 @@ export class ScanPlot {
     return [[a[0] - dx, a[1] - dy], b];
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {Scale} scale @param {number} reach_m */
+  /** @param {Pen} g @param {Scale} scale @param {number} reach_m */
   #rings(g, { at }, reach_m) {
     const a = (19 * Math.PI) / 180;
     for (const r of ringsOf(reach_m)) this.#words(g, String(r), ...at(r * Math.cos(a), r * Math.sin(a)), this.#colour.ink2, 'center');
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {Scale} scale @param {number} reach_m @param {import('./scan-layout.js').Sector[]} sectors @param {number} width */
+  /** @param {Pen} g @param {Scale} scale @param {number} reach_m @param {import('./scan-layout.js').Sector[]} sectors @param {number} width */
   #names(g, { cx, k, at }, reach_m, sectors, width) {
     for (const sector of namedSectors(sectors, NAMES_SHOWN)) {
       const a = (sector.from_rad + sector.to_rad) / 2;
@@ -248,7 +224,7 @@ export class ScanPlot {
     }
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {Scale} scale @param {Float32Array} points */
+  /** @param {Pen} g @param {Scale} scale @param {Float32Array} points */
   #points(g, { cx, cy, k }, points) {
     g.fillStyle = this.#colour.ink;
     g.beginPath();
@@ -256,7 +232,7 @@ export class ScanPlot {
     g.fill();
   }
 
-  /** What the obstacle check found. @param {CanvasRenderingContext2D} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {number} reach_m */
+  /** What the obstacle check found. @param {Pen} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {number} reach_m */
   #nearest(g, { at }, scan, reach_m) {
     const { beam, gap_m } = scan.judged;
     const range_m = beam === null ? null : rangeOf(scan, beam);
@@ -264,7 +240,7 @@ export class ScanPlot {
     const bearing_rad = bearingOf(scan, beam);
     const [x, y] = at(range_m * Math.cos(bearing_rad), range_m * Math.sin(bearing_rad));
     this.#ring(g, x, y, this.#colour.ink);
-    const way = x + 120 > this.#size.width ? -1 : 1;
+    const way = x + 120 > this.#width ? -1 : 1;
     g.beginPath();
     g.moveTo(x + 15 * way, y);
     g.lineTo(x + 36 * way, y);
@@ -272,14 +248,14 @@ export class ScanPlot {
     this.#words(g, `${fixed(gap_m)} m`, x + 44 * way, y - 1, this.#colour.ink, way > 0 ? 'left' : 'right', 22, 700);
   }
 
-  /** Its words stand under the plot: here they would hide other returns. @param {CanvasRenderingContext2D} g @param {Scale} scale @param {NonNullable<Around['mark']>} mark */
+  /** Its words stand under the plot: here they would hide other returns. @param {Pen} g @param {Scale} scale @param {NonNullable<Around['mark']>} mark */
   #mark(g, { at }, mark) {
     if (!mark.isSeen) g.setLineDash([4, 4]);
     this.#ring(g, ...at(mark.x_m, mark.y_m), this.#colour.you);
     g.setLineDash([]);
   }
 
-  /** @param {CanvasRenderingContext2D} g @param {number} x @param {number} y @param {string} colour */
+  /** @param {Pen} g @param {number} x @param {number} y @param {string} colour */
   #ring(g, x, y, colour) {
     g.strokeStyle = colour;
     g.lineWidth = 3;
@@ -288,7 +264,7 @@ export class ScanPlot {
     g.stroke();
   }
 
-  /** The car, its nose at the laser. @param {CanvasRenderingContext2D} g @param {Scale} scale @param {number} height */
+  /** The car, its nose at the laser. @param {Pen} g @param {Scale} scale @param {number} height */
   #car(g, { cx, cy, k }, height) {
     const half = Math.min(60, Math.max(7, 0.9 * k));
     g.strokeStyle = this.#colour.ink;
@@ -311,7 +287,7 @@ export class ScanPlot {
     g.stroke();
   }
 
-  /** Words on a plate of the panel's colour. @param {CanvasRenderingContext2D} g @param {string} text @param {number} x @param {number} y @param {string} css @param {CanvasTextAlign} [align] @param {number} [size] @param {number} [weight] */
+  /** Words on a plate of the panel's colour. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {string} css @param {CanvasTextAlign} [align] @param {number} [size] @param {number} [weight] */
   #words(g, text, x, y, css, align = 'left', size = 14, weight = 400) {
     g.font = `${weight} ${size}px ${this.#font}`;
     g.textAlign = align;
@@ -325,7 +301,20 @@ export class ScanPlot {
   }
 }
 
-/** A line through points of the plane, its part behind the laser left out. @param {CanvasRenderingContext2D} g @param {Scale} scale @param {Point[]} points */
+/** A canvas that nobody sees: a thread has no document. @param {number} width @param {number} height @returns {Surface} */
+function surface(width, height) {
+  if (typeof document === 'undefined') return new OffscreenCanvas(width, height);
+  const canvas = document.createElement('canvas');
+  [canvas.width, canvas.height] = [width, height];
+  return canvas;
+}
+
+/** @param {Surface} canvas @param {CanvasRenderingContext2DSettings} [how] */
+function penOf(canvas, how) {
+  return /** @type {Pen | null} */ (canvas.getContext('2d', how));
+}
+
+/** A line through points of the plane, its part behind the laser left out. @param {Pen} g @param {Scale} scale @param {Point[]} points */
 function trace(g, { at }, points) {
   let isFirst = true;
   for (const [x_m, y_m] of points) {

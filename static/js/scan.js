@@ -4,7 +4,7 @@ import { field, listen, setAttribute, setText, setWords, show } from './dom.js';
 import { ABSENT, write } from './ink.js';
 import { THUMB_PX } from './scan-pick.js';
 import { ScanMark } from './scan-mark.js';
-import { ScanPlot } from './scan-plot.js';
+import { ScanGlass } from './scan-glass.js';
 import { mountTouch } from './scan-touch.js';
 import { bearingOf } from './scan-frame.js';
 import { REACH_M, beamWords, pinched, placeOf, plotScale, reachWithin, sectorSentences, sectorsOf, unseenOf, zoomed } from './scan-layout.js';
@@ -20,15 +20,13 @@ const TOLD_EVERY_MS = 2000;
  */
 export function mount(root, store) {
   const at = (/** @type {string} */ name) => field(root, name);
-  const canvas = /** @type {HTMLCanvasElement} */ (at('canvas'));
   const aim = at('aim');
-  const plot = new ScanPlot(canvas);
+  const glass = new ScanGlass(/** @type {HTMLCanvasElement} */ (at('canvas')));
   const mark = new ScanMark();
   const keys = /** @type {HTMLElement[]} */ ([...root.querySelectorAll('[data-range]')]);
   let reach_m = reachWithin(recall() ?? REACH_M.first);
   let grasped_m = reach_m;
   let isFront = false;
-  let isDue = false;
   let told_ms = -Infinity;
 
   const stops = [
@@ -54,7 +52,7 @@ export function mount(root, store) {
   tellMark();
 
   function themed() {
-    plot.readTheme();
+    glass.readTheme();
     drawSoon();
   }
 
@@ -92,7 +90,7 @@ export function mount(root, store) {
   /** @param {number} x_px @param {number} y_px */
   function touch(x_px, y_px) {
     if (!store.scan || !isLive()) return;
-    const scale = plotScale(canvas.clientWidth, canvas.clientHeight, reach_m);
+    const scale = plotScale(glass.canvas.clientWidth, glass.canvas.clientHeight, reach_m);
     const { x_m, y_m } = placeOf(scale, x_px, y_px);
     mark.touch(store.scan, x_m, y_m, THUMB_PX / scale.k, store.scanAt_ms);
     tellMark();
@@ -115,26 +113,25 @@ export function mount(root, store) {
   }
 
   function isLive() {
-    const { ink } = inkOfScan(store);
+    const { ink } = inkOfScan(store, glass.shown);
     return store.scan !== null && (ink === 'fresh' || ink === 'ageing');
   }
 
   function drawSoon() {
-    if (isDue || !isFront) return;
-    isDue = true;
-    requestAnimationFrame(() => {
-      isDue = false;
-      if (!isFront || !store.scan) return;
-      plot.draw(store.scan, {
+    if (!isFront || !store.scan) return;
+    glass.draw(() => ({
+      scan: /** @type {import('./scan-frame.js').Scan} */ (store.scan),
+      at_ms: store.scanAt_ms,
+      around: {
         reach_m, car: carOf(store), limit_m: store.limit('obstacle.standoff_m'),
         mark: mark.at && { x_m: mark.at.x_m, y_m: mark.at.y_m, isSeen: mark.isSeen },
-      });
-    });
+      },
+    }));
   }
 
   function read() {
     if (!isFront) return;
-    const { ink, age_s } = inkOfScan(store);
+    const { ink, age_s } = inkOfScan(store, glass.shown);
     const { scan } = store;
     const isThere = scan !== null && ink !== 'never' && ink !== 'not_published';
     const isNow = isThere && ink !== 'stale';
@@ -143,7 +140,7 @@ export function mount(root, store) {
       tellMark('the marked return is gone: no data');
     }
     show(at('none'), !isNow);
-    show(canvas, isThere);
+    show(glass.canvas, isThere);
     show(aim, isThere);
     show(at('late'), isNow && ink === 'ageing');
     if (isNow && ink === 'ageing') setText(at('late'), `${age(age_s, 2)} s`);
@@ -179,14 +176,14 @@ export function mount(root, store) {
     told_ms = store.now();
     at('told').dataset['key'] = key;
     if (!isNow || !scan) {
-      setAttribute(canvas, 'aria-label', `Laser scan from above: ${missing === '' ? 'none' : missing}`);
+      setAttribute(glass.canvas, 'aria-label', `Laser scan from above: ${missing === '' ? 'none' : missing}`);
       setText(at('told'), '');
       return;
     }
     const { beam, gap_m, isBlind } = scan.judged;
     const side = beam === null ? null : bearing(bearingOf(scan, beam));
     const nearest = isBlind ? 'the corridor cannot be seen' : side ? `nearest return in the corridor ${fixed(gap_m)} metres, ${side.degrees} ${side.side}` : 'no return in the corridor';
-    setAttribute(canvas, 'aria-label', `Laser scan from above: ${nearest}`);
+    setAttribute(glass.canvas, 'aria-label', `Laser scan from above: ${nearest}`);
     const sectors = sectorSentences([...sectorsOf(scan), ...unseenOf(scan)], 6);
     setText(at('told'), `${beamWords(scan)}. ${sectors.length ? `Nothing is known of these sectors: ${sectors.join('; ')}.` : ''}`);
   }
@@ -205,7 +202,7 @@ export function mount(root, store) {
     },
     unmount() {
       for (const stop of stops) stop();
-      plot.stop();
+      glass.stop();
     },
   };
 }
@@ -213,11 +210,13 @@ export function mount(root, store) {
 /**
  * The scan on the glass came by its own frame: it is as old as that, whatever the state says of a newer one.
  * @param {import('./store.js').Store} store
+ * @param {import('./scan-glass.js').Shown | null} shown null: none is drawn yet, and the newest will be
  */
-function inkOfScan(store) {
+function inkOfScan(store, shown) {
   const state = store.ink('scan');
   if (!store.scan || state.ink === 'never' || state.ink === 'not_published') return state;
-  const age_s = store.scan.age_s + (store.now() - store.scanAt_ms) / 1000;
+  const { age_s: then_s, at_ms } = shown ?? { age_s: store.scan.age_s, at_ms: store.scanAt_ms };
+  const age_s = then_s + (store.now() - at_ms) / 1000;
   // A server that does not know the laser's rate yet is patient with it; a picture of a moving world is not: ten periods.
   const period_s = store.signal('scan')?.period_s ?? 0.1;
   return { ink: age_s > Math.max(1, 10 * period_s) ? /** @type {const} */ ('stale') : state.ink, age_s };

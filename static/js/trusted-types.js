@@ -3,7 +3,9 @@
 
 /** Leaflet tries once whether the browser knows SVG. */
 const MARKUP = ['<svg/>'];
-const SCRIPTS = ['/worker.js'];
+/** The thread that draws the scan. */
+export const PAINTER = new URL('./scan-painter.js', import.meta.url).href;
+const SCRIPTS = ['/worker.js', PAINTER];
 
 /** @typedef {{createPolicy(name: string, rules: Record<string, (text: string) => string | null>): unknown}} Factory */
 

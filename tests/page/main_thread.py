@@ -21,10 +21,10 @@ WATCH = """() => {
   };
   requestAnimationFrame(note);
   window.scans = 0;
-  const kept = CanvasRenderingContext2D.prototype.drawImage;
-  CanvasRenderingContext2D.prototype.drawImage = function (...all) {
-    window.scans += 1;
-    return kept.apply(this, all);
+  const kept = Worker.prototype.postMessage;
+  Worker.prototype.postMessage = function (told, ...more) {
+    window.scans += told.picture ? 1 : 0;  // the next one is asked for when one is drawn
+    return kept.call(this, told, ...more);
   };
 }"""
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from axe_playwright_python.async_playwright import Axe
-from playwright.async_api import expect
+from playwright.async_api import Worker, expect
 
 from tests.page import drives
 from tests.page.conftest import Phone
@@ -53,7 +53,14 @@ LINES = """() => {
     return begin.apply(this, all);
   };
 }"""
-PICTURE = "() => document.querySelector('.scanc').toDataURL()"
+PICTURE = """() => {
+  const [canvas, copy] = [document.querySelector('.scanc'), document.createElement('canvas')];
+  [copy.width, copy.height] = [canvas.width, canvas.height];
+  copy.getContext('2d').drawImage(canvas, 0, 0);
+  return copy.toDataURL();
+}"""
+# What the page draws itself can be listened to; else a thread draws.
+WITHOUT_A_THREAD = "delete HTMLCanvasElement.prototype.transferControlToOffscreen"
 
 
 async def test_681_beams_of_a_real_laser_with_those_below_range_min_not_drawn(
@@ -61,7 +68,7 @@ async def test_681_beams_of_a_real_laser_with_those_below_range_min_not_drawn(
 ) -> None:
     bag = recordings / "lidar" / "scan_tools_hokuyo_demo.bag"
     async with running(*replay(bag)) as laser, running(*server(tmp_path, laser.address)) as watch:
-        await phone.page.add_init_script(f"({LISTEN})()")
+        await phone.page.add_init_script(f"{WITHOUT_A_THREAD}; ({LISTEN})()")
         await phone.open(f"{watch.address}/#scan")
         await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"\d+ of 681"), timeout=12_000)
         await phone.page.wait_for_timeout(1500)
@@ -232,7 +239,7 @@ async def test_a_tapped_return_is_told_in_words_and_stays_until_tapped_away(phon
 
 
 async def test_corridor_gap_and_stopping_distance_are_those_of_the_judge(phone: Phone, street: str) -> None:
-    await phone.page.add_init_script(f"({LINES})()")
+    await phone.page.add_init_script(f"{WITHOUT_A_THREAD}; ({LINES})()")
     await phone.open(f"{street}/#scan")
     await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile("of 1440"), timeout=12_000)
     await expect(phone.f("stops", "#panel-scan")).to_have_text("7.1")  # 4.2·1 + 4.2²/6
@@ -254,6 +261,56 @@ async def test_corridor_gap_and_stopping_distance_are_those_of_the_judge(phone: 
     assert np.minimum(np.abs(radius_m - inner), np.abs(radius_m - outer)).max() < 0.05
     await expect(phone.f("straight", "#panel-scan")).to_be_hidden()
     await expect(phone.page.locator("#scan-told")).to_have_text(re.compile(r"invalid from \d+° right to \d+° right"))
+
+
+async def test_of_a_thread_that_draws_no_more_the_page_takes_over(phone: Phone, tmp_path: Path) -> None:
+    """A picture that stands still is not shown as live meanwhile."""
+    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
+        await phone.open(f"{watch.address}/#scan")
+        await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
+        thread = painter(phone)
+        assert await thread.evaluate("[...fonts].map((one) => one.status)") == ["loaded", "loaded"]
+        await expect(phone.f("none", "#panel-scan")).to_be_hidden()
+        await thread.evaluate("onmessage = () => {}")
+        await expect(phone.f("none-words", "#panel-scan")).to_have_text(re.compile(r"STALE 1"))
+        await expect(phone.f("none", "#panel-scan")).to_be_hidden()
+        assert phone.page.workers == []
+        (said,) = phone.complaints
+        assert "drawn by the page itself" in said
+        phone.complaints.clear()
+
+
+async def test_the_thread_draws_what_the_page_would(phone: Phone, tmp_path: Path) -> None:
+    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
+        await phone.open(f"{watch.address}/#scan")
+        await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
+        await car.type("silent-scan 60")
+        await expect(phone.f("none-words", "#panel-scan")).to_have_text(re.compile(r"STALE \d"))
+        by_thread = await pictures(phone)
+        await painter(phone).evaluate("onmessage = () => {}")
+        await phone.f("nearer", "#panel-scan").tap()
+        async with asyncio.timeout(8):
+            while phone.page.workers:
+                await asyncio.sleep(0.05)
+        by_page = await pictures(phone)
+        assert len(set(by_thread)) == 3
+        assert by_page == by_thread
+        phone.complaints.clear()
+
+
+def painter(phone: Phone) -> Worker:
+    (thread,) = [one for one in phone.page.workers if "scan-painter" in one.url]
+    return thread
+
+
+async def pictures(phone: Phone) -> list[str]:
+    """The plot as it is at three reaches."""
+    found = []
+    for reach_m in (10, 20, 40):
+        await phone.page.locator(f"[data-range='{reach_m}']").tap()
+        await phone.page.wait_for_timeout(400)
+        found.append(await phone.page.evaluate(PICTURE))
+    return found
 
 
 ODD = {

@@ -29,6 +29,10 @@ def static(tmp_path: Path) -> Path:
     (tmp_path / "js" / "app.js").write_text(
         "import { word } from './words.js';\nconsole.log(word);\n"
         "globalThis.later = () => import('./later.js');\nglobalThis.theirs = () => import('../vendor/theirs.js');\n"
+        "globalThis.thread = new URL('./scan-painter.js', import.meta.url).href;\n"
+    )
+    (tmp_path / "js" / "scan-painter.js").write_text(
+        "import { word } from './words.js';\nconsole.log('painting', word);\n"
     )
     (tmp_path / "js" / "words.js").write_text("// said at once\nexport const word = 'hello';\n")
     (tmp_path / "js" / "later.js").write_text(
@@ -62,6 +66,30 @@ def test_the_joined_script_says_what_the_many_said_and_the_rest_comes_later(stat
     style = (static / built.style).read_text()
     assert re.findall(r"\.(\w+)\{", style) == list(STYLES[1:]), "in their order"
     assert "../fonts/n.woff2" in style
+
+
+def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(static: Path) -> None:
+    built = find(static)
+    assert built is not None
+
+    def thread() -> Path:
+        found = find(static)
+        assert found is not None
+        program = f"await import({json.dumps(str(static / found.script))}); console.log(globalThis.thread);"
+        done = subprocess.run([NODE, "--input-type=module", "-e", program], capture_output=True, text=True, check=True)
+        return Path(done.stdout.splitlines()[-1].removeprefix("file://"))
+
+    first = thread()
+    said = subprocess.run([NODE, "--input-type=module", "-e", first.read_text()], capture_output=True, text=True)
+    assert said.stdout == "painting hello\n"
+    (static / "js" / "scan-painter.js").write_text("console.log('painting anew');\n")
+    join(TOOLS, static)
+    second = thread()
+    assert second.name != first.name
+    assert second.is_file()
+    renewed = find(static)
+    assert renewed is not None
+    assert renewed.script != built.script, "what asks for another thread is another script"
 
 
 @pytest.mark.parametrize("changed", ["js/words.js", "js/later.js", "css/wide.css"])
