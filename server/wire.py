@@ -14,7 +14,7 @@ from monitor import values
 from monitor.ahead import ANGLE_STEP_RAD
 from monitor.alarm import Alarm, Transition
 from monitor.alarm_spec import AlarmSpec
-from monitor.check import Quantity, Verdict
+from monitor.check import Finding, Quantity, Verdict
 from monitor.load import AlarmLoad
 from monitor.runner import Tile
 from monitor.scan import usable
@@ -191,6 +191,7 @@ def alarm(alarm: Alarm, now_s: float, wall_ms: int) -> dict[str, Any]:
         "trip_text": alarm.trip.text if alarm.trip else "",
         "measured": _quantity(finding.measured if finding else None),
         "limit": _quantity(finding.limit if finding else None),
+        "worst": _worst(alarm.worst),
         "causes": list(finding.causes) if finding else [],
         "actions": [str(action) for action in spec.actions],
         "advice": spec.advice,
@@ -204,6 +205,19 @@ def _quantity(quantity: Quantity | None) -> dict[str, Any] | None:
     if quantity is None:
         return None
     return {"label": quantity.label, "value": plain(quantity.value), "unit": quantity.unit}
+
+
+def _worst(finding: Finding | None) -> dict[str, Any] | None:
+    """The measured value that was furthest beyond its limit, and on which side of it."""
+    if finding is None or finding.measured is None or finding.limit is None:
+        return None
+    side = "above" if finding.measured.value >= finding.limit.value else "below"
+    return {
+        "label": finding.measured.label,
+        "value": plain(finding.measured.value),
+        "unit": finding.measured.unit,
+        "side": side,
+    }
 
 
 def load(load: AlarmLoad, alarms: Mapping[str, Alarm]) -> dict[str, Any]:

@@ -55,6 +55,7 @@
  * @property {string} trip_text
  * @property {Quantity | null} measured
  * @property {Quantity | null} limit
+ * @property {Quantity & {side: 'above' | 'below'} | null} [worst] what was measured furthest beyond its limit since it was raised
  * @property {string[]} causes
  * @property {string[]} actions
  * @property {string | null} advice

@@ -1,6 +1,6 @@
 // How a standing alarm and the alarm load read: pure functions, no DOM.
 
-import { age, timeOfDay } from './words.js';
+import { age, fixed, timeOfDay } from './words.js';
 
 /**
  * What is wrong, and who has said what to it.
@@ -27,10 +27,18 @@ export function snackWords(alarm) {
 export function dialogWords(alarm) {
   const at = timeOfDay(alarm.raised_ms);
   const began = alarm.trip_text && alarm.trip_text !== alarm.text ? ` with ${bare(alarm.trip_text)}` : '';
-  if (!alarm.active) return [`It is over; it began at ${at}${began}.`, alarm.advice].filter(Boolean).join(' ');
+  const worst = worstWords(alarm);
+  if (!alarm.active) return [`It is over; it began at ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
   const isBlind = alarm.verdict === 'unknown';
   const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
-  return [cause, `Stands for ${age(alarm.for_s)} s, since ${at}${began}.`, alarm.advice].filter(Boolean).join(' ');
+  return [cause, `Stands for ${age(alarm.for_s)} s, since ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
+}
+
+/** How bad it was, where that is not what is measured now. @param {import('./protocol.js').Alarm} alarm */
+function worstWords({ active, verdict, measured, worst }) {
+  if (!worst) return '';
+  const isNow = active && verdict !== 'unknown' && measured && fixed(measured.value) === fixed(worst.value);
+  return isNow ? '' : `${worst.side === 'above' ? 'Highest' : 'Lowest'} ${fixed(worst.value)} ${worst.unit}.`;
 }
 
 /** A sentence without its end. @param {string} sentence */

@@ -90,6 +90,7 @@ async def home_fault(server: Canned, page: Page) -> None:
             "Speed", "Speed above limit", priority="critical", place="dialog", sound="high", needs_ack=True,
             text="12.6 m/s, limit 11.0 m/s", measured={"label": "Speed", "value": 12.6, "unit": "m/s"},
             limit={"label": "Limit", "value": 11.0, "unit": "m/s"}, actions=["acknowledge", "decelerate"],
+            worst={"label": "Speed", "value": 12.8, "unit": "m/s", "side": "above"},
             advice="The safety driver must slow the car.", raised_ms=at("14:07:31"),
         )
     ]  # fmt: skip
