@@ -45,15 +45,19 @@ class Urgency:
         before = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
         try:
             os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
-        except PermissionError:
+        except OSError as why:  # no right to it, or a system that does not know it
             if not self._told:
                 self._told = True
-                log.warning("commands are spoken at ordinary priority: the system allows no other (CAP_SYS_NICE)")
+                log.warning(
+                    "commands are spoken at ordinary priority, the system allows no other (CAP_SYS_NICE): %s", why
+                )
             return
         self._before = before
 
     def _give_back(self) -> None:
         if self._before is not None:
             (policy, priority), self._before = self._before, None
-            # who was let by RLIMIT_RTPRIO alone may not take the second flag back
-            os.sched_setscheduler(0, policy | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+            try:  # who was let by RLIMIT_RTPRIO alone may not take the second flag back
+                os.sched_setscheduler(0, policy | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+            except OSError:  # the commands have ended all the same
+                log.exception("the server keeps its real-time priority")
