@@ -46,6 +46,7 @@ READ_UP_S = 0.1  # to read what waits after the loop stood still
 TELL_STALL_S = 2.0  # a page that was covered for so long is told why
 SICK_LOOP_S = 0.25  # a loop later than this lets one heartbeat fall: a sign of life from a sick server is a lie
 TRENDS_A_FRAME = 4  # steps of the trends in each state: so many frames in a row may be lost without a gap
+EVENTS_FIRST_S = 0.002  # a page's writer is woken some turns of the loop after its events are there
 PROOF_WITHIN_S = 4.0  # something that speaks WebSocket and no rosbridge is told apart by then
 BRIDGE_SILENT_S = 1.4  # the bridge answers a ping every 0.5 s
 
@@ -232,7 +233,7 @@ class Session:
         self._state.reach(self._gate.facts(now_s))
         self._watch_slowing()
         self._judge(now_s, None)
-        if put:
+        if put and not self._state_is_due:
             self._put_state(now_s)
 
     def _watch_slowing(self) -> None:
@@ -677,7 +678,7 @@ class Session:
         """Once the events have gone out: they must not wait until a state is made. Several changes make one state."""
         if not self._state_is_due:
             self._state_is_due = True
-            asyncio.get_running_loop().call_soon(self._put_due_state)
+            asyncio.get_running_loop().call_later(EVENTS_FIRST_S, self._put_due_state)
 
     def _put_due_state(self) -> None:
         if self._state_is_due:  # else one was put meanwhile

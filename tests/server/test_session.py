@@ -11,11 +11,13 @@ import numpy as np
 import psutil
 import pytest
 
+from server.app import create_app
 from server.bridge.server import RosBridge
 from server.config import Config, Vehicle
+from server.turns import Turns
 from tests.server import scan_frames
 from tests.server.cars import driving, scan, twist
-from tests.server.conftest import serving
+from tests.server.conftest import serving, serving_app
 from tests.server.viewer import viewer
 
 
@@ -33,6 +35,42 @@ async def test_speed_reaches_the_page(bridge: RosBridge, server: str) -> None:
         assert state["session"]["ros_version"] == 1
         assert state["signals"]["fuel"]["freshness"] == "not_published"
         assert state["signals"]["scan"]["freshness"] == "never"
+
+
+async def test_events_reach_a_page_before_a_state_is_made(bridge: RosBridge) -> None:
+    """To make a state takes milliseconds: an alarm does not wait for it."""
+    config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
+    app, speeds = create_app(config), {"now": 4.2}
+    turns, due = Turns(), asyncio.Event()  # a page as the hub wakes it
+    happened: list[str] = []
+
+    def watch(kind: str) -> None:
+        happened.append(kind)
+        if kind == "events":
+            turns.queue(due, is_urgent=True)
+
+    async def page() -> None:
+        while True:
+            await due.wait()
+            due.clear()
+            happened.append("told")
+
+    async with serving_app(app, config), driving(bridge, speed=lambda _: speeds["now"]):
+        bus = app.state.running.bus
+        writer = asyncio.create_task(page())
+        bus.watch("car", watch)
+        async with asyncio.timeout(20):
+            while "state" not in happened:
+                await asyncio.sleep(0.02)
+            speeds["now"] = 12.6
+            while not bus.find_events("car", change="raised", alarm="speed_limit"):
+                await asyncio.sleep(0.02)
+        await asyncio.sleep(0.3)
+        writer.cancel()
+    after = [
+        next(one for one in happened[i:] if one != "events") for i, kind in enumerate(happened) if kind == "events"
+    ]
+    assert set(after) == {"told"}
 
 
 async def test_a_killed_bridge_is_said_at_once_and_data_flow_again(bridge: RosBridge, server: str) -> None:
