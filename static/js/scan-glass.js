@@ -13,6 +13,7 @@ const PATIENCE_MS = 1000;
 /**
  * @typedef {import('./scan-plot.js').Around} Around
  * @typedef {import('./scan-frame.js').Scan} Scan
+ * @typedef {{scan: Scan, at_ms: number, around: Around}} Wanted at_ms: when the scan came
  * @typedef {{age_s: number, at_ms: number}} Shown age of a scan when it came, and when that was
  */
 
@@ -26,7 +27,7 @@ export class ScanGlass {
   /** Width and height [CSS px]: asked anew at each scan, they would have the whole page laid out first. */
   #size = { width: 0, height: 0 };
   #watcher = new ResizeObserver(() => this.#measure());
-  /** What was asked for last. @type {(() => {scan: Scan, at_ms: number, around: Around}) | null} */
+  /** What was asked for last. @type {(() => Wanted | null) | null} */
   #newest = null;
   #isDue = false;
   /** What is being drawn. @type {Shown | null} */
@@ -55,7 +56,7 @@ export class ScanGlass {
     this.#theme = null;
   }
 
-  /** Draws soon what is newest then. @param {() => {scan: Scan, at_ms: number, around: Around}} newest */
+  /** Draws soon what is newest then. @param {() => Wanted | null} newest null: nothing any more */
   draw(newest) {
     this.#newest = newest;
     const wasDue = this.#isDue;
@@ -91,6 +92,7 @@ export class ScanGlass {
   }
 
   #drawn() {
+    if (!this.#painter) return; // said before the page took over
     clearTimeout(this.#timer);
     this.shown = this.#drawing ?? this.shown;
     this.#drawing = null;
@@ -130,9 +132,10 @@ export class ScanGlass {
     this.#isDue = false;
     if (!this.#size.width) this.#measure();
     const { width, height } = this.#size;
-    if (!width || !height) return null;
+    const wanted = width && height ? this.#newest() : null;
+    if (!wanted) return null;
     this.#theme ??= themeAt(this.canvas);
-    const { scan, at_ms, around } = this.#newest();
+    const { scan, at_ms, around } = wanted;
     const dpr = Math.min(window.devicePixelRatio || 1, FINEST);
     return { picture: { scan, around, width, height, dpr, theme: this.#theme }, shows: { age_s: scan.age_s, at_ms } };
   }

@@ -118,15 +118,15 @@ export function mount(root, store) {
   }
 
   function drawSoon() {
-    if (!isFront || !store.scan) return;
-    glass.draw(() => ({
-      scan: /** @type {import('./scan-frame.js').Scan} */ (store.scan),
+    if (!isFront) return;
+    glass.draw(() => !isFront || !store.scan ? null : {
+      scan: store.scan,
       at_ms: store.scanAt_ms,
       around: {
         reach_m, car: carOf(store), limit_m: store.limit('obstacle.standoff_m'),
         mark: mark.at && { x_m: mark.at.x_m, y_m: mark.at.y_m, isSeen: mark.isSeen },
       },
-    }));
+    });
   }
 
   function read() {
