@@ -19,6 +19,7 @@ class Pace:
     probes: int  # alarms a series
     probe_every_s: float
     load_s: float  # how long load is measured
+    held_s: float  # how long an order is: of 200 commands three decide on p99, and each late one spoils two gaps
     gap_s: float  # how long a page reads nothing
     settle_s: float  # between connecting and measuring
     crowd: int  # pages that look on
@@ -26,8 +27,12 @@ class Pace:
     most: int  # pages on the server
 
 
-FULL = Pace(probes=240, probe_every_s=0.08, load_s=10.0, gap_s=10.0, settle_s=1.0, crowd=30, many=50, most=100)
-QUICK = Pace(probes=20, probe_every_s=0.06, load_s=0.8, gap_s=2.0, settle_s=0.1, crowd=30, many=50, most=100)
+FULL = Pace(
+    probes=240, probe_every_s=0.08, load_s=10.0, held_s=40.0, gap_s=10.0, settle_s=1.0, crowd=30, many=50, most=100
+)
+QUICK = Pace(
+    probes=20, probe_every_s=0.06, load_s=0.8, held_s=0.8, gap_s=2.0, settle_s=0.1, crowd=30, many=50, most=100
+)
 
 
 class Rig:

@@ -84,7 +84,7 @@ def _held(rig: Rig, bare: Child) -> Held:
     try:
         with connect(rig.server.hello["url"]) as page:  # one that has not read for long is let go
             _slow(page)
-        bare.ask("metronome", url=url, topic=METRONOME, seconds=rig.pace.load_s, period_s=PERIOD_MS / 1000)
+        bare.ask("metronome", url=url, topic=METRONOME, seconds=rig.pace.held_s, period_s=PERIOD_MS / 1000)
     finally:
         if wire is not None:
             wire.stop()
