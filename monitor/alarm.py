@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 from monitor.alarm_spec import AlarmSpec, Place, Sound
 from monitor.check import Finding, Verdict
+from monitor.quick import changer
 
 Change = Literal["raised", "cleared", "acknowledged", "recaused", "shelved", "unshelved", "suppressed", "unsuppressed"]
 
@@ -133,6 +134,9 @@ class Alarm:
         )
 
 
+_changed = changer(Alarm)  # an alarm that stands is judged at every message
+
+
 def _state(active: bool, acknowledged: bool) -> AlarmState:
     if active:
         return AlarmState.ACKED if acknowledged else AlarmState.UNACKED
@@ -238,7 +242,7 @@ class _Step:
         self._transitions: list[Transition] = []
 
     def result(self) -> tuple[Alarm, tuple[Transition, ...]]:
-        alarm = replace(
+        alarm = _changed(
             self._alarm,
             active=self._active,
             acknowledged=self._acknowledged,
@@ -307,8 +311,8 @@ class _Step:
     def _blame(self) -> None:
         """A cause the operator was not told of re-alarms; one that was away no longer than the off-delay is not new."""
         names = _names(self._finding)
-        if not names and not self._alarm.causes:
-            return
+        if len(names) == len(self._alarm.causes) and names == there(self._alarm.causes):
+            return  # by far the most frequent case
         causes: dict[str, float | None] = {}
         for cause in self._alarm.causes:
             absent_s = None if cause.absent_s is None else cause.absent_s + self._dt_s

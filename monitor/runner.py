@@ -62,6 +62,13 @@ class _Row:
         self.calm: Alarm | None = None  # its alarm, as it was last found at rest
 
 
+def _looks_harmless(row: _Row, seen: Snapshot | State) -> bool:
+    try:
+        return row.look(seen, row.limits)  # type: ignore[misc]  # only rows found calm come here, and these have a look
+    except Exception:  # as in `_find`: it will be asked, and if it fails too, that is said
+        return False
+
+
 class Monitor:
     """All checks of one vehicle and their alarms.
 
@@ -119,8 +126,9 @@ class Monitor:
         transitions: list[Transition] = []
         may_pass = self._may_pass(snapshot.link, snapshot.paused)
         for row in self._needing(changed):
-            if not (may_pass and self._is_harmless(row, snapshot)):  # else its words are the last tick's, for a moment
-                transitions += self._judge(row.check, snapshot)
+            if may_pass and self._is_calm(row) and _looks_harmless(row, snapshot):
+                continue  # its words are the last tick's, for a moment
+            transitions += self._judge(row.check, snapshot)
         if self.crashes:
             transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
         return tuple(transitions)
@@ -141,9 +149,10 @@ class Monitor:
         self._asked.clear()
         may_pass = self._may_pass(snapshot.link, snapshot.paused) and self._ticks % ASKED_EVERY != 0
         transitions: list[Transition] = []
+        alarms, passed = self.alarms, self._passed
         for row in self._rows:
-            if may_pass and self._is_harmless(row, snapshot):
-                self._passed.append(row.check)
+            if may_pass and (row.calm is alarms[row.id] or self._is_calm(row)) and _looks_harmless(row, snapshot):
+                passed.append(row.check)
             else:
                 transitions += self._judge(row.check, snapshot)
         self._passed_on = snapshot if self._passed else None
@@ -154,18 +163,13 @@ class Monitor:
     def _may_pass(self, link: LinkFacts, paused: bool) -> bool:
         return link.phase == "monitoring" and not paused
 
-    def _is_harmless(self, row: _Row, seen: Snapshot | State) -> bool:
-        if row.look is None:
-            return False
+    def _is_calm(self, row: _Row) -> bool:
+        """Whether its alarm is at rest, so that a look is enough. Found once: an alarm never changes, it is replaced."""
         alarm = self.alarms[row.id]
-        if row.calm is not alarm:  # an alarm never changes: it is replaced
-            if not alarm.is_at_rest or self._causes.remembers(row.id):
-                return False
-            row.calm = alarm
-        try:
-            return row.look(seen, row.limits)
-        except Exception:  # as in `_find`: it will be asked, and if it fails too, that is said
+        if row.look is None or not alarm.is_at_rest or self._causes.remembers(row.id):
             return False
+        row.calm = alarm
+        return True
 
     @property
     def checks(self) -> tuple[AnyCheck, ...]:
@@ -179,7 +183,11 @@ class Monitor:
             return False
         if self.crashes or not self._may_pass(state.link_facts, state.paused):
             return True
-        return any(not self._is_harmless(row, state) for row in rows)
+        alarms = self.alarms
+        for row in rows:
+            if not ((row.calm is alarms[row.id] or self._is_calm(row)) and _looks_harmless(row, state)):
+                return True
+        return False
 
     def end(self, now_s: float) -> tuple[Transition, ...]:
         """Monitoring ends by the operator's wish: nothing is judged and nothing stands any more."""

@@ -65,13 +65,11 @@ def number(message: Any, *path: str) -> float:
     """The number at a path of fields; NaN where it is null, and where it is infinite, which JSON says as null too: a
     recording tells nothing that its replay would not tell. Raises Rejected for what is missing or is no number."""
     value = message
-    for name in path:
-        if type(value) is not dict and not isinstance(value, Mapping):
-            raise Rejected(f"{'.'.join(path)} is missing")
-        try:
+    try:
+        for name in path:
             value = value[name]
-        except KeyError:
-            raise Rejected(f"{'.'.join(path)} is missing") from None
+    except (KeyError, TypeError, IndexError):  # no such field, or this is nothing that has fields
+        raise Rejected(f"{'.'.join(path)} is missing") from None
     if type(value) is float:  # nearly always
         return value if math.isfinite(value) else math.nan
     if value is None:

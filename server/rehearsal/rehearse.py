@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from monitor.alarm import Transition
-from monitor.runner import Crash, Monitor
+from monitor.runner import ASKED_EVERY, Crash, Monitor
 from monitor.signal_limits import expected_rates
 from monitor.state import LinkFacts, Snapshot, State
 from server import judging
@@ -30,7 +30,7 @@ from server.source import Message
 from server.topics import Source, map_signals
 from server.tuning import Tuning
 
-SAMPLE_TICKS = 10
+SAMPLE_TICKS = ASKED_EVERY  # what every check says is known then, without asking any again
 SILENCE_S = 600.0  # after so long without a message nothing new can be said: the judge is not stepped through the rest
 
 
@@ -216,7 +216,7 @@ class _Run:
         while tick_s <= now_s:
             self._ticks += 1
             self._judge(tick_s, None)
-            if self._ticks % SAMPLE_TICKS == 0:
+            if (self._ticks + 1) % SAMPLE_TICKS == 0:  # the first judgement came with the first message
                 self._sample(tick_s)
                 if self._on_progress is not None:
                     self._on_progress(tick_s)

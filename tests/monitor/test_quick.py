@@ -8,7 +8,7 @@ from dataclasses import FrozenInstanceError, dataclass, field, replace
 
 import pytest
 
-from monitor.quick import maker
+from monitor.quick import changer, maker
 from monitor.state import Reading, Snapshot
 from monitor.values import Twist
 
@@ -53,3 +53,16 @@ def test_each_call_makes_a_value_of_its_own() -> None:
     one.right.append(1)
     assert (one.left, one.right, other.left, other.right) == (1, [1], 2, [])
     assert maker(Snapshot)(now_s=1.0) == Snapshot(now_s=1.0)
+
+
+def test_what_is_changed_quickly_equals_what_is_replaced() -> None:
+    reading = Reading(value=Twist(speed_mps=1.0), received_s=2.0, horizon_s=3.0, count=4)
+    change = changer(Reading)
+    assert change(reading) == reading
+    assert change(reading, count=5, stamp_s=None) == replace(reading, count=5, stamp_s=None)
+    assert type(change(reading)) is Reading
+    assert reading.count == 4
+    with pytest.raises(TypeError, match="nonsense"):
+        change(reading, nonsense=1)
+    with pytest.raises(FrozenInstanceError):
+        change(reading).count = 6  # type: ignore[misc]
