@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from monitor.geo import Plane, offset_m
+from monitor.quick import maker
 from monitor.values import GpsFix
 
 ANCHOR_S = 2.0  # the anchor is the median of the first fixes at rest, this long
@@ -27,13 +28,16 @@ class GpsWatch:
     sigma_m: float | None = None  # the receiver's own; None: it does not say
 
 
+_watch = maker(GpsWatch)
+
+
 class GpsFollower:
     """Follows the fixes of one receiver."""
 
     def __init__(self) -> None:
         self._resting: list[tuple[float, GpsFix]] = []  # fixes since the car came to rest, until there is an anchor
         self._since_s: float | None = None
-        self._anchor: tuple[float, float] | None = None
+        self._anchor: Plane | None = None
         self._drift: deque[float] = deque(maxlen=FIXES)
         self._steps: deque[tuple[float, float, float]] = deque(maxlen=FIXES)  # east m, north m, s
         self._last: tuple[float, GpsFix] | None = None
@@ -45,7 +49,7 @@ class GpsFollower:
             return GpsWatch()
         self._step(fix, at_s if stamp_s is None else stamp_s)
         self._rest(fix, at_s, standing_since_s)
-        return GpsWatch(
+        return _watch(
             drift_m=tuple(self._drift),
             anchored_s=self._since_s if self._anchor is not None else None,
             over_ground_mps=tuple(math.hypot(east, north) / span for east, north, span in self._steps),
@@ -83,13 +87,13 @@ class GpsFollower:
         if self._anchor is None:
             self._resting.append((at_s, fix))
             if at_s - self._resting[0][0] >= ANCHOR_S:
-                self._anchor = (
+                self._anchor = Plane(
                     median(f.lat_deg for _, f in self._resting),
                     _median_lon(tuple(f.lon_deg for _, f in self._resting)),
                 )
                 self._resting.clear()
             return
-        self._drift.append(math.hypot(*Plane(*self._anchor).enu(fix.lat_deg, fix.lon_deg)))
+        self._drift.append(math.hypot(*self._anchor.enu(fix.lat_deg, fix.lon_deg)))
 
 
 def _median_lon(longitudes: tuple[float, ...]) -> float:

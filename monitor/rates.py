@@ -47,7 +47,8 @@ class RateMeter:
 
     __slots__ = (
         "_arrivals",
-        "_block_n",
+        "_block_due_s",
+        "_block_from",
         "_block_start_s",
         "_blocks",
         "_declared_hz",
@@ -81,8 +82,7 @@ class RateMeter:
         self._first_s = 0.0
         self._last_s: float | None = None
         self._heard = 0
-        self._block_start_s = 0.0
-        self._block_n = 0
+        self._begin_block(0.0)
         self._last_block_hz: float | None = None
         self._settle()
 
@@ -92,16 +92,18 @@ class RateMeter:
         self._settle()
 
     def receive(self, at_s: float) -> None:
-        if self._last_s is None or not self._last_s <= at_s <= self._last_s + self.horizon_s:
+        last_s = self._last_s
+        if last_s is None or not last_s <= at_s <= last_s + self.horizon_s:
             # A silence long enough to be called stale has its own alarm; a clock that went back tells nothing at all.
             self.restart()
-            self._first_s = self._block_start_s = at_s
-            self._block_n = -1
+            self._first_s = at_s
+            self._heard = 1
+            self._begin_block(at_s)
+        else:
+            self._heard += 1
         self._last_s = at_s
-        self._heard += 1
         self._arrivals.append(at_s)
-        self._block_n += 1
-        if self._block_n >= BLOCK_INTERVALS and at_s - self._block_start_s >= BLOCK_S:
+        if at_s >= self._block_due_s and self._heard - self._block_from >= BLOCK_INTERVALS:
             self._end_block(at_s)
         if not self._is_settled:
             self._settle()
@@ -146,9 +148,14 @@ class RateMeter:
         while len(arrivals) > 2 and now_s - arrivals[0] > window_s:
             arrivals.popleft()
 
+    def _begin_block(self, at_s: float) -> None:
+        """With the message that came now."""
+        self._block_start_s, self._block_due_s, self._block_from = at_s, at_s + BLOCK_S, self._heard
+
     def _end_block(self, at_s: float) -> None:
-        block_hz, before_hz = self._block_n / (at_s - self._block_start_s), self._last_block_hz
-        self._block_start_s, self._block_n, self._last_block_hz = at_s, 0, block_hz
+        block_hz = (self._heard - self._block_from) / (at_s - self._block_start_s)
+        before_hz, self._last_block_hz = self._last_block_hz, block_hz
+        self._begin_block(at_s)
         self._blocks += 1
         self._agree(block_hz, before_hz)
         self._settle()

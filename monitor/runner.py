@@ -16,7 +16,7 @@ from monitor.inhibition import table_of
 from monitor.link import LinkFacts
 from monitor.restoring import numbered_on, restore
 from monitor.state import NotFresh, Snapshot, State
-from monitor.tiles import Tile, tiles
+from monitor.tiles import Tile, places, tiles
 
 __all__ = ["Crash", "Monitor", "Refused", "Tile", "Transition"]
 
@@ -57,16 +57,14 @@ class _Row:
     def __init__(self, check: AnyCheck, limits: Any) -> None:
         self.check = check
         self.id = check.id
-        self.look = check.is_harmless
+        self.look: Callable[[Any, Any], bool] = check.is_harmless or _never
         self.limits = limits
         self.calm: Alarm | None = None  # its alarm, as it was last found at rest
 
 
-def _looks_harmless(row: _Row, seen: Snapshot | State) -> bool:
-    try:
-        return row.look(seen, row.limits)  # type: ignore[misc]  # only rows found calm come here, and these have a look
-    except Exception:  # as in `_find`: it will be asked, and if it fails too, that is said
-        return False
+def _never(snapshot: Any, limits: Any) -> bool:
+    """The look of a check which has none: it is always asked."""
+    return False
 
 
 class Monitor:
@@ -84,9 +82,8 @@ class Monitor:
         each other: two of one id, a circle of inhibition."""
         declared = CHECKS if checks is None else tuple(checks)
         self._findings: dict[str, Finding] = {}
-        self._passed: list[AnyCheck] = []  # not asked on the last tick, because harmless …
-        self._passed_on: Snapshot | None = None  # … of this snapshot
-        self._asked: set[str] = set()  # since the last tick
+        self._asked: set[str] = set()  # since the last tick began
+        self._passed_on: Snapshot | None = None  # of which the others were not asked, because harmless
         self._ticks = 0
         self.crashes: dict[str, Crash] = {}
         self._failed: dict[str, int] = {}
@@ -95,6 +92,7 @@ class Monitor:
             raise ValueError("two checks have one id")
         self.alarms[IMPAIRED] = Alarm(id=IMPAIRED, spec=IMPAIRED_SPEC)
         self._declared = declared
+        self._places = places(declared)
         self._causes = table_of(self.alarms.values())
         by_id = {check.id: check for check in declared}
         self._checks = tuple(by_id[name] for name in self._causes.order if name in by_id)
@@ -126,7 +124,7 @@ class Monitor:
         transitions: list[Transition] = []
         may_pass = self._may_pass(snapshot.link, snapshot.paused)
         for row in self._needing(changed):
-            if may_pass and self._is_calm(row) and _looks_harmless(row, snapshot):
+            if may_pass and self._is_harmless(row, snapshot):
                 continue  # its words are the last tick's, for a moment
             transitions += self._judge(row.check, snapshot)
         if self.crashes:
@@ -138,24 +136,26 @@ class Monitor:
         """What each check last found, by its id."""
         if self._passed_on is not None:
             snapshot, self._passed_on = self._passed_on, None
-            for check in self._passed:
+            for check in self._checks:
                 if check.id not in self._asked:
                     self._findings[check.id] = self._find(check, snapshot)
         return self._findings
 
     def _tick(self, snapshot: Snapshot) -> tuple[Transition, ...]:
         self._ticks += 1
-        self._passed.clear()
         self._asked.clear()
         may_pass = self._may_pass(snapshot.link, snapshot.paused) and self._ticks % ASKED_EVERY != 0
         transitions: list[Transition] = []
-        alarms, passed = self.alarms, self._passed
+        alarms = self.alarms
         for row in self._rows:
-            if may_pass and (row.calm is alarms[row.id] or self._is_calm(row)) and _looks_harmless(row, snapshot):
-                passed.append(row.check)
-            else:
-                transitions += self._judge(row.check, snapshot)
-        self._passed_on = snapshot if self._passed else None
+            if may_pass and (row.calm is alarms[row.id] or self._is_calm(row)):
+                try:
+                    if row.look(snapshot, row.limits):
+                        continue
+                except Exception:  # noqa: S110  # as in `_find`: it is asked, and if it fails too, that is said
+                    pass
+            transitions += self._judge(row.check, snapshot)
+        self._passed_on = snapshot if may_pass else None
         if self.crashes or not self.alarms[IMPAIRED].is_at_rest:
             transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
         return tuple(transitions)
@@ -166,10 +166,16 @@ class Monitor:
     def _is_calm(self, row: _Row) -> bool:
         """Whether its alarm is at rest, so that a look is enough. Found once: an alarm never changes, it is replaced."""
         alarm = self.alarms[row.id]
-        if row.look is None or not alarm.is_at_rest or self._causes.remembers(row.id):
+        if not alarm.is_at_rest or self._causes.remembers(row.id):
             return False
         row.calm = alarm
         return True
+
+    def _is_harmless(self, row: _Row, snapshot: Snapshot) -> bool:
+        try:
+            return self._is_calm(row) and row.look(snapshot, row.limits)
+        except Exception:  # as in `_find`: it is asked, and if it fails too, that is said
+            return False
 
     @property
     def checks(self) -> tuple[AnyCheck, ...]:
@@ -184,9 +190,12 @@ class Monitor:
         if self.crashes or not self._may_pass(state.link_facts, state.paused):
             return True
         alarms = self.alarms
-        for row in rows:
-            if not ((row.calm is alarms[row.id] or self._is_calm(row)) and _looks_harmless(row, state)):
-                return True
+        try:
+            for row in rows:
+                if not ((row.calm is alarms[row.id] or self._is_calm(row)) and row.look(state, row.limits)):
+                    return True
+        except Exception:  # as in `_find`: it will be asked, and if it fails too, that is said
+            return True
         return False
 
     def end(self, now_s: float) -> tuple[Transition, ...]:
@@ -196,7 +205,6 @@ class Monitor:
             self.alarms[alarm_id], happened = end(alarm, now_s, ENDED)
             transitions += happened
         self._findings.clear()
-        self._passed.clear()
         self._passed_on = None
         self.crashes.clear()
         self._causes.clear()
@@ -232,7 +240,7 @@ class Monitor:
 
     def tiles(self) -> list[Tile]:
         """What the home tab shows of the checks: a tile for each label, at its fixed place."""
-        return tiles(self._declared, self.findings)
+        return tiles(self._places, self.findings)
 
     def acknowledge(self, alarm_id: str, occurrence: int, by: str, now_s: float) -> tuple[Transition, ...]:
         """Raises Refused with the reason, as do `shelve` and `unshelve`."""

@@ -19,7 +19,7 @@ from monitor.quick import maker
 from monitor.rates import Rate, RateMeter
 from monitor.reach import ReachFacts
 from monitor.recorder import RecorderFacts
-from monitor.repeats import RepeatFollower, Repeats, Wheels
+from monitor.repeats import COMPARED, RepeatFollower, Repeats, Wheels
 from monitor.signals import SIGNALS, Signal
 from monitor.slowing import SlowingFacts
 from monitor.stamps import MANY_WRITERS, ClockJump, StampFollower, merged
@@ -300,7 +300,9 @@ class State:
             horizon_s=meter.horizon_s,
             period_s=meter.period_s,
             count=heard.count,
-            repeats=heard.repeats.receive(value, stamp_s, received_s, self._wheels),
+            repeats=None
+            if stamp_s is None and kind not in COMPARED
+            else heard.repeats.receive(value, stamp_s, received_s, self._wheels),
             stamp_change_s=None if stamp_s is None else self._compare_clocks(signal, heard, stamp_s, received_s),
         )
         if self._readings_shared is not None:
@@ -309,7 +311,10 @@ class State:
         self._readings[signal] = reading
         if heard.earlier is not None:
             heard.earlier.add(reading)
-        self._extend(heard, signal, value)
+        if heard.headline is not None:
+            number = getattr(value, heard.headline, None)
+            if number is not None and not heard.lowest <= number <= heard.highest:
+                self._extend(heard, signal, number)
         if kind not in _TELLING:
             return heard.alone
         derived = self._derive(signal, reading)
@@ -514,7 +519,10 @@ class State:
             period_s=reading.period_s,
             derived_from=source,
         )
-        self._extend(self._heard[signal], signal, value)
+        heard = self._heard[signal]
+        number = None if heard.headline is None else getattr(value, heard.headline, None)
+        if number is not None:
+            self._extend(heard, signal, number)
         return signal
 
     def _is_fresh(self, signal: str, now_s: float) -> bool:
@@ -528,11 +536,8 @@ class State:
             self._rates = MappingProxyType({name: heard.meter.rate(now_s) for name, heard in self._heard.items()})
         return self._rates
 
-    def _extend(self, heard: _Heard, signal: str, value: Value) -> None:
-        if heard.headline is None:
-            return
-        number = getattr(value, heard.headline, None)
-        if number is None or heard.lowest <= number <= heard.highest or not math.isfinite(number):
+    def _extend(self, heard: _Heard, signal: str, number: float) -> None:
+        if heard.lowest <= number <= heard.highest or not math.isfinite(number):
             return
         heard.lowest, heard.highest = min(heard.lowest, number), max(heard.highest, number)
         if self._extents_shared is not None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from monitor.check import BRIEF_LETTERS, Check, Finding, Verdict, unknown
+from monitor.quick import maker
 
-_WORSE = [Verdict.OK, Verdict.UNKNOWN, Verdict.FAULT]  # not checked beats checked and good
 NOT_YET = unknown("Not checked yet")
 
 
@@ -24,37 +24,60 @@ class Tile:
     checks: tuple[str, ...]  # ids
 
 
-def tiles(checks: Sequence[Check[Any]], findings: Mapping[str, Finding]) -> list[Tile]:
-    """A tile for each tile label of `checks`, in their order; checks that do not apply count only where none does."""
-    grouped: dict[str, list[Check[Any]]] = {}
+_tile = maker(Tile)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a tile of the home tab is, and what it stands for."""
+
+    id: str
+    label: str
+    checks: tuple[str, ...]  # ids
+
+
+def places(checks: Sequence[Check[Any]]) -> tuple[Place, ...]:
+    """One for each tile label of `checks`, in their order."""
+    grouped: dict[str, list[str]] = {}
     for check in checks:
-        grouped.setdefault(check.tile_label, []).append(check)
-    return [_tile(label, group, findings) for label, group in grouped.items()]
-
-
-def _tile(label: str, group: Sequence[Check[Any]], findings: Mapping[str, Finding]) -> Tile:
-    found = [(check, findings.get(check.id, NOT_YET)) for check in group]
-    relevant = [pair for pair in found if pair[1].applies] or found
-    verdict = max((finding.verdict for _, finding in relevant), key=_WORSE.index)
-    those = [pair for pair in relevant if pair[1].verdict is verdict]
-    text, brief = _words(verdict, those, len(relevant))
-    return Tile(
-        id=label.lower().replace(" ", "_"),
-        label=label,
-        verdict=verdict,
-        text=text,
-        brief=brief,
-        checks=tuple(check.id for check in group),
+        grouped.setdefault(check.tile_label, []).append(check.id)
+    return tuple(
+        Place(id=label.lower().replace(" ", "_"), label=label, checks=tuple(ids)) for label, ids in grouped.items()
     )
 
 
-def _words(verdict: Verdict, those: Sequence[tuple[Check[Any], Finding]], of: int) -> tuple[str, str]:
-    texts = list(dict.fromkeys(finding.text for _, finding in those))
-    briefs = list(dict.fromkeys(finding.brief for _, finding in those))
-    if len(texts) == 1:
-        return texts[0], briefs[0]
+def tiles(places: Sequence[Place], findings: Mapping[str, Finding]) -> list[Tile]:
+    """A tile for each place; checks that do not apply count only where none does."""
+    return [_tile_at(place, findings) for place in places]
+
+
+def _tile_at(place: Place, findings: Mapping[str, Finding]) -> Tile:
+    found = [findings.get(check_id, NOT_YET) for check_id in place.checks]
+    relevant = [finding for finding in found if finding.applies] or found
+    verdict = _worst(relevant)
+    text, brief = _words(verdict, [finding for finding in relevant if finding.verdict is verdict], len(relevant))
+    return _tile(id=place.id, label=place.label, verdict=verdict, text=text, brief=brief, checks=place.checks)
+
+
+def _worst(findings: Sequence[Finding]) -> Verdict:
+    """Not checked beats checked and good."""
+    worst = Verdict.OK
+    for finding in findings:
+        if finding.verdict is Verdict.FAULT:
+            return Verdict.FAULT
+        if finding.verdict is Verdict.UNKNOWN:
+            worst = Verdict.UNKNOWN
+    return worst
+
+
+def _words(verdict: Verdict, those: Sequence[Finding], of: int) -> tuple[str, str]:
+    first = those[0]
+    if all(finding.text == first.text for finding in those):
+        return first.text, first.brief
     if verdict is Verdict.OK:
         return f"All {len(those)} in order", "OK"
+    texts = list(dict.fromkeys(finding.text for finding in those))
+    briefs = list(dict.fromkeys(finding.brief for finding in those))
     text = "; ".join(texts)
     if len(briefs) == 1 and verdict is Verdict.UNKNOWN:
         return text, briefs[0]

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import struct
+from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -41,39 +44,53 @@ class Bag1:
         self._chunk_bytes = 0
 
     def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-        entries = [
-            (entry[0], entry[1], entry[2], number)
-            for number in numbers
-            for entry in self._reader.indexes.get(number, ())
-            if entry[0] >= start_ns
-        ]
-        entries.sort()  # by time, then by place in the file
-        position, chunk = -1, b""
-        for time_ns, at, offset, number in entries:
-            if at != position:
-                position, chunk = at, self._chunk(at)
-            try:
-                raw = _message(chunk, offset)
-            except (struct.error, IndexError):
-                raise RecordingUnreadable(f"{self.path.name} is damaged: a message lies outside its chunk") from None
-            yield time_ns, number, raw
+        runs = {number: _since(start_ns, self._reader.indexes.get(number, ())) for number in numbers}
+        begins = [run[0] for run in runs.values() if run]
+        if not begins:
+            return
+        with ThreadPoolExecutor(1, "bag") as ahead:
+            coming = {min(begins)[1]: self._unpack(ahead, min(begins)[1])}  # at most one
+            entries = [(*entry, number) for number, run in runs.items() for entry in run]
+            entries.sort()  # by time, then by place in the file
+            order = iter(dict.fromkeys(entry[1] for entry in entries))
+            position, chunk = -1, b""
+            for time_ns, at, offset, number in entries:
+                if at != position:
+                    position, chunk = at, self._chunk(at, coming, ahead)
+                    if not coming:
+                        following = next((one for one in order if one not in self._chunks), None)
+                        if following is not None:
+                            coming[following] = self._unpack(ahead, following)
+                try:
+                    raw = _message(chunk, offset)
+                except (struct.error, IndexError):
+                    raise RecordingUnreadable(f"{self.path.name} is damaged: a message lies outside its chunk") from None
+                yield time_ns, number, raw
 
     def close(self) -> None:
         self._chunks.clear()
         self._reader.close()
 
-    def _chunk(self, position: int) -> bytes:
+    def _unpack(self, ahead: Executor, position: int) -> Future[bytes]:
+        """A chunk, unpacked beside the reader: that takes as long as reading what is in it."""
+        header = self._reader.chunks[position]
+        try:
+            self._file.seek(header.datapos)
+            packed = self._file.read(header.datasize)
+        except (OSError, MemoryError) as error:
+            failed: Future[bytes] = Future()
+            failed.set_exception(error)
+            return failed
+        return ahead.submit(_unpacked, header, packed)
+
+    def _chunk(self, position: int, coming: dict[int, Future[bytes]], ahead: Executor) -> bytes:
         cached = self._chunks.get(position)
         if cached is not None:
             self._chunks.move_to_end(position)
             return cached
-        header, file = self._reader.chunks[position], self._file
+        future = coming.pop(position, None) or self._unpack(ahead, position)
         try:
-            file.seek(header.datapos)
-            packed = file.read(header.datasize)
-            if len(packed) < header.datasize:
-                raise EOFError
-            chunk = bytes(header.decompressor(packed))
+            chunk = future.result()
         except (OSError, EOFError, ValueError, RuntimeError, MemoryError):  # what bz2, lz4 and the disk may say
             raise RecordingUnreadable(f"{self.path.name} is damaged: a part of it cannot be unpacked") from None
         self._chunks[position] = chunk
@@ -82,6 +99,18 @@ class Bag1:
             _, old = self._chunks.popitem(last=False)
             self._chunk_bytes -= len(old)
         return chunk
+
+
+def _since(start_ns: int, index: Sequence[Any]) -> Sequence[Any]:
+    """The entries of an index, which is in order of time, from a moment on."""
+    first = bisect_left(index, start_ns, key=itemgetter(0))
+    return index[first:] if first else index
+
+
+def _unpacked(header: Any, packed: bytes) -> bytes:
+    if len(packed) < header.datasize:
+        raise EOFError
+    return bytes(header.decompressor(packed))
 
 
 def _message(chunk: bytes, offset: int) -> bytes:

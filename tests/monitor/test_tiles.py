@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from monitor.check import OK, Check, Finding, Limits, Verdict, absent, fault, ok, unknown
-from monitor.tiles import tiles
+from monitor.tiles import places, tiles
 from tests.monitor.test_alarm import SPEC
 
 A, B, C = (
@@ -41,14 +41,14 @@ NONE = absent("c is not published")
 )
 def test_the_worst_speaks(findings: list[Finding], verdict: str, brief: str, text: str) -> None:
     found = dict(zip("abc", findings, strict=False))
-    (tile,) = tiles((A, B, C), found)
+    (tile,) = tiles(places((A, B, C)), found)
     assert (tile.verdict, tile.brief, tile.text) == (Verdict(verdict), brief, text)
     assert (tile.id, tile.label, tile.checks) == ("signals", "Signals", ("a", "b", "c"))
 
 
 def test_each_label_is_a_tile_in_the_order_of_the_checks() -> None:
     checks = (replace(B, tile="GPS drift"), A, replace(C, tile=""))
-    assert [(tile.id, tile.label) for tile in tiles(checks, {})] == [
+    assert [(tile.id, tile.label) for tile in tiles(places(checks), {})] == [
         ("gps_drift", "GPS drift"),
         ("signals", "Signals"),
         ("c", "C"),
@@ -57,7 +57,7 @@ def test_each_label_is_a_tile_in_the_order_of_the_checks() -> None:
 
 def test_no_brief_is_longer_than_its_tile() -> None:
     many = tuple(replace(A, id=str(n)) for n in range(100))
-    (tile,) = tiles(many, {str(n): unknown(f"{n}", short=f"no {n % 3}") for n in range(100)})
+    (tile,) = tiles(places(many), {str(n): unknown(f"{n}", short=f"no {n % 3}") for n in range(100)})
     assert tile.brief == "not checked"
     assert len(fault("", brief="Accelerator 3599 seconds").brief) <= 21
     assert len(unknown("", short="something long").brief) <= 21
