@@ -227,6 +227,21 @@ def _beyond(finding: Finding | None) -> float:
 class _Step:
     """Collects the changes of one judgement, so that a new `Alarm` is made once."""
 
+    __slots__ = (
+        "_acknowledged",
+        "_active",
+        "_alarm",
+        "_dt_s",
+        "_finding",
+        "_now_s",
+        "_occurrence",
+        "_set",
+        "_shelved",
+        "_suppressed",
+        "_transitions",
+        "_verdict_before",
+    )
+
     def __init__(self, alarm: Alarm, finding: Finding, now_s: float) -> None:
         self._alarm = alarm
         self._finding = finding

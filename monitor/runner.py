@@ -182,12 +182,14 @@ class Monitor:
         """What is judged, in the order of the home tab."""
         return self._declared
 
-    def heeds(self, changed: Collection[str], state: State) -> bool:
+    def heeds(self, changed: tuple[str, ...], state: State) -> bool:
         """Whether a step for these signals could find anything; where not, there is no need of a snapshot."""
-        rows = self._needing(changed)
+        rows = self._rows_by_signals.get(changed)
+        if rows is None:
+            rows = self._needing(changed)
         if not rows:
             return False
-        if self.crashes or not self._may_pass(state.link_facts, state.paused):
+        if self.crashes or state.paused or state.link_facts.phase != "monitoring":
             return True
         alarms = self.alarms
         try:

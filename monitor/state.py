@@ -201,7 +201,7 @@ class Snapshot:
         return reading.value
 
 
-_new_snapshot, _new_reading = maker(Snapshot), maker(Reading)
+_new_snapshot, _new_reading, _new_acceleration = maker(Snapshot), maker(Reading), maker(Acceleration)
 _TELLING = frozenset({Twist, GpsFix, Odometry, Heading})  # from which something else is derived
 
 
@@ -264,11 +264,11 @@ class State:
         self._rides: str | None = None
         self._scan_earlier = self._heard["scan"].earlier = Earlier()
         self._distance_earlier = self._heard["distance"].earlier = Earlier()
-        self._link = LinkFacts()
+        self.link_facts = LinkFacts()  # as the next, read by whoever likes and written by `link` and `set_paused` alone
         self._recorder = RecorderFacts()
         self._reach: ReachFacts | None = None
         self._slowing = SlowingFacts()
-        self._paused = False
+        self.paused = False
         self._paused_since_s: float | None = None
 
     def expect(self, expected_hz: Mapping[str, float]) -> None:
@@ -341,14 +341,6 @@ class State:
         return self._latest_s
 
     @property
-    def link_facts(self) -> LinkFacts:
-        return self._link
-
-    @property
-    def paused(self) -> bool:
-        return self._paused
-
-    @property
     def gps(self) -> GpsWatch:
         return self._gps
 
@@ -370,7 +362,7 @@ class State:
 
     def link(self, facts: LinkFacts) -> None:
         """What is now known of the link. A link that opens (again) starts the measuring of rates anew."""
-        before, self._link = self._link, facts
+        before, self.link_facts = self.link_facts, facts
         if facts.opened_s is not None and facts.opened_s != before.opened_s:
             for heard in self._heard.values():
                 heard.restart()
@@ -394,13 +386,13 @@ class State:
 
     def set_paused(self, paused: bool, since_s: float | None = None) -> None:
         """Monitoring is paused or goes on. `since_s` is when the pause began, where it was not now."""
-        self._paused = paused
+        self.paused = paused
         self._paused_since_s = since_s if paused else None
 
     def snapshot(self, now_s: float) -> Snapshot:
         """What is known at `now_s`, which later messages do not change."""
         self._follow_clock(now_s)
-        if self._paused and self._paused_since_s is None:
+        if self.paused and self._paused_since_s is None:
             self._paused_since_s = now_s
         readings, extents = self._readings_shared, self._extents_shared
         if readings is None:
@@ -410,9 +402,9 @@ class State:
         return _new_snapshot(
             now_s=now_s,
             readings=readings,
-            link=self._link,
+            link=self.link_facts,
             rates=self._measure(now_s),
-            paused=self._paused,
+            paused=self.paused,
             paused_since_s=self._paused_since_s,
             heard_s=self._heard_s,
             extents=extents,
@@ -502,7 +494,7 @@ class State:
         slope_mps2 = self._slope_mps2 = self._slope.add(at_s, speed_mps)
         if slope_mps2 is None or self._heard["acceleration"].count:
             return None
-        acceleration = Acceleration(acceleration_mps2=slope_mps2, source="speed")
+        acceleration = _new_acceleration(acceleration_mps2=slope_mps2, source="speed")
         return self._derived("acceleration", acceleration, "speed", reading)
 
     def _derived(self, signal: str, value: Value | None, source: str, reading: Reading[Any]) -> str | None:

@@ -55,6 +55,7 @@ _REAL = (int, float, np.integer, np.floating)
 # What comes a hundred times a second is made quickly.
 _twist, _effort, _steering = maker(Twist), maker(Effort), maker(Steering)
 _distance, _bearing = maker(Distance), maker(Bearing)
+_fix, _odometry = maker(GpsFix), maker(Odometry)
 
 
 class Rejected(ValueError):
@@ -85,6 +86,14 @@ def number(message: Any, *path: str) -> float:
 
 def finite(message: Any, *path: str) -> float:
     """As `number`, and known: null, NaN and infinities are rejected."""
+    try:
+        found = message
+        for name in path:
+            found = found[name]
+        if type(found) is float and math.isfinite(found):
+            return found  # nearly always
+    except (KeyError, TypeError, IndexError):
+        pass  # `number` says what is wrong
     value = number(message, *path)
     if not math.isfinite(value):
         raise Rejected(f"{'.'.join(path)} is null")
@@ -98,17 +107,21 @@ def known(value: float) -> float | None:
 def text(message: Any, *path: str, default: str = "") -> str:
     value = message
     for name in path:
-        value = value.get(name) if isinstance(value, Mapping) else None
+        value = value.get(name) if _has_fields(value) else None
     return value[:200] if isinstance(value, str) else default
+
+
+def _has_fields(value: Any) -> bool:
+    return type(value) is dict or isinstance(value, Mapping)  # an abstract class takes its time
 
 
 def stamp_s(message: Any) -> float | None:
     """The header's stamp in seconds, ROS 1 or ROS 2; None where there is none or it is zero or absurd."""
     if type(message) is dict and "header" not in message:
         return None
-    header = message.get("header") if isinstance(message, Mapping) else None
-    stamp = header.get("stamp") if isinstance(header, Mapping) else None
-    if not isinstance(stamp, Mapping):
+    header = message.get("header") if _has_fields(message) else None
+    stamp = header.get("stamp") if _has_fields(header) else None
+    if not _has_fields(stamp):
         return None
     seconds = stamp.get("secs", stamp.get("sec"))
     nanoseconds = stamp.get("nsecs", stamp.get("nanosec"))
@@ -177,9 +190,7 @@ def steering_of_float(message: Any) -> Steering:
 
 
 def distance(message: Any) -> Distance:
-    value = number(message, "data")
-    if math.isnan(value):
-        raise Rejected("data is null")
+    value = finite(message, "data")
     if value < 0:
         raise Rejected("a distance below zero")
     if value >= FARTHEST_M or abs(value - NONE_REAL_M) < 1e-3 or abs(value - NONE_SIMULATED_M) < 1e-3:
@@ -188,9 +199,7 @@ def distance(message: Any) -> Distance:
 
 
 def bearing(message: Any) -> Bearing:
-    value = number(message, "data")
-    if not math.isfinite(value):
-        raise Rejected("data is null")
+    value = finite(message, "data")
     if abs(value) > 2 * math.pi:
         raise Rejected("an angle beyond a full turn")
     return _bearing(bearing_rad=value)
@@ -212,7 +221,7 @@ def nav_sat_fix(message: Any) -> GpsFix:
     kind = number(message, "position_covariance_type")
     kind_is_known = kind in (1, 2, 3)
     spread = _spread(message.get("position_covariance")) if kind_is_known else None
-    return GpsFix(
+    return _fix(
         lat_deg=latitude,
         lon_deg=(longitude + 180) % 360 - 180 if abs(longitude) > 180 else longitude,
         alt_m=known(number(message, "altitude")),
@@ -246,7 +255,7 @@ def odometry(message: Any) -> Odometry:
     body = _inner(_inner(message, "twist"), "twist")
     x, y = number(body, "linear", "x"), number(body, "linear", "y")
     speed = math.hypot(x, 0.0 if math.isnan(y) else y)
-    return Odometry(
+    return _odometry(
         x_m=finite(pose, "position", "x"),
         y_m=finite(pose, "position", "y"),
         z_m=known(number(pose, "position", "z")),

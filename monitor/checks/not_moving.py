@@ -67,7 +67,6 @@ CHECKS = (
         ),
         limits=NotMovingLimits,
         find=find,
-        is_harmless=is_harmless,
-        needs=frozenset({"speed"}),
+        is_harmless=is_harmless,  # of time, so judged by the tick alone
     ),
 )

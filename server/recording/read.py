@@ -123,10 +123,7 @@ class Recording:
             for source, roads in zip(self._sources, self._roads, strict=True)
             if roads
         ]
-        if len(streams) == 1:
-            yield from streams[0]
-        else:
-            yield from heapq.merge(*streams, key=operator.attrgetter("at_s"))
+        return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=operator.attrgetter("at_s"))
 
     def own(self, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
         """What catgraph itself wrote on one of its channels ("/catgraph/alarms"), in time order: seconds since 1970,

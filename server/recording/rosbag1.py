@@ -21,6 +21,7 @@ from server.source import RosVersion
 CACHE_BYTES = 64_000_000  # unpacked chunks kept: chunks may overlap in time
 _CONNECTION = 7  # the op of a record that may stand before a message in its chunk
 _OP = b"\x04\x00\x00\x00op="
+_OP_BYTES = len(_OP)
 
 _length = struct.Struct("<I").unpack_from
 
@@ -52,7 +53,7 @@ class Bag1:
             coming = {min(begins)[1]: self._unpack(ahead, min(begins)[1])}  # at most one
             entries = [(*entry, number) for number, run in runs.items() for entry in run]
             entries.sort()  # by time, then by place in the file
-            order = iter(dict.fromkeys(entry[1] for entry in entries))
+            order = iter(dict.fromkeys(map(itemgetter(1), entries)))
             position, chunk = -1, b""
             for time_ns, at, offset, number in entries:
                 if at != position:
@@ -123,7 +124,7 @@ def _message(chunk: bytes, offset: int) -> bytes:
         if end > len(chunk):
             raise IndexError
         op = chunk.find(_OP, head, data)
-        if op >= 0 and chunk[op + len(_OP)] == _CONNECTION:
+        if op >= 0 and chunk[op + _OP_BYTES] == _CONNECTION:
             offset = end
             continue
         return chunk[begin:end]

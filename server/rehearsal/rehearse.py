@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from monitor.alarm import Transition
+from monitor.quick import maker
 from monitor.runner import ASKED_EVERY, Crash, Monitor
 from monitor.signal_limits import expected_rates
 from monitor.state import LinkFacts, Snapshot, State
@@ -31,6 +32,7 @@ from server.topics import Source, map_signals
 from server.tuning import Tuning
 
 SAMPLE_TICKS = ASKED_EVERY  # what every check says is known then, without asking any again
+_link_facts = maker(LinkFacts)  # one for each tick
 SILENCE_S = 600.0  # after so long without a message nothing new can be said: the judge is not stepped through the rest
 
 
@@ -241,7 +243,7 @@ class _Run:
 
     def _link(self, now_s: float) -> LinkFacts:
         """A link that opened with the first message and answers as long as there is something to read."""
-        return LinkFacts(
+        return _link_facts(
             phase="monitoring",
             since_s=self._opened_s,
             bridge_heard_s=now_s,
