@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import MISSING, fields, make_dataclass
+from dataclasses import MISSING, fields
+from types import new_class
 from typing import Any, ParamSpec, TypeVar, cast
 
 P = ParamSpec("P")
@@ -46,18 +47,12 @@ def changer(cls: type[T]) -> Callable[..., T]:
 
 def _written(kind: Any, arguments: str, values: Sequence[str], known: dict[str, Any]) -> Callable[..., Any]:
     """The function that makes a `kind` of these values, an expression for each of its fields."""
-    twin = make_dataclass(
-        kind.__name__,
-        [(one.name, Any) for one in fields(kind)],
-        bases=getattr(kind, "__orig_bases__", kind.__bases__),
-        slots=True,
-        init=False,
-        repr=False,
-        eq=False,
-    )
+    fields_of = [one.name for one in fields(kind)]
+    bases = getattr(kind, "__orig_bases__", kind.__bases__)
+    twin = new_class(kind.__name__, bases, {}, lambda namespace: namespace.update(__slots__=fields_of))
     names = known | {"_new": object.__new__, "_twin": twin, "_kind": kind, "_missing": MISSING}
     lines = [f"def make({arguments}):", " _self = _new(_twin)"]
-    lines += [f" _self.{one.name} = {value}" for one, value in zip(fields(kind), values, strict=True)]
+    lines += [f" _self.{name} = {value}" for name, value in zip(fields_of, values, strict=True)]
     lines += [" _self.__class__ = _kind", " return _self"]
     exec(compile("\n".join(lines), f"<maker of {kind.__qualname__}>", "exec"), names)
     make: Callable[..., Any] = names["make"]

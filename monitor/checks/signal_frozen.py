@@ -8,6 +8,7 @@ speed, acceleration, heading. A stamp may never rest, whatever the car does.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from monitor.check import (
@@ -105,11 +106,16 @@ def _frozen(signal: Signal, what: str, held_s: float, limits: SlowLimits) -> Fin
     )
 
 
-def is_harmless(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> bool:
-    reading = snapshot.readings.get(signal.name)
-    if reading is None or reading.repeats is None:
-        return True
-    return reading.repeats.value_s < limits.frozen_after_s and reading.repeats.stamp_s < limits.frozen_after_s
+def harmless(signal: Signal) -> Callable[[Snapshot, SlowLimits], bool]:
+    name = signal.name
+
+    def is_harmless(snapshot: Snapshot, limits: SlowLimits) -> bool:
+        reading = snapshot.readings.get(name)
+        if reading is None or reading.repeats is None:
+            return True
+        return reading.repeats.value_s < limits.frozen_after_s and reading.repeats.stamp_s < limits.frozen_after_s
+
+    return is_harmless
 
 
 def check(signal: Signal) -> Check[Limits]:
@@ -137,7 +143,7 @@ def check(signal: Signal) -> Check[Limits]:
         ),
         limits=SignalLimits,
         find=partial(find, signal),
-        is_harmless=partial(is_harmless, signal),
+        is_harmless=harmless(signal),
     )
 
 
