@@ -6,7 +6,7 @@ import struct
 from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, BinaryIO, cast
@@ -43,37 +43,40 @@ class Bag1:
         self.end_ns = self._reader.end_time - 1
         self._chunks: OrderedDict[int, bytes] = OrderedDict()
         self._chunk_bytes = 0
+        self._ahead = ThreadPoolExecutor(1, "bag")
+        self._coming: dict[int, Future[bytes]] = {}  # at most one
+        begins = [index[0] for index in self._reader.indexes.values() if index]
+        if begins:
+            self._begin_unpacking(min(begins)[1])  # whoever opens a bag reads it
 
     def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
         runs = {number: _since(start_ns, self._reader.indexes.get(number, ())) for number in numbers}
-        begins = [run[0] for run in runs.values() if run]
-        if not begins:
-            return
-        with ThreadPoolExecutor(1, "bag") as ahead:
-            coming = {min(begins)[1]: self._unpack(ahead, min(begins)[1])}  # at most one
-            entries = [(*entry, number) for number, run in runs.items() for entry in run]
-            entries.sort()  # by time, then by place in the file
-            order = iter(dict.fromkeys(map(itemgetter(1), entries)))
-            position, chunk = -1, b""
-            for time_ns, at, offset, number in entries:
-                if at != position:
-                    position, chunk = at, self._chunk(at, coming, ahead)
-                    if not coming:
-                        following = next((one for one in order if one not in self._chunks), None)
-                        if following is not None:
-                            coming[following] = self._unpack(ahead, following)
-                try:
-                    raw = _message(chunk, offset)
-                except (struct.error, IndexError):
-                    raise RecordingUnreadable(f"{self.path.name} is damaged: a message lies outside its chunk") from None
-                yield time_ns, number, raw
+        entries = [(*entry, number) for number, run in runs.items() for entry in run]
+        entries.sort()  # by time, then by place in the file
+        wanted = dict.fromkeys(map(itemgetter(1), entries))
+        self._coming = {at: future for at, future in self._coming.items() if at in wanted}
+        order = iter(wanted)
+        position, chunk = -1, b""
+        for time_ns, at, offset, number in entries:
+            if at != position:
+                position, chunk = at, self._chunk(at)
+                following = None if self._coming else next((one for one in order if one not in self._chunks), None)
+                if following is not None:
+                    self._begin_unpacking(following)
+            try:
+                raw = _message(chunk, offset)
+            except (struct.error, IndexError):
+                raise RecordingUnreadable(f"{self.path.name} is damaged: a message lies outside its chunk") from None
+            yield time_ns, number, raw
 
     def close(self) -> None:
+        self._ahead.shutdown(cancel_futures=True)
+        self._coming.clear()
         self._chunks.clear()
         self._reader.close()
 
-    def _unpack(self, ahead: Executor, position: int) -> Future[bytes]:
-        """A chunk, unpacked beside the reader: that takes as long as reading what is in it."""
+    def _begin_unpacking(self, position: int) -> None:
+        """A chunk is unpacked beside the reader: that takes as long as judging what is in it."""
         header = self._reader.chunks[position]
         try:
             self._file.seek(header.datapos)
@@ -81,15 +84,18 @@ class Bag1:
         except (OSError, MemoryError) as error:
             failed: Future[bytes] = Future()
             failed.set_exception(error)
-            return failed
-        return ahead.submit(_unpacked, header, packed)
+            self._coming[position] = failed
+        else:
+            self._coming[position] = self._ahead.submit(_unpacked, header, packed)
 
-    def _chunk(self, position: int, coming: dict[int, Future[bytes]], ahead: Executor) -> bytes:
+    def _chunk(self, position: int) -> bytes:
         cached = self._chunks.get(position)
         if cached is not None:
             self._chunks.move_to_end(position)
             return cached
-        future = coming.pop(position, None) or self._unpack(ahead, position)
+        if position not in self._coming:
+            self._begin_unpacking(position)
+        future = self._coming.pop(position)
         try:
             chunk = future.result()
         except (OSError, EOFError, ValueError, RuntimeError, MemoryError):  # what bz2, lz4 and the disk may say
