@@ -41,7 +41,9 @@ def changer(cls: type[T]) -> Callable[..., T]:
     """As `dataclasses.replace` for one class, for which the same holds as for `maker`: `change(value, field=new)`."""
     names = [one.name for one in fields(cast("Any", cls))]
     values = [f"_old.{name} if {name} is _missing else {name}" for name in names]
-    change: Callable[..., T] = _written(cls, f"_old, /, *, {', '.join(f'{name}=_missing' for name in names)}", values, {})
+    change: Callable[..., T] = _written(
+        cls, f"_old, /, *, {', '.join(f'{name}=_missing' for name in names)}", values, {}
+    )
     return change
 
 

@@ -152,7 +152,7 @@ class Monitor:
                 try:
                     if row.look(snapshot, row.limits):
                         continue
-                except Exception:  # noqa: S110  # as in `_find`: it is asked, and if it fails too, that is said
+                except Exception:  # as in `_find`: it is asked, and if it fails too, that is said
                     pass
             transitions += self._judge(row.check, snapshot)
         self._passed_on = snapshot if may_pass else None
@@ -164,7 +164,7 @@ class Monitor:
         return link.phase == "monitoring" and not paused
 
     def _is_calm(self, row: _Row) -> bool:
-        """Whether its alarm is at rest, so that a look is enough. Found once: an alarm never changes, it is replaced."""
+        """Whether its alarm is at rest, so that a look is enough. Asked once: an alarm is replaced, not changed."""
         alarm = self.alarms[row.id]
         if not alarm.is_at_rest or self._causes.remembers(row.id):
             return False

@@ -13,7 +13,7 @@ import base64
 import binascii
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -111,7 +111,7 @@ def text(message: Any, *path: str, default: str = "") -> str:
     return value[:200] if isinstance(value, str) else default
 
 
-def _has_fields(value: Any) -> bool:
+def _has_fields(value: Any) -> TypeGuard[Mapping[str, Any]]:
     return type(value) is dict or isinstance(value, Mapping)  # an abstract class takes its time
 
 

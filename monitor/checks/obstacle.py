@@ -85,12 +85,15 @@ def laser_is_clear(snapshot: Snapshot, limits: ObstacleLimits) -> bool:
 
 def estimator_is_clear(snapshot: Snapshot, limits: ObstacleLimits) -> bool:
     distance = snapshot.get("distance")
-    if distance is None or distance.value.distance_m is None:
+    if distance is None:
+        return True
+    gap_m = distance.value.distance_m
+    if gap_m is None:
         return True
     before = snapshot.distance_before
-    before_m = None if before is None else before.value.distance_m
-    span_s = 0.0 if before is None else distance.received_s - before.received_s
-    return _is_clear(distance.value.distance_m, before_m, span_s, snapshot, limits)
+    if before is None:
+        return _is_clear(gap_m, None, 0.0, snapshot, limits)
+    return _is_clear(gap_m, before.value.distance_m, distance.received_s - before.received_s, snapshot, limits)
 
 
 def _is_far(gap_m: float, snapshot: Snapshot, limits: ObstacleLimits) -> bool:
@@ -101,12 +104,14 @@ def _is_far(gap_m: float, snapshot: Snapshot, limits: ObstacleLimits) -> bool:
 
 def _is_clear(gap_m: float, before_m: float | None, span_s: float, snapshot: Snapshot, limits: ObstacleLimits) -> bool:
     speed_mps = _newest_speed(snapshot)
-    if not gap_m >= max(limits.standoff_m, stopping_m(speed_mps, limits)):
+    if not (gap_m >= limits.standoff_m and gap_m >= stopping_m(speed_mps, limits)):
         return False
-    closing_mps = speed_mps
+    reach_m = limits.time_to_collision_s * speed_mps
     if before_m is not None and span_s > 0.0:
-        closing_mps = max(closing_mps, (before_m - gap_m) / span_s)
-    return gap_m >= limits.time_to_collision_s * closing_mps
+        shrunk_mps = (before_m - gap_m) / span_s
+        if shrunk_mps > speed_mps:
+            reach_m = limits.time_to_collision_s * shrunk_mps
+    return gap_m >= reach_m
 
 
 def _newest_speed(snapshot: Snapshot) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 from monitor.check import (
     BRIEF_LETTERS,
@@ -106,7 +107,7 @@ def _frozen(signal: Signal, what: str, held_s: float, limits: SlowLimits) -> Fin
     )
 
 
-def harmless(signal: Signal) -> Callable[[Snapshot, SlowLimits], bool]:
+def harmless(signal: Signal) -> Callable[[Snapshot, Any], bool]:
     name = signal.name
 
     def is_harmless(snapshot: Snapshot, limits: SlowLimits) -> bool:

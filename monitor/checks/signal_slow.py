@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 from monitor.check import (
     BRIEF_LETTERS,
@@ -57,7 +58,7 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
     )
 
 
-def harmless(signal: Signal) -> Callable[[Snapshot, SlowLimits], bool]:
+def harmless(signal: Signal) -> Callable[[Snapshot, Any], bool]:
     name = signal.name
 
     def is_harmless(snapshot: Snapshot, limits: SlowLimits) -> bool:

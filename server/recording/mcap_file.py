@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import heapq
-import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, Literal, cast
 
-from mcap.data_stream import ReadDataStream
-from mcap.opcode import Opcode
 from mcap.reader import McapReader, make_reader
-from mcap.records import Chunk, ChunkIndex, Metadata
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import ChunkIndex, Metadata
 
+from server.recording.chunk_rows import ChunkRow, chunk_rows
 from server.recording.errors import RecordingUnreadable
 from server.recording.own import LIBRARY, METADATA
 from server.recording.source import Channel, Damage, DefinitionFormat
 from server.source import RosVersion
 
 _FORMATS: dict[str, DefinitionFormat] = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
-_MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 
 
 def is_bag2(path: Path) -> bool:
@@ -106,36 +102,25 @@ class McapFile:
         place = 0
         while unread or heap:
             while unread and (not heap or unread[-1].message_start_time <= heap[0][0]):
-                for time_ns, number, raw in self._whole(unread.pop(), numbers, start_ns):
+                part = unread.pop()
+                rows = self._whole(part, numbers, start_ns)
+                if not heap and (not unread or unread[-1].message_start_time > part.message_end_time):
+                    yield from rows  # as nearly always: it overlaps with none
+                    continue
+                for time_ns, number, raw in rows:
                     place += 1
                     heapq.heappush(heap, (time_ns, place, number, raw))
             if heap:
                 time_ns, _, number, raw = heapq.heappop(heap)
                 yield time_ns, number, raw
 
-    def _whole(self, part: ChunkIndex, numbers: set[int], start_ns: int) -> list[tuple[int, int, bytes]]:
-        """The messages of a part that are wanted; none where it is damaged. The library's own way through a chunk makes
-        an object of each record, which takes four times as long."""
-        rows: list[tuple[int, int, bytes]] = []
+    def _whole(self, part: ChunkIndex, numbers: set[int], start_ns: int) -> list[ChunkRow]:
+        """The messages of a part that are wanted; none where it is damaged."""
         try:
-            self._file.seek(part.chunk_start_offset + 1 + 8)
-            stream, size = get_chunk_data_stream(Chunk.read(ReadDataStream(self._file)), validate_crc=True)
-            data = stream.read(size)
-            place = 0
-            while place < size:
-                if data[place] == Opcode.MESSAGE:
-                    _, length, number, _, time_ns, _ = _MESSAGE_HEAD.unpack_from(data, place)
-                    if number in numbers and time_ns >= start_ns:
-                        rows.append((time_ns, number, data[place + _MESSAGE_HEAD.size : place + 9 + length]))
-                else:
-                    length = int.from_bytes(data[place + 1 : place + 9], "little")
-                place += 9 + length
-            if place != size:
-                raise ValueError("its records do not fill it")
+            return chunk_rows(self._file, part.chunk_start_offset, numbers, start_ns)
         except Exception:  # damage makes the readers fail in every way there is
             self.damage.lost.append((part.message_start_time, part.message_end_time))
             return []
-        return rows
 
     def close(self) -> None:
         self._file.close()

@@ -22,7 +22,7 @@ from server.recording.recognise import Kind, recognise
 from server.recording.rosbag1 import Bag1
 from server.recording.rosbag2 import Bag2
 from server.recording.source import Channel, FileSource
-from server.source import Message, RosVersion, message_of
+from server.source import Json, Message, RosVersion, message_of
 
 __all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
 
@@ -44,6 +44,9 @@ class _Road:
     topic: str
     type: str
     decode: Decode
+
+
+Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, what it says
 
 
 def open_recording(paths: Sequence[Path]) -> Recording:
@@ -111,7 +114,14 @@ class Recording:
         return sum(topic.count for topic in self.topics.values())
 
     def messages(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Message]:
-        """All messages in time order, from `start_s` after the beginning on, read as they are asked for.
+        """All messages in time order, from `start_s` after the beginning on, read as they are asked for; see `rows`."""
+        return (
+            message_of(at_s=at_s, topic=topic, type=type, message=message)
+            for at_s, topic, type, message in self.rows(start_s, topics)
+        )
+
+    def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
+        """As `messages`, for whoever takes them apart at once: time, topic, type, and what it says.
 
         Where `topics` are given, those of other topics come too, but empty: unpacking is most of the work. What cannot
         be decoded is left out and counted in `rejected`, what is damaged is left out where the rest can be told from
@@ -123,7 +133,7 @@ class Recording:
             for source, roads in zip(self._sources, self._roads, strict=True)
             if roads
         ]
-        return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=operator.attrgetter("at_s"))
+        return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=operator.itemgetter(0))
 
     def own(self, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
         """What catgraph itself wrote on one of its channels ("/catgraph/alarms"), in time order: seconds since 1970,
@@ -177,7 +187,7 @@ class Recording:
 
     def _read(
         self, source: FileSource, roads: dict[int, _Road], start_ns: int, topics: Collection[str] | None
-    ) -> Iterator[Message]:
+    ) -> Iterator[Row]:
         ways = {
             number: (road.topic, road.type, road.decode if topics is None or road.topic in topics else _nothing)
             for number, road in roads.items()
@@ -191,7 +201,7 @@ class Recording:
                     self.rejected[topic] = self.rejected.get(topic, 0) + 1
                     self.why_rejected.setdefault(topic, str(why))
                     continue
-                yield message_of(at_s=time_ns / 1e9, topic=topic, type=type, message=message)
+                yield time_ns / 1e9, topic, type, message
             if source.damage.is_total:
                 raise RecordingUnreadable(f"{source.path} is damaged: none of its {source.damage.parts} parts is whole")
         except RecordingUnreadable:

@@ -6,7 +6,7 @@ import contextlib
 import gc
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from monitor.alarm import Transition
@@ -18,7 +18,7 @@ from server import judging
 from server.bridge.names import BadName, canonical_name
 from server.judging import TICK_S
 from server.reception import Reception
-from server.recording.read import Recording, RecordingUnreadable
+from server.recording.read import Recording, RecordingUnreadable, Row
 from server.rehearsal.episodes import Diary, Episode
 from server.rehearsal.faults import Faults, Laid
 from server.rehearsal.load import Load, load_of
@@ -175,12 +175,9 @@ class _Run:
         count = 0
         from_s = at_s = self._extract.start_s
         tick_s = math.inf
-        messages: Iterator[Message] = self._recording.messages(self._extract.start_s, listeners)
-        if self._faults.laid:
-            messages = self._faults.over(messages, origin_s, self._signal_of())
         try:
-            for message in messages:
-                now_s = message.at_s - origin_s
+            for message_s, topic, _, message in self._rows(listeners):
+                now_s = message_s - origin_s
                 if count == 0:
                     from_s = self._opened_s = now_s
                     self._judge(now_s, None)
@@ -192,12 +189,12 @@ class _Run:
                 if now_s > at_s:
                     at_s = now_s
                 count += 1
-                sources = listeners.get(message.topic)
+                sources = listeners.get(topic)
                 if sources is None:
                     continue
                 self._last_message_s = now_s
                 changed = judging.receive(
-                    sources, message.message, now_s, None, reception=reception, state=state, profile=profile
+                    sources, message, now_s, None, reception=reception, state=state, profile=profile
                 )
                 if changed:
                     transitions = judging.judge(monitor, state, now_s, changed)
@@ -210,6 +207,15 @@ class _Run:
                 raise
             self._broke_off = str(error)  # it is judged up to there
         return count, from_s, at_s
+
+    def _rows(self, listeners: Collection[str]) -> Iterator[Row]:
+        """The messages, with the faults laid over."""
+        start_s = self._extract.start_s
+        if not self._faults.laid:
+            return self._recording.rows(start_s, listeners)
+        messages = self._recording.messages(start_s, listeners)
+        laid = self._faults.over(messages, self._recording.start_s, self._signal_of())
+        return ((message.at_s, message.topic, message.type, message.message) for message in laid)
 
     def _tick_until(self, now_s: float, heard_s: float) -> float:
         """All ticks up to a moment; answers when the next one is due. `heard_s`: when the last message came."""

@@ -44,14 +44,14 @@ class Ribbons:
                 priorities = [monitor.alarms[check_id].spec.priority for check_id in tile.checks]
                 priority = min(priorities, key=lambda priority: priority.rank)
                 ribbon = self._by_label[tile.label] = Ribbon(label=tile.label, priority=priority)
-            spans = ribbon.spans
-            before = spans[-1] if spans else None
             # What an OK says changes with every number; only why something is not checked is worth keeping.
             text = tile.text if tile.verdict is not Verdict.OK else ""
-            if before is not None:
-                spans[-1] = (before[0], now_s, before[2], before[3])
-                if before[2] is tile.verdict and (before[3] == text or tile.verdict is Verdict.FAULT):
-                    continue
+            spans = ribbon.spans
+            if spans:
+                from_s, _, verdict, before = spans[-1]
+                if verdict is tile.verdict and (before == text or verdict is Verdict.FAULT):
+                    continue  # its end is told when something else begins
+                spans[-1] = (from_s, now_s, verdict, before)
             spans.append((now_s, now_s, tile.verdict, text))
 
     def finish(self, end_s: float) -> tuple[Ribbon, ...]:
