@@ -106,10 +106,9 @@ class Monitor:
     @limits.setter
     def limits(self, limits: AllLimits) -> None:
         self._limits = limits
-        self._limits_of: dict[str, Any] = {
-            check.id: getattr(limits, check.limits_group, None) or check.limits() for check in self._declared
-        }
-        self._rows = tuple(_Row(check, self._limits_of[check.id]) for check in self._checks)
+        self._rows = tuple(
+            _Row(check, getattr(limits, check.limits_group, None) or check.limits()) for check in self._checks
+        )
         self._rows_by_signals: dict[Collection[str], tuple[_Row, ...]] = {}  # of the sets that were ever asked for
 
     def step(self, snapshot: Snapshot, changed: Collection[str] | None = None) -> tuple[Transition, ...]:
@@ -126,7 +125,7 @@ class Monitor:
         for row in self._needing(changed):
             if may_pass and self._is_harmless(row, snapshot):
                 continue  # its words are the last tick's, for a moment
-            transitions += self._judge(row.check, snapshot)
+            transitions += self._judge(row, snapshot)
         if self.crashes:
             transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
         return tuple(transitions)
@@ -136,9 +135,9 @@ class Monitor:
         """What each check last found, by its id."""
         if self._passed_on is not None:
             snapshot, self._passed_on = self._passed_on, None
-            for check in self._checks:
-                if check.id not in self._asked:
-                    self._findings[check.id] = self._find(check, snapshot)
+            for row in self._rows:
+                if row.id not in self._asked:
+                    self._findings[row.id] = self._find(row, snapshot)
         return self._findings
 
     def _tick(self, snapshot: Snapshot) -> tuple[Transition, ...]:
@@ -154,7 +153,7 @@ class Monitor:
                         continue
                 except Exception:  # as in `_find`: it is asked, and if it fails too, that is said
                     pass
-            transitions += self._judge(row.check, snapshot)
+            transitions += self._judge(row, snapshot)
         self._passed_on = snapshot if may_pass else None
         if self.crashes or not self.alarms[IMPAIRED].is_at_rest:
             transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
@@ -277,13 +276,12 @@ class Monitor:
                 self._rows_by_signals[together] = found
         return found
 
-    def _judge(self, check: AnyCheck, snapshot: Snapshot) -> tuple[Transition, ...]:
-        finding = self._find(check, snapshot)
+    def _judge(self, row: _Row, snapshot: Snapshot) -> tuple[Transition, ...]:
+        check, finding = row.check, self._find(row, snapshot)
         self._asked.add(check.id)
         by = self._causes.holding(check.id, snapshot.now_s)
         if not by and finding.verdict is not Verdict.FAULT and not snapshot.paused:
-            alarm = self.alarms[check.id]
-            if alarm.is_at_rest and not self._causes.remembers(check.id):
+            if row.calm is self.alarms[check.id] or self._is_calm(row):
                 self._findings[check.id] = finding
                 return ()  # by far the most frequent case
         if by and finding.verdict is Verdict.FAULT:
@@ -301,14 +299,15 @@ class Monitor:
         self._causes.note(alarm, now_s)
         return transitions
 
-    def _find(self, check: AnyCheck, snapshot: Snapshot) -> Finding:
+    def _find(self, row: _Row, snapshot: Snapshot) -> Finding:
+        check = row.check
         if check.scope is Scope.CAR:
             if snapshot.link.phase != "monitoring":
                 return NO_LINK
             if snapshot.paused:
                 return PAUSED
         try:
-            finding = check.find(snapshot, self._limits_of[check.id], self.alarms[check.id].active)
+            finding = check.find(snapshot, row.limits, self.alarms[check.id].active)
             if type(finding) is not Finding:
                 raise TypeError(f"{check.id} found {finding!r}, which is no finding")
         except NotFresh as missing:

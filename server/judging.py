@@ -53,7 +53,7 @@ def receive(
             continue
         if type(value) is Steering and profile.steering == "tyre_angle":
             value = Steering(percent=value.percent * PERCENT_A_RAD)
-        changed += state.receive(source.signal, value, at_s, stamp_s(message))
+        changed += state.receive(source.signal, value, at_s, stamp_s(message) if "header" in message else None)
     if not is_proper:
         reception.rejected += 1
     return changed

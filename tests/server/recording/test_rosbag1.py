@@ -1,5 +1,4 @@
-"""Bags of ROS 1 of many chunks: the same messages as the library's own reader gives, from any moment on, in any order of
-the chunks."""
+"""Bags of ROS 1 of many chunks: the messages that the library's own reader gives, from any moment on."""
 
 from __future__ import annotations
 
