@@ -28,10 +28,13 @@ _ENTRY = struct.Struct("<III")  # seconds, nanoseconds, place in the chunk
 _length = struct.Struct("<I").unpack_from
 
 
+_Entry = tuple[int, int, int, int]  # of an index: ns, chunk, place in it, connection
+
+
 class _Reader(Reader):
     """The library's, but for the entries of the index: made one by one they take longer than all else of opening."""
 
-    indexes: dict[int, list[tuple[int, int, int]]]  # type: ignore[assignment]  # ns, chunk, place in it; in this order
+    indexes: dict[int, list[_Entry]]  # type: ignore[assignment]  # by connection, in order
 
     def read_index_data(self, pos: int, indexes: dict[int, list[Any]]) -> None:
         """One record of a connection's messages in the chunk at `pos`. Raises ReaderError where it is none."""
@@ -41,8 +44,10 @@ class _Reader(Reader):
         count = _length(header[b"count"])[0]
         if header[b"op"] != _INDEX or header[b"ver"] != _INDEX_1 or len(entries) != count * _ENTRY.size:
             raise ReaderError("An index record is damaged.")
-        indexes[_length(header[b"conn"])[0]] += [
-            (seconds * 10**9 + nanoseconds, pos, place) for seconds, nanoseconds, place in _ENTRY.iter_unpack(entries)
+        number = _length(header[b"conn"])[0]
+        indexes[number] += [
+            (seconds * 10**9 + nanoseconds, pos, place, number)
+            for seconds, nanoseconds, place in _ENTRY.iter_unpack(entries)
         ]
 
 
@@ -81,8 +86,9 @@ class Bag1:
             self._begin_unpacking(min(begins)[1])  # whoever opens a bag reads it
 
     def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-        runs = {number: _since(start_ns, self._reader.indexes.get(number, ())) for number in numbers}
-        entries = [(*entry, number) for number, run in runs.items() for entry in run]
+        entries: list[_Entry] = []
+        for number in numbers:
+            entries += _since(start_ns, self._reader.indexes.get(number, ()))
         entries.sort()  # by time, then by place in the file
         wanted = dict.fromkeys(map(itemgetter(1), entries))
         self._coming = {at: future for at, future in self._coming.items() if at in wanted}
@@ -139,8 +145,8 @@ class Bag1:
         return chunk
 
 
-def _since(start_ns: int, index: Sequence[Any]) -> Sequence[Any]:
-    """The entries of an index, which is in order of time, from a moment on."""
+def _since(start_ns: int, index: Sequence[_Entry]) -> Sequence[_Entry]:
+    """The entries of one connection from a moment on."""
     first = bisect_left(index, start_ns, key=itemgetter(0))
     return index[first:] if first else index
 
