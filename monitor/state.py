@@ -264,11 +264,12 @@ class State:
         self._rides: str | None = None
         self._scan_earlier = self._heard["scan"].earlier = Earlier()
         self._distance_earlier = self._heard["distance"].earlier = Earlier()
-        self.link_facts = LinkFacts()  # as the next, read by whoever likes and written by `link` and `set_paused` alone
+        # Read by whoever likes, written by `link` and `set_paused` alone: asked at every message.
+        self.link_facts = LinkFacts()
+        self.paused = False
         self._recorder = RecorderFacts()
         self._reach: ReachFacts | None = None
         self._slowing = SlowingFacts()
-        self.paused = False
         self._paused_since_s: float | None = None
 
     def expect(self, expected_hz: Mapping[str, float]) -> None:

@@ -8,9 +8,7 @@ speed, acceleration, heading. A stamp may never rest, whatever the car does.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from monitor.check import (
     BRIEF_LETTERS,
@@ -107,16 +105,11 @@ def _frozen(signal: Signal, what: str, held_s: float, limits: SlowLimits) -> Fin
     )
 
 
-def harmless(signal: Signal) -> Callable[[Snapshot, Any], bool]:
-    name = signal.name
-
-    def is_harmless(snapshot: Snapshot, limits: SlowLimits) -> bool:
-        reading = snapshot.readings.get(name)
-        if reading is None or reading.repeats is None:
-            return True
-        return reading.repeats.value_s < limits.frozen_after_s and reading.repeats.stamp_s < limits.frozen_after_s
-
-    return is_harmless
+def is_harmless(name: str, snapshot: Snapshot, limits: SlowLimits) -> bool:
+    reading = snapshot.readings.get(name)
+    if reading is None or reading.repeats is None:
+        return True
+    return reading.repeats.value_s < limits.frozen_after_s and reading.repeats.stamp_s < limits.frozen_after_s
 
 
 def check(signal: Signal) -> Check[Limits]:
@@ -144,7 +137,7 @@ def check(signal: Signal) -> Check[Limits]:
         ),
         limits=SignalLimits,
         find=partial(find, signal),
-        is_harmless=harmless(signal),
+        is_harmless=partial(is_harmless, signal.name),
     )
 
 

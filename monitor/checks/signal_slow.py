@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from monitor.check import (
     BRIEF_LETTERS,
@@ -58,16 +56,11 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
     )
 
 
-def harmless(signal: Signal) -> Callable[[Snapshot, Any], bool]:
-    name = signal.name
-
-    def is_harmless(snapshot: Snapshot, limits: SlowLimits) -> bool:
-        rate = snapshot.rates.get(name)
-        if rate is None or rate.expected_hz is None or rate.measured_hz is None or not rate.settled:
-            return True
-        return rate.measured_hz >= rate.expected_hz * limits.slow_below_percent / 100.0
-
-    return is_harmless
+def is_harmless(name: str, snapshot: Snapshot, limits: SlowLimits) -> bool:
+    rate = snapshot.rates.get(name)
+    if rate is None or rate.expected_hz is None or rate.measured_hz is None or not rate.settled:
+        return True
+    return rate.measured_hz >= rate.expected_hz * limits.slow_below_percent / 100.0
 
 
 def _brief(signal: Signal, hz: float) -> str:
@@ -97,7 +90,7 @@ def check(signal: Signal) -> Check[Limits]:
         ),
         limits=SignalLimits,
         find=partial(find, signal),
-        is_harmless=harmless(signal),
+        is_harmless=partial(is_harmless, signal.name),
     )
 
 

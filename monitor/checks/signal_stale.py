@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from monitor.check import (
     BRIEF_LETTERS,
@@ -60,17 +58,12 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
     )
 
 
-def harmless(signal: Signal) -> Callable[[Snapshot, Any], bool]:
-    name = signal.name
-
-    def is_harmless(snapshot: Snapshot, limits: SlowLimits) -> bool:
-        """Fresh, or not on the car."""
-        reading = snapshot.readings.get(name)
-        if reading is None or reading.derived_from is not None:
-            return name not in snapshot.link.published
-        return reading.is_fresh(snapshot.now_s)
-
-    return is_harmless
+def is_harmless(name: str, snapshot: Snapshot, limits: SlowLimits) -> bool:
+    """Fresh, or not on the car."""
+    reading = snapshot.readings.get(name)
+    if reading is None or reading.derived_from is not None:
+        return name not in snapshot.link.published
+    return reading.is_fresh(snapshot.now_s)
 
 
 def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Finding:
@@ -129,7 +122,7 @@ def check(signal: Signal) -> Check[Limits]:
         ),
         limits=SignalLimits,
         find=partial(find, signal),
-        is_harmless=harmless(signal),
+        is_harmless=partial(is_harmless, signal.name),
     )
 
 

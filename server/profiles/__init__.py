@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.resources import files
+from pathlib import Path
 from typing import Any, Literal
 
 from monitor import catalog
@@ -40,10 +40,9 @@ GENERIC = Profile(name="generic", title="Any car")
 def load() -> dict[str, Profile]:
     """The profiles that are shipped, by name. Raises ValueError where one of them is wrong (a test loads them all)."""
     found = {GENERIC.name: GENERIC}
-    for entry in sorted(files(__name__).iterdir(), key=lambda entry: entry.name):
-        if entry.name.endswith(".toml"):
-            profile = _read(entry.name.removesuffix(".toml"), tomllib.loads(entry.read_text(encoding="utf-8")))
-            found[profile.name] = profile
+    for path in sorted(Path(__file__).parent.glob("*.toml")):
+        profile = _read(path.stem, tomllib.loads(path.read_text(encoding="utf-8")))
+        found[profile.name] = profile
     return found
 
 

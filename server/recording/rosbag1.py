@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from bisect import bisect_left
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from operator import itemgetter
 from pathlib import Path
@@ -36,9 +36,17 @@ class _Reader(Reader):
 
     indexes: dict[int, list[_Entry]]  # type: ignore[assignment]  # by connection, in order
 
+    def __init__(self, path: Path, on_first_chunk: Callable[[int], None]) -> None:
+        super().__init__(path)
+        self._on_first_chunk: Callable[[int], None] | None = on_first_chunk
+
     def read_index_data(self, pos: int, indexes: dict[int, list[Any]]) -> None:
         """One record of a connection's messages in the chunk at `pos`. Raises ReaderError where it is none."""
         file = cast("BinaryIO", self.bio)
+        if self._on_first_chunk is not None:
+            tell, self._on_first_chunk, place = self._on_first_chunk, None, file.tell()
+            tell(pos)
+            file.seek(place)
         header = _fields(file.read(_length(file.read(4))[0]))
         entries = file.read(_length(file.read(4))[0])
         count = _length(header[b"count"])[0]
@@ -71,19 +79,15 @@ class Bag1:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.damage = Damage()  # none that is left out: the format has no checksums
-        self._reader = _Reader(path)
-        self._reader.open()
-        self._file = cast("BinaryIO", self._reader.bio)
-        self.channels: Sequence[Channel] = [_channel(connection) for connection in self._reader.connections]
-        self.start_ns = self._reader.start_time
-        self.end_ns = self._reader.end_time - 1
         self._chunks: OrderedDict[int, bytes] = OrderedDict()
         self._chunk_bytes = 0
         self._ahead = ThreadPoolExecutor(1, "bag")
         self._coming: dict[int, Future[bytes]] = {}  # at most one
-        begins = [index[0] for index in self._reader.indexes.values() if index]
-        if begins:
-            self._begin_unpacking(min(begins)[1])  # whoever opens a bag reads it
+        self._reader = _Reader(path, self._begin_unpacking)  # whoever opens a bag reads it, as a rule from there
+        self._reader.open()
+        self.channels: Sequence[Channel] = [_channel(connection) for connection in self._reader.connections]
+        self.start_ns = self._reader.start_time
+        self.end_ns = self._reader.end_time - 1
 
     def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
         entries: list[_Entry] = []
@@ -114,10 +118,10 @@ class Bag1:
 
     def _begin_unpacking(self, position: int) -> None:
         """A chunk is unpacked beside the reader: that takes as long as judging what is in it."""
-        header = self._reader.chunks[position]
+        header, file = self._reader.chunks[position], cast("BinaryIO", self._reader.bio)
         try:
-            self._file.seek(header.datapos)
-            packed = self._file.read(header.datasize)
+            file.seek(header.datapos)
+            packed = file.read(header.datasize)
         except (OSError, MemoryError) as error:
             failed: Future[bytes] = Future()
             failed.set_exception(error)
