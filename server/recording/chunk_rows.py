@@ -3,10 +3,11 @@ four times as long."""
 
 from __future__ import annotations
 
+import heapq
 import struct
-from collections.abc import Container
-from operator import itemgetter
-from typing import IO
+from collections.abc import Callable, Container, Iterable, Iterator
+from operator import attrgetter, itemgetter
+from typing import IO, Protocol, TypeVar
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -19,6 +20,35 @@ _MESSAGE = int(Opcode.MESSAGE)
 _MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 
 ChunkRow = tuple[int, int, bytes]  # ns, channel, message
+
+
+class Part(Protocol):
+    """What an index says of a chunk."""
+
+    @property
+    def message_start_time(self) -> int: ...  # ns
+
+
+P = TypeVar("P", bound=Part)
+
+
+def in_order(parts: Iterable[P], read: Callable[[P], list[ChunkRow]]) -> Iterator[ChunkRow]:
+    """What is in these parts, in order of time; each is read when its time has come. Nearly always no two overlap."""
+    unread = sorted(parts, key=attrgetter("message_start_time"))[::-1]
+    heap: list[tuple[int, int, int, bytes]] = []  # time, place, channel, message: of the parts that overlap
+    place = 0
+    while unread or heap:
+        while unread and (not heap or unread[-1].message_start_time <= heap[0][0]):
+            rows = read(unread.pop())
+            if rows and not heap and (not unread or unread[-1].message_start_time > rows[-1][0]):
+                yield from rows
+                continue
+            for time_ns, channel, raw in rows:
+                place += 1
+                heapq.heappush(heap, (time_ns, place, channel, raw))
+        if heap:
+            time_ns, _, channel, raw = heapq.heappop(heap)
+            yield time_ns, channel, raw
 
 
 def chunk_rows(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import IO, Any, Literal, cast
 from mcap.reader import McapReader, make_reader
 from mcap.records import ChunkIndex, Metadata
 
-from server.recording.chunk_rows import ChunkRow, chunk_rows
+from server.recording.chunk_rows import ChunkRow, chunk_rows, in_order
 from server.recording.errors import RecordingUnreadable
 from server.recording.own import LIBRARY, METADATA
 from server.recording.source import Channel, Damage, DefinitionFormat
@@ -96,23 +95,9 @@ class McapFile:
                 if channel.id in numbers:
                     yield message.log_time, channel.id, message.data
             return
-        unread = [part for part in reversed(self._parts) if _matters(part, numbers, start_ns)]
-        self.damage.parts = len(unread)
-        heap: list[tuple[int, int, int, bytes]] = []  # time, place, channel, message: of the parts that overlap
-        place = 0
-        while unread or heap:
-            while unread and (not heap or unread[-1].message_start_time <= heap[0][0]):
-                part = unread.pop()
-                rows = self._whole(part, numbers, start_ns)
-                if not heap and (not unread or unread[-1].message_start_time > part.message_end_time):
-                    yield from rows  # as nearly always: it overlaps with none
-                    continue
-                for time_ns, number, raw in rows:
-                    place += 1
-                    heapq.heappush(heap, (time_ns, place, number, raw))
-            if heap:
-                time_ns, _, number, raw = heapq.heappop(heap)
-                yield time_ns, number, raw
+        parts = [part for part in self._parts if _matters(part, numbers, start_ns)]
+        self.damage.parts = len(parts)
+        yield from in_order(parts, lambda part: self._whole(part, numbers, start_ns))
 
     def _whole(self, part: ChunkIndex, numbers: set[int], start_ns: int) -> list[ChunkRow]:
         """The messages of a part that are wanted; none where it is damaged."""

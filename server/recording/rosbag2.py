@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Collection, Generator, Iterator, Mapping, Sequence
-from operator import attrgetter, itemgetter
 from pathlib import Path, PosixPath
 from typing import Any, BinaryIO, Literal, cast
 from urllib.parse import quote
@@ -14,7 +12,7 @@ from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
-from server.recording.chunk_rows import chunk_rows
+from server.recording.chunk_rows import ChunkRow, chunk_rows, in_order
 from server.recording.errors import RecordingUnreadable
 from server.recording.source import Channel, Damage, DefinitionFormat
 from server.source import RosVersion
@@ -61,36 +59,15 @@ class _WholeParts(McapReader):
             and any(part.channel_count.get(number) for number in wanted)
         ]
         self.damage.parts = len(parts)
-        for together in _overlapping(parts):
-            streams = [self._whole(part, wanted, from_ns, to_ns) for part in together]
-            for time_ns, number, raw in heapq.merge(*streams, key=itemgetter(0)) if len(streams) > 1 else streams[0]:
-                if number is not None:
-                    yield wanted[number], time_ns, raw
+        for time_ns, number, raw in in_order(parts, lambda part: self._whole(part, wanted, from_ns, to_ns)):
+            yield wanted[number], time_ns, raw
 
-    def _whole(
-        self, part: Any, wanted: dict[int, Connection], from_ns: int, to_ns: int
-    ) -> Iterator[tuple[int, int | None, bytes]]:
-        yield part.message_start_time, None, b""  # so that it is read when its time has come
+    def _whole(self, part: Any, wanted: dict[int, Connection], from_ns: int, to_ns: int) -> list[ChunkRow]:
         try:
-            rows = chunk_rows(cast("BinaryIO", self.bio), part.chunk_start_offset, wanted, from_ns, to_ns)
+            return chunk_rows(cast("BinaryIO", self.bio), part.chunk_start_offset, wanted, from_ns, to_ns)
         except Exception:  # damage makes the readers fail in every way there is
             self.damage.lost.append((part.message_start_time, part.message_end_time))
-        else:
-            yield from rows
-
-
-def _overlapping(parts: Sequence[Any]) -> Iterator[list[Any]]:
-    """Parts in order of time, together where their times overlap. Nearly always each is alone."""
-    together: list[Any] = []
-    end_ns = 0
-    for part in sorted(parts, key=attrgetter("message_start_time")):
-        if together and part.message_start_time > end_ns:
-            yield together
-            together = []
-        end_ns = max(end_ns, part.message_end_time)
-        together.append(part)
-    if together:
-        yield together
+            return []
 
 
 class _Directory(DirectoryReader):
