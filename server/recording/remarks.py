@@ -131,8 +131,8 @@ def text(words: Any) -> str:
     """In lines, else the same."""
     if not isinstance(words, str):
         return ""
-    lines = [line_.rstrip() for line_ in words.replace("\r\n", "\n").replace("\r", "\n").split("\n")]
-    return "\n".join("".join(map(_seen, line_)) for line_ in lines).strip()
+    lines = words.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return "\n".join("".join(map(_seen, line_)).rstrip() for line_ in lines).strip()
 
 
 def _seen(letter: str) -> str:
