@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from pathlib import Path
 
 import pytest
 
 from tests.chromium import find_chromium
-
-PROJECT = Path(__file__).resolve().parents[1]
+from tests.tree import RECORDINGS
 
 
 def pytest_configure() -> None:
@@ -22,10 +20,9 @@ def pytest_configure() -> None:
 @pytest.fixture(scope="session")
 def recordings() -> Path:
     """The folder of real drives: $CATGRAPH_DATA, else ../shared/data. Tests that need it are skipped without it."""
-    folder = Path(os.environ.get("CATGRAPH_DATA") or PROJECT.parent / "shared" / "data")
-    if not folder.is_dir():
-        pytest.skip(f"no recordings in {folder}: name their folder in CATGRAPH_DATA")
-    return folder
+    if not RECORDINGS.is_dir():
+        pytest.skip(f"no recordings in {RECORDINGS}: name their folder in CATGRAPH_DATA")
+    return RECORDINGS
 
 
 @pytest.fixture(scope="session")

@@ -1,12 +1,16 @@
-"""The project's own files, for the tests that look at all of them."""
+"""Where things lie: the project's own files, for the tests that look at all of them, and the real drives."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 from functools import cache
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[1]
+RECORDINGS = Path(
+    os.environ.get("CATGRAPH_DATA") or PROJECT.parent / "shared" / "data"
+)  # real drives, where there are any
 
 
 @cache

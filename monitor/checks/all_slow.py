@@ -47,7 +47,7 @@ def is_harmless(snapshot: Snapshot, limits: SlowLimits) -> bool:
     """So few are slow that it does not matter which of them count."""
     share, slow = limits.slow_below_percent / 100.0, 0
     for rate in snapshot.rates.values():
-        if rate.measured_hz and rate.expected_hz and rate.measured_hz < share * rate.expected_hz:
+        if rate.measured_hz and rate.expected_hz and rate.measured_hz / rate.expected_hz < share:
             slow += 1
     return slow < AT_LEAST
 

@@ -84,7 +84,11 @@ class Bag1:
         self._ahead = ThreadPoolExecutor(1, "bag")
         self._coming: dict[int, Future[bytes]] = {}  # at most one
         self._reader = _Reader(path, self._begin_unpacking)  # whoever opens a bag reads it, as a rule from there
-        self._reader.open()
+        try:
+            self._reader.open()
+        except BaseException:
+            self._ahead.shutdown(cancel_futures=True)
+            raise
         self.channels: Sequence[Channel] = [_channel(connection) for connection in self._reader.connections]
         self.start_ns = self._reader.start_time
         self.end_ns = self._reader.end_time - 1

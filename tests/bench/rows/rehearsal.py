@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import statistics
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import orjson
 
-from tests.bench.child import PROJECT, Failed
+from tests.bench.child import Failed
 from tests.bench.rig import Rig
 from tests.bench.table import Group, Row
+from tests.tree import PROJECT, RECORDINGS
 
 DRIVE = "catvehicle_2016-06-01.bag"
 TIMES_REAL = 300
@@ -34,7 +33,7 @@ print(time.perf_counter() - began_s)
 
 def measure(rig: Rig) -> Group:
     """`catgraph check` on the CATVehicle's drive, each time in a process of its own, opening the file included."""
-    path = Path(os.environ.get("CATGRAPH_DATA", PROJECT.parent / "shared" / "data")) / DRIVE
+    path = RECORDINGS / DRIVE
     if not path.is_file():
         raise Failed(f"no {path}: name the folder of the recordings in CATGRAPH_DATA")
     judged_ms, whole_ms, floor_ms = [], [], []

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import PROJECT
 from tests.server.mail.mailing import Shelf
 from tests.server.mail.post import Post, posting, read
+from tests.tree import PROJECT
 
 LARGE = hashlib.shake_256(b"drive").digest(250_000)  # three parts at the limit of 0.1 MB
 SEED = 20
