@@ -20,6 +20,7 @@ from pathlib import Path
 FOLDER = "built"  # in static/, beside js/ and css/, so that what they name by ../ is found from here too
 STYLES = ("tokens", "frame", "instruments", "map", "sheets", "screens", "settings", "slowing", "wide")  # in this order
 ENTRY = "app.js"
+EARLY = "early.js"  # stands in the page itself
 THREADS = ("scan-painter",)  # scripts of threads, each joined for itself
 _LIST = "built.json"  # written last
 _TARGET = "es2022"  # private fields and top-level await: every browser of 2022 and later
@@ -33,6 +34,7 @@ class Built:
     script: str
     style: str
     needed: tuple[str, ...]  # scripts that `script` asks for at once
+    early: str  # the text of the script that runs before all others
     name: str  # of this build: other sources have another
 
 
@@ -62,6 +64,7 @@ def join(tools: Path, static: Path) -> None:
         _run([str(tools / "rollup"), "--config", str(_CONFIG), "--silent"], {**os.environ, **entry})
         told = json.loads((joined / "joined.json").read_text(encoding="utf-8"))
         _run([str(tools / "esbuild"), *map(str, sorted(joined.glob("*.js"))), "--format=esm", *small])
+        early = _run([str(tools / "esbuild"), str(static / "js" / EARLY), "--minify", f"--target={_TARGET}"])
         imports = (f"@import {json.dumps(str(static / 'css' / f'{name}.css'))};" for name in STYLES)
         style.write_text("\n".join(imports), encoding="utf-8")
         _run([str(tools / "esbuild"), str(style), *own, "--external:../fonts/*", *small])
@@ -70,6 +73,7 @@ def join(tools: Path, static: Path) -> None:
         "script": f"{FOLDER}/{told['script']}",
         "style": f"{FOLDER}/{next(path.name for path in into.glob('page-*.css'))}",
         "needed": [f"{FOLDER}/{name}" for name in told["needed"]],
+        "early": early.strip(),
     }
     (into / _LIST).write_text(json.dumps(listed), encoding="utf-8")
 
@@ -98,7 +102,8 @@ def _find(static: Path, stamps: tuple[tuple[str, int], ...], listed_ns: int) -> 
     try:
         listed = json.loads((static / FOLDER / _LIST).read_text(encoding="utf-8"))
         needed, name = tuple(listed["needed"]), listed["sources"][:12]
-        found = Built(script=listed["script"], style=listed["style"], needed=needed, name=name)
+        script, style, early = listed["script"], listed["style"], listed["early"]
+        found = Built(script=script, style=style, needed=needed, early=early, name=name)
         is_whole = all((static / name).is_file() for name in (found.script, found.style, *found.needed))
         return found if is_whole and listed["sources"] == digest_of_sources(static) else None
     except (OSError, ValueError, KeyError, TypeError):
@@ -109,10 +114,11 @@ def _sources(static: Path) -> list[Path]:
     return sorted([*(static / "js").glob("*.js"), *(static / "css").glob("*.css")])
 
 
-def _run(command: list[str], environment: dict[str, str] | None = None) -> None:
+def _run(command: list[str], environment: dict[str, str] | None = None) -> str:
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     if done.returncode:
         raise SystemExit(f"The page's files could not be joined:\n{done.stderr}{done.stdout}")
+    return done.stdout
 
 
 def main(arguments: Iterable[str]) -> None:

@@ -12,12 +12,14 @@ from pathlib import Path
 from fastapi import FastAPI, Request
 from fastapi.responses import HTMLResponse, Response
 from fastapi.templating import Jinja2Templates
+from markupsafe import Markup
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse
 
 from server.web.api import running, vehicle_of
 from server.web.assets import check_vendor, static_dir, templates_dir
-from server.web.built import ENTRY, STYLES, Built, find
+from server.web.built import EARLY, ENTRY, STYLES, Built, find
+from server.web.headers import policy_of
 from server.web.icons import FOLDER as DRAWN
 from server.web.icons import WITHOUT, are_drawn
 from server.web.manifest import manifest as manifest_of
@@ -35,6 +37,11 @@ def parts_of(built: Built | None, asset: Callable[[str], str]) -> dict[str, obje
         return {"styles": [asset(f"css/{name}.css") for name in STYLES], "script": asset(f"js/{ENTRY}"), "needed": []}
     style, script, *needed = (f"/static/{name}" for name in (built.style, built.script, *built.needed))
     return {"styles": [style], "script": script, "needed": needed}
+
+
+def early_of(built: Built | None, static: Path) -> str:
+    """The script that stands in a page itself: asked for by an address it would hold up all that comes after it."""
+    return built.early if built is not None else (static / "js" / EARLY).read_text(encoding="utf-8")
 
 
 def install(app: FastAPI) -> None:
@@ -63,7 +70,13 @@ def install(app: FastAPI) -> None:
 
     def page_of(template: str, request: Request, built: Built | None, **context: object) -> bytes:
         context |= parts_of(built, asset) | {"build": build_of(built), "icons": are_drawn(static)}
+        context["early"] = Markup(early_of(built, static))
         return bytes(templates.TemplateResponse(request, template, context).body)
+
+    def sent(body: bytes, request: Request, built: Built | None) -> Response:
+        answered = answer(packed(body), request.headers, _HTML, "no-cache")
+        answered.headers["Content-Security-Policy"] = policy_of(early_of(built, static))
+        return answered
 
     def shell(request: Request, built: Built) -> Shell:
         return shell_of(static, built, asset, page_of("offline.html", request, built))
@@ -74,7 +87,7 @@ def install(app: FastAPI) -> None:
         access = "open" if one.access.is_open else "paired"
         context = {"version": one.version, "vehicle": vehicle_of(one, vehicle), "access": access}
         body = page_of("page.html", request, built, worker=built is not None and one.config.worker, **context)
-        return answer(packed(body), request.headers, _HTML, "no-cache")
+        return sent(body, request, built)
 
     @app.get(OFFLINE, response_class=HTMLResponse, include_in_schema=False)
     async def offline(request: Request, v: str | None = None) -> Response:
@@ -82,7 +95,7 @@ def install(app: FastAPI) -> None:
         built = find(static)
         if v is not None and (built is None or shell(request, built).version != v):
             raise HTTPException(404, "The page has changed since.")
-        return answer(packed(page_of("offline.html", request, built)), request.headers, _HTML, "no-cache")
+        return sent(page_of("offline.html", request, built), request, built)
 
     @app.get(WORKER, include_in_schema=False)
     async def worker(request: Request) -> Response:
@@ -90,9 +103,9 @@ def install(app: FastAPI) -> None:
         built = find(static)
         is_kept = built is not None and running(request).config.worker
         script = shell(request, built).worker(static) if built is not None and is_kept else withdrawn(static)
-        sent = answer(packed(script.encode()), request.headers, "text/javascript; charset=utf-8", "no-cache")
-        sent.headers["Service-Worker-Allowed"] = "/"
-        return sent
+        answered = answer(packed(script.encode()), request.headers, "text/javascript; charset=utf-8", "no-cache")
+        answered.headers["Service-Worker-Allowed"] = "/"
+        return answered
 
     @app.get("/manifest.webmanifest", include_in_schema=False)
     async def manifest(request: Request) -> Response:

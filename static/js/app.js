@@ -14,6 +14,7 @@ import { FilesTab } from './files-tab.js';
 import { forgetWork } from './forget.js';
 import { Handset } from './handset.js';
 import { MapTab } from './map-tab.js';
+import { holdTaps } from './held-taps.js';
 import { notices } from './notice.js';
 import { ownName } from './own-name.js';
 import { Page } from './page.js';
@@ -47,63 +48,77 @@ import { mount as mountTopbar } from './topbar.js';
 import { mount as mountTrends } from './trends.js';
 import { mount as mountVeil } from './veil.js';
 
+/** The rest of the page waits for the first values so long, and no longer [ms]. */
+const WAITS_MS = 400;
+
 begin();
 
-/** Part after part, with a breath between: as one piece it would keep a slow phone from everything else for a fifth of a second. */
+/**
+ * First what is seen at a glance, with its first values; then, part after part, what answers a finger. As one piece it would
+ * keep a slow phone from the values for a third of a second, and from everything else for as long.
+ */
 async function begin() {
+  const release = holdTaps();
   const vehicle = document.documentElement.dataset['vehicle'];
   const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
 
   /** Where devices are paired, each socket needs a ticket. */
   const admission = document.documentElement.dataset['access'] === 'paired' ? new Admission(address, shut) : null;
-  const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), deviceName(navigator.userAgent, keptHere()), ownName());
+  let name = ''; // one, also where nothing can be kept
+  const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), () => (name ||= deviceName(navigator.userAgent, keptHere())), ownName);
   const voice = new Voice();
-  const arming = new Arming(voice, new Phone(store));
   const monitor = need(document, '#monitor');
-  const handset = new Handset();
   const tell = notices(field(document, 'snacks'));
   const control = new Control(store, tell, openPhone);
   /** What was refused because another is in control is said with a key that helps. @type {typeof tell} */
   const say = (sentence, title, way) => tell(sentence, title, way ?? control.wayOf(sentence));
-  const page = new Page(store, arming, say);
+  const page = new Page(store, say);
+  /** Called when another tab or screen came in front; the tabs' contents come later. */
+  let front = () => {};
+  const tabs = new Tabs(monitor, () => front());
+  page.onShown = () => {
+    tabs.place();
+    front();
+  };
+  store.on('draw', draw);
+  mountTopbar(monitor, store, say);
+  mountStrip(monitor, store);
+  mountVeil(monitor, store);
+  mountGauge(need(monitor, '[data-part="gauge"]'), store);
+  mountNearest(need(monitor, '[data-part="nearest"]'), store);
+  mountPedals(need(monitor, '[data-part="pedals"]'), store);
+  mountPosition(need(monitor, '[data-part="position"]'), store);
+  store.start();
+  await glanced(store);
 
+  const arming = new Arming(voice, new Phone(store));
+  const handset = new Handset();
+  mountStart(need(document, '#start'), store);
+  mountConnect(need(document, '#connect'), store, page, arming);
+  mountRail(monitor, store, page);
+  mountSnackbar(field(document, 'snacks'), store, say);
+  mountDialogs(store, page);
+  mountSlowing(monitor, store, control, say); // after the dialogs: its count-down lies over them
+  mountControl(monitor, field(document, 'snacks'), store, control);
   await breath();
   const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
   const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null, say);
   const files = new FilesTab(need(monitor, '[data-panel="files"]'), store, say, () => page.isMonitorShown && tabs.shows('files') && screens.open === null);
   const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
-  const screens = new Screens(monitor, store, front);
-  const tabs = new Tabs(monitor, front);
+  const screens = new Screens(monitor, store, () => front());
+  mountSheets();
+  mountInstall(say);
+  mountPreferences(voice);
+  await breath();
+  mountReach(need(monitor, '[data-part="reach"]'), store, openPhone);
+  mountChecks(need(monitor, '[data-part="checks"]'), store);
+  mountTrends(need(monitor, '[data-part="trends"]'), store);
+  mountBadge(store);
   page.onShown = () => {
     tabs.place();
     front();
     unfold();
   };
-
-  await breath();
-  mountStart(need(document, '#start'), store);
-  mountConnect(need(document, '#connect'), store, page);
-  mountTopbar(monitor, store, say);
-  mountControl(monitor, field(document, 'snacks'), store, control);
-  mountReach(need(monitor, '[data-part="reach"]'), store, openPhone);
-  mountStrip(monitor, store);
-  mountVeil(monitor, store);
-  await breath();
-  mountGauge(need(monitor, '[data-part="gauge"]'), store);
-  mountNearest(need(monitor, '[data-part="nearest"]'), store);
-  mountPedals(need(monitor, '[data-part="pedals"]'), store);
-  mountPosition(need(monitor, '[data-part="position"]'), store);
-  mountChecks(need(monitor, '[data-part="checks"]'), store);
-  mountTrends(need(monitor, '[data-part="trends"]'), store);
-  await breath();
-  mountSheets();
-  mountInstall(say);
-  mountPreferences(voice);
-  mountRail(monitor, store, page);
-  mountSnackbar(field(document, 'snacks'), store, say);
-  mountDialogs(store, page);
-  mountSlowing(monitor, store, control, say); // after the dialogs: its count-down lies over them
-  mountBadge(store);
 
   /** What lies under the fold of Home comes after what is seen first, a part at a time. */
   async function unfold() {
@@ -116,14 +131,14 @@ async function begin() {
   }
 
   /** The scan is sent and drawn only while its tab is in front and nothing lies over it; Settings is loaded once it is. */
-  function front() {
+  front = () => {
     queueMicrotask(() => {
       scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null);
       map.look();
       files.look();
       settings.look();
     });
-  }
+  };
 
   /** What this phone can do is looked at seldom. */
   function openPhone() {
@@ -151,12 +166,13 @@ async function begin() {
   }
 
   /** What a viewer may not do is greyed; once somebody is one, it is told so. */
+  let isViewed = false;
   function greet() {
-    if (!store.isViewer) return;
-    unviewed();
+    if (!store.isViewer || isViewed) return;
+    isViewed = true;
     import('./viewer.js').then(({ mountViewer }) => mountViewer(store, say)).catch(() => {}); // the server refuses it all the same
   }
-  const unviewed = store.on('open', greet);
+  store.whenOpen(greet);
 
   function draw() {
     page.draw();
@@ -177,7 +193,6 @@ async function begin() {
     closeSheet(/** @type {HTMLDialogElement} */ (need(document, '#sheet-menu')));
     openPhone();
   });
-  store.on('draw', draw);
   store.on('beat', speak);
   store.on('tick', speak);
   store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
@@ -194,14 +209,18 @@ async function begin() {
   const asked = new URLSearchParams(location.search);
   const then = thenOf(asked.get('then'));
   const recording = asked.get('replay');
-  const unasked = store.on('open', () => {
-    unasked();
+  let isAsked = false;
+  store.whenOpen(() => {
+    if (isAsked) return;
+    isAsked = true;
     if (asked.has('then')) history.replaceState(history.state, '', location.pathname);
     if (then) location.assign(then); // a link in a mail: now that this device is known
     if (recording) import('./replay.js').then(({ openReplay }) => openReplay(recording, store, say, Number(asked.get('t')) || 0)).catch(() => say('What shows a recording could not be fetched.', 'Not replayed'));
   });
-  store.start();
   draw();
+  front();
+  unfold();
+  release();
   // What outlasts this visit is seen to once the page stands.
   setTimeout(() => import('./shell.js').then(({ Shell }) => new Shell(store, say)).catch(() => {}), 2000);
   // The screens an operator may want when the server is gone are fetched while it is there, once the page has begun.
@@ -209,4 +228,20 @@ async function begin() {
   function prefetch() {
     for (const load of [() => import('./slow-sheet.js'), () => import('./log.js'), () => import('./signals.js'), () => import('./scan.js'), () => import('./chart.js')]) load().catch(() => {});
   }
+}
+
+/**
+ * Until the first values were painted. Where none come, or nothing is painted, as in the background, the page goes on without.
+ * @param {Store} store
+ * @returns {Promise<void>}
+ */
+function glanced(store) {
+  return new Promise((resolve) => {
+    setTimeout(resolve, WAITS_MS);
+    const off = store.on('draw', () => {
+      if (!store.frame) return;
+      off();
+      requestAnimationFrame(() => setTimeout(resolve)); // the next picture begins: this one was shown
+    });
+  });
 }

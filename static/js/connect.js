@@ -75,8 +75,9 @@ export function bare(address) {
  * @param {HTMLElement} root
  * @param {import('./store.js').Store} store
  * @param {import('./page.js').Page} page
+ * @param {import('./arming.js').Arming} arming
  */
-export function mount(root, store, page) {
+export function mount(root, store, page, arming) {
   const at = (/** @type {string} */ name) => field(root, name);
   const input = /** @type {HTMLInputElement} */ (at('address'));
   const [says, list, go] = [at('says'), at('found'), at('go')];
@@ -120,7 +121,7 @@ export function mount(root, store, page) {
   }
 
   async function connect() {
-    page.arming.ask(); // within the tap, and before anything is waited for
+    arming.ask(); // within the tap, and before anything is waited for
     const address = input.value.trim();
     if (isBack()) {
       page.chosen();
@@ -214,7 +215,7 @@ export function mount(root, store, page) {
     if (store.isSilent !== wasSilent) complain(store.isSilent ? 'The server does not answer; this page keeps trying.' : '');
     wasSilent = store.isSilent;
     drawSays();
-    const { arms } = page.arming;
+    const { arms } = arming;
     for (const what of /** @type {const} */ (['sound', 'screen', 'position'])) {
       const words = armWords(what, arms[what]);
       tag(at(what), words.tag, words.kind);

@@ -101,6 +101,7 @@ export function mount(root, snacks, store, control) {
   }
 
   draw();
+  tell(store.log.events); // what came before there was anybody to tell
   const stops = [
     store.on('draw', draw),
     store.on('log', tell),

@@ -40,6 +40,11 @@ export class EventLog {
     return this.last;
   }
 
+  /** What is kept, oldest first. */
+  get events() {
+    return this.rows.flatMap(({ event }) => event ?? []).reverse();
+  }
+
   get boot() {
     return this.#boot;
   }

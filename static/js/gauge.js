@@ -62,9 +62,9 @@ export function mount(root, store) {
       speed_max: speedIn(scale.speed_max_mps), acceleration_max_mps2: scale.acceleration_max_mps2, limit: speedIn(scale.limit_mps),
     });
     face.replaceChildren(
-      ...tracks.map((d) => svg('path', { class: 'track', d })),
-      ...rungs.map((d) => svg('path', { class: 'rung', d })),
-      ...ticks.map(({ d, isBig }) => svg('path', { class: isBig ? 'tick big' : 'tick', d })),
+      svg('path', { class: 'track', d: tracks.join('') }), // as one: the browser pays for each path, not for its length
+      svg('path', { class: 'rung', d: rungs.join('') }),
+      ...[false, true].map((isBig) => svg('path', { class: isBig ? 'tick big' : 'tick', d: ticks.filter((tick) => tick.isBig === isBig).map(({ d }) => d).join('') })),
       ...labels.map(({ text, x, y }) => svg('text', { class: /[+−]/.test(text) ? 'num end' : 'num', x, y, 'text-anchor': 'middle' }, text)),
     );
     bug.replaceChildren(...(limit ? [
@@ -139,7 +139,7 @@ export function mount(root, store) {
   }
 
   move();
-  draw();
+  if (store.frame) draw(); // before the first frame it is not shown
   const watcher = new IntersectionObserver((entries) => {
     isSeen = entries.at(-1)?.isIntersecting ?? true;
     move();

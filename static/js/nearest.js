@@ -70,7 +70,7 @@ export function mount(root, store) {
     mark(marks.standoff, onTape(store.limit('obstacle.standoff_m')));
   }
 
-  draw();
+  if (store.frame) draw(); // before the first frame it is not shown
   return store.on('draw', draw);
 }
 

@@ -20,12 +20,10 @@ export class Page {
 
   /**
    * @param {Store} store
-   * @param {import('./arming.js').Arming} arming
    * @param {(sentence: string, title?: string) => void} say
    */
-  constructor(store, arming, say) {
+  constructor(store, say) {
     this.store = store;
-    this.arming = arming;
     this.say = say;
     this.screens = ['pairing', 'start', 'connect', 'monitor'].map((name) => need(document, `#${name}`));
   }

@@ -57,6 +57,6 @@ export function mount(root, store) {
     }
   }
 
-  draw();
+  if (store.frame) draw(); // before the first frame it is not shown
   return store.on('draw', draw);
 }

@@ -39,7 +39,7 @@ export function mount(root, store) {
     write(fields.fuel, tank.ink, fixed(percent ?? fuel?.litres ?? null), fields.fuelUnit, percent === null ? (fuel?.unit ?? 'l') : '%');
   }
 
-  draw();
+  if (store.frame) draw(); // before the first frame it is not shown
   return store.on('draw', draw);
 }
 

@@ -21,7 +21,7 @@ export class Presence {
     const look = () => this.#look();
     store.on('tick', look);
     store.on('beat', look); // while the page is hidden frames come and its timers hardly run
-    store.on('open', () => {
+    store.whenOpen(() => {
       this.#told_ms = -Infinity;
       look();
     });

@@ -72,14 +72,33 @@ export class Store {
   #looked_ms = 0;
   #lookedWall_ms = 0;
 
-  /** @param {() => import('./wire.js').Socket} dial @param {string} [name] what this phone is called in the log @param {string} [page] by which the server knows this page */
-  constructor(dial, name = '', page = '') {
-    this.name = name;
-    this.page = page;
+  #nameOf;
+  #pageOf;
+  /** The answer to the server's greeting, until the first values were drawn. @type {(() => void) | null} */
+  #owed = null;
+
+  /**
+   * @param {() => import('./wire.js').Socket} dial
+   * @param {() => string} [name] what this phone is called in the log
+   * @param {() => string} [page] by which the server knows this page
+   */
+  constructor(dial, name = () => '', page = () => '') {
+    this.#nameOf = name;
+    this.#pageOf = page;
     this.wire = new Wire(
       { opened: () => this.#opened(), text: (text, at_ms) => this.#heard(text, at_ms), bytes: (bytes) => this.#heardScan(bytes), closed: () => this.#closed() },
       dial,
     );
+  }
+
+  /** What this phone is called in the log. */
+  get name() {
+    return this.#nameOf();
+  }
+
+  /** By which the server knows this page; '' where it does not. */
+  get page() {
+    return this.#pageOf();
   }
 
   /** Begin to dial and to draw. */
@@ -119,6 +138,12 @@ export class Store {
     this.#listeners.set(topic, all);
     all.add(listener);
     return () => void all.delete(listener);
+  }
+
+  /** Whenever the server greets this page, and at once where it has. @param {() => void} listener */
+  whenOpen(listener) {
+    if (this.log.boot !== null) listener();
+    return this.on('open', listener);
   }
 
   /** Nothing fresh has come for so long that the values are covered, or nothing ever came. */
@@ -236,6 +261,7 @@ export class Store {
   }
 
   #closed() {
+    this.#owed = null;
     for (const id of [...this.#waiting.keys()]) this.#answer(id, { ok: false, reason: 'The connection to the server broke.' });
   }
 
@@ -288,7 +314,11 @@ export class Store {
     this.who = hello.who ?? null;
     const blind_s = this.heard_ms === null ? 0 : this.silence_s;
     const have_event = this.log.greet(hello.boot, hello.last_event, blind_s, Date.now());
-    this.wire.send({ kind: 'hello', have_event, boot: hello.boot, name: this.name, ...(this.page ? { page: this.page } : {}) });
+    this.#owed = () => {
+      this.#owed = null;
+      this.wire.send({ kind: 'hello', have_event, boot: hello.boot, name: this.name, ...(this.page ? { page: this.page } : {}) });
+    };
+    if (this.frame) this.#owed(); // who a page is that just begins can wait until it shows the car
     this.#caughtUp();
     this.#emit('open', hello);
   }
@@ -301,6 +331,7 @@ export class Store {
     }
     const delay_ms = this.#clock.note(frame.server.time_ms, now_ms);
     if (!this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service
+    const isFirst = this.frame === null;
     this.frame = frame;
     this.#delay_ms = delay_ms;
     this.heard_ms = Date.now() - (this.now() - now_ms);
@@ -314,12 +345,14 @@ export class Store {
     if (this.#isMoved || (!isUrgent && now_ms - this.#moved_ms < MOVE_EVERY_MS)) return;
     this.#isMoved = true;
     this.#moved_ms = now_ms;
-    requestAnimationFrame(() => {
+    const show = () => {
       this.#isMoved = false;
       this.#emit('move');
       if (this.#isUrgent || now_ms - this.#drew_ms >= 2 * MOVE_EVERY_MS) this.#draw();
       this.#isUrgent = false;
-    });
+    };
+    if (isFirst) show(); // nothing moves yet that a picture could fall between
+    else requestAnimationFrame(show);
   }
 
   /** @param {ArrayBuffer} bytes */
@@ -343,6 +376,7 @@ export class Store {
     if (slept_ms > 2000 && this.frame) this.deadMan.cover();
     this.deadMan.look(now_ms);
     this.wire.look(now_ms);
+    this.#owed?.();
     if (!document.hidden && now_ms - this.deadMan.heard_ms > FED_MS && now_ms - this.#drew_ms >= DRAW_EVERY_MS - 20) requestAnimationFrame(() => this.#draw());
     this.#emit('tick');
   }
@@ -360,7 +394,7 @@ export class Store {
     const isBack = type === 'resume' || type === 'pageshow' || !document.hidden;
     if (this.frame && (type !== 'pageshow' || this.silence_s > 1)) this.deadMan.cover();
     if (isBack) this.wire.hurry();
-    this.#emit('draw');
+    if (this.frame) this.#emit('draw'); // before the first frame there is nothing to cover: a page that begins is “shown” too
   }
 
   #caughtUp() {

@@ -27,7 +27,7 @@ export function mount(root, store) {
     setAttribute(frame, 'data-mode', modeOf(store));
   }
 
-  draw();
+  if (store.frame) draw(); // before the first frame it is not shown
   return store.on('draw', draw);
 }
 

@@ -54,7 +54,7 @@ export class Tabs {
       listen(this.pager, 'pointerdown', () => this.#unfold(), { passive: true }),
       listen(this.pager, 'wheel', () => this.#unfold(), { passive: true }),
       listen(window, 'hashchange', () => this.#linked()),
-      listen(window, 'resize', () => this.place()),
+      listen(window, 'resize', () => this.#isPlaced && this.place()), // a page that begins is told of its size once: nothing is shown yet
     ];
     this.#bring(this.index);
     this.#fold();
@@ -163,6 +163,12 @@ export class Tabs {
     if (index >= 0 && index !== this.index) this.go(index);
   }
 
+  /** Into the address, and to be remembered. @param {string} tab */
+  #note(tab) {
+    history.replaceState(history.state, '', `#${tab}`);
+    remember(tab);
+  }
+
   /** @param {number} index */
   #bring(index) {
     this.index = index;
@@ -174,8 +180,8 @@ export class Tabs {
       setAttribute(button, 'aria-selected', String(i === index));
       setAttribute(button, 'tabindex', i === index ? 0 : -1);
     });
-    history.replaceState(history.state, '', `#${tab}`);
-    remember(tab);
+    if (this.#isPlaced) this.#note(tab);
+    else setTimeout(() => this.index === index && this.#note(tab)); // a page that begins has more urgent things to do
     this.onFront();
   }
 }

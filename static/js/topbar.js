@@ -58,7 +58,7 @@ export function mount(root, store, say) {
     if (!answer.ok) say(answer.reason ?? 'Refused.', order ? 'Not recording' : 'The recording goes on');
   }
 
-  draw();
+  if (store.frame) draw(); // before the first frame it is not shown
   const stops = [store.on('draw', draw), listen(key, 'click', obey)];
   return () => stops.forEach((stop) => stop());
 }

@@ -52,6 +52,8 @@ export function mount(root, store) {
   let beat = 0;
   let rewound_ms = -Infinity;
   let told = '';
+  let isDrawn = false;
+  const plate = need(veil, '.plate');
 
   function rewind() {
     const now_ms = store.now();
@@ -64,6 +66,11 @@ export function mount(root, store) {
   function draw() {
     const kind = veilOf(store);
     setAttribute(veil, 'data-on', kind);
+    if (kind === null && plate.hidden && !isDrawn) {
+      isDrawn = true; // the first values come before what is said once they end: with the next drawing
+      return;
+    }
+    show(plate, true);
     const view = store.chain;
     // While all is well the plate already says what it will have to say if this script hangs.
     const shown = kind === null ? { ...view, cut: /** @type {const} */ (0), nodes: view.nodes.map((node, i) => ({ ...node, mark: i === 0 ? 'here' : i === 1 ? 'silent' : 'unknown', isBad: i === 1, isKnown: i === 0 })) } : view;
@@ -82,7 +89,7 @@ export function mount(root, store) {
     show(rec, recording !== '');
   }
 
-  draw();
+  if (store.frame) draw(); // before the first frame it is not shown
   const stops = [store.on('beat', rewind), store.on('draw', draw)];
   return () => stops.forEach((stop) => stop());
 }
