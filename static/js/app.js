@@ -91,16 +91,22 @@ async function begin() {
   store.start();
   await glanced(store);
 
-  const arming = new Arming(voice, new Phone(store));
-  const handset = new Handset();
-  mountStart(need(document, '#start'), store);
-  mountConnect(need(document, '#connect'), store, page, arming);
-  mountRail(monitor, store, page);
-  mountSnackbar(field(document, 'snacks'), store, say);
+  // What asks for the operator, and what acts on the car.
+  store.on('beat', speak);
+  store.on('tick', speak);
   mountDialogs(store, page);
+  mountSnackbar(field(document, 'snacks'), store, say);
   mountSlowing(monitor, store, control, say); // after the dialogs: its count-down lies over them
+  mountRail(monitor, store, page);
+  await breath();
   mountControl(monitor, field(document, 'snacks'), store, control);
   await breath();
+  const arming = new Arming(voice, new Phone(store));
+  const handset = new Handset();
+  new Presence(store, arming, handset);
+  await breath();
+  mountStart(need(document, '#start'), store);
+  mountConnect(need(document, '#connect'), store, page, arming);
   const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
   const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null, say);
   const files = new FilesTab(need(monitor, '[data-panel="files"]'), store, say, () => page.isMonitorShown && tabs.shows('files') && screens.open === null);
@@ -112,7 +118,9 @@ async function begin() {
   await breath();
   mountReach(need(monitor, '[data-part="reach"]'), store, openPhone);
   mountChecks(need(monitor, '[data-part="checks"]'), store);
+  await breath();
   mountTrends(need(monitor, '[data-part="trends"]'), store);
+  await breath();
   mountBadge(store);
   page.onShown = () => {
     tabs.place();
@@ -184,7 +192,6 @@ async function begin() {
     voice.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
   }
 
-  new Presence(store, arming, handset);
   store.on('refused', (answer) => {
     control.note(answer);
     if (answer.heldBy) say(answer.reason, 'You are not in control'); // whoever ordered it may say it better
@@ -193,8 +200,6 @@ async function begin() {
     closeSheet(/** @type {HTMLDialogElement} */ (need(document, '#sheet-menu')));
     openPhone();
   });
-  store.on('beat', speak);
-  store.on('tick', speak);
   store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
   // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
   for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
