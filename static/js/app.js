@@ -12,9 +12,10 @@ import { gapWords } from './events.js';
 import { takeEarly } from './early-socket.js';
 import { FilesTab } from './files-tab.js';
 import { forgetWork } from './forget.js';
+import { giveUp } from './give-up.js';
 import { Handset } from './handset.js';
-import { MapTab } from './map-tab.js';
 import { holdTaps } from './held-taps.js';
+import { MapTab } from './map-tab.js';
 import { notices } from './notice.js';
 import { ownName } from './own-name.js';
 import { Page } from './page.js';
@@ -51,7 +52,14 @@ import { mount as mountVeil } from './veil.js';
 /** The rest of the page waits for the first values so long, and no longer [ms]. */
 const WAITS_MS = 400;
 
-begin();
+/** Ends what has begun. */
+let stop = () => {};
+
+begin().catch((error) => {
+  console.error(error);
+  stop(); // values that look alive, on a page that could not ask for anybody, would be a lie
+  giveUp();
+});
 
 /**
  * First what is seen at a glance, with its first values; then, part after part, what answers a finger. As one piece it would
@@ -66,6 +74,7 @@ async function begin() {
   const admission = document.documentElement.dataset['access'] === 'paired' ? new Admission(address, shut) : null;
   let name = ''; // one, also where nothing can be kept
   const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), () => (name ||= deviceName(navigator.userAgent, keptHere())), ownName);
+  stop = () => store.stop();
   const voice = new Voice();
   const monitor = need(document, '#monitor');
   const tell = notices(field(document, 'snacks'));
@@ -90,6 +99,7 @@ async function begin() {
   mountPosition(need(monitor, '[data-part="position"]'), store);
   store.start();
   await glanced(store);
+  store.greet();
 
   // What asks for the operator, and what acts on the car.
   store.on('beat', speak);

@@ -74,8 +74,9 @@ export class Store {
 
   #nameOf;
   #pageOf;
-  /** The answer to the server's greeting, until the first values were drawn. @type {(() => void) | null} */
+  /** The answer to the server's greeting, while it is owed. @type {(() => void) | null} */
   #owed = null;
+  #mayGreet = false;
 
   /**
    * @param {() => import('./wire.js').Socket} dial
@@ -108,7 +109,9 @@ export class Store {
     const timer = setInterval(() => this.#look(), DRAW_EVERY_MS);
     this.#stops.push(() => clearInterval(timer));
     for (const [target, type] of /** @type {[EventTarget, string][]} */ ([[document, 'visibilitychange'], [document, 'freeze'], [document, 'resume'], [window, 'pageshow']])) {
-      const listener = () => this.#slept(type);
+      const listener = (/** @type {Event} */ event) => {
+        if (type !== 'pageshow' || /** @type {PageTransitionEvent} */ (event).persisted) this.#slept(type); // a page that begins is “shown” too
+      };
       target.addEventListener(type, listener);
       this.#stops.push(() => target.removeEventListener(type, listener));
     }
@@ -138,6 +141,12 @@ export class Store {
     this.#listeners.set(topic, all);
     all.add(listener);
     return () => void all.delete(listener);
+  }
+
+  /** From now on the server's greeting is answered: who a page is that just begins can wait until it shows the car. */
+  greet() {
+    this.#mayGreet = true;
+    this.#owed?.();
   }
 
   /** Whenever the server greets this page, and at once where it has. @param {() => void} listener */
@@ -318,7 +327,7 @@ export class Store {
       this.#owed = null;
       this.wire.send({ kind: 'hello', have_event, boot: hello.boot, name: this.name, ...(this.page ? { page: this.page } : {}) });
     };
-    if (this.frame) this.#owed(); // who a page is that just begins can wait until it shows the car
+    if (this.#mayGreet) this.#owed();
     this.#caughtUp();
     this.#emit('open', hello);
   }
@@ -376,7 +385,6 @@ export class Store {
     if (slept_ms > 2000 && this.frame) this.deadMan.cover();
     this.deadMan.look(now_ms);
     this.wire.look(now_ms);
-    this.#owed?.();
     if (!document.hidden && now_ms - this.deadMan.heard_ms > FED_MS && now_ms - this.#drew_ms >= DRAW_EVERY_MS - 20) requestAnimationFrame(() => this.#draw());
     this.#emit('tick');
   }
@@ -394,7 +402,7 @@ export class Store {
     const isBack = type === 'resume' || type === 'pageshow' || !document.hidden;
     if (this.frame && (type !== 'pageshow' || this.silence_s > 1)) this.deadMan.cover();
     if (isBack) this.wire.hurry();
-    if (this.frame) this.#emit('draw'); // before the first frame there is nothing to cover: a page that begins is “shown” too
+    if (this.frame) this.#emit('draw'); // before, there is nothing to cover
   }
 
   #caughtUp() {

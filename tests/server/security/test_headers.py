@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import re
 from pathlib import Path
 
 import httpx
@@ -11,13 +14,19 @@ from fastapi import Request
 
 from server.app import create_app
 from server.config import Config
-from server.web.headers import FOR_ALL, PERMISSIONS, POLICY, POLICY_OF_DATA, POLICY_OF_PARTS
+from server.web.assets import static_dir
+from server.web.built import find
+from server.web.headers import FOR_ALL, PERMISSIONS, POLICY, POLICY_OF_DATA, POLICY_OF_PARTS, policy_of
+from server.web.pages import early_of
 from tests.server.conftest import serving, serving_app
 from tests.server.recording.made import record
 
 ID = "car_20160601T120000Z"
+POLICY_RULES = dict(rule.strip().split(" ", 1) for rule in POLICY.split(";"))
+POLICY_OF_PAGES = policy_of(early_of(find(static_dir()), static_dir()))
 ANSWERS = {  # method, path, headers, status, its policy
-    "the page": ("GET", "/", {}, 200, POLICY),
+    "the page": ("GET", "/", {}, 200, POLICY_OF_PAGES),
+    "the page without a server": ("GET", "/offline", {}, 200, POLICY_OF_PAGES),
     "its description": ("GET", "/docs", {}, 200, POLICY),
     "its worker": ("GET", "/worker.js", {}, None, POLICY),
     "a part": ("GET", "/static/js/app.js", {}, 200, POLICY_OF_PARTS),
@@ -56,7 +65,7 @@ async def test_every_answer_has_them(
 
 async def test_what_is_kept_is_renewed_with_them() -> None:
     async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
-        for path, its_policy in (("/", POLICY), ("/static/js/app.js", POLICY_OF_PARTS)):
+        for path, its_policy in (("/", POLICY_OF_PAGES), ("/static/js/app.js", POLICY_OF_PARTS)):
             first = await client.get(path)
             again = await client.get(path, headers={"If-None-Match": first.headers["etag"]})
             assert again.status_code == 304
@@ -91,8 +100,9 @@ def _has_all(headers: httpx.Headers, its_policy: str) -> None:
         assert headers[name], name
     assert headers["x-content-type-options"] == "nosniff"
     assert headers["content-security-policy"] == its_policy
-    assert ("permissions-policy" in headers) == (its_policy == POLICY)
-    assert ("cross-origin-opener-policy" in headers) == (its_policy == POLICY)
+    is_document = its_policy in (POLICY, POLICY_OF_PAGES)
+    assert ("permissions-policy" in headers) == is_document
+    assert ("cross-origin-opener-policy" in headers) == is_document
     assert "default-src 'none'" in its_policy
     assert "object-src 'none'" in its_policy
     assert "base-uri 'none'" in its_policy
@@ -100,8 +110,19 @@ def _has_all(headers: httpx.Headers, its_policy: str) -> None:
         assert name not in headers
 
 
+@pytest.mark.parametrize("path", ["/", "/offline"])
+async def test_the_one_script_in_a_page_is_allowed_by_its_content_and_nothing_else_is(path: str) -> None:
+    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+        answer = await client.get(path)
+    (script,) = re.findall(r"<script>(.*?)</script>", answer.text, re.DOTALL)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    rules = dict(rule.strip().split(" ", 1) for rule in answer.headers["content-security-policy"].split(";"))
+    assert rules == POLICY_RULES | {"script-src": f"'self' 'sha256-{digest}'"}
+    assert not re.search(r"<style|\son[a-z]+=", answer.text)
+
+
 def test_the_page_may_run_only_its_own_scripts_and_use_only_what_it_needs() -> None:
-    rules = dict(rule.strip().split(" ", 1) for rule in POLICY.split(";"))
+    rules = POLICY_RULES
     assert rules["script-src"] == rules["connect-src"] == rules["style-src"] == "'self'"
     assert rules["require-trusted-types-for"] == "'script'"
     assert rules["trusted-types"] == "default"

@@ -38,6 +38,7 @@ def static(tmp_path: Path) -> Path:
     (tmp_path / "js" / "later.js").write_text(
         "import { word } from './words.js';\nexport const said = word + ' later';\n"
     )
+    (tmp_path / "js" / "early.js").write_text("// before all others\n(() => {\n  globalThis.early = 'first';\n})();\n")
     for name in STYLES:
         (tmp_path / "css" / f"{name}.css").write_text(f".{name} {{ color: red; }}\n")
     (tmp_path / "css" / "tokens.css").write_text("@font-face { font-family: n; src: url('../fonts/n.woff2'); }\n")
@@ -66,6 +67,9 @@ def test_the_joined_script_says_what_the_many_said_and_the_rest_comes_later(stat
     style = (static / built.style).read_text()
     assert re.findall(r"\.(\w+)\{", style) == list(STYLES[1:]), "in their order"
     assert "../fonts/n.woff2" in style
+    assert "first" in built.early
+    assert "before" not in built.early, "without comments"
+    assert "\n" not in built.early
 
 
 def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(static: Path) -> None:

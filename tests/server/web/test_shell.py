@@ -44,7 +44,7 @@ def static(tmp_path: Path) -> Path:
     return folder
 
 
-BUILT = Built(script="built/app-AAAAAAAA.js", style="built/page-CCCCCCCC.css", needed=(), name="0123456789ab")
+BUILT = Built(script="built/app-AAAAAAAA.js", style="built/page-CCCCCCCC.css", needed=(), early="", name="0123456789ab")
 
 
 def asset(name: str) -> str:
@@ -126,7 +126,7 @@ def test_another_content_is_another_version_and_the_same_is_the_same(static: Pat
     first = version()
     assert version() == first
     seen = {first, version(offline=b"<html>2"), version(asset=lambda name: f"/static/{name}?v=2")}
-    seen.add(version(built=Built(script="", style="", needed=(), name="ba9876543210")))
+    seen.add(version(built=Built(script="", style="", needed=(), early="", name="ba9876543210")))
     font = static / "fonts" / "catgraph-numerals-500.woff2"
     font.write_bytes(font.read_bytes() + b"0")
     seen.add(version())
