@@ -54,9 +54,11 @@ const WAITS_MS = 400;
 
 /** Ends what has begun. */
 let stop = () => {};
+let isOver = false;
 
 begin().catch((error) => {
   console.error(error);
+  isOver = true;
   stop(); // values that look alive, on a page that could not ask for anybody, would be a lie
   giveUp();
 });
@@ -74,8 +76,11 @@ async function begin() {
   const admission = document.documentElement.dataset['access'] === 'paired' ? new Admission(address, shut) : null;
   let name = ''; // one, also where nothing can be kept
   const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), () => (name ||= deviceName(navigator.userAgent, keptHere())), ownName);
-  stop = () => store.stop();
   const voice = new Voice();
+  stop = () => {
+    store.stop();
+    voice.say(null);
+  };
   const monitor = need(document, '#monitor');
   const tell = notices(field(document, 'snacks'));
   const control = new Control(store, tell, openPhone);
@@ -97,6 +102,9 @@ async function begin() {
   mountNearest(need(monitor, '[data-part="nearest"]'), store);
   mountPedals(need(monitor, '[data-part="pedals"]'), store);
   mountPosition(need(monitor, '[data-part="position"]'), store);
+  mountRail(monitor, store, page);
+  // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
+  for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
   store.start();
   await glanced(store);
   store.greet();
@@ -107,7 +115,6 @@ async function begin() {
   mountDialogs(store, page);
   mountSnackbar(field(document, 'snacks'), store, say);
   mountSlowing(monitor, store, control, say); // after the dialogs: its count-down lies over them
-  mountRail(monitor, store, page);
   await breath();
   mountControl(monitor, field(document, 'snacks'), store, control);
   await breath();
@@ -165,6 +172,7 @@ async function begin() {
 
   /** This device is not paired, or was removed just now. @param {import('./admission.js').Refusal} why */
   function shut(why) {
+    if (isOver) return;
     if (why.code === 'removed') forgetWork(keptHere());
     if (store.frame) {
       location.reload(); // nothing of the car stays on a page that may not look any more; the screen then says the reason
@@ -211,8 +219,6 @@ async function begin() {
     openPhone();
   });
   store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
-  // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
-  for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
   listen(document, 'keydown', () => { document.documentElement.dataset['keys'] = ''; }, { capture: true });
   listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
   listen(field(monitor, 'sound-off'), 'click', () => arming.ask());

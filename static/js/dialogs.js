@@ -137,6 +137,7 @@ export function mount(store, page) {
     }
   }
 
+  if (store.frame) draw();
   return () => stops.forEach((stop) => stop());
 }
 

@@ -1,18 +1,27 @@
 // What is pressed while the page has not yet put its ears up is pressed again once it has: no tap is lost.
 
+const PRESSED = 'button, a, label, input, select, summary';
+
 /** Holds every press from now on; the result presses what was held, in its order, and holds no more. @returns {() => void} */
-export function holdTaps(root = document) {
+export function holdTaps() {
   /** @type {Element[]} */
   const held = [];
   /** @param {Event} event */
   const hold = (event) => {
+    const { target } = event;
+    // What asks the operator was put up by what listens already: held, a press could be taken for one of what asks by then.
+    if (!(target instanceof Element) || target.closest('dialog[open], .snack')) return;
     event.preventDefault(); // a form is not sent by itself
     event.stopImmediatePropagation();
-    if (event.target instanceof Element) held.push(event.target);
+    held.push(target.closest(PRESSED) ?? target); // what is written within is written anew
   };
-  root.addEventListener('click', hold, { capture: true });
+  document.addEventListener('click', hold, { capture: true });
   return () => {
-    root.removeEventListener('click', hold, { capture: true });
-    for (const target of held) if (target.isConnected) target.dispatchEvent(new MouseEvent('click', { bubbles: true, cancelable: true }));
+    document.removeEventListener('click', hold, { capture: true });
+    for (const target of held) {
+      const dialog = [...document.querySelectorAll('dialog[open]')].at(-1);
+      if (dialog && !dialog.contains(target)) continue; // what lies under an alarm cannot be pressed
+      if (target.isConnected) target.dispatchEvent(new MouseEvent('click', { bubbles: true, cancelable: true }));
+    }
   };
 }

@@ -37,6 +37,6 @@ export function mount(root, store, page) {
     setIcon(mark, isPaused ? 'play' : 'pause');
   }
 
-  draw();
+  if (store.frame) draw(); // before the first frame it is not shown
   return () => stops.forEach((stop) => stop());
 }

@@ -252,6 +252,7 @@ function mountCountdown(store) {
     } else setWords(says, `Not vetoed: ${answer.reason ?? 'refused.'}`);
   }
 
+  if (store.frame) draw();
   const stops = [
     store.on('draw', draw),
     listen(veto, 'click', () => void refuse()),

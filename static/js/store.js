@@ -123,6 +123,7 @@ export class Store {
 
   stop() {
     for (const stop of this.#stops.splice(0)) stop();
+    this.#listeners.clear(); // a picture may be under way
     this.wire.stop();
   }
 
@@ -294,6 +295,11 @@ export class Store {
         this.#state(message, at_ms);
         break;
       case 'events': {
+        if (this.#owed) { // they came before this page told what it has: from there they are sent again, and in order
+          this.#owed();
+          this.wire.send({ kind: 'have', event: this.log.last ?? 0 });
+          break;
+        }
         const fresh = this.log.take(message.events);
         this.wire.send({ kind: 'have', event: this.log.last ?? 0 });
         if (fresh.length) this.#emit('log', fresh);

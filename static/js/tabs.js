@@ -54,7 +54,7 @@ export class Tabs {
       listen(this.pager, 'pointerdown', () => this.#unfold(), { passive: true }),
       listen(this.pager, 'wheel', () => this.#unfold(), { passive: true }),
       listen(window, 'hashchange', () => this.#linked()),
-      listen(window, 'resize', () => this.#isPlaced && this.place()), // a page that begins is told of its size once: nothing is shown yet
+      listen(window, 'resize', () => root.hidden || this.place()), // a page that begins is told of its size: nothing is shown yet
     ];
     this.#bring(this.index);
     this.#fold();
