@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format lint types imports tsc node bench soak sbom screenshots clean vendor-missing
+.PHONY: help demo test check world format lint types imports tsc node bench soak sbom screenshots clean vendor-missing
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -19,6 +19,7 @@ demo: $(VENV)/.ready static/built/built.json ## a simulated car, its bridge and 
 
 test: $(VENV)/.ready-test static/built/built.json ## all of the tests: what must pass before a change goes in
 	$(PY) -m tests.chromium
+	$(PY) -m tests.vehicle.ros2_environment
 	$(MAKE) --no-print-directory format lint types imports tsc node
 	status=0; \
 	$(PYTEST) -n 2 -m "$(FAST)" || status=$$?; \
@@ -29,6 +30,11 @@ test: $(VENV)/.ready-test static/built/built.json ## all of the tests: what must
 check: $(VENV)/.ready-test ## the fast half of the tests, without a browser
 	$(MAKE) --no-print-directory format lint types imports tsc node
 	$(PYTEST) -q -n 2 -m "$(FAST)"
+
+world: $(VENV)/.ready-test static/built/built.json ## what failed on real bridges and for real operators, by its points (docs/world.md)
+	$(PY) -m tests.chromium
+	$(PY) -m tests.vehicle.ros2_environment
+	$(PYTEST) -m "world and not soak"
 
 bench: $(VENV)/.ready-test static/built/built.json ## latency, bytes and load, beside a bare client and one bridge connection a page
 	$(PY) -m tests.bench
@@ -64,7 +70,7 @@ node: $(VENV)/.ready-test
 	files=$$(find tests/page -name '*.test.js' | sort); [ -z "$$files" ] || node --test --test-reporter dot $$files
 
 clean: ## back to a fresh clone; recordings in data/ stay
-	rm -rf $(VENV) node_modules static/vendor static/built static/drawn build dist out *.egg-info
+	rm -rf $(VENV) .venv-ros2 node_modules static/vendor static/built static/drawn build dist out *.egg-info
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find monitor server tests -name __pycache__ -type d -prune -exec rm -rf {} +
 

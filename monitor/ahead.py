@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from monitor.corridor import TYRE_RAD_A_PERCENT, Corridor, Sight, look
+from monitor.corridor import Corridor, Sight, look
 from monitor.instruments import ObstacleLimits
 from monitor.state import Snapshot
 from monitor.values import LaserScan
@@ -18,17 +18,24 @@ ASIDE_DEADBAND_M = 0.2  # what stands at the corridor's very edge is in the way 
 
 def corridor_ahead(snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bool = False) -> Corridor:
     """Bent by the newest steering; straight where that is not known or too old. Wider while an obstacle is alarmed."""
-    steering = snapshot.get("steering")
-    angle_rad = 0.0
-    if steering is not None and steering.is_fresh(snapshot.now_s) and math.isfinite(steering.value.percent):
-        angle_rad = max(-WIDEST_TYRE_RAD, min(WIDEST_TYRE_RAD, steering.value.percent * TYRE_RAD_A_PERCENT))
-        angle_rad = round(angle_rad / ANGLE_STEP_RAD) * ANGLE_STEP_RAD
+    angle_rad = tyre_angle_rad(snapshot) or 0.0
+    angle_rad = max(-WIDEST_TYRE_RAD, min(WIDEST_TYRE_RAD, angle_rad))
+    angle_rad = round(angle_rad / ANGLE_STEP_RAD) * ANGLE_STEP_RAD
     return Corridor(
         half_width_m=limits.half_width_m + (ASIDE_DEADBAND_M if was_active else 0.0),
         wheelbase_m=limits.wheelbase_m,
         laser_ahead_m=limits.laser_ahead_m,
         tyre_angle_rad=angle_rad,
     )
+
+
+def tyre_angle_rad(snapshot: Snapshot) -> float | None:
+    """As it is measured now; None: not known, or too old."""
+    steering = snapshot.get("steering")
+    if steering is None or not steering.is_fresh(snapshot.now_s):
+        return None
+    angle_rad = steering.value.tyre_rad
+    return angle_rad if angle_rad is not None and math.isfinite(angle_rad) else None
 
 
 def look_ahead(scan: LaserScan, corridor: Corridor) -> Sight:

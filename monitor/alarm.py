@@ -4,6 +4,8 @@
   counts) and starts the count to clearing anew; so UNKNOWN neither raises nor clears.
 - *Occurrence* counts announcements: a raise, a new or worse cause, the end of shelving. Each asks for its own
   acknowledgement, and an acknowledgement names the one it saw.
+- *Repeats*: where the spec says so, an alarm that comes back with causes announced of late stands in the list as it was
+  left, acknowledged or not, and is not announced again.
 - *Suppressed* alarms neither raise nor clear, and come back as they were: known ones are not announced again.
 - A clock that goes back moves the alarm's own times with it: no delay gets longer, none is skipped.
 """
@@ -15,7 +17,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Literal
 
-from monitor.alarm_spec import AlarmSpec, Place, Sound
+from monitor.alarm_spec import Action, AlarmSpec, Place, Sound
 from monitor.check import Finding, Verdict
 from monitor.quick import changer
 
@@ -94,6 +96,7 @@ class Alarm:
     trip: Finding | None = None  # as announced
     worst: Finding | None = None  # furthest beyond its limit since raised
     causes: tuple[Cause, ...] = ()  # what the operator was told of
+    announced: tuple[tuple[str, float], ...] = ()  # causes announced of late, and when; where the spec limits repeats
     held_s: float = 0.0  # how long the other side (fault while not active, ok while active) has held
     at_s: float | None = None  # when last judged
 
@@ -121,6 +124,18 @@ class Alarm:
     def sound(self) -> Sound:
         """What it sounds like now: silent once it is gone, acknowledged, shelved or suppressed."""
         return self.spec.sound if self.state is AlarmState.UNACKED else Sound.NONE
+
+    @property
+    def actions(self) -> tuple[Action, ...]:
+        """What the operator can do about it now; what is unacknowledged can be acknowledged, also when it returned."""
+        if self.shelved_until_s is not None:
+            return (*self._others, Action.UNSHELVE)
+        possible = self._others if self.acknowledged else (Action.ACKNOWLEDGE, *self._others)
+        return (Action.SHELVE, *possible) if Action.SHELVE in self.spec.actions and self.is_standing else possible
+
+    @property
+    def _others(self) -> tuple[Action, ...]:
+        return tuple(one for one in self.spec.actions if one not in (Action.ACKNOWLEDGE, Action.SHELVE))
 
     @property
     def is_at_rest(self) -> bool:
@@ -210,6 +225,7 @@ def rebased(alarm: Alarm, now_s: float) -> Alarm:
         announced_s=moved(alarm.announced_s),
         cleared_s=moved(alarm.cleared_s),
         shelved_until_s=moved(alarm.shelved_until_s),
+        announced=tuple((name, at_s + shift_s) for name, at_s in alarm.announced),
     )
 
 
@@ -321,7 +337,16 @@ class _Step:
                 "worst": self._finding,
                 "causes": tuple(Cause(name=name) for name in _names(self._finding)),
             }
-            self._announce("raised")
+            if self._was_announced(_names(self._finding)):
+                self._tell("raised")
+            else:
+                self._announce("raised")
+
+    def _was_announced(self, names: Collection[str]) -> bool:
+        """Whether the operator was told of all these causes so short a time ago that it is not repeated."""
+        within_s = self._alarm.spec.repeat_after_s
+        known = {name for name, at_s in self._alarm.announced if self._now_s - at_s < within_s}
+        return within_s > 0.0 and bool(names) and known.issuperset(names)
 
     def _blame(self) -> None:
         """A cause the operator was not told of re-alarms; one that was away no longer than the off-delay is not new."""
@@ -333,10 +358,10 @@ class _Step:
             absent_s = None if cause.absent_s is None else cause.absent_s + self._dt_s
             if absent_s is None or absent_s <= self._alarm.spec.off_delay_s + ROUNDING_S:
                 causes[cause.name] = 0.0 if absent_s is None else absent_s
-        is_new = any(name not in causes for name in names)
+        fresh = [name for name in names if name not in causes]
         causes |= dict.fromkeys(names)
         self._set["causes"] = tuple(Cause(name=name, absent_s=absent_s) for name, absent_s in causes.items())
-        if is_new:
+        if fresh and not self._was_announced(fresh):
             self._announce("recaused")
 
     def _ok(self) -> None:
@@ -363,6 +388,10 @@ class _Step:
         self._set |= {"acknowledged_by": None, "announced_s": self._now_s}
         if self._finding.verdict is Verdict.FAULT:
             self._set["trip"] = self._finding
+        if self._alarm.spec.repeat_after_s > 0.0:
+            names = _names(self._finding)
+            older = [(name, at_s) for name, at_s in self._alarm.announced if name not in names]
+            self._set["announced"] = (*older, *((name, self._now_s) for name in names))
         self._tell(change, announces=not (self._shelved or self._suppressed))
 
     def _tell(self, change: Change, *, announces: bool = False) -> None:

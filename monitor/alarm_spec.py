@@ -40,6 +40,7 @@ class Action(StrEnum):
 
     ACKNOWLEDGE = "acknowledge"
     SHELVE = "shelve"
+    UNSHELVE = "unshelve"  # of every shelved one; no declaration names it
     DECELERATE = "decelerate"
     RECONNECT = "reconnect"
     CHANGE_ADDRESS = "change_address"
@@ -61,6 +62,7 @@ class AlarmSpec:
     advice: str = ""  # one sentence: what the operator should do
     inhibited_by: tuple[str, ...] = ()  # alarms which explain this one: while they stand it is not announced
     grace_s: float = 0.0  # once this alarm's condition has gone, what it explains gets this long to go too
+    repeat_after_s: float = 0.0  # what was announced is not announced again within this time, if it comes and goes
     latches: bool = False  # stays active until acknowledged although its condition has gone
     place_after: Place | None = None  # where it shows once its condition has gone; None: where it was
 

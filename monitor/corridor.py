@@ -13,7 +13,6 @@ from monitor.scan import usable
 from monitor.values import LaserScan
 
 STRAIGHT_RAD = 0.0005  # a radius of more than five kilometres
-TYRE_RAD_A_PERCENT = -0.00536  # of the CATVehicle's steering; negative percent = left, positive angle = left
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

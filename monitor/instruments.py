@@ -14,6 +14,20 @@ class GaugeLimits(Limits):
     )
 
 
+class SteeringLimits(Limits):
+    tyre_rad_per_unit: float = threshold(
+        0.0,
+        "Tyre angle per unit of steering",
+        unit="rad",
+        low=-2.0,
+        high=2.0,
+        step=0.00001,
+        help="Angle of the front tyres, positive to the left, for one unit of the steering signal: percent, or radians "
+        "of the tyre or of the steering wheel. 0: not known; then no slow-down, and a straight corridor.",
+        heading=VEHICLE,
+    )
+
+
 class ObstacleLimits(Limits):
     """Shared by the two checks that look for obstacles, and by the bars that the page draws."""
 
@@ -55,7 +69,7 @@ class ObstacleLimits(Limits):
 
 
 # By the name of the group; a check that judges by one of them names the same class.
-GROUPS: dict[str, type[Limits]] = {"gauge": GaugeLimits, "obstacle": ObstacleLimits}
+GROUPS: dict[str, type[Limits]] = {"steering": SteeringLimits, "gauge": GaugeLimits, "obstacle": ObstacleLimits}
 
 
 def stopping_m(speed_mps: float, limits: ObstacleLimits) -> float:

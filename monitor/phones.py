@@ -69,6 +69,7 @@ class PhoneView:
     usable_s: float = -math.inf  # the moment of its newest usable fix; before there is one, when it first spoke
     fix: PhoneFix | None = None  # the newest, usable or not
     measured_s: float = -math.inf
+    was_usable: bool = False  # it had a usable position before
     why: Why | None = None  # why its newest word is no usable fix
     is_chosen: bool = False  # the operator said that it rides in the car
     comparisons: tuple[Comparison, ...] = ()  # the newest five, oldest first
@@ -262,6 +263,7 @@ class Phones:
             usable_s=phone.usable_s,
             fix=phone.fix,
             measured_s=phone.measured_s,
+            was_usable=phone.was_usable,
             why=phone.why,
             is_chosen=phone.name == self._rides,
         )

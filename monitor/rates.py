@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from statistics import median_low
 
 from monitor.quick import maker
 
@@ -20,6 +21,8 @@ UNDECLARED_S = 10.0  # before the rate of a signal that may have any rate is set
 BLOCK_S = 2.5  # two blocks in a row that agree are a steady rate: 5 s after connecting at the earliest
 BLOCK_INTERVALS = 5
 STEADY_WITHIN = 0.1  # relative
+PROVISIONAL_BLOCKS = 6  # so long a learned rate is refined: its first blocks may hold the catching up of a hiccup
+HICCUP_SHARE = 0.8  # a block below this share of the learned rate is a source that slowed down, and refines nothing
 DECIDED_BLOCKS = 4  # without agreement by then, the declared rate stands
 
 
@@ -41,8 +44,9 @@ class RateMeter:
 
     What to expect is, in this order: what the operator set; the car's own steady rate; the declared default. Rates
     differ between healthy cars (a scan at 10, 30 or 75 Hz), so a car which holds its own rate for two blocks of 2.5 s
-    is taken at its word. Later only a steadily *higher* rate is learned: a falling one is what the operator wants to
-    hear about.
+    is taken at its word. After a hiccup messages come faster than their source for some seconds: the
+    median of the blocks of the next 15 s takes the place of what was learned first. Later only a steadily *higher* rate
+    is learned: a falling one is what the operator must know.
     """
 
     __slots__ = (
@@ -57,7 +61,9 @@ class RateMeter:
         "_is_settled",
         "_last_block_hz",
         "_last_s",
+        "_learned_blocks",
         "_learned_hz",
+        "_learned_hz_before",
         "_set_hz",
         "horizon_s",
         "period_s",
@@ -71,6 +77,8 @@ class RateMeter:
         self._declared_hz = declared_hz
         self._set_hz = set_hz
         self._learned_hz: float | None = None
+        self._learned_hz_before: float | None = None  # what a step up took the place of
+        self._learned_blocks: list[float] = []  # Hz of the blocks it is the median of, while it is provisional
         self._blocks = 0
         self._arrivals: deque[float] = deque(maxlen=20_000)
         self._is_settled = False
@@ -157,16 +165,33 @@ class RateMeter:
         before_hz, self._last_block_hz = self._last_block_hz, block_hz
         self._begin_block(at_s)
         self._blocks += 1
+        self._refine(block_hz)
         self._agree(block_hz, before_hz)
         self._settle()
 
     def _agree(self, block_hz: float, before_hz: float | None) -> None:
         if before_hz is None or abs(block_hz - before_hz) > STEADY_WITHIN * max(block_hz, before_hz):
             return
-        steady_hz = (block_hz + before_hz) / 2
+        learned_hz = self._learned_hz
         # Only a clear step up is a new rate: following every wobble upward would ratchet the demand.
-        if self._learned_hz is None or min(block_hz, before_hz) > (1 + STEADY_WITHIN) * self._learned_hz:
-            self._learned_hz = steady_hz
+        if learned_hz is None or min(block_hz, before_hz) > (1 + STEADY_WITHIN) * learned_hz:
+            self._learned_hz_before = learned_hz
+            self._learned_blocks = [before_hz, block_hz]
+            self._learned_hz = (before_hz + block_hz) / 2
+
+    def _refine(self, block_hz: float) -> None:
+        """Takes the median of more blocks for a rate just learned; a step up that does not last is taken back."""
+        learned_hz = self._learned_hz
+        if not self._learned_blocks or learned_hz is None:
+            return
+        if block_hz < HICCUP_SHARE * learned_hz or len(self._learned_blocks) > PROVISIONAL_BLOCKS:
+            self._learned_blocks = []
+            return
+        self._learned_blocks.append(block_hz)
+        self._learned_hz = median_low(self._learned_blocks)
+        before_hz = self._learned_hz_before
+        if before_hz is not None and self._learned_hz <= (1 + STEADY_WITHIN) * before_hz:
+            self._learned_hz, self._learned_blocks = before_hz, []
 
     def _settle(self) -> None:
         """To be called whenever what is expected may have changed, and until it is settled at every message."""

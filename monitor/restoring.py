@@ -44,6 +44,8 @@ def _after(alarm: Alarm, transition: Transition) -> Alarm:
     match transition.change:
         case "raised":
             alarm = replace(alarm, active=True, raised_s=transition.at_s, worst=transition.finding)
+            if transition.state is AlarmState.ACKED:  # it came back soon, and was not announced again
+                return alarm
             return _announced(alarm, transition)
         case "recaused":
             return _announced(replace(alarm, active=True), transition)

@@ -86,6 +86,7 @@ class Monitor:
         self._passed_on: Snapshot | None = None  # of which the others were not asked, because harmless
         self._ticks = 0
         self.crashes: dict[str, Crash] = {}
+        self.failed_parts: tuple[str, ...] = ()  # of what feeds the checks; written by the caller before a step
         self._failed: dict[str, int] = {}
         self.alarms = {check.id: Alarm(id=check.id, spec=check.alarm) for check in declared}
         if len(self.alarms) < len(declared):
@@ -155,7 +156,7 @@ class Monitor:
                     pass
             transitions += self._judge(row, snapshot)
         self._passed_on = snapshot if may_pass else None
-        if self.crashes or not self.alarms[IMPAIRED].is_at_rest:
+        if self.crashes or self.failed_parts or not self.alarms[IMPAIRED].is_at_rest:
             transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
         return tuple(transitions)
 
@@ -238,6 +239,15 @@ class Monitor:
                 -(alarm.announced_s or 0.0),
             ),
         )
+
+    def suppressed(self) -> list[Alarm]:
+        """Alarms that would stand if nothing explained them, most urgent first."""
+        hidden = [
+            alarm
+            for alarm in self.alarms.values()
+            if alarm.suppressed_by and (alarm.is_standing or (alarm.finding and alarm.finding.verdict is Verdict.FAULT))
+        ]
+        return sorted(hidden, key=lambda alarm: (alarm.spec.priority.rank, alarm.id))
 
     def tiles(self) -> list[Tile]:
         """What the home tab shows of the checks: a tile for each label, at its fixed place."""
@@ -326,7 +336,7 @@ class Monitor:
         return finding
 
     def _impaired(self) -> Finding:
-        if not self.crashes:
+        if not self.crashes and not self.failed_parts:
             return OK
-        labels = tuple(check.label for check in self._declared if check.id in self.crashes)
+        labels = (*(check.label for check in self._declared if check.id in self.crashes), *self.failed_parts)
         return fault(f"Not watched: {', '.join(labels)}", causes=labels)

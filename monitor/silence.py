@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 from monitor.signals import SIGNALS
-from monitor.state import Reading, Snapshot
+from monitor.state import Snapshot
 
 OVERDUE_PERIODS = 3
 OVERDUE_S = 0.3  # later than this nothing of Wi-Fi's usual bunching explains
@@ -21,9 +22,9 @@ class Silence:
     """How silent the car is at one moment."""
 
     heard: int  # signals heard on this connection that ought to come regularly
-    fresh: int  # of those, the ones still fresh
+    fresh: int  # of those, the ones that still come
     is_quiet: bool  # nothing where several things ought to have come: too early to blame one signal
-    is_silent: bool  # all that comes fast is stale at once
+    is_silent: bool  # nothing comes of all that comes fast
     falters: bool  # nothing fast for half as long: after a silence it is not over yet
     silent_s: float  # since the newest fast message
     is_bridge_proved: bool  # the bridge has been heard from since
@@ -32,34 +33,49 @@ class Silence:
 def silence(snapshot: Snapshot) -> Silence | None:
     """None while nothing regular was heard on this connection."""
     now_s, opened_s = snapshot.now_s, snapshot.link.opened_s
-    heard = [
-        reading
-        for name, reading in snapshot.readings.items()
-        if reading.derived_from is None
-        and not SIGNALS[name].event_like
-        and (opened_s is None or reading.received_s >= opened_s)
-    ]
+    heard = [one for one in _arrivals(snapshot) if opened_s is None or one.at_s >= opened_s]
     if not heard:
         return None
-    horizon_s = max(FAST_HORIZON_S, min(reading.horizon_s for reading in heard))
-    fast = [reading for reading in heard if reading.horizon_s <= horizon_s]
-    fresh = sum(reading.is_fresh(now_s) for reading in heard)
-    newest_s = max(reading.received_s for reading in fast)
-    margin_s = min(_overdue_s(reading) for reading in fast)
+    horizon_s = max(FAST_HORIZON_S, min(one.horizon_s for one in heard))
+    fast = [one for one in heard if one.horizon_s <= horizon_s]
+    newest_s = max(one.at_s for one in fast)
+    margin_s = min(_overdue_s(one) for one in fast)
     newest_of_all_s = newest_s if snapshot.heard_s is None else snapshot.heard_s
     nothing_since = newest_of_all_s - newest_s <= margin_s
-    all_overdue = all(now_s - reading.received_s > _overdue_s(reading) for reading in fast)
+    all_overdue = all(now_s - one.at_s > _overdue_s(one) for one in fast)
     bridge_s = max((s for s in (snapshot.link.bridge_heard_s, snapshot.heard_s) if s is not None), default=newest_s)
     return Silence(
         heard=len(heard),
-        fresh=fresh,
+        fresh=sum(one.is_coming(now_s) for one in heard),
         is_quiet=all_overdue and (len(fast) >= CROWD or now_s - newest_of_all_s > margin_s),
-        is_silent=not any(reading.is_fresh(now_s) for reading in fast) and (len(fast) >= CROWD or nothing_since),
-        falters=all(now_s - reading.received_s > FALTERS_AT * reading.horizon_s for reading in fast),
+        is_silent=not any(one.is_coming(now_s) for one in fast) and (len(fast) >= CROWD or nothing_since),
+        falters=all(now_s - one.at_s > FALTERS_AT * one.horizon_s for one in fast),
         silent_s=max(0.0, now_s - newest_s),
         is_bridge_proved=bridge_s - newest_s > margin_s,
     )
 
 
-def _overdue_s(reading: Reading[Any]) -> float:
-    return max(OVERDUE_S, OVERDUE_PERIODS * (reading.period_s or 0.0))
+def _arrivals(snapshot: Snapshot) -> Iterator[_Arrival]:
+    """Of each signal that ought to come regularly, whether what came can be used or not."""
+    unusable = snapshot.unusable
+    for name, reading in snapshot.readings.items():
+        if reading.derived_from is None and not SIGNALS[name].event_like and name not in unusable:
+            yield _Arrival(reading.received_s, reading.horizon_s, reading.period_s)
+    for name, one in unusable.items():
+        if not SIGNALS[name].event_like:
+            yield _Arrival(one.at_s, one.horizon_s, one.period_s)
+
+
+class _Arrival(NamedTuple):
+    """The newest message of a signal."""
+
+    at_s: float
+    horizon_s: float
+    period_s: float | None
+
+    def is_coming(self, now_s: float) -> bool:
+        return -self.horizon_s <= now_s - self.at_s <= self.horizon_s
+
+
+def _overdue_s(arrival: _Arrival) -> float:
+    return max(OVERDUE_S, OVERDUE_PERIODS * (arrival.period_s or 0.0))

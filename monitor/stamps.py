@@ -17,6 +17,7 @@ AGREE_WITHIN_S = 0.25
 SETTLES_S = 5.0  # the first messages after connecting may have waited long
 FOLLOWS = 0.001  # seconds a second: what no clock of a computer drifts
 PACE_AFTER = 10  # so many odd stamps that do not agree are no jump but another pace, as of a replay
+PACE, PACE_LEAST_S = 0.4, 0.05  # stamps that gain or lose so much a second are of another pace, as of a replay
 SAME_JUMP_S = 3.0  # jumps of several signals within this are one jump of one clock
 
 # Here several nodes write to one topic, each with its own stamps.
@@ -35,7 +36,7 @@ class ClockJump:
 class StampFollower:
     """Follows the stamps of one signal."""
 
-    __slots__ = ("_best_s", "_first_s", "_last_s", "_newest_s", "_odd", "_odd_n", "_usual_s", "change_s")
+    __slots__ = ("_best_s", "_first_s", "_last_s", "_newest_s", "_odd", "_odd_at_s", "_odd_n", "_usual_s", "change_s")
 
     def __init__(self) -> None:
         self.restart()
@@ -48,6 +49,7 @@ class StampFollower:
         self._best_s = 0.0  # difference of the message that waited least
         self._usual_s = 0.0  # the difference that change is measured from
         self._odd: list[float] = []
+        self._odd_at_s = 0.0  # when the first of them came
         self._odd_n = 0
         self.change_s: float | None = None  # the newest difference against the usual one: ahead positive, late negative
 
@@ -69,7 +71,7 @@ class StampFollower:
             and abs(difference_s - self._odd[-1]) <= AGREE_WITHIN_S
         )
         if is_ahead or is_back:
-            return self._doubt(stamp_s, difference_s)
+            return self._doubt(stamp_s, difference_s, at_s)
         if self._odd:
             self._odd.clear()
         self._odd_n = 0
@@ -84,16 +86,22 @@ class StampFollower:
         self.change_s = difference_s - self._usual_s
         return None
 
-    def _doubt(self, stamp_s: float, difference_s: float) -> float | None:
-        """An odd stamp: believed when the next ones agree with it."""
+    def _doubt(self, stamp_s: float, difference_s: float, at_s: float) -> float | None:
+        """An odd stamp: believed when the next ones agree with it, and do not run on."""
+        if not self._odd:
+            self._odd_at_s = at_s
         self._odd_n += 1
         if self._odd and abs(difference_s - self._odd[-1]) > AGREE_WITHIN_S:
             self._odd.clear()
+            self._odd_at_s = at_s
         self._odd.append(difference_s)
         if self._odd_n >= PACE_AFTER:
             self._begin_anew(stamp_s, difference_s, keep_usual=True)
             return None
         if len(self._odd) < CONFIRMED_BY:
+            return None
+        if abs(difference_s - self._odd[0]) > max(PACE * (at_s - self._odd_at_s), PACE_LEAST_S):
+            self._begin_anew(stamp_s, difference_s, keep_usual=True)
             return None
         jump_s = difference_s - self._best_s
         self._begin_anew(stamp_s, difference_s, keep_usual=False)

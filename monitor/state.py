@@ -21,9 +21,11 @@ from monitor.reach import ReachFacts
 from monitor.recorder import RecorderFacts
 from monitor.repeats import COMPARED, RepeatFollower, Repeats, Wheels
 from monitor.signals import SIGNALS, Signal
+from monitor.slow_proof import NOTHING_SHOWN, ProofFollower, SlowProof
 from monitor.slowing import SlowingFacts
 from monitor.stamps import MANY_WRITERS, ClockJump, StampFollower, merged
 from monitor.tracks import Track, TrackPoint
+from monitor.unusable import Unusable
 from monitor.values import (
     Acceleration,
     Bearing,
@@ -44,7 +46,8 @@ from monitor.values import (
 __all__ = ["Extent", "Freshness", "LinkFacts", "NotFresh", "Phase", "Reading", "Snapshot", "State", "TrackPoint"]
 
 AGEING_PERIODS = 3
-AGEING_FLOOR_S = 0.25  # three periods of a 75 Hz signal are one hiccup of Wi-Fi
+AGEING_FLOOR_S = 0.4  # three periods of a 75 Hz signal are one hiccup of Wi-Fi; a healthy link has its own 0.15 s
+DELAY_AT_MOST_S = 2.0  # later than this a value is old, however patient one is with a signal that comes seldom
 CLOCK_BACK_S = 0.5
 RATES_EVERY_S = 0.5  # a rate over 5 s does not change faster
 
@@ -75,15 +78,26 @@ class Reading(Generic[T_co]):
     count: int = 0  # messages since connecting; 0 for a derived value
     derived_from: str | None = None  # the signal it was computed from; None: published by the car
     repeats: Repeats | None = None  # what it repeats of the messages before it; None: nothing of it can be followed
+    delay_s: float = 0.0  # how old it was when it came, at most: what its transport may have taken
     # How much further its stamp is behind the receiver's clock (negative) or ahead of it (positive) than usual since
     # connecting; None: no stamp, or many writers.
     stamp_change_s: float | None = None
 
     def age_s(self, now_s: float) -> float:
+        """How old the value is, its transport included."""
+        return self.silent_s(now_s) + self.delay_s
+
+    def silent_s(self, now_s: float) -> float:
+        """Since it came: of the messages, not of what they say."""
         return max(0.0, now_s - self.received_s)
 
     def is_fresh(self, now_s: float) -> bool:
         # Both ways: a reading from far in the future says that the clock went back, not that the value is new.
+        silent_s = now_s - self.received_s
+        return -self.horizon_s <= silent_s <= self.horizon_s - self.delay_s and self.delay_s <= DELAY_AT_MOST_S
+
+    def is_coming(self, now_s: float) -> bool:
+        """Whether messages come, however late they are."""
         return -self.horizon_s <= now_s - self.received_s <= self.horizon_s
 
     def freshness(self, now_s: float) -> Freshness:
@@ -113,6 +127,7 @@ class Snapshot:
     paused: bool = False
     paused_since_s: float | None = None
     heard_s: float | None = None  # when any signal last came
+    unusable: Mapping[str, Unusable] = field(default_factory=dict)  # signals whose newest messages cannot be used
     extents: Mapping[str, Extent] = field(default_factory=dict)  # where a headline number was ever heard
     track: tuple[TrackPoint, ...] = ()  # where the car was, thinned and bounded, oldest first
     track_m: float | None = None  # distance driven since connecting; None: never had a position
@@ -127,6 +142,7 @@ class Snapshot:
     recorder: RecorderFacts = field(default_factory=RecorderFacts)
     reach: ReachFacts | None = None  # whom an alarm would reach; None: nobody is asked, as in a recording
     slowing: SlowingFacts = field(default_factory=SlowingFacts)
+    slow_proof: SlowProof = NOTHING_SHOWN  # what the car's speed shows of the order
 
     @overload
     def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...
@@ -192,6 +208,9 @@ class Snapshot:
         """The value while it is fresh; raises `NotFresh`, which the runner turns into UNKNOWN, otherwise."""
         reading = self.readings.get(signal)
         label = SIGNALS[signal].label
+        unusable = self.unusable.get(signal)
+        if unusable is not None and (reading is None or not reading.is_fresh(self.now_s)):
+            raise NotFresh(f"{label}: {unusable.words}", "unusable")
         if reading is None:
             if signal in self.link.published:
                 raise NotFresh(f"{label}: nothing received yet", "no data")
@@ -249,6 +268,7 @@ class State:
         self._rates: Mapping[str, Rate] = MappingProxyType({})
         self._rates_at_s: float | None = None
         self._heard_s: float | None = None
+        self._unusable: Mapping[str, Unusable] = MappingProxyType({})
         self._latest_s = -math.inf
         self._slope = Slope()
         self._slope_mps2: float | None = None
@@ -261,6 +281,7 @@ class State:
         self._gps_follower = GpsFollower()
         self._gps = GpsWatch()
         self._phones = Phones()
+        self._fix_s = -math.inf  # when the newest position was sent
         self._rides: str | None = None
         self._scan_earlier = self._heard["scan"].earlier = Earlier()
         self._distance_earlier = self._heard["distance"].earlier = Earlier()
@@ -270,6 +291,7 @@ class State:
         self._recorder = RecorderFacts()
         self._reach: ReachFacts | None = None
         self._slowing = SlowingFacts()
+        self._slow_proof = ProofFollower()
         self._paused_since_s: float | None = None
 
     def expect(self, expected_hz: Mapping[str, float]) -> None:
@@ -278,8 +300,13 @@ class State:
         for name, heard in self._heard.items():
             heard.meter.expect(self._expected_hz.get(name))
 
-    def receive(self, signal: str, value: Value, received_s: float, stamp_s: float | None = None) -> tuple[str, ...]:
-        """Take one decoded value; returns the signals that changed by it, derived ones included, for `Monitor.step`."""
+    def receive(
+        self, signal: str, value: Value, received_s: float, stamp_s: float | None = None, delay_s: float = 0.0
+    ) -> tuple[str, ...]:
+        """Take one decoded value; returns the signals that changed by it, derived ones included, for `Monitor.step`.
+
+        `delay_s`: how old it was when it came, at most.
+        """
         if received_s >= self._latest_s:
             self._latest_s = received_s
         else:
@@ -289,9 +316,12 @@ class State:
         meter = heard.meter
         meter.receive(received_s)
         self._heard_s = received_s
+        if signal in self._unusable:
+            self._unusable = MappingProxyType({name: one for name, one in self._unusable.items() if name != signal})
         kind = type(value)
         if kind is Twist:
             self._wheels.add(received_s, value.speed_mps)  # type: ignore[union-attr, arg-type]
+            self._slow_proof.add(received_s, value.speed_mps)  # type: ignore[union-attr, arg-type]
         elif kind is Diagnostics:
             value = self._components.merge(value, received_s)  # type: ignore[arg-type]
         reading = _new_reading(
@@ -301,6 +331,7 @@ class State:
             horizon_s=meter.horizon_s,
             period_s=meter.period_s,
             count=heard.count,
+            delay_s=delay_s,
             repeats=None
             if stamp_s is None and kind not in COMPARED
             else heard.repeats.receive(value, stamp_s, received_s, self._wheels),
@@ -320,6 +351,27 @@ class State:
             return heard.alone
         derived = self._derive(signal, reading)
         return heard.alone if derived is None else (signal, derived)
+
+    def refuse(self, signal: str, reason: str, received_s: float) -> None:
+        """A message came that says nothing usable of this signal, and why."""
+        self._follow_clock(received_s)
+        meter = self._heard[signal].meter
+        meter.receive(received_s)
+        self._heard_s = received_s
+        before = self._unusable.get(signal)
+        self._unusable = MappingProxyType(
+            {
+                **self._unusable,
+                signal: Unusable(
+                    reason=reason,
+                    at_s=received_s,
+                    since_s=received_s if before is None else before.since_s,
+                    count=1 if before is None else before.count + 1,
+                    horizon_s=meter.horizon_s,
+                    period_s=meter.period_s,
+                ),
+            }
+        )
 
     def hear_phone(self, word: PhoneWord, now_s: float) -> None:
         """What an operator's phone says of its own position; judged on the next tick."""
@@ -368,6 +420,7 @@ class State:
             for heard in self._heard.values():
                 heard.restart()
             self._clock_jump = None
+            self._unusable = MappingProxyType({})
 
     def recorder(self, facts: RecorderFacts) -> None:
         """What is now known of the recorder."""
@@ -380,6 +433,7 @@ class State:
     def slow(self, facts: SlowingFacts) -> None:
         """What is now known of an order to slow the car."""
         self._slowing = facts
+        self._slow_proof.order(facts)
 
     def reach(self, facts: ReachFacts) -> None:
         """Whom an alarm would reach now."""
@@ -408,6 +462,7 @@ class State:
             paused=self.paused,
             paused_since_s=self._paused_since_s,
             heard_s=self._heard_s,
+            unusable=self._unusable,
             extents=extents,
             track=self._track.points,
             track_m=self._track.distance_m,
@@ -422,6 +477,7 @@ class State:
             recorder=self._recorder,
             reach=self._reach,
             slowing=self._slowing,
+            slow_proof=self._slow_proof.proof,
         )
 
     def glance(self, now_s: float) -> Snapshot:
@@ -441,12 +497,15 @@ class State:
         if shift_s > -CLOCK_BACK_S:
             return  # a message waited a moment between its arrival and here
         self._latest_s = at_s
+        self._slow_proof.forget()
+        self._fix_s = -math.inf
         self._phones = Phones()  # they speak again within seconds
         self._phones.ride(self._rides, at_s)
         self._readings = {
             name: replace(reading, received_s=reading.received_s + shift_s) for name, reading in self._readings.items()
         }
         self._readings_shared = None
+        self._unusable = MappingProxyType({})
         if self._heard_s is not None:
             self._heard_s += shift_s
         if self._paused_since_s is not None:
@@ -476,7 +535,8 @@ class State:
                 self._track.receive(value, at_s, speed_mps, is_standing)
                 standing_since_s = None if speed_mps is None else self._standstill.since_s
                 self._gps = self._gps_follower.receive(value, at_s, reading.stamp_s, standing_since_s)
-                self._phones.car(value, at_s)
+                self._fix_s = max(self._fix_s, at_s - reading.delay_s)  # the phone's time is when it was measured too
+                self._phones.car(value, self._fix_s)
                 heading = self._headings.on_course(
                     self._track.course_deg, speed_mps, yaw_is_fresh=self._is_fresh("odometry", at_s)
                 )
@@ -510,6 +570,7 @@ class State:
             stamp_s=reading.stamp_s,
             horizon_s=reading.horizon_s,
             period_s=reading.period_s,
+            delay_s=reading.delay_s,
             derived_from=source,
         )
         heard = self._heard[signal]

@@ -39,6 +39,7 @@ class Steering:
     """How far the steering is turned."""
 
     percent: float  # −100 … 100, negative = left
+    tyre_rad: float | None = None  # angle of the front tyres, positive = left; None: not known for this kind of car
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

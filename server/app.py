@@ -33,7 +33,9 @@ from server.recording.recover import Recovered
 from server.recovering import recover_left
 from server.session import Session
 from server.settings import SettingsFile
+from server.storage.data_folder import DataFolder
 from server.version import catgraph_version
+from server.vitals import problems
 from server.web import api, devices, docs, errors, metrics, notices, pages, slow_down
 from server.web import exports as web_exports
 from server.web import ground as web_ground
@@ -56,6 +58,7 @@ class Running:
     """What the routes of one app use."""
 
     config: Config
+    folder: DataFolder | None  # held until the app ends; None: nothing is kept
     bus: LocalBus
     hub: Hub
     access: Access
@@ -81,6 +84,15 @@ class Running:
             "frames_skipped": self.hub.skipped,
         }
 
+    def problems(self) -> list[str]:
+        """What is wrong with the server, a sentence each; those of a vehicle begin with its name."""
+        found = [f"{name}: {what}" for name, session in self.sessions.items() for what in problems(session.vitals())]
+        if self.recordings is not None:
+            found += self.recordings.problems()
+        if self.mailer is not None:
+            found += self.mailer.problems()
+        return found
+
     def hello(self, vehicle: str) -> dict[str, Any]:
         return {
             "kind": "hello",
@@ -104,17 +116,18 @@ def create_app(
 ) -> FastAPI:
     """The ASGI application; its sessions run from its start-up to its shut-down. `checks` None: all there are.
 
-    Raises OSError when the data folder cannot be used, AssetsMissing when the page's files are not there,
+    Raises OSError when the data folder cannot be used, DataFolderRefused when another server uses it or a newer version
+    wrote it, AssetsMissing when the page's files are not there,
     MapRefused when a map file cannot be shown.
     """
     ground = Ground(config.maps, config.site_image, _upstream(config, now=now, wall_ms=wall_ms))
-    if config.data is not None:
-        config.data.mkdir(parents=True, exist_ok=True)
+    folder = DataFolder(config.data) if config.data is not None else None
     journal = Journal(config.data / "events.sqlite" if config.data is not None else None)
     bus = LocalBus(journal, now=now)
     desk = Desk(lambda id: _recording(running, id), now=now)
     running = Running(
         config=config,
+        folder=folder,
         bus=bus,
         hub=Hub(bus, desk=desk, server=lambda: running.server_facts(), limits=config.limits, now=now),
         access=Access(config, now=now, wall_ms=wall_ms),
@@ -172,6 +185,8 @@ def create_app(
             running.access.stop()
             journal.close()
             ground.close()
+            if folder is not None:
+                folder.close()
 
     app = _Served(
         title="catgraph",

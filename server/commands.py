@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
@@ -24,8 +24,10 @@ class _Command(BaseModel):
 
 
 class Connect(_Command):
+    """Without an address: to the car that was configured when the server was started."""
+
     kind: Literal["connect"]
-    address: Annotated[str, Field(max_length=300)]
+    address: Annotated[str, Field(max_length=300)] = ""
 
 
 class Retry(_Command):
@@ -153,6 +155,7 @@ class PresentWord(_Command):
     needs: ClassVar[Needs] = "operator"
     kind: Literal["present"]
     visible: bool
+    draws: bool = True  # false: what shows its values and alarms has failed
     sound: Literal["ready", "refused", "asks", "missing", "interrupted"]
     awake: Literal["ready", "refused", "asks", "missing"]
     vibrates: bool = False
@@ -222,6 +225,8 @@ Command = (
     | PresentWord
     | SlowingCommand
 )
+KINDS = frozenset(get_args(one.model_fields["kind"].annotation)[0] for one in get_args(Command))
+NO_SUCH = "There is no such command."
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
 
 
@@ -241,6 +246,6 @@ def read(command: Any) -> Command:
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
         if first["type"] in ("union_tag_invalid", "union_tag_not_found"):
-            raise NotUnderstood("There is no such command.") from None
+            raise NotUnderstood(NO_SUCH) from None
         where = ".".join(str(part) for part in first["loc"][1:]) or "the command"
         raise NotUnderstood(f"{where}: {first['msg']}.") from None

@@ -35,6 +35,7 @@ from monitor.values import (
     Steering,
     Twist,
 )
+from server.clean_text import clean
 
 Decode = Callable[[Any], Any]
 
@@ -96,7 +97,7 @@ def finite(message: Any, *path: str) -> float:
         pass  # `number` says what is wrong
     value = number(message, *path)
     if not math.isfinite(value):
-        raise Rejected(f"{'.'.join(path)} is null")
+        raise Rejected(f"{'.'.join(path)} is not a number")
     return value
 
 
@@ -108,7 +109,7 @@ def text(message: Any, *path: str, default: str = "") -> str:
     value = message
     for name in path:
         value = value.get(name) if _has_fields(value) else None
-    return value[:200] if isinstance(value, str) else default
+    return clean(value[:200]) if isinstance(value, str) else default
 
 
 def _has_fields(value: Any) -> TypeGuard[Mapping[str, Any]]:
@@ -214,7 +215,7 @@ def nav_sat_fix(message: Any) -> GpsFix:
     latitude, longitude = number(message, "latitude"), number(message, "longitude")
     if math.isnan(latitude) or math.isnan(longitude):
         if status >= 0:
-            raise Rejected("latitude or longitude is null")
+            raise Rejected("latitude or longitude is not a number")
         latitude = longitude = math.nan
     elif abs(latitude) > 90 or abs(longitude) > 360:
         raise Rejected("latitude or longitude out of range")

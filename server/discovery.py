@@ -3,11 +3,13 @@ lives."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from server.link import CallFailed, LinkDown, RosLink
+from server.decode import stamp_s
+from server.link import CallFailed, LinkDown
+from server.questions import Asks
 from server.recording.schemas import text_of_details
 from server.source import RosVersion
 from server.topics import ros_version
@@ -16,6 +18,8 @@ MAX_TOPICS = 5000
 MAX_PUBLISHERS = 100
 MAX_NAME = 120
 MAX_DETAILS = 100  # types that are asked for one by one
+DEFINITIONS_WITHIN_S = 5.0  # rosapi reads a file for each type
+_FAILED = "# failed to get full definition text"  # a comment in place of a definition, by ROS 2: not an empty message
 STANDARD = frozenset(
     f"{name}_msgs"
     for name in ("std", "geometry", "sensor", "nav", "diagnostic", "rosgraph", "tf2", "visualization", "shape", "map")
@@ -30,7 +34,7 @@ class Offer:
     ros: RosVersion | None
 
 
-async def ask_topics(link: RosLink) -> Offer | None:
+async def ask_topics(link: Asks) -> Offer | None:
     """The topics of the car; None where the bridge has no rosapi or does not answer sensibly. Raises LinkDown."""
     try:
         answer = await link.call("/rosapi/topics", timeout_s=2.5)
@@ -46,14 +50,15 @@ async def ask_topics(link: RosLink) -> Offer | None:
     return Offer(topics=found, ros=2 if version == 2 else 1 if version == 1 else None)
 
 
-async def ask_definitions(link: RosLink, types: Collection[str]) -> dict[str, str]:
-    """The definitions of types, in .msg text, as far as the bridge knows them. Raises LinkDown."""
-    try:
-        answer = await link.call("/rosapi/topics_and_raw_types", timeout_s=5.0)
-    except CallFailed:
-        answer = None
-    found = {type: text for type, text in _texts(answer).items() if type in types}
-    for type in sorted(set(types) - found.keys())[:MAX_DETAILS]:
+async def ask_definitions(link: Asks, types: Collection[str], ros: RosVersion | None) -> dict[str, str]:
+    """The definitions of types, in .msg text, as far as the bridge knows them. Raises LinkDown, or CallFailed where it
+    did not answer.
+
+    `message_details` is asked of ROS 1 only: on ROS 2 a type with a bounded array or a wstring ends rosapi.
+    """
+    answer = await link.call("/rosapi/topics_and_raw_types", timeout_s=DEFINITIONS_WITHIN_S)
+    found = {type: text for type, text in _texts(answer, ros).items() if type in types}
+    for type in sorted(set(types) - found.keys())[:MAX_DETAILS] if ros == 1 else ():
         if plain_package(type) not in STANDARD:  # of those the distribution knows more than rosapi tells
             try:
                 text = text_of_details(await link.call("/rosapi/message_details", {"type": type}, timeout_s=1.5))
@@ -64,18 +69,22 @@ async def ask_definitions(link: RosLink, types: Collection[str]) -> dict[str, st
     return found
 
 
-async def ask_alive(link: RosLink) -> bool | None:
-    """Does ROS behind the bridge still answer? None: it never could say (no rosapi). Raises LinkDown."""
+async def ask_alive(link: Asks, *, timed: Callable[[float], None] = lambda _: None) -> bool | None:
+    """Does ROS behind the bridge still answer? None: it never could say (no rosapi). Raises LinkDown. `timed` gets the
+    time of ROS, in seconds."""
     try:
         answer = await link.call("/rosapi/get_time", timeout_s=1.5)
     except CallFailed:
         return False
+    ros_s = stamp_s({"header": {"stamp": answer.get("time")}}) if isinstance(answer, Mapping) else None
+    if ros_s is not None:
+        timed(ros_s)
     return isinstance(answer, Mapping)
 
 
-async def ask_publishers(link: RosLink, topic: str) -> tuple[str, ...] | None:
-    """The nodes that publish on a topic, but for the bridge, which is also we; None where it does not say. Raises
-    LinkDown."""
+async def ask_publishers(link: Asks, topic: str, *, and_bridge: bool = False) -> tuple[str, ...] | None:
+    """The nodes that publish on a topic, `and_bridge`: with the bridge, which is also we; None where it does not say.
+    Raises LinkDown."""
     try:
         answer = await link.call("/rosapi/publishers", {"topic": topic}, timeout_s=1.0)
     except CallFailed:
@@ -84,10 +93,22 @@ async def ask_publishers(link: RosLink, topic: str) -> tuple[str, ...] | None:
     if not isinstance(names, list):
         return None
     found = {name for name in names[:MAX_PUBLISHERS] if isinstance(name, str)}
-    return tuple(sorted(name[:MAX_NAME] for name in found if "rosbridge" not in name))
+    return tuple(sorted(name[:MAX_NAME] for name in found if and_bridge or "rosbridge" not in name))
 
 
-async def _ask_type(link: RosLink, topic: str) -> str:
+async def ask_subscribers(link: Asks, topic: str) -> tuple[str, ...] | None:
+    """The nodes that subscribe to a topic, the bridge among them; None where rosapi does not say. Raises LinkDown."""
+    try:
+        answer = await link.call("/rosapi/subscribers", {"topic": topic}, timeout_s=1.0)
+    except CallFailed:
+        return None
+    names = answer.get("subscribers") if isinstance(answer, dict) else None
+    if not isinstance(names, list):
+        return None
+    return tuple(sorted({name[:MAX_NAME] for name in names[:MAX_PUBLISHERS] if isinstance(name, str)}))
+
+
+async def _ask_type(link: Asks, topic: str) -> str:
     try:
         answer = await link.call("/rosapi/topic_type", {"topic": topic}, timeout_s=1.5)
     except (CallFailed, LinkDown):
@@ -96,12 +117,19 @@ async def _ask_type(link: RosLink, topic: str) -> str:
     return kind if isinstance(kind, str) else ""
 
 
-def _texts(answer: Any) -> dict[str, str]:
+def _texts(answer: Any, ros: RosVersion | None) -> dict[str, str]:
     names, types = _lists(answer)
-    texts = answer.get("typedefs_full_texts") if names is not None else None
+    texts = answer.get("typedefs_full_text") if names is not None else None
     if not isinstance(texts, list) or len(texts) != len(types):
         return {}
-    return {type: text for type, text in zip(types, texts, strict=True) if type and isinstance(text, str) and text}
+    found = {}
+    for type, text in zip(types, texts, strict=True):
+        if type and isinstance(text, str) and not text.startswith(_FAILED):
+            if text:
+                found[type] = text
+            elif ros == 2:  # no fields; on ROS 1 an empty text may also mean that the bridge does not know the type
+                found[type] = "\n"
+    return found
 
 
 def plain_package(type: str) -> str:

@@ -11,8 +11,11 @@ from typing import Any
 
 from server import discovery
 from server.address import Address, BadAddress, parse
+from server.diagnosis import SILENT_S, Diagnosis
 from server.link import LinkDown, RosLink, Subscription
-from server.problems import Problem, not_rosbridge
+from server.passing import BLOCKED_AFTER_S, CLIENT_COUNT, Passing
+from server.problems import LOGIN_WANTED, ROSAPI_ENDED, ROSAPI_MISSING, Problem, not_proved
+from server.questions import Questions
 from server.reception import Reception
 from server.topics import BY_SIGNAL, TOPICS, Source, map_signals
 
@@ -50,6 +53,7 @@ class _Ear:
         self.by_topic: dict[str, tuple[Source, ...]] = {}
         self.counts: dict[str, int] = {}
         self.values: dict[str, Any] = {}
+        self.client_count: Any = None  # of the bridge, as it last published it
         self.words: list[str] = []
 
     def link_opened(self) -> None:
@@ -65,6 +69,8 @@ class _Ear:
 
     def message_received(self, topic: str, message: Any, note: str | None) -> None:
         self.spoke.set()
+        if topic == CLIENT_COUNT:
+            self.client_count = message
         self.counts[topic] = self.counts.get(topic, 0) + 1
         for source in self.by_topic.get(topic, ()):
             value = self.reception.read(source, message, note)
@@ -77,6 +83,9 @@ class _Ear:
 
     def junk_received(self, why: str) -> None:
         self.reception.junk(why)
+
+    def large_skipped(self, topic: str | None, size: int) -> None:
+        """It is counted among the frames that are no operations."""
 
 
 async def _examine(address: Address, seconds: float) -> int:
@@ -104,32 +113,90 @@ async def _examine(address: Address, seconds: float) -> int:
         await asyncio.sleep(0)
 
 
-async def _report(address: Address, link: RosLink, ear: _Ear, seconds: float) -> int:
-    offer = await discovery.ask_topics(link)
-    alive = await discovery.ask_alive(link)
-    if offer is None and not alive and not ear.spoke.is_set():
-        problem = not_rosbridge(address, "It speaks WebSocket and answers nothing that rosbridge would.")
+def _cannot(problem: Problem | None) -> int:
+    if problem is not None:
         print(f"catgraph: {problem.title} {problem.hint}", file=sys.stderr)
-        return 2
+    return 2
+
+
+async def _report(address: Address, link: RosLink, ear: _Ear, seconds: float) -> int:
+    diagnosis = Diagnosis()
+    asks = Questions(link, diagnosis, now=time.monotonic)
+    try:
+        return await _tell(address, link, ear, asks, diagnosis, seconds)
+    finally:
+        asks.stop()
+
+
+async def _tell(
+    address: Address, link: RosLink, ear: _Ear, asks: Questions, diagnosis: Diagnosis, seconds: float
+) -> int:
+    server_software = link.server_software
+    asked_s = time.monotonic()
+    offer = await discovery.ask_topics(asks)
+    alive = await discovery.ask_alive(asks)
+    if asks.login is not None or (ear.problem is not None and ear.problem.code == LOGIN_WANTED):
+        return _cannot(asks.login or ear.problem)
+    if not alive:
+        while (wait_s := asked_s + SILENT_S + 0.2 - time.monotonic()) > 0 and not alive:
+            await asyncio.sleep(min(wait_s, 0.5))  # ROS 2 finds rosapi a little later; an answer may be late
+            alive = await discovery.ask_alive(asks)
+        offer = offer or (await discovery.ask_topics(asks) if alive else None)
+    behind = diagnosis.problem(time.monotonic(), flows=False)
+    if offer is None and not diagnosis.is_rosbridge and not ear.spoke.is_set():
+        return _cannot(not_proved(address, server_software, link.junk_count))
+    if behind is not None and behind not in (ROSAPI_MISSING, ROSAPI_ENDED) and offer is None:
+        return _cannot(behind)
     print(f"rosbridge on {address.shown}: answers" + (f", ROS {offer.ros}" if offer and offer.ros else ""))
     print(f"ROS behind it: {'answers' if alive else ROS_SILENT}")
     if offer is None:
-        print("It has no rosapi: topics and types cannot be asked for. Start rosapi beside rosbridge.")
+        problem = behind or ROSAPI_MISSING
+        print(f"{problem.title} {problem.hint}")
         return 1
-    sources = map_signals(offer.topics)
+    sources = await _map(asks, offer)
     ear.by_topic = {}
     for source in sources.values():
         ear.by_topic[source.topic] = (*ear.by_topic.get(source.topic, ()), source)
     for topic, kind in offer.topics.items():
-        mapped = ear.by_topic.get(topic, ())
+        mapped = [source for source in ear.by_topic.get(topic, ()) if source.decode is not None]
         cbor = any(BY_SIGNAL[source.signal].compression == "cbor" for source in mapped)
-        if mapped:
+        if mapped or topic == CLIENT_COUNT:
             link.subscribe(
                 Subscription(topic=topic, type=kind or None, compression="cbor" if cbor else "none", queue_length=50)
             )
     print(f"Listening for {seconds:g} s …", flush=True)
     await asyncio.sleep(seconds)
+    not_passed = await _not_passed(offer, sources, ear, asks)
+    if not_passed is not None:
+        print(f"{not_passed.title} {not_passed.hint}")
     return _print(offer, sources, ear, seconds)
+
+
+async def _map(asks: Questions, offer: discovery.Offer) -> dict[str, Source]:
+    """The topic of each signal, of those that a node publishes."""
+    published: set[str] = set()
+    unpublished: set[str] = set()
+    while True:
+        sources = map_signals(offer.topics, unpublished=unpublished)
+        unknown = {source.topic for source in sources.values()} - published - unpublished
+        if not unknown:
+            return sources
+        for topic in sorted(unknown):
+            nodes = await discovery.ask_publishers(asks, topic, and_bridge=True)
+            (unpublished if nodes == () else published).add(topic)
+
+
+async def _not_passed(offer: discovery.Offer, sources: dict[str, Source], ear: _Ear, asks: Questions) -> Problem | None:
+    """Why topics of signals that have a publisher do not come through the bridge; None: they do, or it is not known."""
+    silent = [topic for topic in {source.topic for source in sources.values()} if not ear.counts.get(topic)]
+    published = [topic for topic in silent if await discovery.ask_publishers(asks, topic)]
+    passing = Passing()
+    passing.follow(published, 0.0)
+    passing.counted(ear.client_count)
+    passing.bridges = frozenset(await discovery.ask_publishers(asks, CLIENT_COUNT, and_bridge=True) or ())
+    for topic in published if passing.bridges else ():
+        passing.answered(topic, await discovery.ask_subscribers(asks, topic), 0.0)
+    return passing.problem(BLOCKED_AFTER_S)
 
 
 def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Ear, seconds: float) -> int:
@@ -162,7 +229,10 @@ def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Ear, second
             f"{ear.reception.frames.rejected} frames were no rosbridge operations: {ear.reception.frames.last_reason}"
         )
     needed = [signal for signal in missing if signal in REPORT_SIGNALS]
-    print(f"\n{'Missing or silent: ' + ', '.join(needed) if needed else 'Every signal of the page is there.'}")
+    optional = [signal for signal in missing if signal not in REPORT_SIGNALS]
+    print(f"\n{'Missing or silent: ' + ', '.join(needed) if needed else 'Every signal that the page needs is there.'}")
+    if optional:
+        print(f"Not there, and not needed: {', '.join(optional)}")
     print(
         "rosbridge asks nobody who they are: everyone on this network can read this car and command it. "
         "docs/safety.md says how to close it."

@@ -8,12 +8,15 @@ from typing import Any
 
 import orjson
 
+from server.clean_text import clean
+
 COLUMNS = (
     *("n", "time", "change", "alarm", "occurrence", "title", "priority", "state", "text", "by"),
     *("measured", "limit", "unit", "causes", "settings_version", "details"),
 )
 _TOLD = frozenset((*COLUMNS, "at_ms", "place", "sound", "announces"))  # the rest stands in `details`, as JSON
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet runs a cell that begins so
+# A spreadsheet runs a cell that begins so; some take the wide letters for the same.
+_FORMULA = ("=", "+", "-", "@", "|", "\uff1d", "\uff0b", "\uff0d", "\uff20")
 
 
 def event_row(event: Mapping[str, Any]) -> list[Any]:
@@ -34,4 +37,7 @@ def event_row(event: Mapping[str, Any]) -> list[Any]:
 
 def safe_cell(value: Any) -> Any:
     """A text that no spreadsheet takes for a formula; numbers as they are."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+    if not isinstance(value, str):
+        return value
+    seen = clean(value, 1 << 20)  # an older version may have logged it as it came
+    return f"'{seen}" if seen.lstrip().startswith(_FORMULA) else seen

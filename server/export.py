@@ -13,7 +13,6 @@ import math
 import os
 import signal
 import sys
-import tempfile
 import threading
 import time
 import traceback
@@ -25,6 +24,8 @@ from typing import Any
 
 import orjson
 
+from server.memory_limit import TOO_LARGE, bounded_memory
+from server.output_file import Output, output_of, writing
 from server.recording.export.bag_file import COMPRESSIONS
 from server.recording.export.clip import AFTER_S, BEFORE_S, LONGEST_S, Window, first_raised_ns, write_clip
 from server.recording.export.formats import CLIP, FORMATS
@@ -38,6 +39,7 @@ WHOLE, NOT_ALL, CANNOT = 0, 1, 2
 _NICENESS = 10
 _EVERY_S = 0.1  # progress is told
 _LOOK_EVERY_S = 0.5
+MOST_NOTES = 100
 LEAVE_FREE = 500_000_000  # bytes on the disk, for the recording that may be going on
 
 
@@ -72,24 +74,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 all of it was written, 1 written, but part of the recording is damaged and not in it, 2 nothing was written."""
+    """0 all of it was written, 1 written, but something of the recording is not in it, 2 nothing was written."""
     if args.background:
         _live_with_the_server()
     speaker: _Lines | _Person = _Lines() if args.background else _Person(args.format)
     try:
         out = _target(args)
-        with open_recording(args.files) as recording:
-            progress = _with_room(out, speaker.progress) if args.background else speaker.progress
+        with bounded_memory(), open_recording(args.files) as recording:
+            progress = _with_room(out.path, speaker.progress) if args.background else speaker.progress
             outcome = _export(recording, args, out, progress)
             is_whole = not recording.damage
     except (RecordingUnreadable, ExportRefused, AssetsMissing, _Impossible) as error:
         return speaker.refused(str(error))
+    except BrokenPipeError:
+        return speaker.refused("It cannot be written: nobody reads it to its end.")
     except OSError as error:
         return speaker.refused(f"It cannot be written: {error.strerror or error}.")
+    except MemoryError:
+        return speaker.refused(f"{args.files[0]}: {TOO_LARGE}")
     except Exception as error:  # the one net: 1 would say that something was written
         traceback.print_exc()
         return speaker.refused(f"a fault of catgraph itself, please report it: {type(error).__name__}: {error}")
-    speaker.done(out, outcome)
+    is_whole = is_whole and not outcome.notes
+    speaker.done(out, outcome, is_whole=is_whole)
     return WHOLE if is_whole else NOT_ALL
 
 
@@ -114,35 +121,31 @@ class _Impossible(Exception):
     """What was asked for cannot be done. The text is one sentence."""
 
 
-def _export(recording: Recording, args: argparse.Namespace, out: Path, progress: Callable[[float], None]) -> Outcome:
+def _export(recording: Recording, args: argparse.Namespace, out: Output, progress: Callable[[float], None]) -> Outcome:
     """Whole or not at all: nothing has the name of `out` before it is complete."""
     name = args.name or _stem(args.files[0])
-    with tempfile.TemporaryDirectory(prefix=".export-", dir=out.parent) as folder:
-        new = Path(folder) / "new"
+    with writing(out) as new:
         if args.at is None:
-            outcome = _write(recording, new, name, args, progress)
-        else:
-            new, outcome = _cut(recording, Path(folder), name, args, progress)
-        with new.open("rb") as file:
-            os.fsync(file.fileno())
-        os.replace(new, out)
-    return outcome
+            return _write(recording, new, name, args, progress)
+        return _cut(recording, new, name, args, progress)
 
 
 def _cut(
-    recording: Recording, folder: Path, name: str, args: argparse.Namespace, progress: Callable[[float], None]
-) -> tuple[Path, Outcome]:
+    recording: Recording, new: Path, name: str, args: argparse.Namespace, progress: Callable[[float], None]
+) -> Outcome:
     """The time around a moment, as a recording, and that in the format asked for."""
-    clip, new = folder / "clip.mcap", folder / "new"
+    clip = new.with_name("clip.mcap")
     window = Window(at_ns=_moment_ns(recording, args.at), before_s=args.before, after_s=args.after)
     share = 1.0 if args.format == CLIP else 0.5
     outcome = write_clip(recording, clip, window, clip_of=name, progress=lambda part: progress(part * share))
     if args.format == CLIP:
-        return clip, outcome
+        os.rename(clip, new)
+        return outcome
     with open_recording([clip]) as cut:
         made = _write(cut, new, f"{name}, clip", args, lambda part: progress(share + part * (1.0 - share)))
     made.notes[:0] = outcome.notes
-    return new, made
+    made.remarks[:0] = outcome.remarks
+    return made
 
 
 def _write(
@@ -156,7 +159,7 @@ def _write(
     return outcome
 
 
-def _target(args: argparse.Namespace) -> Path:
+def _target(args: argparse.Namespace) -> Output:
     """Where to write, found to be writable before the work and not after it."""
     if args.format == CLIP and args.at is None:
         raise _Impossible("--format mcap cuts out the time around a moment: name it with --at.")
@@ -165,13 +168,14 @@ def _target(args: argparse.Namespace) -> Path:
     out: Path = args.out or Path(f"{_stem(args.files[0])}{part}.{ending}")
     if out.is_dir():
         out = out / f"{_stem(args.files[0])}{part}.{ending}"
-    if not out.parent.is_dir():
-        raise _Impossible(f"{out} cannot be written: {out.parent} is no directory.")
     if any(out.exists() and file.exists() and out.samefile(file) for file in args.files):
         raise _Impossible(f"{out} is the recording itself: name another file with --out.")
     if args.out is None and out.exists():
         raise _Impossible(f"{out} is there already: name the file with --out.")
-    return out
+    try:
+        return output_of(out)
+    except OSError as error:
+        raise _Impossible(f"{out} cannot be written: {error.strerror or error}.") from None
 
 
 def _moment_ns(recording: Recording, text: str) -> int:
@@ -224,12 +228,15 @@ class _Person:
         print(f"catgraph export: {sentence}", file=sys.stderr)
         return CANNOT
 
-    def done(self, out: Path, outcome: Outcome) -> None:
+    def done(self, out: Output, outcome: Outcome, *, is_whole: bool) -> None:
         self._bar.close()
-        for note in outcome.notes:
+        for note in (*outcome.remarks, *outcome.notes):
             print(f"catgraph export: {note}", file=sys.stderr)
+        if not is_whole:
+            print("catgraph export: the file does not hold all of the recording.", file=sys.stderr)
         with contextlib.suppress(BrokenPipeError):  # who read the other end of a pipe has seen enough
-            print(f"{out} ({amount(out.stat().st_size)})", flush=True)
+            size = f" ({amount(out.file.stat().st_size)})" if out.file is not None else ""
+            print(f"{out.path}{size}", file=sys.stderr if out.is_stdout else sys.stdout, flush=True)
 
 
 class _Lines:
@@ -248,8 +255,9 @@ class _Lines:
         self._tell({"refused": f"{sentence[:1].upper()}{sentence[1:]}"})
         return CANNOT
 
-    def done(self, out: Path, outcome: Outcome) -> None:
-        self._tell({"done": str(out), "entries": outcome.entries, "notes": outcome.notes[:100]})
+    def done(self, out: Output, outcome: Outcome, *, is_whole: bool) -> None:
+        notes = [*outcome.remarks, *outcome.notes][:MOST_NOTES]
+        self._tell({"done": str(out.path), "entries": outcome.entries, "notes": notes, "is_whole": is_whole})
 
     def _tell(self, what: dict[str, Any]) -> None:
         with contextlib.suppress(BrokenPipeError):

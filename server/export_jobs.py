@@ -33,6 +33,8 @@ KEEP_S = 3600.0  # the file of a job that is done
 KEEP_BYTES = 2_000_000_000  # of all such files together
 FLUSHED_S = 1.5  # after so long the recorder has put what it heard on the disk
 POLL_S = 0.25
+NOT_ALL = "Not all of the recording is in it."
+NOT_WHOLE = f"It is ready. {NOT_ALL}"
 AHEAD_S = 60.0  # a clip may end so long after now: it is waited for
 
 State = Literal["waiting", "working", "done", "failed", "cancelled"]
@@ -62,6 +64,7 @@ class Job:
     progress: float = 0.0
     sentence: str = "Waits for the one before it."
     notes: list[str] = field(default_factory=list)  # what is not in it, and why
+    is_whole: bool | None = None  # False: something of the recording is not in it; None: not made yet
     path: Path | None = None
     size: int | None = None
     recording: str | None = None  # the new one, of a clip that is done
@@ -81,6 +84,7 @@ class Job:
             "progress": round(self.progress, 3),
             "sentence": self.sentence,
             "notes": self.notes,
+            "is_whole": self.is_whole,
             "size_bytes": self.size,
             "recording": self.recording,
         }
@@ -196,7 +200,7 @@ class Exports:
             made = await self._work(job, [source], ["--format", job.format, "--name", job.of, "--out", str(out)])
             job.path = made.path
             job.size = (await asyncio.to_thread(made.path.stat)).st_size
-            job.sentence = "It is ready."
+            job.sentence = "It is ready." if made.is_whole else NOT_WHOLE
 
     async def _clip(self, job: Job, window: Window) -> None:
         await self._until_recorded(job, window)
@@ -215,7 +219,7 @@ class Exports:
                 made = await self._work(job, sources[:1], arguments)  # another part must not spoil this one
             path = await asyncio.to_thread(_keep, made.path, sources[0].parent, f"{job.of[:50]}_clip_{moment:%H%M%S}")
             job.recording, job.size = id_of(path), (await asyncio.to_thread(path.stat)).st_size
-            job.sentence = "It is among the recordings."
+            job.sentence = "It is among the recordings." if made.is_whole else f"It is among the recordings. {NOT_ALL}"
             self._on_clip(path)
 
     async def _until_recorded(self, job: Job, window: Window) -> None:
@@ -234,7 +238,7 @@ class Exports:
 
         job.state, job.sentence = "working", "It is being made."
         made = await run_worker([*map(str, sources), *arguments], told)
-        job.notes = made.notes
+        job.notes, job.is_whole = made.notes, made.is_whole
         return made
 
     async def _place(self, job: Job, name: str) -> Path:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:  # a replay shows states too, and has no use for all that dial
 CAR_SILENT_S = 1.4  # said before 2 s are over
 OVERDUE_PERIODS = 3
 NO_MESSAGE_S = 5.0
+MOST_SUPPRESSED = 20
+FIRST_MESSAGE_S = 1.4  # where a part behind the bridge is known to have failed
 ROS_GONE_S = 2.5  # one unanswered question may be lost; three are a sign
 
 
@@ -56,12 +58,14 @@ class Facts:
     ros_answered_s: float | None
     ros_alive: bool | None
     offers_nothing: bool
+    behind: Problem | None  # the part that failed behind the open bridge
     bridge_answers: bool
     reception: Reception
     sources: Mapping[str, Source]
     topics_heard: int
     trends: Piece
     track_number: int  # of this run of the server; another number is another track
+    configured: str | None = None  # the address of the car the session was started for
     topics_judged: int = 0  # subscribed to for their signals
     recording: Mapping[str, Any] = field(default_factory=lambda: {"state": "off", "for_s": None})
     decelerate: Mapping[str, Any] = field(
@@ -83,6 +87,10 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str,
         "nearest": _nearest(snapshot, monitor),
         "checks": [wire.tile(tile) for tile in monitor.tiles()],
         "alarms": [wire.alarm(alarm, facts.now_s, facts.wall_ms) for alarm in monitor.standing()],
+        "suppressed": [
+            wire.suppressed(alarm, monitor.alarms, facts.now_s, facts.wall_ms)
+            for alarm in monitor.suppressed()[:MOST_SUPPRESSED]
+        ],
         "alarm_load": wire.load(facts.load, monitor.alarms),
         "log_trouble": facts.log_trouble,
         "trends": wire.trends(facts.trends),
@@ -101,6 +109,7 @@ def _session(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
         "phase": facts.phase,
         "address": facts.address.url if facts.address else None,
         "name": facts.address.shown if facts.address else None,
+        "configured": facts.configured,
         "ros_version": facts.ros_version,
         "profile": facts.profile,
         "settings_version": facts.settings_version,
@@ -138,13 +147,16 @@ def _link(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
         else 0.0,
         "topics_subscribed": facts.topics_judged,
         "topics_heard": facts.topics_heard,
+        "late_s": wire.plain(snapshot.link.late_s, 2),
+        "reduced": snapshot.link.reduced,
         "unreadable_frames": facts.reception.frames.rejected,
         "unreadable_why": facts.reception.frames.last_reason,
     }
 
 
 def where_cut(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Problem | None, float | None]:
-    """Which wire of the chain is broken, why, and when what lies beyond it was last heard."""
+    """Which wire of the chain is broken, why, and when what lies beyond it was last heard. A part behind the bridge may
+    have failed while messages still come: then no wire is broken, and the problem is named all the same."""
     if facts.phase == "idle":
         return None, None, None
     heard_s = facts.link.heard_s if facts.link is not None else None
@@ -161,14 +173,15 @@ def _behind_the_bridge(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Pr
     last_s = facts.last_message_s
     opened_s = max(facts.since_s, facts.connected_s or facts.since_s)
     answered_s = facts.ros_answered_s
+    behind = facts.behind
     ros_is_gone = facts.ros_alive is False and answered_s is not None and facts.now_s - answered_s > ROS_GONE_S
     if last_s is None:
-        if facts.now_s - opened_s < NO_MESSAGE_S:
-            return None, None, None
-        return "bridge-car", problems.NOTHING_KNOWN if facts.offers_nothing else problems.NO_MESSAGE, None
+        if facts.now_s - opened_s < (NO_MESSAGE_S if behind is None else FIRST_MESSAGE_S):
+            return None, behind, None
+        return "bridge-car", behind or (problems.NOTHING_KNOWN if facts.offers_nothing else problems.NO_MESSAGE), None
     if facts.now_s - max(last_s, facts.since_s) < max(CAR_SILENT_S, OVERDUE_PERIODS * _shortest_period_s(snapshot)):
-        return None, None, None
-    return "bridge-car", problems.ROS_GONE if ros_is_gone else problems.CAR_SILENT, last_s
+        return None, behind, None
+    return "bridge-car", behind or (problems.ROS_GONE if ros_is_gone else problems.CAR_SILENT), last_s
 
 
 def _shortest_period_s(snapshot: Snapshot) -> float:
@@ -182,6 +195,7 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
     tally = facts.reception.by_signal.get(signal.name) or Tally()
     rate = snapshot.rates.get(signal.name)
     extent = snapshot.extents.get(signal.name)
+    unusable = snapshot.unusable.get(signal.name)
     freshness: str
     if reading is not None:
         freshness = reading.freshness(facts.now_s)
@@ -194,13 +208,17 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
         "unit": signal.unit,
         "freshness": freshness,
         "age_s": wire.plain(reading.age_s(facts.now_s), 3) if reading else None,
+        "delay_s": wire.plain(reading.delay_s, 3) if reading else None,
         "horizon_s": wire.plain(reading.horizon_s, 2) if reading else None,
         "period_s": wire.plain(reading.period_s, 4) if reading else None,
         "expected_hz": wire.plain(rate.expected_hz, 1) if rate else signal.expected_hz,
         "rate_hz": wire.plain(rate.measured_hz, 1) if rate else None,
         "topic": source.topic if source else None,
         "type": source.type if source else None,
-        "note": (source.note if source else None) or (_unknown_part(reading.value) if reading else None),
+        "note": (unusable.words if unusable else None)
+        or (source.note if source else None)
+        or (_unknown_part(reading.value) if reading else None),
+        "unusable": unusable.words if unusable else None,
         "count": tally.received,
         "rejected": tally.rejected,
         "rejected_why": tally.last_reason,

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import json
 import math
+from collections.abc import Iterator
 from typing import Any, NoReturn
 
 import cbor2
@@ -11,6 +14,13 @@ import numpy as np
 import orjson
 
 MAX_DEPTH = 64  # a ROS message nests a handful deep; what goes deeper was made to hurt
+# What a frame may hold: parsing it holds up the event loop, and from any thread every other one. The figures are what
+# takes some 40 ms; 1.4 million objects took 2 s, twice.
+MAX_CONTAINERS = 50_000  # objects and arrays
+MAX_ELEMENTS = 500_000
+MAX_SLOW_ELEMENTS = 100_000  # in CBOR, and in JSON with NaN, which take longer
+_FEW_BYTES = 20_000  # too short for too many
+_PAUSE_GC_BYTES = 100_000
 
 # RFC 8746: typed arrays. Tag 76 is reserved there, and 83 and 87 are for floats of 128 bits, which no ROS message has.
 _TYPED_ARRAYS = {
@@ -25,6 +35,13 @@ class Unreadable(ValueError):
     """A frame that is no rosbridge operation; `str()` says why, in few words."""
 
 
+class TooManyParts(Unreadable):
+    """A frame that would take too long to parse."""
+
+    def __init__(self) -> None:
+        super().__init__("a message of too many parts")
+
+
 def encode(operation: dict[str, Any]) -> bytes:
     """JSON text of an operation; numpy values allowed, NaN and infinities become null."""
     return orjson.dumps(operation, option=orjson.OPT_SERIALIZE_NUMPY)
@@ -33,9 +50,18 @@ def encode(operation: dict[str, Any]) -> bytes:
 def decode(payload: bytes, is_binary: bool) -> tuple[dict[str, Any], str | None]:
     """The operation in a frame, and a note where it had to be read with indulgence. Raises Unreadable.
 
+    It is not parsed where it holds too much: raises TooManyParts, an Unreadable.
+
     Text is whole Unicode, whole numbers have at most 64 bits and a sign, no value holds itself, nothing nests deeper
     than MAX_DEPTH. From CBOR, arrays of numbers are numpy arrays, and bytes are bytes.
     """
+    if len(payload) > _FEW_BYTES and (_has_much_cbor(payload) if is_binary else _has_much_json(payload)):
+        raise TooManyParts
+    with _without_gc(len(payload)):
+        return _parse(payload, is_binary)
+
+
+def _parse(payload: bytes, is_binary: bool) -> tuple[dict[str, Any], str | None]:
     note: str | None = None
     if is_binary:
         operation = _from_cbor(payload)
@@ -50,6 +76,47 @@ def decode(payload: bytes, is_binary: bool) -> tuple[dict[str, Any], str | None]
     if not isinstance(operation, dict):
         raise Unreadable("a frame that is not an object")
     return operation, note
+
+
+def _has_much_json(payload: bytes) -> bool:
+    """By the signs between values; those inside of texts count too, which no ROS message has so many of."""
+    return payload.count(b"[") + payload.count(b"{") > MAX_CONTAINERS or payload.count(b",") > MAX_ELEMENTS
+
+
+def _has_much_cbor(payload: bytes) -> bool:
+    """By the heads of all values, one after the other; strings, and the arrays of numbers in them, are passed over."""
+    at = containers = elements = 0
+    end = len(payload)
+    while at < end:
+        kind, size = divmod(payload[at], 32)
+        at += 1
+        if 24 <= size < 28:
+            width = 1 << (size - 24)
+            size = int.from_bytes(payload[at : at + width], "big")
+            at += width
+        elif size == 31:  # of no declared length
+            size = 0
+        if kind in (2, 3):
+            at += size
+        elif kind in (4, 5):
+            containers += 1
+        elements += 1
+        if containers > MAX_CONTAINERS or elements > MAX_SLOW_ELEMENTS:
+            return True
+    return False
+
+
+@contextlib.contextmanager
+def _without_gc(size: int) -> Iterator[None]:
+    """The collector would look through a large message again and again while it grows; nothing of it is garbage."""
+    if size < _PAUSE_GC_BYTES or not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
 
 
 def _may_be_deep(payload: bytes) -> bool:
@@ -75,6 +142,8 @@ def _from_lax_json(payload: bytes) -> Any:
     """JSON with the bare NaN and Infinity tokens that ROS 2's fixed-size arrays can carry."""
     if not (b"NaN" in payload or b"Infinity" in payload):
         raise Unreadable("text that is not JSON")
+    if payload.count(b",") > MAX_SLOW_ELEMENTS:
+        raise TooManyParts
     try:
         operation = json.loads(payload.decode(), parse_int=_whole, parse_float=_number)
         orjson.dumps(operation)  # Python's reader lets half characters pass, which nothing after it could write again
@@ -122,8 +191,15 @@ def _refuse(value: Any, immutable: bool) -> NoReturn:
     raise ValueError("a kind of value that no ROS message has")
 
 
-# Numbers of any size, dates, patterns, values shared with each other and with themselves: rosbridge sends none of the
-# kinds that cbor2 knows besides, and a hostile one could hang us with some.
+def _bignum(value: Any, immutable: bool) -> int:
+    """A uint64 above 2^63, which rosbridge of ROS 1 sends as a bignum."""
+    if not isinstance(value, bytes) or len(value) > 8:
+        raise ValueError("a number of more than 64 bits")
+    return int.from_bytes(value)
+
+
+# Negative numbers of any size, dates, patterns, values shared with each other and with themselves: rosbridge sends none
+# of the kinds that cbor2 knows besides, and a hostile one could hang us with some.
 _NOT_SENT = dict.fromkeys(
-    (0, 1, 2, 3, 4, 5, 25, 28, 29, 30, 35, 36, 37, 52, 54, 100, 256, 258, 260, 261, 1004, 43000), _refuse
-)
+    (0, 1, 3, 4, 5, 25, 28, 29, 30, 35, 36, 37, 52, 54, 100, 256, 258, 260, 261, 1004, 43000), _refuse
+) | {2: _bignum}

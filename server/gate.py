@@ -138,6 +138,7 @@ class Gate:
             battery=word.battery,
             is_charging=word.charging,
             lag_s=word.lag_s,
+            is_drawing=word.draws,
             is_replaying=caller.is_replaying,
         )
         self._reach.hear(operator, said, now_s)
@@ -152,6 +153,10 @@ class Gate:
         """The number of the lease that this page has; None: it has none."""
         lease, operator = self._control.lease, caller.operator
         return lease.fence if lease is not None and operator is not None and operator.is_same(lease.holder) else None
+
+    def heard_s(self) -> float | None:
+        """When a page of an operator was heard last; None: none is here."""
+        return self._reach.heard_s()
 
     def facts(self, now_s: float) -> ReachFacts:
         return self._reach.facts(now_s)

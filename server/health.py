@@ -7,6 +7,7 @@ authority signed it, and nobody stands between two programs of one machine.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import ipaddress
 import json
 import ssl
@@ -40,6 +41,8 @@ def run(args: argparse.Namespace) -> int:
         return 2
     vehicles = body.get("vehicles")  # told only to who is known there
     print(f"catgraph {body.get('version')}: {body.get('status')}{f', {vehicles}' if vehicles else ''}")
+    for problem in body.get("problems", ()):
+        print(f"  {problem}")
     return 0 if body.get("status") == "ok" else 1
 
 
@@ -58,6 +61,12 @@ def _ask(addresses: Sequence[str], ca: Path | None) -> dict[str, Any]:
                 if isinstance(body, dict):
                     return body
                 failed.append(f"{address} does not answer as catgraph does")
+        except urllib.error.HTTPError as refused:  # 503: it answers, and is not well
+            with contextlib.suppress(ValueError), refused:
+                body = json.load(refused)
+                if isinstance(body, dict) and refused.code == 503 and "status" in body:
+                    return body
+            failed.append(f"{address} does not answer: {refused.reason}")
         except json.JSONDecodeError:
             failed.append(f"{address} does not answer as catgraph does")
         except (urllib.error.URLError, OSError, ValueError) as why:

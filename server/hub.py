@@ -22,7 +22,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from server import commands, label
 from server.access.who import LOCAL, Who
 from server.bus import LocalBus, NotServed
-from server.limits import MAX_DEPTH, Allowance, Limits, nests_deeper
+from server.limits import MAX_DEPTH, SLOW_DOWN, Allowance, Limits, nests_deeper
 from server.playback import orders
 from server.playback.desk import Desk, NoReplay
 from server.playback.seat import Seat
@@ -33,6 +33,7 @@ log = logging.getLogger("catgraph.hub")
 EVENTS_A_BATCH = 100
 MAX_PAGES = 500
 MAX_COMPLAINTS = 200  # a page that sends nothing sensible is let go
+LONGEST_SLOW_DOWN = 400  # letters of an order to slow the car
 MAX_REPLIES = 200  # and so is one that asks and never reads
 # Where the phone is, the live monitor must know whatever its page shows; and a page that is asked for control answers.
 FROM_A_REPLAY = ("position", "control", "veto")
@@ -85,21 +86,32 @@ class Page:
         self._name = label.NAMELESS  # what the page calls itself: who gave its orders, in the log
         self._page = secrets.token_hex(8)  # by which it knows itself, and keeps control over a reload
         self._complaints = 0
+        self._is_leaving = False
         self._now = now
         self._turns = turns
         self._messages = Allowance(limits.messages, now())
         self._orders = Allowance(limits.commands, now())
+        self._slow_downs = Allowance(limits.slow_down, now())
         self.skipped = 0  # frames that were replaced by newer ones before this page could take them
 
     async def serve(self) -> None:
         """Runs until the page leaves."""
         unwatch = self._bus.watch(self._vehicle, self._something_new)
         writer = asyncio.create_task(self._write(), name="page writer")
+        reader = asyncio.create_task(self._read(), name="page reader")
+        writer.add_done_callback(lambda task: self._writer_ended(task, reader))
         try:
-            await self._read()
+            await reader
         except (WebSocketDisconnect, RuntimeError):
             pass  # it left, perhaps while something was being sent
+        except asyncio.CancelledError:
+            if not writer.done():
+                raise  # the server ends; else the writer failed, and the page shall connect again
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):
+                await self._socket.close(code=1011, reason="the server failed to send")
         finally:
+            self._is_leaving = True
+            reader.cancel()
             unwatch()
             self._turns.leave(self._wake)
             if self._opening is not None:
@@ -110,6 +122,15 @@ class Page:
                 await writer
             self._watch_scan(False)
             await self._seat.leave()
+
+    def _writer_ended(self, writer: asyncio.Task[None], reader: asyncio.Task[None]) -> None:
+        """A page that gets nothing more is no page: it is closed, so that it connects again."""
+        if self._is_leaving:
+            return
+        if writer.cancelled() or writer.exception() is not None:
+            error = None if writer.cancelled() else writer.exception()
+            log.error("the writer of a page ended: %s", error or "it was cancelled", exc_info=error)
+            reader.cancel()
 
     # -- from the bus ------------------------------------------------------------------------------------------------
 
@@ -143,10 +164,10 @@ class Page:
                 if received.get("code") == GOING_AWAY:
                     await self._present(FAREWELL)
                 return
-            if not self._messages.takes(self._now()):
+            text = received.get("text")
+            if not self._messages.takes(self._now()) and not _may_slow_down(text):
                 self._complain("Too many messages at once.")
                 continue
-            text = received.get("text")
             if text is None or len(text) > commands.MAX_COMMAND_BYTES:
                 self._complain("A page's message is text of at most 16 kB.")
                 continue
@@ -206,7 +227,12 @@ class Page:
         if not self._who.is_operator:  # whatever it is: no command of the union needs less than an operator
             self._reply(identity, {"ok": False, "reason": NOT_A_VIEWERS})
             return
-        if not self._orders.takes(self._now()):
+        kind = message.get("kind")
+        if not isinstance(kind, str) or kind not in commands.KINDS:  # what the server asks of a session is not a page's
+            self._reply(identity, {"ok": False, "reason": commands.NO_SUCH})
+            return
+        allowance = self._slow_downs if message.get("kind") in SLOW_DOWN else self._orders
+        if not allowance.takes(self._now()):
             self._reply(identity, {"ok": False, "reason": TOO_MANY})
             return
         if self._seat.is_replaying and message.get("kind") not in FROM_A_REPLAY:
@@ -286,7 +312,7 @@ class Page:
         return None
 
     def _reply(self, identity: str, answer: Mapping[str, Any]) -> None:
-        self._replies.append({"kind": "reply", "id": identity, **answer})
+        self._replies.append({**answer, "kind": "reply", "id": identity})
         self._wake.set()
 
     def _complain(self, reason: str) -> None:
@@ -365,6 +391,11 @@ class Page:
 
     async def _send(self, message: Mapping[str, Any]) -> None:
         await self._socket.send_text(orjson.dumps(message).decode())
+
+
+def _may_slow_down(text: str | None) -> bool:
+    """Whether a message beyond the allowance is read all the same: it may be an order to slow the car."""
+    return text is not None and len(text) <= LONGEST_SLOW_DOWN and '"slow_down"' in text
 
 
 class Hub:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import orjson
 
+from server.storage.set_aside import free_name
+
 log = logging.getLogger("catgraph.journal")
 
 _SCHEMA = """
@@ -98,7 +100,7 @@ def _numbers(database: sqlite3.Connection) -> Iterator[tuple[str, int]]:
 
 
 def _begin_anew(path: Path) -> Opened:
-    aside = _free_name(path)
+    aside = free_name(path, "damaged")
     try:
         for suffix in ("", "-wal", "-shm"):
             old = path.with_name(path.name + suffix)
@@ -116,13 +118,6 @@ def _begin_anew(path: Path) -> Opened:
         why=opened.why,
         complaint=f"The alarm log was damaged: it is set aside as {aside.name}; {saved} of its events could be read.",
     )
-
-
-def _free_name(path: Path) -> Path:
-    number = 1
-    while (aside := path.with_name(f"{path.stem}.damaged-{number}{path.suffix}")).exists():
-        number += 1
-    return aside
 
 
 def _take_over(old: Path, new: sqlite3.Connection) -> int:

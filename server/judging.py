@@ -7,6 +7,7 @@ from typing import Any
 
 from monitor.runner import Monitor, Transition
 from monitor.state import State
+from monitor.transport import TransportDelay
 from monitor.values import Steering
 from server.decode import stamp_s
 from server.profiles import Profile
@@ -41,22 +42,36 @@ def receive(
     reception: Reception,
     state: State,
     profile: Profile,
+    tyre_rad_per_unit: float,
+    transport: TransportDelay | None = None,
 ) -> tuple[str, ...]:
-    """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock."""
+    """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock;
+    `tyre_rad_per_unit` of the steering signal, 0: not known; `transport` None: it came without delay, as from a file.
+    """
     reception.received += 1
+    stamp = stamp_s(message)
+    delay_s = 0.0 if transport is None else transport.receive(sources[0].topic, at_s, stamp)
     changed: tuple[str, ...] = ()
     is_proper = True
     for source in sources:
         value = reception.read(source, message, note)
         if value is None:
             is_proper = False
+            if source.decode is not None:
+                state.refuse(source.signal, reception.tally(source.signal).last_reason or "unreadable", at_s)
             continue
-        if type(value) is Steering and profile.steering == "tyre_angle":
-            value = Steering(percent=value.percent * PERCENT_A_RAD)
-        changed += state.receive(source.signal, value, at_s, stamp_s(message) if "header" in message else None)
+        if type(value) is Steering:
+            value = steered(value, profile, tyre_rad_per_unit)
+        changed += state.receive(source.signal, value, at_s, stamp, delay_s)
     if not is_proper:
         reception.rejected += 1
     return changed
+
+
+def steered(signal: Steering, profile: Profile, tyre_rad_per_unit: float) -> Steering:
+    """The steering as the kind of car means it, from the number of its signal."""
+    percent = signal.percent * PERCENT_A_RAD if profile.steering == "tyre_angle" else signal.percent
+    return Steering(percent=percent, tyre_rad=signal.percent * tyre_rad_per_unit if tyre_rad_per_unit else None)
 
 
 def judge(

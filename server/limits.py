@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+SLOW_DOWN = ("slow_down", "release", "veto", "arm", "disarm")  # commands with an allowance of their own
 MAX_DEPTH = 32  # of what a page sends; its deepest message nests three deep
 
 
@@ -31,6 +32,7 @@ class Limits:
     commands: Rate = Rate(
         per_s=40.0, at_once=120
     )  # of one page: a replay that is dragged through asks for dozens of moments
+    slow_down: Rate = Rate(per_s=5.0, at_once=20)  # of one page or device, apart from all else that it asks for
     messages: Rate = Rate(per_s=300.0, at_once=900)  # of one page, its answers to frames included
 
 

@@ -24,6 +24,7 @@ import os
 import socket as sockets
 import ssl
 import struct
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -35,7 +36,12 @@ from roslibpy.comm.comm_asyncio import AsyncioRosBridgeClientFactory, AsyncioRos
 
 from server import frames, problems
 from server.address import Address, BadAddress, refuse_forbidden
+from server.clean_text import clean
+from server.large_message import ENDS_BYTES, topic_of
+from server.outgoing import NotAllowed, Outgoing
 from server.problems import Problem
+from server.raw_frame import RawFrame, raw_frame
+from server.supervision import Supervisor
 
 log = logging.getLogger("catgraph.link")
 for _name in ("autobahn", "txaio", "roslibpy"):  # they tell each dropped connection; the operator hears it from us
@@ -53,7 +59,7 @@ ASSUMPTIONS = {
     "ros": "Ros.__init__ sets _id_counter, factory and is_connecting and then calls connect()",
 }
 
-PING_EVERY_S = 0.25  # while nothing else comes
+PING_EVERY_S = 0.1  # each answer bounds how old what comes after it can be
 SILENT_AFTER_S = 1.6  # the answer to a ping may take 1.3 s; a dead link is dropped, and said, within 2 s
 LATE_S = 0.1  # a look later than this says that we were held up ourselves
 LOOKUP_TIMEOUT_S = 4.0
@@ -72,6 +78,9 @@ MAX_MESSAGE_BYTES = (
 )  # a 100 000-beam cloud fits; reading a 40 MB message would stop the loop for a second
 MAX_SKIPPED_BYTES = 256 * 1024 * 1024  # a frame that claims more is no message, and would swallow all that follows
 MAX_PENDING_CALLS = 64
+MAX_FAULTS = 200  # different ones that are logged
+MARK = b"t"  # how the payload of such a ping begins
+MAX_MARKS = 600
 
 
 class LinkDown(ConnectionError):
@@ -82,12 +91,25 @@ class CallFailed(RuntimeError):
     """The bridge answered a service call with a failure, or not in time."""
 
 
+class Refusal(CallFailed):
+    """The bridge answered a service call with a failure: in its own words, which only a rosbridge sends."""
+
+
 class NoWebSocket(ConnectionError):
     """The connection was taken, and the handshake failed; `answer` is how the other side's words began."""
 
     def __init__(self, reason: str, answer: bytes) -> None:
         super().__init__(reason)
         self.answer = answer
+
+
+class Marks(Protocol):
+    """Who follows how late the link is."""
+
+    def open(self, at_s: float) -> None: ...
+    def sent(self, at_s: float) -> None: ...
+    def answered(self, sent_s: float, at_s: float) -> None: ...
+    def subscribe(self, topic: str, queue_length: int, throttle_s: float = 0.0) -> None: ...
 
 
 class LinkListener(Protocol):
@@ -99,6 +121,7 @@ class LinkListener(Protocol):
     def message_received(self, topic: str, message: Any, note: str | None) -> None: ...
     def status_received(self, level: str, text: str) -> None: ...
     def junk_received(self, why: str) -> None: ...
+    def large_skipped(self, topic: str | None, size: int) -> None: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,6 +133,10 @@ class Subscription:
     compression: str = "none"  # or "cbor"
     throttle_ms: int = 0
     queue_length: int = 0
+
+    def is_like(self, other: Subscription) -> bool:
+        """The same but for how often: the bridge takes that over without an end and a beginning."""
+        return (self.topic, self.type, self.compression) == (other.topic, other.type, other.compression)
 
 
 class _OwnLoop:
@@ -130,8 +157,13 @@ class _BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
         self.gone = asyncio.Event()
         self.was_accepted = False  # by the link, when it opened
         self.was_silent = False
+        self.is_dismissed = False  # the bridge said goodbye without a code
+        self.has_spoken = False  # a message came
         self.message_data: list[bytes] = []
+        self.message_head = self.message_tail = b""  # of one that is skipped
         self.pings = self.pongs = 0  # of `RosLink.ping`: sent, and the newest that was answered
+        self.marks_sent: deque[tuple[bytes, float]] = deque(maxlen=MAX_MARKS)  # payload of a ping, when it was sent
+        self.mark_numbers = itertools.count(1)
         self.heard_s = self.factory.loop.time()
         self._timer: asyncio.TimerHandle | None = None
         super().connection_made(transport)
@@ -153,6 +185,9 @@ class _BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
         self.settled.set()
 
     def onPong(self, payload: bytes) -> None:
+        if payload.startswith(MARK):
+            self.factory.link._mark_answered(self, bytes(payload))
+            return
         if payload.isdigit() and self.pongs < int(payload) <= self.pings:
             self.pongs = int(payload)
 
@@ -166,6 +201,7 @@ class _BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
 
     def onCloseFrame(self, code: int | None, reasonRaw: bytes | None) -> bool | None:
         """The bridge says goodbye: it is answered, and not waited for."""
+        self.is_dismissed = code in (None, 1005)
         done: bool | None = super().onCloseFrame(code, reasonRaw)
         if self._timer is not None and self.transport is not None:
             self._timer.cancel()
@@ -184,7 +220,7 @@ class _BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
         super()._closeConnection(abort)
 
     def _look(self, due_s: float) -> None:
-        """Is the other side still there? Pings where it says nothing by itself, drops it where it does not answer."""
+        """Is the other side still there, and how late is the link? Pings, and drops what does not answer."""
         loop = self.factory.loop
         now_s = loop.time()
         quiet_s = now_s - self.heard_s
@@ -193,8 +229,7 @@ class _BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
             self.was_silent = True
             self.dropConnection(abort=True)
             return
-        if quiet_s >= PING_EVERY_S / 2:
-            self.sendPing()
+        self.factory.link._send_mark(self)
         next_s = max(min(now_s + PING_EVERY_S, self.heard_s + SILENT_AFTER_S + 0.001), now_s + LATE_S)
         self._timer = loop.call_at(next_s, self._look, next_s)
 
@@ -205,18 +240,29 @@ class _BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
         if self.message_data_total_length > MAX_SKIPPED_BYTES:
             self._fail_connection(1009, f"a message of {self.message_data_total_length // 2**20} MB")
         elif self._is_too_large:
+            self._keep_ends(b"".join(self.message_data))
             self.message_data.clear()
 
     def onMessageFrameData(self, payload: bytes) -> None:
-        if not self._is_too_large:
+        if self._is_too_large:
+            self._keep_ends(payload)
+        else:
             super().onMessageFrameData(payload)
+
+    def _keep_ends(self, payload: bytes) -> None:
+        if len(self.message_head) < ENDS_BYTES:
+            self.message_head += payload[: ENDS_BYTES - len(self.message_head)]
+        self.message_tail = (self.message_tail + payload[-ENDS_BYTES:])[-ENDS_BYTES:]
 
     def onMessageEnd(self) -> None:
         data, self.message_data = self.message_data, []
+        head, tail, self.message_head, self.message_tail = self.message_head, self.message_tail, b"", b""
+        self.has_spoken = True
         if self.failedByMe:
             return
         if self._is_too_large:
-            self.factory.link._junk(self, f"a message of more than {MAX_MESSAGE_BYTES // 2**20} MB")
+            size = int(self.message_data_total_length)
+            self.factory.link._skipped(self, topic_of(head, tail, is_binary=self.message_is_binary), size)
         else:
             self.factory.link._frame(self, b"".join(data), self.message_is_binary)
 
@@ -239,7 +285,7 @@ class _Dialler(AsyncioRosBridgeClientFactory):  # type: ignore[misc]
         self._retry_count = 0
         self._reconnect_delay = FIRST_RETRY_S
         self.link = link
-        self._running: asyncio.Task[None] | None = None
+        self._supervisor = Supervisor(f"link to {url}")
         self._hurry = asyncio.Event()
         # No permessage-deflate is offered: it would cost the car's computer more than it saves the network.
         self.setProtocolOptions(
@@ -252,8 +298,8 @@ class _Dialler(AsyncioRosBridgeClientFactory):  # type: ignore[misc]
         )
 
     def connect(self) -> None:
-        if self._running is None and not self._stop:
-            self._running = self._manager.loop.create_task(self._connect_async(), name=f"dial {self.url}")
+        if not self._stop and not self._supervisor.keeps("dial"):
+            self._supervisor.keep("dial", self._connect_async)
 
     async def _connect_async(self) -> None:
         delay_s = FIRST_RETRY_S
@@ -285,8 +331,7 @@ class _Dialler(AsyncioRosBridgeClientFactory):  # type: ignore[misc]
     def stop(self) -> None:
         """No further try, nothing left behind."""
         self._stop = True
-        if self._running is not None:
-            self._running.cancel()
+        self._supervisor.end("dial")
 
 
 class _Ros(roslibpy.Ros):  # type: ignore[misc]
@@ -304,19 +349,35 @@ class RosLink:
     `now` is the session's monotonic clock in seconds. All methods are called on the loop it was made on.
     """
 
-    def __init__(self, address: Address, listener: LinkListener, *, now: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        address: Address,
+        listener: LinkListener,
+        *,
+        now: Callable[[], float],
+        take_unparsed: Callable[[RawFrame], bool] = lambda _: False,
+        marks: Marks | None = None,
+    ) -> None:
+        """`take_unparsed` gets each publish first, as it came; True: it needs no parsing, and no listener is called.
+        `marks` follows how late the link is; None: nobody does."""
         self.address = address
         self.attempts = 0
         self.heard_s: float | None = None  # when the bridge last sent anything, pongs included
         self.frame_bytes = 0  # of the frame that is being told
         self._listener = listener
+        self._take_unparsed = take_unparsed
         self._now = now
+        self._marks = marks
         self._ros = _Ros(address.url, link=self)
         self._socket: _BridgeProtocol | None = None  # the open one
         self._table: dict[str, Subscription] = {}
         self._calls: dict[str, asyncio.Future[Any]] = {}
         self._ids = itertools.count(1)
         self._stopped = False
+        self._outgoing = Outgoing()
+        self._was_asked = False  # anything, on this connection
+        self.junk_count = 0  # frames that were no operations, on this connection
+        self.server_software = ""  # what the other side called itself in its newest handshake
         self._faults: set[str] = set()  # told already
         self._lookup: asyncio.Task[Any] | None = None
         self._tls: ssl.SSLContext | None = None
@@ -356,16 +417,28 @@ class RosLink:
         previous = self._table.get(wanted.topic)
         if previous == wanted:
             return
+        try:
+            Outgoing().frame(_row("subscribe", wanted))
+        except NotAllowed as why:  # a name that only a hostile or broken bridge offers
+            self._log_once(f"not subscribed: {why}")
+            return
         self._table[wanted.topic] = wanted
         if self.is_open:
-            if previous is not None:
+            if previous is not None and not previous.is_like(wanted):
                 self._send_row("unsubscribe", previous)
-            self._send_row("subscribe", wanted)
+            self._send_row("subscribe", wanted)  # under the same id: throttle and queue take the place of the old ones
 
     def unsubscribe(self, topic: str) -> None:
         row = self._table.pop(topic, None)
         if row is not None and self.is_open:
             self._send_row("unsubscribe", row)
+
+    def renew(self, topic: str) -> None:
+        """Subscribes to a topic of the table anew, where nothing comes on it."""
+        row = self._table.get(topic)
+        if row is not None and self.is_open:
+            self._send_row("unsubscribe", row)
+            self._send_row("subscribe", row)
 
     def unsubscribe_all(self) -> None:
         for topic in list(self._table):
@@ -376,10 +449,17 @@ class RosLink:
         return tuple(self._table.values())
 
     def send_now(self, operation: dict[str, Any]) -> None:
-        """Writes one rosbridge operation to the open connection. Raises LinkDown when there is none."""
+        """Writes one rosbridge operation to the open connection. Raises LinkDown when there is none, NotAllowed where
+        it could do harm."""
         if self._socket is None or not self.is_open:
             raise LinkDown("not sent: no connection to the car")
-        self._socket.sendMessage(frames.encode(operation), isBinary=False)
+        try:
+            frame = self._outgoing.frame(operation)
+        except NotAllowed as why:
+            self._log_once(f"not sent: {why}")
+            raise
+        self._was_asked = True
+        self._socket.sendMessage(frame, isBinary=False)
 
     def ping(self) -> None:
         """Asks the bridge for a sign of life, behind all that was sent before. Raises LinkDown."""
@@ -400,7 +480,10 @@ class RosLink:
             raise CallFailed("too many calls are unanswered")
         identity = f"call:{service}:{next(self._ids)}"
         answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        self.send_now({"op": "call_service", "id": identity, "service": service, "args": arguments or {}})
+        try:
+            self.send_now({"op": "call_service", "id": identity, "service": service, "args": arguments or {}})
+        except NotAllowed as why:
+            raise CallFailed(f"not sent: {why}") from None
         self._calls[identity] = answer
         try:
             async with asyncio.timeout(timeout_s):
@@ -484,11 +567,34 @@ class RosLink:
             socket.dropConnection(abort=True)
             return
         self._socket = socket
+        self._outgoing.reset()
+        self._was_asked, self.junk_count = False, 0
+        self.server_software = str((getattr(socket, "http_headers", None) or {}).get("server", ""))[:60]
         socket.was_accepted = True
         self.heard_s = self._now()
+        if self._marks is not None:
+            self._marks.open(self._now())
         for row in self._table.values():
             self._send_row("subscribe", row)
         self._tell(self._listener.link_opened)
+
+    def _send_mark(self, socket: _BridgeProtocol) -> None:
+        payload = MARK + b"%d" % next(socket.mark_numbers)
+        sent_s = self._now()
+        socket.sendPing(payload)
+        if self._marks is not None and socket is self._socket:
+            socket.marks_sent.append((payload, sent_s))
+            self._marks.sent(sent_s)
+
+    def _mark_answered(self, socket: _BridgeProtocol, payload: bytes) -> None:
+        """An answer also answers the pings before it."""
+        if self._marks is None or socket is not self._socket or all(sent != payload for sent, _ in socket.marks_sent):
+            return
+        while socket.marks_sent:
+            sent, sent_s = socket.marks_sent.popleft()
+            if sent == payload:
+                self._marks.answered(sent_s, self._now())
+                return
 
     def _closed(self, socket: _BridgeProtocol) -> None:
         if socket is not self._socket:
@@ -499,18 +605,29 @@ class RosLink:
             problem = problems.bridge_silent(self.address)
         elif socket.failedByMe:
             problem = problems.closed_by_bridge(self.address, str(socket.wasNotCleanReason))
+        elif socket.is_dismissed and not socket.has_spoken and self._was_asked:
+            problem = problems.login_wanted(self.address)
         else:
-            problem = problems.closed_by_bridge(self.address, socket.remoteCloseReason or "")
+            problem = problems.closed_by_bridge(self.address, _words(socket.remoteCloseReason, 200))
         self._tell(self._listener.link_closed, problem)
 
     def _junk(self, socket: _BridgeProtocol, why: str) -> None:
         if socket is self._socket:
+            self.junk_count += 1
             self._tell(self._listener.junk_received, why)
+
+    def _skipped(self, socket: _BridgeProtocol, topic: str | None, size: int) -> None:
+        if socket is self._socket:
+            self._junk(socket, f"a message of more than {MAX_MESSAGE_BYTES // 2**20} MB")
+            self._tell(self._listener.large_skipped, topic, size)
 
     def _frame(self, socket: _BridgeProtocol, payload: bytes, is_binary: bool) -> None:
         if socket is not self._socket:
             return  # stopped, or dropped: what is still in the pipe is no news
         self.frame_bytes = len(payload)
+        raw = raw_frame(payload, is_binary)
+        if raw is not None and self._takes_unparsed(raw):
+            return
         try:
             operation, note = frames.decode(payload, is_binary)
         except frames.Unreadable as error:
@@ -533,13 +650,23 @@ class RosLink:
             case _:
                 self._junk(socket, "an operation that rosbridge does not have")
 
+    def _takes_unparsed(self, raw: RawFrame) -> bool:
+        """Whether nothing more is to be done with a frame; it is parsed where this fails."""
+        taken = False
+
+        def take(frame: RawFrame) -> None:
+            nonlocal taken
+            taken = self._take_unparsed(frame)
+
+        return self._tell(take, raw) and taken and not self._stopped
+
     def _answered(self, operation: dict[str, Any]) -> None:
         identity = operation.get("id")
         answer = self._calls.get(identity) if isinstance(identity, str) else None
         if answer is None or answer.done():
             return  # late: the caller has given up
         if operation.get("result") is False:
-            answer.set_exception(CallFailed(_words(operation.get("values"), 300)))
+            answer.set_exception(Refusal(_words(operation.get("values"), 300)))
         else:
             answer.set_result(operation.get("values"))
 
@@ -567,17 +694,30 @@ class RosLink:
                 answer.set_exception(LinkDown(why))
 
     def _send_row(self, operation: str, row: Subscription) -> None:
-        # The same id at both ends: unsubscribing names the subscription.
-        message: dict[str, Any] = {"op": operation, "id": f"subscribe:{row.topic}", "topic": row.topic}
-        if operation == "subscribe":
-            if row.type is not None:
-                message["type"] = row.type
-            message |= {
-                "compression": row.compression,
-                "throttle_rate": row.throttle_ms,
-                "queue_length": row.queue_length,
-            }
-        self.send_now(message)
+        if operation == "subscribe" and self._marks is not None:
+            self._marks.subscribe(row.topic, row.queue_length, row.throttle_ms / 1000)
+        self.send_now(_row(operation, row))
+
+    def _log_once(self, text: str) -> None:
+        if text not in self._faults and len(self._faults) < MAX_FAULTS:
+            self._faults.add(text)
+            log.error("%s (%s)", text, self.address.shown)
+
+
+def _row(operation: str, row: Subscription) -> dict[str, Any]:
+    # The same id at both ends: unsubscribing names the subscription.
+    message: dict[str, Any] = {"op": operation, "id": f"subscribe:{row.topic}", "topic": row.topic}
+    if operation == "subscribe":
+        if row.type is not None:
+            message["type"] = row.type
+        message |= {
+            "compression": row.compression,
+            # ROS 2's rosbridge sends what is left in a queue without a throttle for ever once its client has gone,
+            # and takes no connection any more.
+            "throttle_rate": max(row.throttle_ms, 1 if row.queue_length else 0),
+            "queue_length": row.queue_length,
+        }
+    return message
 
 
 async def _look_up(host: str, port: int) -> Any:
@@ -591,4 +731,4 @@ def _says_little(error: Exception) -> int:
 
 
 def _words(value: Any, limit: int) -> str:
-    return value[:limit] if isinstance(value, str) else "" if value is None else f"({type(value).__name__})"
+    return clean(value[:limit]) if isinstance(value, str) else "" if value is None else f"({type(value).__name__})"

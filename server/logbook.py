@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import logging
+from collections import deque
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from monitor.alarm import Alarm, Transition
 from server import wire
 from server.bus import LocalBus
+from server.clean_text import cleaned
 from server.tuning import Tuning
+
+log = logging.getLogger("catgraph.logbook")
+
+MAX_WAITING = 1000  # events that the log refused and that are tried again
 
 
 class Logbook:
     """Every event carries the version of the settings in force. `wall_ms` is the time of day in ms since 1970;
-    `also` is told of each with its number."""
+    `also` is called with each event and its number.
+
+    No method raises for what the log does: what an event reports has happened already. Events that cannot be appended
+    wait for `retry`, in order, and `trouble` says so.
+    """
 
     def __init__(
         self,
@@ -29,6 +40,22 @@ class Logbook:
         self._tuning = tuning
         self._wall_ms = wall_ms
         self._also = also
+        self._waiting: deque[dict[str, Any]] = deque()
+        self._lost = 0
+        self._why: str | None = None
+
+    @property
+    def trouble(self) -> str | None:
+        """Why events are not appended, as a sentence; None: they are."""
+        if self._why is None:
+            return None
+        lost = f", {self._lost} lost" if self._lost else ""
+        return f"The event log fails: {self._why}. Events that wait: {len(self._waiting)}{lost}."
+
+    def retry(self) -> None:
+        """Tries to append what waits; to be called now and then."""
+        if self._waiting:
+            self._write([])
 
     def tell(self, transitions: Collection[Transition], alarms: Mapping[str, Alarm], now_s: float) -> None:
         """What happened to alarms, at `now_s` of the monitor's clock."""
@@ -55,9 +82,25 @@ class Logbook:
         self.note("settings", text, by=by, changes=self._tuning.changes())
 
     def _write(self, events: list[dict[str, Any]]) -> None:
-        numbered = self._bus.append(self._vehicle, events)
-        if numbered:
-            self._also(numbered)
+        due = [*self._waiting, *(events := [cleaned(event) for event in events])]
+        try:
+            numbered = self._bus.append(self._vehicle, due)
+        except Exception as error:
+            self._why = f"{type(error).__name__}: {error}"[:200]
+            log.exception("%d events of %s could not be logged", len(due), self._vehicle)
+            self._waiting.extend(events)
+            while len(self._waiting) > MAX_WAITING:
+                self._waiting.popleft()
+                self._lost += 1
+            return
+        self._waiting.clear()
+        self._why = None
+        try:
+            if numbered:
+                self._also(numbered)
+        except Exception as error:  # the recording of events; the log has them
+            self._why = f"{type(error).__name__}: {error}"[:200]
+            log.exception("%d events of %s could not be recorded", len(numbered), self._vehicle)
 
     @property
     def _version(self) -> int:

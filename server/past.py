@@ -15,7 +15,7 @@ from server.bus import LocalBus
 _PORTION = 50
 _ENOUGH = 1000  # events of one alarm; the newest few say where it stands
 ORDER_ENDED = ("released", "ended")
-ORDER_STANDS = ("ordered", "sent", "slows", "not_confirmed", "cut", "resumed")
+ORDER_STANDS = ("ordered", "sent", "slows", "stands", "not_confirmed", "cut", "resumed")
 LONGEST_HOLD_S = 3600.0  # as the setting allows
 Clock = Callable[[float], float]
 _CHANGES = frozenset(get_args(Change))

@@ -7,9 +7,14 @@ import errno
 import re
 import socket
 import ssl
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from server.address import Address, BadAddress
+
+LOGIN_WANTED = "login_wanted"
+ROSBRIDGE_SERVERS = ("AutobahnPython", "TornadoServer")  # what rosbridge of ROS 1 and ROS 2 is built on
+MAX_NAMES = 3  # of topics in a sentence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,6 +113,13 @@ def not_rosbridge(address: Address, what: str) -> Problem:
     )
 
 
+def not_proved(address: Address, server_software: str, junk: int) -> Problem:
+    """A WebSocket from which nothing came that only a rosbridge sends; `junk`: how much else came."""
+    if server_software.startswith(ROSBRIDGE_SERVERS) and not junk:
+        return BRIDGE_DEAF
+    return not_rosbridge(address, "It speaks WebSocket, but not rosbridge's protocol.")
+
+
 def of_handshake(address: Address, reason: str, answer: bytes) -> Problem:
     """The problem of something that took the connection and is no WebSocket: why its handshake failed, and how its
     answer began."""
@@ -148,6 +160,45 @@ def closed_by_bridge(address: Address, why: str) -> Problem:
     )
 
 
+def login_wanted(address: Address) -> Problem:
+    """rosbridge of ROS 1 with authenticate:=true closes after the first operation, without a code or a word."""
+    return Problem(
+        code=LOGIN_WANTED,
+        title=f"The bridge on {address.shown} wants a login.",
+        hint="It closes the connection after the first request, as rosbridge with authenticate:=true does. "
+        "catgraph has no login for it: start rosbridge without authenticate.",
+        mark="wants login",
+    )
+
+
+def hidden_topics(topics: Sequence[str]) -> Problem:
+    """Topics that have a publisher, and to which the bridge did not subscribe for us."""
+    return Problem(
+        code="topics_hidden",
+        title=f"The bridge does not pass on {_names(topics)}.",
+        hint="They have a publisher, but the bridge did not subscribe to them: its topics_glob hides them. "
+        "Start rosbridge with a topics_glob that includes them, or without one.",
+        mark="hidden topics",
+    )
+
+
+def blocked_topics(topics: Sequence[str], clients: int) -> Problem:
+    """Topics that have a publisher, to which the bridge subscribed for us, and of which nothing comes."""
+    others = f"{clients} other client{'s are' if clients != 1 else ' is'} connected to this bridge"
+    return Problem(
+        code="topics_blocked",
+        title=f"No message comes through the bridge from {_names(topics)}.",
+        hint=f"They have a publisher, and {others}: one that subscribed with cbor-raw before us blocks them. "
+        "End that client; the subscription is renewed by itself. Or the publisher is idle.",
+        mark="blocked topics",
+    )
+
+
+def _names(topics: Sequence[str]) -> str:
+    more = len(topics) - MAX_NAMES
+    return ", ".join(topics[:MAX_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
 def bridge_silent(address: Address) -> Problem:
     return Problem(
         code="bridge_silent",
@@ -184,4 +235,52 @@ NOTHING_KNOWN = Problem(
     title="The bridge answers, but it offers no topic that catgraph knows.",
     hint="Is the car's own software running? Its topics can be picked in Settings.",
     mark="no topics",
+)
+ROSAPI_MISSING = Problem(
+    code="no_rosapi",
+    title="This is a rosbridge, but rosapi does not run beside it.",
+    hint="Start the node rosapi_node of the package rosapi on the car: without it topics and types are not known, "
+    "and only the usual names are tried.",
+    mark="no rosapi",
+)
+ROSAPI_ENDED = Problem(
+    code="rosapi_ended",
+    title="rosapi has ended.",
+    hint="Start rosapi again on the car. If roscore was restarted, restart rosbridge too. "
+    "Messages may still come; new topics are not found.",
+    mark="rosapi ended",
+)
+ROSAPI_SILENT = Problem(
+    code="rosapi_silent",
+    title="The bridge answers, rosapi does not.",
+    hint="rosapi hangs or was killed, or the bridge's services_glob hides it: restart rosapi. "
+    "Messages may still come; new topics are not found.",
+    mark="rosapi silent",
+)
+ROSCORE_GONE = Problem(
+    code="roscore_gone",
+    title="roscore does not run any more.",
+    hint="What is connected still sends, but nothing new can connect. "
+    "Start roscore, then restart rosbridge, rosapi and the car's nodes.",
+    mark="no roscore",
+)
+ROSCORE_RESTARTED = Problem(
+    code="roscore_restarted",
+    title="roscore was restarted, and rosbridge is not connected to the new one.",
+    hint="Restart rosbridge: until then new messages may not come, and commands may not reach the car. "
+    "Nodes that are older than roscore have to be restarted too.",
+    mark="restart rosbridge",
+)
+BRIDGE_NODE_DEAD = Problem(
+    code="bridge_node_dead",
+    title="The bridge's ROS node has died; its process still accepts connections.",
+    hint="Nothing passes it any more. End the rosbridge process (kill -9) and start it again.",
+    mark="node died",
+)
+BRIDGE_DEAF = Problem(
+    code="bridge_deaf",
+    title="The connection is open, but nothing is answered.",
+    hint="If this is rosbridge, its ROS node hangs or has died: restart rosbridge. "
+    "Otherwise check the port: rosbridge usually listens on 9090.",
+    mark="no answer",
 )

@@ -18,11 +18,12 @@ MOST = 64
 MOST_SHOWN = 12
 
 Ready = Literal["ready", "refused", "asks", "missing", "interrupted"]
-Why = Literal["silent", "blind", "hidden", "sound", "replay"]
+Why = Literal["silent", "blind", "hidden", "undrawn", "sound", "replay"]
 WORDS: dict[Why, str] = {
     "silent": "not heard",
     "blind": "link slow",
     "hidden": "page in the background",
+    "undrawn": "page cannot draw",
     "sound": "sound off",
     "replay": "shows a replay",
 }
@@ -40,6 +41,7 @@ class Present:
     is_charging: bool | None = None
     lag_s: float = 0.0  # age of the newest state there
     is_replaying: bool = False
+    is_drawing: bool = True  # false: it covers what it shows, because drawing failed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +67,8 @@ class Here:
             return "hidden"
         if self.word.lag_s > BLIND_S:
             return "blind"
+        if not self.word.is_drawing:
+            return "undrawn"
         if self.word.is_replaying:
             return "replay"
         return None if self.word.sound == "ready" else "sound"
@@ -91,6 +95,10 @@ class Reach:
         old = [key for key, one in self._pages.items() if now_s - one.heard_s > FORGOTTEN_S]
         for key in (*old, *list(self._pages)[: max(0, len(self._pages) - len(old) - MOST)]):
             self._pages.pop(key, None)
+
+    def heard_s(self) -> float | None:
+        """When any page was heard last; None: none is here."""
+        return max((one.heard_s for one in self._pages.values()), default=None)
 
     def is_here(self, operator: Operator, now_s: float) -> bool:
         one = self._pages.get((operator.who, operator.page))

@@ -24,6 +24,7 @@ is out of date.
 Each check answers *OK*, *FAULT* or *not checked* (why). A fault that lasts for the *on* delay raises the alarm, *OK*
 that lasts for the *off* delay clears it; *not checked* does neither. While an alarm of the column *explained by*
 stands, this one is not announced. *Ack*: it stays, although its condition has gone, until somebody has acknowledged it.
+*Repeats after*: within this time what was announced is not announced again; it stands in the list as it was left.
 `<signal>` stands for each of: {signals}.
 
 """
@@ -38,8 +39,8 @@ def text() -> str:
 def _alarms() -> Iterator[str]:
     yield "## Alarms"
     yield ""
-    yield "| Alarm | What is asked | Priority, place | On / off | Ack | Explained by | What to do |"
-    yield "|---|---|---|---|---|---|---|"
+    yield "| Alarm | What is asked | Priority, place | On / off | Repeats after | Ack | Explained by | What to do |"
+    yield "|---|---|---|---|---|---|---|---|"
     families: dict[str, list[AnyCheck]] = {}
     for check in CHECKS:
         families.setdefault(_family(check.id), []).append(check)
@@ -73,6 +74,7 @@ def _alarm_row(alarm_id: str, spec: AlarmSpec, question: str, inhibited_by: tupl
         question,
         f"{spec.priority}, {spec.place}",
         f"{spec.on_delay_s:g} / {spec.off_delay_s:g} s",
+        f"{spec.repeat_after_s / 60:g} min" if spec.repeat_after_s else "",
         "yes" if spec.needs_ack else "",
         ", ".join(f"`{name}`" for name in inhibited_by),
         spec.advice,

@@ -44,7 +44,7 @@ class ScanFeed:
             frame = wire.scan_frame(
                 reading.value,
                 number=self._number,
-                age_s=snapshot.now_s - reading.received_s,
+                age_s=reading.age_s(snapshot.now_s),
                 kinds_kept=kinds_kept,
                 judged=judged(reading.value, snapshot, limits, was_active=was_active),
             )

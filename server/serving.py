@@ -22,6 +22,7 @@ from server.access.invitations import LASTS_S
 from server.announce import Announcement, Pairing, addresses, invitation, lines
 from server.app import Running, create_app
 from server.config import Config, Tls, default_data
+from server.storage.data_folder import DataFolderRefused
 from server.tls import option
 from server.tls.authority import TlsRefused
 from server.tls.probe import Probe
@@ -100,7 +101,7 @@ async def serve(config: Config) -> int:
         app = create_app(config)
     except TlsRefused as why:
         raise CannotServe(str(why)) from None
-    except (AssetsMissing, MapRefused) as why:
+    except (AssetsMissing, MapRefused, DataFolderRefused) as why:
         raise CannotServe(str(why)) from None
     except OSError as why:
         raise CannotServe(f"The data folder {config.data} cannot be used: {why.strerror or why}.") from None

@@ -20,7 +20,7 @@ from monitor.recorder import RecorderFacts, RecorderState
 from monitor.runner import Refused
 from server import wire
 from server.address import without_login
-from server.others import Also
+from server.others import Also, Missing
 from server.recording import space
 from server.recording.folder import RecordingsFolder, id_of, part_id
 from server.recording.own import Own
@@ -72,13 +72,16 @@ class SessionRecording:
         now: Callable[[], float],
         wall_ms: Callable[[], int],
         told: Callable[[Path], None] = lambda _: None,
+        unreadable: Callable[[str], None] = lambda _: None,
     ) -> None:
+        """`unreadable(why)` is called for each message that came unparsed and could not be read."""
         self._vehicle = vehicle
         self._folder = folder
         self._tuning = tuning
         self._now = now
         self._wall_ms = wall_ms
         self._told = told
+        self._unreadable = unreadable
         self._recorder: Recorder | None = None
         self._tape: _Tape | None = None
         self._early: list[tuple[float, Own, dict[str, Any]]] = []  # what was said while nothing was recorded, and when
@@ -93,7 +96,7 @@ class SessionRecording:
         self._trouble: str | None = None
         self.address: str | None = None
         self.ros_version: int | None = None
-        self.left_out: tuple[str, ...] = ()  # topics that are not recorded, for they are bulky
+        self.missing = Missing()
 
     def prepare(self) -> None:
         """Gets ready to record, so that the first message finds all that it needs."""
@@ -102,6 +105,7 @@ class SessionRecording:
                 self._folder,
                 call=asyncio.get_running_loop().call_soon_threadsafe,
                 on_finished=self._finished,
+                on_unreadable=self._unreadable,
                 allowance=self._allowance(),
             )
             self._recorder.prepare()
@@ -177,7 +181,7 @@ class SessionRecording:
             raise Refused(why)
 
     def take(self, topic: str, type: str | None, message: Any, now_s: float, size: int) -> None:
-        """A message of the car."""
+        """A message of the car, or the RawFrame that holds it."""
         tape = self._tape
         if tape is None:
             return
@@ -250,6 +254,9 @@ class SessionRecording:
             return
         if tape.due_s is not None and now_s >= tape.due_s:
             self._begin(tape)
+        if tape.is_open and tape.begun is not None and self.ros_version not in (None, tape.begun.version):
+            self._close("The version of ROS became known: the recording goes on in another part.")
+            self._begin(tape)
         if tape.lost_s is not None and now_s - tape.lost_s > self._limit("hold_s"):
             self._tape = None
         if self._recorder is not None:
@@ -298,7 +305,7 @@ class SessionRecording:
             "messages": status.messages if is_mine else 0,
             "as_json": status.misfits if is_mine else 0,
             "dropped": recorder.dropped if recorder is not None and tape is not None else 0,
-            "left_out": list(self.left_out[:20]) if tape is not None else [],
+            **(self.missing if tape is not None else Missing()).as_json(),
             "room_gb": wire.plain(room, 2),
             "saved": {"name": self._saved[0], "until_ms": self._saved[1]} if self._saved else None,
             "reason": self._reason(),
@@ -411,7 +418,7 @@ class SessionRecording:
             self._ended_ms = self._wall_ms()
             self._trouble = self._status().trouble if self._state() == "stopped" else None
             self._waiting += 1
-            self._recorder.end(ended="closed", why=why, left_out="\n".join(self.left_out), then=self._completed)
+            self._recorder.end(ended="closed", why=why, then=self._completed, **self.missing.as_metadata())
 
     def _completed(self) -> None:
         self._waiting -= 1

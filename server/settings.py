@@ -6,8 +6,8 @@ Only what differs from the profile's defaults is kept, so that a better default 
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -19,11 +19,14 @@ from pydantic import ValidationError
 from monitor import catalog
 from monitor.catalog import AllLimits
 from monitor.signals import SIGNALS
-from server import profiles
+from server import bounded_toml, profiles
 from server.profiles import GENERIC, Profile
+from server.storage.set_aside import set_aside
+
+log = logging.getLogger("catgraph.settings")
 
 AUTO = "auto"  # the profile follows from what the car offers
-MAX_TOML_BYTES = 64 * 1024
+MAX_TOML_BYTES = bounded_toml.MAX_BYTES
 _MAX_VERSION = 2**53  # a larger one could not be told to a page
 _HUGE = 1e12
 _SECTIONS = {"version", "profile", "topics", "limits"}
@@ -227,12 +230,10 @@ def salvage(text: str, known_profiles: Mapping[str, Profile]) -> tuple[Settings,
 
 
 def _toml(text: str) -> dict[str, Any]:
-    if len(text) > MAX_TOML_BYTES or len(text.encode(errors="replace")) > MAX_TOML_BYTES:
-        raise BadSetting("", "A file of settings has at most 64 kB.")
     try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a ValueError too: a number of more than 4300 digits
-        raise BadSetting("", f"This is not TOML: {_seen(str(error).splitlines()[0])}.") from None
+        return bounded_toml.loads(text)
+    except bounded_toml.BadToml as why:
+        raise BadSetting("", str(why)) from None
 
 
 def _table(body: Mapping[str, Any], name: str, within: str = "") -> dict[str, Any]:
@@ -247,6 +248,7 @@ class SettingsFile:
 
     def __init__(self, path: Path | None) -> None:
         self._path = path
+        self._is_unread = False  # what the file holds is not known: it is set aside before anything is written
         self.complaint: str | None = None  # why what was found could not be used
 
     def read(self) -> Settings:
@@ -260,6 +262,7 @@ class SettingsFile:
         except FileNotFoundError:
             return Settings()
         except OSError as why:
+            self._is_unread = True
             self.complaint = f"The settings cannot be read ({why.strerror or why}); the defaults are in force."
             return Settings()
         except UnicodeDecodeError:
@@ -272,22 +275,31 @@ class SettingsFile:
 
     def _rescue(self, settings: Settings, left_out: list[str]) -> Settings:
         assert self._path is not None
-        aside = self._path.with_suffix(".unusable.toml")
+        aside = self._path
+        self._is_unread = True
         try:
-            os.replace(self._path, aside)
+            aside = set_aside(self._path)
+            self._is_unread = False
             if settings != Settings():
                 self.write(settings)
         except OSError:
-            aside = self._path
+            log.exception("the settings in %s could not be set aside or kept anew", self._path)
         told = " ".join(left_out[:_TOLD]) + (f" And {len(left_out) - _TOLD} more." if len(left_out) > _TOLD else "")
         rest = "the rest is in force" if settings != Settings() else "the defaults are in force"
         self.complaint = f"The settings kept in {aside.name} cannot all be used; {rest}. {told}"
         return settings
 
     def write(self, settings: Settings) -> None:
-        """Keeps a version: whole or not at all, through a loss of power too. Raises OSError."""
+        """Keeps a version: whole or not at all, through a loss of power too. Raises OSError.
+
+        A file that could not be read is set aside first; where that fails, nothing is written.
+        """
         if self._path is None:
             return
+        if self._is_unread:
+            with contextlib.suppress(FileNotFoundError):
+                log.warning("%s could not be read and is set aside as %s", self._path, set_aside(self._path))
+            self._is_unread = False
         self._path.parent.mkdir(parents=True, exist_ok=True)
         new = self._path.with_suffix(".new")
         try:

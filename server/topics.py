@@ -3,8 +3,8 @@ fills it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 
 from server import decode
 from server.decode import Decode
@@ -22,7 +22,8 @@ class Topic:
     by_type: tuple[
         str, ...
     ] = ()  # types that only this signal has: taken under any name when none of the names is there
-    queue_length: int = 50  # messages the bridge keeps for us in a burst; 1 for what is large and fast
+    # Messages the bridge keeps for us in a burst: few, for what waits there grows old unseen; 1 for what is large.
+    queue_length: int = 5
     compression: str = "none"
 
     @property
@@ -127,6 +128,7 @@ TOPICS = (
     ),
 )
 
+COMMAND = "command"
 BY_SIGNAL = {topic.signal: topic for topic in TOPICS}
 
 
@@ -167,16 +169,45 @@ def candidates(found: Mapping[str, str]) -> dict[str, list[dict[str, str]]]:
     return fitting
 
 
-def map_signals(found: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> dict[str, Source]:
-    """Signal → Source for the topics a car has (topic → type). `chosen` are the operator's picks, signal → topic."""
+def map_signals(
+    found: Mapping[str, str], chosen: Mapping[str, str] | None = None, unpublished: Collection[str] = ()
+) -> dict[str, Source]:
+    """Signal → Source for the topics a car has (topic → type). `chosen` are the operator's picks, signal → topic.
+
+    `unpublished` are topics that no node publishes. Such a one is not read; it stands for its signal, with a note, only
+    where the operator picked it or nothing else could carry the signal. The command topic is kept by its name: the car
+    listens there, and others may not have begun to publish.
+    """
     lower = {name.lower(): name for name in sorted(found, reverse=True)}
+    published = {name: kind for name, kind in found.items() if name not in unpublished}
+    lower_published = {key: name for key, name in lower.items() if name in published}
     sources = {}
     for row in TOPICS:
         pick = (chosen or {}).get(row.signal)
-        source = _picked(row, pick, found) if pick else _by_name(row, lower, found) or _by_type(row, found)
+        if pick:
+            source = _picked(row, pick, found)
+        elif row.signal == COMMAND:
+            source = _by_name(row, lower, found)
+        else:
+            source = _by_name(row, lower_published, published) or _by_type(row, published)
+            source = source or _by_name(row, lower, found) or _by_type(row, found)
         if source is not None:
-            sources[row.signal] = source
+            sources[row.signal] = _unread(source) if source.topic in unpublished else source
     return sources
+
+
+def could_carry(found: Mapping[str, str], chosen: Mapping[str, str] | None = None) -> set[str]:
+    """The topics of a car that a signal may be mapped to, now or when their publisher comes."""
+    names = {name for row in TOPICS for name in map(str.lower, row.names)}
+    kinds = {kind for row in TOPICS for kind in row.by_type}
+    picked = set((chosen or {}).values())
+    return {
+        name for name, kind in found.items() if name in picked or name.lower() in names or plain_type(kind) in kinds
+    }
+
+
+def _unread(source: Source) -> Source:
+    return replace(source, decode=None, note="no node publishes it")
 
 
 def _picked(row: Topic, name: str, found: Mapping[str, str]) -> Source | None:

@@ -43,8 +43,10 @@ def value(reading: Any) -> dict[str, Any] | None:
             return {"speed_mps": plain(reading.speed_mps), "yaw_rate_radps": plain(reading.yaw_rate_radps)}
         case values.Acceleration():
             return {"acceleration_mps2": plain(reading.acceleration_mps2), "source": reading.source}
-        case values.Effort() | values.Steering():
+        case values.Effort():
             return {"percent": plain(reading.percent)}
+        case values.Steering():
+            return {"percent": plain(reading.percent), "tyre_rad": plain(reading.tyre_rad, 4)}
         case values.Distance():
             return {"distance_m": plain(reading.distance_m), "none_in_range": reading.none_in_range}
         case values.Bearing():
@@ -193,11 +195,24 @@ def alarm(alarm: Alarm, now_s: float, wall_ms: int) -> dict[str, Any]:
         "limit": _quantity(finding.limit if finding else None),
         "worst": _worst(alarm.worst),
         "causes": list(finding.causes) if finding else [],
-        "actions": [str(action) for action in spec.actions],
+        "actions": [str(action) for action in alarm.actions],
         "advice": spec.advice,
         "acknowledged_by": alarm.acknowledged_by if alarm.acknowledged else None,
         "shelved_until_ms": round(wall_ms + (until_s - now_s) * 1000) if until_s is not None else None,
         "shelved_by": alarm.shelved_by,
+    }
+
+
+def suppressed(alarm: Alarm, alarms: Mapping[str, Alarm], now_s: float, wall_ms: int) -> dict[str, Any]:
+    """An alarm that is not announced because others explain it, or because monitoring is paused."""
+    raised_for_s = now_s - alarm.raised_s if alarm.active and alarm.raised_s is not None else None
+    by = [alarms[name].spec.title if name in alarms else "Monitoring is paused" for name in alarm.suppressed_by]
+    return {
+        "id": alarm.id,
+        "title": alarm.spec.title,
+        "priority": str(alarm.spec.priority),
+        "by": by,
+        "raised_ms": round(wall_ms - raised_for_s * 1000) if raised_for_s is not None else None,
     }
 
 

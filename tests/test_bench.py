@@ -16,6 +16,7 @@ from tests.bench.__main__ import main
 from tests.bench.child import Child, Failed
 from tests.bench.rig import QUICK, Rig
 from tests.bench.rows.latency import latencies_ms
+from tests.bench.rows.memory import growth_mb_an_hour
 from tests.bench.table import Group, Row, printed
 from tests.bench.wire import Wire
 
@@ -40,6 +41,25 @@ def test_a_run_has_a_figure_for_each_way_and_leaves_nothing_running(
     p50, p99, longest = group["rows"]
     for way in ("catgraph", "floor", "today"):
         assert 0 < p50[way] <= p99[way] <= longest[way] < 5000
+
+
+@pytest.mark.slow
+@pytest.mark.world(n=25)
+def test_the_growth_of_the_servers_memory_has_a_row(tmp_path: Path) -> None:
+    found = tmp_path / "found.json"
+    assert main(["--quick", "--only", "memory", "--json", str(found)]) == 0
+    (group,) = orjson.loads(found.read_bytes())["groups"]
+    growth, used = group["rows"]
+    assert (growth["unit"], growth["reach"]) == ("MB/h", 1.0)
+    assert used["catgraph"] > 20
+
+
+@pytest.mark.world(n=25)
+def test_a_slope_is_that_of_the_whole_time_and_not_of_one_step() -> None:
+    steady = [(float(s), 80.0 + 18.0 * s / 3600) for s in range(0, 600, 20)]
+    assert growth_mb_an_hour(steady) == pytest.approx(18.0)
+    one_step = [(float(s), 80.0 + (0.5 if s > 300 else 0.0)) for s in range(0, 600, 20)]
+    assert growth_mb_an_hour(one_step) < 1.5 * 3.6
 
 
 @pytest.mark.slow

@@ -63,6 +63,7 @@ def _shares(snapshot: Snapshot, limits: SlowLimits) -> list[float]:
         and rate.expected_hz
         and name in readings
         and readings[name].derived_from is None
+        and name not in snapshot.link.throttled
         and not (SIGNALS[name].event_like and set_hz(limits, name) == 0.0)
     ]
 
@@ -82,9 +83,10 @@ CHECKS = (
             needs_ack=True,
             on_delay_s=5.0,  # the window of the rates, as for the single ones: a hiccup shorter than that is none
             off_delay_s=5.0,
+            repeat_after_s=600.0,
             actions=(Action.ACKNOWLEDGE,),  # it explains the single rates: never hidden
             advice="Bridge, radio or server is overloaded: what is shown comes late.",
-            inhibited_by=("car_silent", "no_message"),
+            inhibited_by=("car_silent", "no_message", "link_late", "link_late_moving"),
         ),
         limits=SignalLimits,
         find=find,

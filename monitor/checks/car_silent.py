@@ -29,7 +29,7 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     if found is None:
         return unknown("Nothing received since connecting", short="no data")
     if not found.is_silent and not (was_active and found.falters):
-        return ok(f"{found.fresh} of {found.heard} signals are fresh")
+        return ok(f"{found.fresh} of {found.heard} signals come")
     if not (found.is_bridge_proved or was_active or found.silent_s > BRIDGE_WITHIN_S):
         # Car or link? Wait for the bridge's next sign of life: a lost link has its own words.
         return unknown(f"No message for {found.silent_s:.1f} s, asking the bridge", short="silent")
@@ -39,6 +39,8 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
         proof = "the bridge answers, the car says nothing"
     else:
         proof = "neither car nor bridge answers"
+    if snapshot.link.behind_title:
+        proof = snapshot.link.behind_title
     return fault(
         f"No message for {found.silent_s:.1f} s: {proof}",
         brief=f"{found.silent_s:.0f} s",
@@ -48,13 +50,13 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
 
 
 def is_harmless(snapshot: Snapshot, limits: Limits) -> bool:
-    """One fast signal is fresh."""
+    """One fast signal comes."""
     now_s, opened_s = snapshot.now_s, snapshot.link.opened_s or -math.inf
     for name, reading in snapshot.readings.items():
         if (
             reading.horizon_s <= FAST_HORIZON_S
             and reading.received_s >= opened_s
-            and reading.is_fresh(now_s)
+            and reading.is_coming(now_s)
             and reading.derived_from is None
             and not SIGNALS[name].event_like
         ):
@@ -77,7 +79,7 @@ CHECKS = (
             off_delay_s=1.0,
             actions=(Action.ACKNOWLEDGE, Action.RECONNECT, Action.EXIT),
             advice="The car may still be moving: watch the car.",
-            inhibited_by=("link_lost",),
+            inhibited_by=("link_lost", "link_late", "link_late_moving"),
             grace_s=GRACE_S,
             place_after=Place.LIST,
         ),

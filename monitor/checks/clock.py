@@ -215,7 +215,7 @@ CHECKS = (
             "What is shown may be older than it looks, and times in recordings are wrong by as much.",
             on_delay_s=2.0,  # a burst after a gap of the radio is over by then
             off_delay_s=5.0,
-            by=("clock_jump",),
+            by=("clock_jump", "link_late", "link_late_moving"),
         ),
         limits=ClockLimits,
         find=differs,

@@ -35,7 +35,9 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     if waited_s < WITHIN_S:
         return unknown("Waiting for the first message", short="waiting")
     return fault(
-        _words(link.bridge_answers, link.topics_subscribed),
+        f"{link.behind_title} {link.behind_hint or ''}".strip()
+        if link.behind_title
+        else _words(link.bridge_answers, link.topics_subscribed),
         brief="no message",
         measured=Quantity(label="Waited", value=waited_s, unit="s"),
         causes=("car",),

@@ -7,8 +7,9 @@ collision at the speed at which the gap closes (SAE J2944: undefined while it do
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
-from monitor.ahead import corridor_ahead, is_blind, look_ahead
+from monitor.ahead import corridor_ahead, is_blind, look_ahead, tyre_angle_rad
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -47,7 +48,10 @@ def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Fi
         gap_before_m = look_ahead(before.value, corridor).gap_m if before is not None else None
         span_s = snapshot.readings["scan"].received_s - before.received_s if before is not None else 0.0
         closing_mps = _closing(sight.gap_m, gap_before_m, span_s, speed_mps)
-    return _judge(sight.gap_m, sight.bearing_rad, speed_mps, closing_mps, limits, was_active, cause="scan")
+    found = _judge(sight.gap_m, sight.bearing_rad, speed_mps, closing_mps, limits, was_active, cause="scan")
+    if tyre_angle_rad(snapshot) is None:
+        found = replace(found, text=f"{found.text}; steering unknown, looked straight ahead")
+    return found
 
 
 def by_estimator(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Finding:

@@ -64,7 +64,7 @@ def _why_not(snapshot: Snapshot, was_active: bool) -> Finding | None:
         return absent("Position is not published")
     view, now_s = snapshot.phone, snapshot.now_s
     if not view.is_there(now_s):
-        why = "No phone tells its position"
+        why = "No phone is sharing its position"
         return ok(why) if was_active else absent(why, brief="no phone")  # else the alarm would stand for ever
     if snapshot.need("position").status < 0:
         return unknown("The car's receiver has no fix", short="no fix")

@@ -35,15 +35,17 @@ class MissingLimits(Limits):
 def find(snapshot: Snapshot, limits: MissingLimits, was_active: bool) -> Finding:
     view, now_s = snapshot.phone, snapshot.now_s
     if not view.is_there(now_s):
-        return _none("No phone tells its position", was_active)
+        return _none("No phone is sharing its position", was_active)
     if snapshot.get("position") is None and "position" not in snapshot.link.published:
         return _none("The car publishes no position to compare with", was_active)
     why = view.why_not(now_s)
     if why is None:
         radius_m = view.fix.accuracy_m if view.fix is not None else 0.0
-        return ok(f"The phone knows its position to {radius_m:.0f} m")
+        return ok(f"Position of the phone known to {radius_m:.0f} m")
     if not view.is_handheld and not view.is_chosen and why != "denied":
         return _none("This is no phone: no position is expected of it", was_active)
+    if why == "silent" and not view.was_usable and not view.is_chosen:
+        return _none("No phone is sharing its position", was_active)  # nothing was lost with it
     words, missing_s = why_words(why, view, now_s), view.missing_s(now_s)
     if missing_s < limits.after_s and not was_active:
         return unknown(words.sentence, short=words.short)
@@ -52,7 +54,7 @@ def find(snapshot: Snapshot, limits: MissingLimits, was_active: bool) -> Finding
         brief=words.brief,
         measured=Quantity(label="Missing for", value=missing_s, unit="s"),
         limit=Quantity(label="Said after", value=limits.after_s, unit="s"),
-        causes=("permission" if why in ("denied", "insecure") else "phone",),
+        causes=("phone",),
     )
 
 
@@ -77,6 +79,7 @@ CHECKS = (
             sound=Sound.LOW,
             needs_ack=False,
             off_delay_s=FIX_LIVES_S + 1.0,  # longer than one fix lives: now and then one is not a position
+            repeat_after_s=3600.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
             advice="Allow this page the location and keep it open: without it nobody checks the car's position.",
         ),

@@ -77,6 +77,7 @@ CHECKS = (
             needs_ack=True,  # whoever comes back must know that nobody listened
             on_delay_s=RELOADED_S,
             off_delay_s=2.0,
+            repeat_after_s=1800.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
             advice="Open this page on a phone, touch it so that it may sound, and keep it in front.",
         ),

@@ -33,6 +33,8 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
         return absent(f"{signal.label}: no rate to measure")  # that it never came is the other family's to say
     if signal.event_like and set_hz(limits, signal.name) == 0.0:
         return absent(f"{signal.label} speaks when it has something to say", brief="no fixed rate")
+    if signal.name in snapshot.link.throttled:
+        return absent(f"{signal.label}: fewer messages are asked for, for the link is slow", brief="throttled")
     snapshot.need(signal.name)  # while stale there is no rate to speak of
     rate = snapshot.rates.get(signal.name)
     if rate is None or rate.expected_hz is None or not rate.settled:
@@ -58,6 +60,8 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
 
 def is_harmless(name: str, snapshot: Snapshot, limits: SlowLimits) -> bool:
     rate = snapshot.rates.get(name)
+    if name in snapshot.link.throttled:
+        return True
     if rate is None or rate.expected_hz is None or rate.measured_hz is None or not rate.settled:
         return True
     return rate.measured_hz >= rate.expected_hz * limits.slow_below_percent / 100.0
@@ -84,9 +88,10 @@ def check(signal: Signal) -> Check[Limits]:
             # As long as the window of the rate: no gap shorter than "silent" can hold it below the limit so long.
             on_delay_s=5.0,
             off_delay_s=2.0,
+            repeat_after_s=600.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
             advice="The car or the radio is busy; what depends on it comes late.",
-            inhibited_by=(f"signal_stale.{signal.name}", "all_slow"),
+            inhibited_by=(f"signal_stale.{signal.name}", "all_slow", "link_late", "link_late_moving"),
         ),
         limits=SignalLimits,
         find=partial(find, signal),

@@ -30,14 +30,19 @@ NEVER_AFTER_S = 5.0  # as long as the whole car is given for its first message
 
 
 def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
+    unusable = snapshot.unusable.get(signal.name)
+    if unusable is not None and unusable.is_coming(snapshot.now_s):
+        return ok(f"{signal.label}: messages come, {unusable.words}")
     reading = snapshot.get(signal.name)
     if reading is None or reading.derived_from is not None:
         return _never_came(signal, snapshot, limits)
-    age_s = reading.age_s(snapshot.now_s)
+    age_s = reading.silent_s(snapshot.now_s)
+    if unusable is not None:
+        age_s = min(age_s, snapshot.now_s - unusable.at_s)
     text = f"{signal.label}: newest message {age_s:.1f} s old"
     if _is_event_like(signal, limits):
         return ok(text)
-    if reading.is_fresh(snapshot.now_s) and not (was_active and age_s > FALTERS_AT * reading.horizon_s):
+    if reading.is_coming(snapshot.now_s) and not (was_active and age_s > FALTERS_AT * reading.horizon_s):
         return ok(text)
     if reading.received_s > snapshot.now_s:
         return unknown(f"{signal.label}: the clock went back", short="waiting")
@@ -59,11 +64,11 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
 
 
 def is_harmless(name: str, snapshot: Snapshot, limits: SlowLimits) -> bool:
-    """Fresh, or not on the car."""
+    """It comes, or is not on the car."""
     reading = snapshot.readings.get(name)
     if reading is None or reading.derived_from is not None:
         return name not in snapshot.link.published
-    return reading.is_fresh(snapshot.now_s)
+    return reading.is_coming(snapshot.now_s)
 
 
 def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Finding:
@@ -117,7 +122,7 @@ def check(signal: Signal) -> Check[Limits]:
             off_delay_s=2.0,
             actions=(Action.ACKNOWLEDGE,),  # not to be shelved: it is why other checks do not judge
             advice="What depends on it is not checked.",
-            inhibited_by=("car_silent", "no_message"),
+            inhibited_by=("car_silent", "no_message", "link_late", "link_late_moving"),
             grace_s=GRACE_S,
         ),
         limits=SignalLimits,

@@ -1,7 +1,9 @@
-"""Does the car slow when catgraph orders it to? The proof is the car's own wheels, and nothing else.
+"""Does the car slow when catgraph orders it to? The proof is the car's own speed, and nothing else.
 
-Half of the ordered deceleration within a second counts as obeyed: a real car follows loosely, and the slope of the
-speed is known over the last 0.6 s. A car that stands, or is no faster than it was told, obeys too.
+First a change must be shown that the order explains (monitor/slow_proof.py): the ramp begins at the measured speed, so
+that a car is no faster than commanded proves nothing. From then on half of the ordered deceleration counts as obeyed,
+as a real car follows loosely and the slope of the speed is known over the last 0.6 s; so does a car that is no faster
+than commanded. A car that stands needs no alarm, whatever made it stand.
 """
 
 from __future__ import annotations
@@ -25,12 +27,14 @@ from monitor.check import (
     unknown,
 )
 from monitor.motion import STANDS_BELOW_MPS
+from monitor.slow_proof import NOTHING_SHOWN, SHARE, SlowProof
 from monitor.state import Snapshot
 
 TILE = "Slow-down"
-SHARE = 0.5  # of the ordered deceleration
+STANDS_ALREADY = "The car stood already: there is nothing to slow"
+STANDS_UNPROVEN = "The car stands; its speed does not show that the order stopped it"
 WITHIN_S = 1.0  # of the first command
-FOLLOWS_WITHIN_MPS = 0.5  # a car so near the commanded speed follows it, however slowly that falls
+FOLLOWS_WITHIN_MPS = 0.5  # once it is shown to slow, a car so near the commanded speed follows it
 ENDED_TOLD_S = 30.0
 
 
@@ -103,29 +107,52 @@ def obeys(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Findi
             "NOT CONFIRMED: no speed comes from the car. Use the physical stop", brief="no speed", causes=("no speed",)
         )
     speed_mps = abs(speed.value.speed_mps)
+    proof = proof_of(snapshot)
+    if speed_mps < STANDS_BELOW_MPS or snapshot.standing_since_s is not None:
+        return ok(_standing(proof))
     text = f"{abs(facts.commanded_mps):.1f} m/s ordered, {speed_mps:.1f} m/s driven"
-    if speed_mps < STANDS_BELOW_MPS:
-        return ok("The car stands, as ordered")
-    if speed_mps - abs(facts.commanded_mps) <= FOLLOWS_WITHIN_MPS * (0.6 if was_active else 1.0):
-        return ok(f"{text}: the car follows")
     slope_mps2 = snapshot.speed_slope_mps2
     braking_mps2 = None if slope_mps2 is None else max(0.0, -slope_mps2 if speed.value.speed_mps > 0 else slope_mps2)
+    measured = None if braking_mps2 is None else Quantity(label="Braking", value=braking_mps2, unit="m/s²")
     least_mps2 = SHARE * facts.deceleration_mps2 * (1.2 if was_active else 1.0)
     limit = Quantity(label="At least", value=least_mps2, unit="m/s²")
+    if proof.shown is None:
+        if for_s < WITHIN_S:
+            return unknown(f"{text}: ordered {for_s:.1f} s ago", short="waiting")
+        return fault(
+            f"NOT CONFIRMED: {text}, and its speed does not show that the order slows it. Use the physical stop",
+            brief=f"{speed_mps:.1f} m/s",
+            measured=measured,
+            limit=limit,
+            causes=("not shown",),
+        )
+    if speed_mps - abs(facts.commanded_mps) <= FOLLOWS_WITHIN_MPS * (0.6 if was_active else 1.0):
+        return ok(f"{text}: the car follows")
     if braking_mps2 is not None and braking_mps2 >= least_mps2:
-        measured = Quantity(label="Braking", value=braking_mps2, unit="m/s²")
         return ok(f"{text}: the car slows by {braking_mps2:.1f} m/s²", measured=measured, limit=limit)
-    if for_s < WITHIN_S:
-        return unknown(f"{text}: ordered {for_s:.1f} s ago", short="waiting")
+    if for_s < WITHIN_S or (proof.shown_s is not None and snapshot.now_s - proof.shown_s < WITHIN_S):
+        return ok(f"{text}: the car slows")
     if braking_mps2 is None:
         return fault(f"NOT CONFIRMED: {text}, too few speeds come. Use the physical stop", causes=("no speed",))
     return fault(
         f"NOT CONFIRMED: {text}, braking {braking_mps2:.1f} m/s², {least_mps2:.2f} needed. Use the physical stop",
         brief=f"{speed_mps:.1f} m/s",
-        measured=Quantity(label="Braking", value=braking_mps2, unit="m/s²"),
+        measured=measured,
         limit=limit,
         causes=("no braking",),
     )
+
+
+def proof_of(snapshot: Snapshot) -> SlowProof:
+    """What the car's speed shows of the order that stands."""
+    proof = snapshot.slow_proof
+    return proof if proof.ordered_s == snapshot.slowing.ordered_s else NOTHING_SHOWN
+
+
+def _standing(proof: SlowProof) -> str:
+    if proof.shown is not None:
+        return "The car stands, as ordered"
+    return STANDS_ALREADY if proof.stood_before else STANDS_UNPROVEN
 
 
 def is_alone(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Finding:

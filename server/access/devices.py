@@ -8,7 +8,6 @@ from __future__ import annotations
 import hashlib
 import hmac
 import logging
-import os
 import secrets
 import threading
 from collections.abc import Callable, Mapping
@@ -19,6 +18,7 @@ from typing import Any
 from server import label
 from server.access import secret_file
 from server.access.who import Role
+from server.storage.set_aside import set_aside
 
 log = logging.getLogger("catgraph.access")
 
@@ -173,8 +173,7 @@ class Devices:
             if len(server) != 8 or len(key) < 64:
                 raise ValueError("its keys are too short")
         except (ValueError, KeyError, TypeError) as why:
-            aside = path.with_name(f"{path.name}.damaged")
-            os.replace(path, aside)
+            aside = set_aside(path, "damaged")
             log.error("the list of paired devices cannot be read (%s): all pair anew; it is kept as %s", why, aside)
             self._save(0)
             return

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from websockets.asyncio.server import Server, ServerConnection
+from websockets.frames import Frame, Opcode
 from websockets.protocol import State
 from websockets.server import ServerProtocol
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from server.bridge.listener import Listener
 
 HANDSHAKE_S = 10.0  # a socket that has not become a WebSocket by then is closed
-LARGEST_BUFFER = 4_000_000  # bytes: beyond, the peer floods us with pings and does not read the pongs
+LARGEST_BUFFER = 4_000_000  # bytes of pongs: beyond, the peer floods us with pings and does not read
 KEEPALIVE_S = 30  # TCP's own probe finds peers that vanished; rosbridge itself sends no pings
 
 
@@ -25,9 +26,12 @@ class Connection(ServerConnection):
     def __init__(self, listener: Listener, protocol: ServerProtocol, server: Server, **options: Any) -> None:
         super().__init__(protocol, server, **options)
         self._listener = listener
+        if listener.close_answer is not None:
+            _answer_close(protocol, listener.close_answer)
         self.awake = asyncio.Event()  # not frozen
         self.awake.set()
         self._unread = bytearray()
+        self._pong_bytes = 0  # written since the socket's buffer was last empty
         self._deadline: asyncio.TimerHandle | None = None  # of the handshake
         self.on_ready: Callable[[], None] | None = None
         self.on_lost: Callable[[], None] | None = None
@@ -50,6 +54,15 @@ class Connection(ServerConnection):
     def write(self, frame: bytes) -> None:
         """Writes one whole frame. Frames are never split here, so they cannot fall into the middle of another."""
         self.transport.write(frame)
+
+    def drop(self) -> None:
+        """Ends the connection without a closing handshake."""
+        self.transport.abort()
+
+    def close_without_code(self) -> None:
+        """Ends the connection with a closing frame that is empty: the peer sees 1005."""
+        self.protocol.send_close()
+        self.send_data()
 
     def freeze(self) -> None:
         self.awake.clear()
@@ -89,8 +102,11 @@ class Connection(ServerConnection):
             self._unread += data
             self.transport.pause_reading()
             return
+        before = self.transport.get_write_buffer_size()
         super().data_received(data)
-        if self.transport.get_write_buffer_size() > LARGEST_BUFFER:
+        after = self.transport.get_write_buffer_size()
+        self._pong_bytes = self._pong_bytes + max(0, after - before) if after else 0  # messages may be large
+        if self._pong_bytes > LARGEST_BUFFER:
             self.transport.abort()
 
     def resume_writing(self) -> None:
@@ -108,6 +124,17 @@ class Connection(ServerConnection):
             self._deadline = self.loop.call_later(HANDSHAKE_S, self._end_handshake)
         else:
             self.transport.abort()
+
+
+def _answer_close(protocol: ServerProtocol, answer: Callable[[bytes], bytes]) -> None:
+    """Makes the protocol answer a closing frame with another one than it got."""
+    send = protocol.send_frame
+
+    def send_frame(frame: Frame) -> None:
+        is_answer = frame.opcode is Opcode.CLOSE and protocol.close_rcvd is not None and protocol.close_sent is None
+        send(Frame(Opcode.CLOSE, answer(bytes(frame.data))) if is_answer else frame)
+
+    protocol.send_frame = send_frame  # type: ignore[method-assign]
 
 
 def _keep_alive(sock: socket.socket) -> None:

@@ -40,6 +40,16 @@ def frame(opcode: int, payload: bytes) -> bytes:
     return head + payload
 
 
+def text_frame(payload: bytes) -> bytes:
+    """A frame of ready-made text."""
+    return frame(_TEXT, payload)
+
+
+def binary_frame(payload: bytes) -> bytes:
+    """A frame of ready-made bytes."""
+    return frame(_BINARY, payload)
+
+
 def json_frame(message: Json) -> bytes:
     """A text frame of one JSON object; NaN and ±Inf become null."""
     return frame(_TEXT, json_bytes(message))

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 from server.bridge.encoding import Outgoing
 from server.bridge.names import canonical_name
 
 if TYPE_CHECKING:
     from server.bridge.client import Client
-    from server.bridge.subscription import Subscription
 
 SOURCE = "source"  # the recording or the car behind the bridge, as a publisher
+
+
+class Subscriber(Protocol):
+    """Takes the messages of one topic."""
+
+    def offer(self, message: Outgoing, /) -> None: ...
+
+
+class Owner(Protocol):
+    """Whoever a subscriber belongs to."""
+
+    def type_became(self, topic: Topic, subscription: Any, /) -> None: ...
 
 
 @dataclass(slots=True, kw_only=True)
@@ -24,7 +35,7 @@ class Topic:
     latches: bool = False
     latched: Outgoing | None = None  # the newest message, for those who come later
     publishers: set[Client | str] = field(default_factory=set)
-    subscribers: dict[Subscription, Client] = field(default_factory=dict)
+    subscribers: dict[Subscriber, Owner] = field(default_factory=dict)
 
     def distribute(self, message: Outgoing) -> None:
         """Hands a message to every subscriber; none can hold up another."""

@@ -51,6 +51,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--wait", action="store_true", help="begin when a client has subscribed, so that it misses no message"
     )
     parser.add_argument("--stay", action="store_true", help="keep the bridge up after the end, until interrupted")
+    parser.add_argument(
+        "--like",
+        choices=("helpful", "real"),
+        default="helpful",
+        help="real: behave as the real rosbridge_suite, which says nothing of errors, loses what it cannot encode and "
+        "can be made deaf (default: helpful)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -73,7 +80,7 @@ class _Replay:
     def __init__(self, recording: Recording, args: argparse.Namespace) -> None:
         self._recording = recording
         self._args = args
-        self._bridge = RosBridge(ros_version=recording.ros_version, node="/replay")
+        self._bridge = RosBridge(ros_version=recording.ros_version, node="/replay", like=args.like)
         self._names = _renamed(recording, dict(args.remap))
         self._report = Report(recording, self._bridge)
         self._subscribed = asyncio.Event()  # a client subscribed to something

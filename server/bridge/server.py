@@ -5,24 +5,38 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from typing import Literal
 
 from server.bridge.client import Client
 from server.bridge.connection import Connection
 from server.bridge.encoding import Outgoing
-from server.bridge.graph import SOURCE, Graph
+from server.bridge.graph import SOURCE, Graph, Topic
 from server.bridge.listener import CannotListen, Listener
 from server.bridge.names import canonical_name, canonical_type
 from server.bridge.outbox import Counters
-from server.bridge.rosapi import add_rosapi
+from server.bridge.real.client import RealClient
+from server.bridge.real.fragments import RealFragments
+from server.bridge.real.options import BOUND_BYTES, RealOptions
+from server.bridge.real.outgoing import RealOutgoing
+from server.bridge.real.publishers import Publishers
+from server.bridge.real.subscribers import Subscribers
+from server.bridge.rosapi import ROSAPI_NODE, add_rosapi
 from server.bridge.services import Handler, Service, ServiceFailed, Services
 from server.bridge.types import MessageTypes
 from server.source import Json, RosVersion
 
-__all__ = ["CannotListen", "RosBridge", "ServiceFailed"]
+__all__ = ["CannotListen", "Like", "RealOptions", "RosBridge", "ServiceFailed"]
+
+Like = Literal["helpful", "real"]
+_CLOSE_ANSWERS: dict[int, Callable[[bytes], bytes]] = {1: lambda _: b"\x03\xe8", 2: lambda data: data[:2]}
+_SERVERS = {1: "AutobahnPython/22.7.1", 2: "TornadoServer/6.6.1"}
 
 
 class RosBridge:
     """Speaks as the rosbridge of `ros_version` does; `now` is the ROS time that rosapi tells [s since 1970].
+
+    `like` "helpful" says in `status` messages what is wrong, and sends and survives what the real server loses or dies
+    of; "real" is that server, with its silences, `real` being how it was started.
 
     Everything but start, stop, kill and revive is synchronous and belongs on the loop on which the bridge was started.
     """
@@ -35,6 +49,8 @@ class RosBridge:
         node: str = "/car",
         max_clients: int = 256,
         max_message_bytes: int = 10_000_000,
+        like: Like = "helpful",
+        real: RealOptions | None = None,
     ) -> None:
         self.ros_version: RosVersion = ros_version
         self.now = now
@@ -46,10 +62,25 @@ class RosBridge:
         self.types = MessageTypes(ros_version)
         self.on_publish: list[Callable[[str, str, Json], None]] = []  # (topic, type, message) of what clients publish
         self.on_subscribe: list[Callable[[str], None]] = []  # (topic) each time a client subscribes
-        self._listener = Listener(self._serve_client, max_clients=max_clients, max_message_bytes=max_message_bytes)
-        self._clients: set[Client] = set()
+        self.like: Like = like
+        self.real = real or RealOptions()
+        self.subscribers = Subscribers(self)
+        self.publishers = Publishers(self)
+        self.fragments = RealFragments()
+        self.dead_nodes: set[str] = set()  # their services are still listed and never answer
+        self.down: str | None = None  # what every service call is answered while ROS itself is gone
+        self.parameters: dict[str, object] = {}
+        self._types_seen: dict[str, str] = {}  # ROS 1's master remembers the type of every topic there ever was
+        self._listener = Listener(
+            self._serve_client,
+            max_clients=max_clients,
+            max_message_bytes=max_message_bytes if like == "helpful" else BOUND_BYTES,
+            server_header=None if like == "helpful" else _SERVERS[ros_version],
+            close_answer=None if like == "helpful" else _CLOSE_ANSWERS[ros_version],
+        )
+        self._clients: set[Client | RealClient] = set()
         self._address: tuple[str, int] | None = None
-        add_rosapi(self)
+        self.add_rosapi()
 
     @property
     def sent(self) -> int:
@@ -80,6 +111,7 @@ class RosBridge:
     async def stop(self) -> None:
         """Says goodbye to every client and stops listening."""
         self._address = None
+        self.publishers.close()
         await self._listener.close(abruptly=False)
 
     async def kill(self) -> None:
@@ -115,6 +147,7 @@ class RosBridge:
         if definition:
             self.types.learn(type, definition)
         found.publishers.add(SOURCE)
+        self.note_type(found.name, type)
         for subscription, client in list(found.subscribers.items()):
             client.type_became(found, subscription)
 
@@ -133,15 +166,77 @@ class RosBridge:
         found = self.graph.find(topic)
         if found is None or SOURCE not in found.publishers:
             raise LookupError(f"{topic} was not advertised")
-        found.distribute(Outgoing(message))
+        assert found.type is not None
+        found.distribute(self._outgoing(found.type, message))
 
-    def add_service(self, name: str, type: str, handler: Handler, arguments: tuple[str, ...] = ()) -> None:
+    def deliver(self, topic: Topic, type: str, message: Json, *, latches: bool = False) -> None:
+        """Takes a message that a client of a bridge like the real one published."""
+        topic.latches |= latches
+        topic.distribute(self._outgoing(type, message))
+        for callback in self.on_publish:
+            callback(topic.name, type, message)
+
+    def add_service(
+        self,
+        name: str,
+        type: str,
+        handler: Handler,
+        arguments: tuple[str, ...] = (),
+        *,
+        request: str | None = None,
+        response: str | None = None,
+        node: str | None = None,
+    ) -> None:
         """Offers a service. `handler(args)` answers the values, now or as an awaitable; what it raises is passed on.
 
-        `arguments` are their names in order, for the callers that send a list.
+        `arguments` are their names in order, for the callers that send a list; `request` and `response` the .msg text
+        of both.
         """
-        kind = canonical_type(type, self.ros_version, "srv")
-        self.services.add(Service(name=canonical_name(name), type=kind, handler=handler, arguments=arguments))
+        self.services.add(
+            Service(
+                name=canonical_name(name),
+                type=canonical_type(type, self.ros_version, "srv"),
+                handler=handler,
+                arguments=arguments,
+                request=request,
+                response=response,
+                node=self.node if node is None else node,
+            )
+        )
+
+    def end_node(self, node: str) -> None:
+        """A node ends and takes its services with it."""
+        for service in self.services.all():
+            if service.node == node:
+                self.services.remove(service.name)
+
+    def add_rosapi(self) -> None:
+        """Offers the services of rosapi, at the beginning and again after its end."""
+        self.dead_nodes.discard(ROSAPI_NODE)
+        add_rosapi(self)
+
+    def note_type(self, topic: str, type: str | None) -> None:
+        """Remembers the type of a topic."""
+        if type is not None:
+            self._types_seen[topic] = type
+
+    def known_type(self, topic: str) -> str | None:
+        """The type of a topic, in ROS 1 of any that ever was."""
+        found = self.graph.find(topic)
+        if self.ros_version == 1:
+            return self._types_seen.get(topic)
+        return found.type if found is not None else None
+
+    def advertised_types(self) -> set[str]:
+        """The types of what the source publishes: they are known to it, even where no definition came with them."""
+        return {topic.type for topic in self.graph.topics() if topic.type and SOURCE in topic.publishers}
+
+    def types_seen(self) -> dict[str, str]:
+        """Every topic there ever was, with its newest type."""
+        return dict(self._types_seen)
+
+    def _outgoing(self, type: str, message: Json) -> Outgoing:
+        return RealOutgoing(self, type, message) if self.like == "real" else Outgoing(message)
 
     def subscribed(self, topic: str) -> None:
         """Called by a client when it has subscribed."""
@@ -157,8 +252,12 @@ class RosBridge:
             await asyncio.sleep(0.01)
         return True
 
+    def client(self, connection: Connection) -> Client | RealClient:
+        """Whoever serves one connection."""
+        return RealClient(self, connection) if self.like == "real" else Client(self, connection)
+
     async def _serve_client(self, connection: Connection) -> None:
-        client = Client(self, connection)
+        client = self.client(connection)
         self._clients.add(client)
         try:
             await client.run()

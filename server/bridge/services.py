@@ -22,6 +22,9 @@ class Service:
     type: str
     handler: Handler
     arguments: tuple[str, ...] = ()  # names of the arguments in order, for callers that send a list
+    request: str | None = None  # .msg text of the request: a bridge like the real one checks the arguments by it
+    response: str | None = None  # .msg text of the response, for those who ask rosapi
+    node: str = ""  # who offers it
 
 
 class Services:
@@ -32,6 +35,12 @@ class Services:
 
     def add(self, service: Service) -> None:
         self._services[canonical_name(service.name)] = service
+
+    def remove(self, name: str) -> None:
+        self._services.pop(canonical_name(name), None)
+
+    def all(self) -> list[Service]:
+        return [self._services[name] for name in self.names()]
 
     def find(self, name: str) -> Service | None:
         return self._services.get(canonical_name(name))

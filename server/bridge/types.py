@@ -46,26 +46,42 @@ class MessageTypes:
 
         Raises Misfit where a field does not exist or has a value of the wrong kind.
         """
-        definitions = self._definitions(type)
+        definitions = self.definitions(type)
         return message if definitions is None else complete(_long(type), definitions, self._version, message, now_s)
 
     def describe(self, type: str) -> list[Json]:
         """The type and all it contains, as rosapi describes them. Raises LookupError where it is not known."""
-        definitions = self._definitions(type)
+        definitions = self.definitions(type)
         if definitions is None:
             raise LookupError(f"the type {type} is not known here")
         return describe(_long(type), definitions, self._version)
 
-    def _definitions(self, type: str) -> Definitions | None:
-        if type in self._texts and type not in self._parsed:
+    def has_package(self, package: str) -> bool:
+        """Is any type of this package known?"""
+        names = (*self._texts, *_standard(self._version).fielddefs)
+        return any(name.startswith(f"{package}/") for name in names)
+
+    def long_name(self, type: str) -> str:
+        """The type as rosbags spells it, in both versions."""
+        return _long(type)
+
+    def definitions(self, type: str) -> Definitions | None:
+        """The definitions of a type and of all it contains; None where it is not known."""
+        long = _long(type)
+        for definitions in (self._learnt(type), _standard(self._version).fielddefs):
+            if long in definitions:
+                return definitions
+        return next((found for found in map(self._learnt, list(self._texts)) if long in found), None)
+
+    def _learnt(self, type: str) -> Definitions:
+        if type not in self._texts:
+            return {}
+        if type not in self._parsed:
             try:
                 self._parsed[type] = dict(get_types_from_msg(self._texts[type], _long(type)))
             except Exception:  # the parser says what is wrong in many ways; the standard messages may still know it
                 self._parsed[type] = {}
-        for definitions in (self._parsed.get(type, {}), _standard(self._version).fielddefs):
-            if _long(type) in definitions:
-                return definitions
-        return None
+        return self._parsed[type]
 
 
 @cache

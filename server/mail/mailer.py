@@ -25,6 +25,7 @@ from server.mail.replies import Trouble
 from server.mail.settings import MailSettings, MailSettingsFile, checked
 from server.mail.source import Source
 from server.mail.wire import Account, Connection, Envelope, connect
+from server.supervision import Supervisor
 
 log = logging.getLogger("catgraph.mail")
 T = TypeVar("T")
@@ -69,7 +70,7 @@ class Mailer:
         self._wall_ms = wall_ms
         self._pause_s = pause_s
         self._thread = ThreadPoolExecutor(1, "catgraph-outbox")
-        self._tasks: list[asyncio.Task[None]] = []
+        self._supervisor = Supervisor("mail")
         self._to_make = asyncio.Event()
         self._to_send = asyncio.Event()
         self._failures = 0  # of the account, one after the other
@@ -90,16 +91,18 @@ class Mailer:
             self.trouble = f"Mail is off: {_reason(why)}."
             log.error("%s", self.trouble)
             return
-        self._tasks = [
-            asyncio.create_task(self._supervised("preparing mail", self._make_all)),
-            asyncio.create_task(self._supervised("sending mail", self._send_all)),
-        ]
+        self._supervisor.keep("preparing", partial(self._again, "preparing mail", self._make_all))
+        self._supervisor.keep("sending", partial(self._again, "sending mail", self._send_all))
 
     async def stop(self) -> None:
         """Ends it; what is on its way is sent again at the next start."""
-        await asyncio.gather(*(_ended(task) for task in self._tasks))
+        await self._supervisor.stop()
         await self._in_thread(self._close)
         self._thread.shutdown(wait=True)
+
+    def problems(self) -> list[str]:
+        """What is wrong with its tasks, a sentence each."""
+        return self._supervisor.problems()
 
     def look(self) -> None:
         """Something may be due: a clock was moved, or mail was ordered."""
@@ -404,7 +407,7 @@ class Mailer:
         if not address.is_allowed(address.parse(one), self.settings.allowed):
             raise MailRefused(f"{one} is not among the allowed recipients.", field="to")
 
-    async def _supervised(self, what: str, work: Callable[[], Awaitable[None]]) -> None:
+    async def _again(self, what: str, work: Callable[[], Awaitable[None]]) -> None:
         while True:
             try:
                 await work()

@@ -38,7 +38,7 @@ async def prepare(
     stop = threading.Event()
     try:
         await asyncio.to_thread(_begin, work)
-        paths = await _exported(letter, source, work, lambda share: progress(share * _EXPORTED))
+        paths, missing = await _exported(letter, source, work, lambda share: progress(share * _EXPORTED))
         packing = partial(
             pack,
             paths,
@@ -49,7 +49,7 @@ async def prepare(
             stop,
         )
         packed = await _in_thread(packing, stop)
-        made = await _in_thread(partial(_write, letter, settings, packed, files, stop), stop)
+        made = await _in_thread(partial(_write, letter, settings, packed, missing, files, stop), stop)
         progress(1.0)
         return made
     except (NoRoom, ValueError) as why:
@@ -76,8 +76,12 @@ async def _in_thread(work: Callable[[], T], stop: threading.Event) -> T:
         raise
 
 
-async def _exported(letter: Letter, source: Source, work: Path, progress: Callable[[float], None]) -> list[Path]:
+async def _exported(
+    letter: Letter, source: Source, work: Path, progress: Callable[[float], None]
+) -> tuple[list[Path], list[str]]:
+    """The files, and what of the recordings is not in them, in sentences."""
     found: list[Path] = []
+    missing: list[str] = []
     order = letter.order
     for i, recording in enumerate(order.recordings):
         path = await asyncio.to_thread(source.path_of, recording)
@@ -88,19 +92,24 @@ async def _exported(letter: Letter, source: Source, work: Path, progress: Callab
             await asyncio.to_thread(into.mkdir)
             told = partial(_part_of, progress, i, len(order.recordings))
             try:
-                path = await source.export(path, order.format, into, told)
+                made = await source.export(path, order.format, into, told)
             except (OSError, ValueError, RuntimeError) as why:
                 raise CannotPrepare(f"{recording} cannot be written as {order.format}: {why}") from None
+            path = made.path
+            if not made.is_whole:
+                missing += [f"{recording}: {note}" for note in made.notes] or [f"{recording}: something is not in it."]
         found.append(path)
         progress((i + 1) / len(order.recordings))
-    return found
+    return found, missing
 
 
 def _part_of(progress: Callable[[float], None], i: int, of: int, share: float) -> None:
     progress((i + share) / of)
 
 
-def _write(letter: Letter, settings: MailSettings, packed: Pack, files: Path, stop: threading.Event) -> Prepared:
+def _write(
+    letter: Letter, settings: MailSettings, packed: Pack, missing: list[str], files: Path, stop: threading.Event
+) -> Prepared:
     order = letter.order
     parts = cut(packed, settings.limit_bytes)
     way: Way = "attached" if len(parts) == 1 else order.too_large
@@ -110,9 +119,9 @@ def _write(letter: Letter, settings: MailSettings, packed: Pack, files: Path, st
             "send it as a link."
         )
     if way == "link":
-        texts = [words.linked(order.text, order.recordings, order.format, packed, _links(letter, settings))]
+        texts = [words.linked(order.text, order.recordings, order.format, packed, _links(letter, settings), missing)]
     else:
-        texts = words.attached(order.text, order.recordings, order.format, packed, parts)
+        texts = words.attached(order.text, order.recordings, order.format, packed, parts, missing)
         need_room(files, packed.size_bytes * 3 // 2)
     sender = address.parse(settings.sender)
     made: list[Composed] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from server.recording.export import make_export
+from server.recording.export import Made, make_export
 
 
 class Recorded:
@@ -17,5 +17,5 @@ class Recorded:
     def path_of(self, recording: str) -> Path | None:
         return self._path_of(recording)
 
-    async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Path:
+    async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Made:
         return await make_export(path, format, into, progress)

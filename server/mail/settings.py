@@ -7,7 +7,6 @@ import ipaddress
 import os
 import re
 import ssl
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -16,8 +15,10 @@ from urllib.parse import urlsplit
 
 import tomli_w
 
+from server import bounded_toml
 from server.mail import address
 from server.mail.heads import is_one_line
+from server.storage.set_aside import set_aside
 
 Security = Literal["starttls", "tls", "none"]
 USUAL_PORT: Mapping[str, int] = {"starttls": 587, "tls": 465, "none": 25}
@@ -222,6 +223,7 @@ class MailSettingsFile:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self._is_unread = False  # what the file holds is not known: it is set aside before anything is written
         self.complaint: str | None = None  # why what was found could not be used
 
     def read(self) -> MailSettings:
@@ -230,23 +232,35 @@ class MailSettingsFile:
             with open(self._path, "rb") as file:
                 if os.fstat(file.fileno()).st_mode & 0o077:
                     os.fchmod(file.fileno(), 0o600)
-                body = tomllib.loads(file.read(_MAX_FILE).decode())
+                body = bounded_toml.loads(
+                    file.read(_MAX_FILE), max_bytes=_MAX_FILE, max_line=_MAX_FILE
+                )  # a certificate is a line
             kept = MailSettings(password=str(body.get("password", "")))
             return checked({**body, "password": kept.password}, kept)
         except FileNotFoundError:
             return MailSettings()
         except OSError as why:
+            self._is_unread = True
             self.complaint = f"The mail settings cannot be read ({why.strerror or why}); nothing is sent."
             return MailSettings()
-        except (ValueError, RecursionError):
-            aside = self._path.with_suffix(".unusable.toml")
+        except ValueError:
+            aside = self._path
+            self._is_unread = True
             with contextlib.suppress(OSError):
-                os.replace(self._path, aside)
+                aside = set_aside(self._path)
+                self._is_unread = False
             self.complaint = f"The mail settings could not be used and are set aside as {aside.name}; set them again."
             return MailSettings()
 
     def write(self, settings: MailSettings) -> None:
-        """Keeps them: whole or not at all, never readable for others. Raises OSError."""
+        """Keeps them: whole or not at all, never readable for others. Raises OSError.
+
+        A file that could not be read is set aside first; where that fails, nothing is written.
+        """
+        if self._is_unread:
+            with contextlib.suppress(FileNotFoundError):
+                set_aside(self._path)
+            self._is_unread = False
         new = self._path.with_suffix(".new")
         with contextlib.suppress(FileNotFoundError):
             new.unlink()

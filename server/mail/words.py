@@ -19,9 +19,19 @@ def subject_of(subject: str, part: int, parts: int) -> str:
     return f"{subject} ({part}/{parts})" if parts > 1 else subject
 
 
-def attached(text: str, recordings: Sequence[str], format: Format, pack: Pack, parts: Sequence[Stretch]) -> list[str]:
-    """The text of each mail."""
-    what = f"{_recordings(recordings)} as {FORMATS[format]}."
+MOST_MISSING = 30  # sentences of what is not in the files
+
+
+def attached(
+    text: str,
+    recordings: Sequence[str],
+    format: Format,
+    pack: Pack,
+    parts: Sequence[Stretch],
+    missing: Sequence[str] = (),
+) -> list[str]:
+    """The text of each mail. `missing`: what of the recordings is not in the files, a sentence each."""
+    what = _joined(f"{_recordings(recordings)} as {FORMATS[format]}.", _missing(missing))
     sum_ = f"SHA-256 of {pack.name}: {pack.sha256}"
     if len(parts) == 1:
         return [_joined(text, what, f"Attached: {pack.name}, {_size(pack.size_bytes)}.", sum_)]
@@ -45,12 +55,27 @@ def attached(text: str, recordings: Sequence[str], format: Format, pack: Pack, p
     ]
 
 
-def linked(text: str, recordings: Sequence[str], format: Format, pack: Pack, links: Sequence[str]) -> str:
+def linked(
+    text: str,
+    recordings: Sequence[str],
+    format: Format,
+    pack: Pack,
+    links: Sequence[str],
+    missing: Sequence[str] = (),
+) -> str:
     """The text of a mail with links in place of an attachment."""
     what = f"{_recordings(recordings)} as {FORMATS[format]}: {_size(pack.size_bytes)}, too large to be attached."
     many = "Each link is" if len(links) > 1 else "The link is"
     note = f"{many} one to catgraph's own server: it works while that runs, and where its network can be reached."
-    return _joined(text, what, "\n".join(links), note)
+    return _joined(text, what, _missing(missing), "\n".join(links), note)
+
+
+def _missing(sentences: Sequence[str]) -> str:
+    if not sentences:
+        return ""
+    more = len(sentences) - MOST_MISSING
+    lines = [f"- {one}" for one in sentences[:MOST_MISSING]] + ([f"- and {more} more."] if more > 0 else [])
+    return "\n".join(["Not all of the recording is in the file:", *lines])
 
 
 def _recordings(recordings: Sequence[str]) -> str:

@@ -229,6 +229,7 @@ class Run:
             reception=known.reception,
             state=known.state,
             profile=self._ways.tuning.profile,
+            tyre_rad_per_unit=self._ways.tuning.limits.steering.tyre_rad_per_unit,
         )
         if changed:
             self._tell(judging.judge(known.monitor, known.state, now_s, changed))
@@ -335,6 +336,7 @@ class Run:
             last_message_s=known.last_message_s,
             ros_answered_s=now_s,
             ros_alive=True,
+            behind=None,
             offers_nothing=False,
             bridge_answers=True,
             reception=known.reception,
@@ -376,7 +378,7 @@ class Run:
         return wire.scan_frame(
             reading.value,
             number=known.scans,
-            age_s=known.at_s - reading.received_s,
+            age_s=reading.age_s(known.at_s),
             kinds_kept=known.kinds_kept,
             judged=judged(
                 reading.value,

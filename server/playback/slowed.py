@@ -24,6 +24,7 @@ class SlowDownTold:
     why: str
     topic: str | None
     commanded_mps: float | None
+    stood_before: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +41,7 @@ class OrderTold:
     ramp_mps: float = 0.0
     slows_s: float | None = None
     is_unconfirmed: bool = False
+    stands: str | None = None  # as in a live order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +63,9 @@ class Slowed:
         match told.step:
             case "released" | "ended":
                 return replace(self, order=None)
-            case "ordered" | "resumed" | "sent" | "slows" | "not_confirmed" | "cut" if told.order is not None:
+            case "ordered" | "resumed" | "sent" | "slows" | "stands" | "not_confirmed" | "cut" if (
+                told.order is not None
+            ):
                 if order is None or order.number != told.order:
                     order = OrderTold(number=told.order, by=told.by or "catgraph", why=told.why, ordered_s=at_s)
                 return replace(self, topic=topic, order=_after(order, told, at_s))
@@ -114,6 +118,7 @@ def read(event: Mapping[str, Any]) -> SlowDownTold | None:
         why=str(event.get("why") or ""),
         topic=event["topic"] if isinstance(event.get("topic"), str) else None,
         commanded_mps=float(speed) if isinstance(speed, int | float) and not isinstance(speed, bool) else None,
+        stood_before=event.get("stands") == "before",
     )
 
 
@@ -127,9 +132,11 @@ def _after(order: OrderTold, told: SlowDownTold, at_s: float) -> OrderTold:
         case "cut":
             order = replace(order, ramp_s=None)
         case "slows":
-            order = replace(order, slows_s=order.slows_s or at_s, is_unconfirmed=False)
+            order = replace(order, slows_s=order.slows_s or at_s, is_unconfirmed=False, stands=None)
+        case "stands":
+            order = replace(order, is_unconfirmed=False, stands="before" if told.stood_before else "unproven")
         case "not_confirmed":
-            order = replace(order, is_unconfirmed=True)
+            order = replace(order, is_unconfirmed=True, stands=None)
     return order
 
 
@@ -157,6 +164,7 @@ def _order(
         "deceleration_mps2": wire.plain(limits.deceleration_mps2, 2),
         "sending": order.ramp_s is not None,
         "confirmed": False if order.is_unconfirmed else True if order.slows_s is not None else None,
+        "stands": order.stands,
         "steps": {
             "pressed_ms": None,
             "server_ms": at_ms(order.ordered_s),

@@ -20,6 +20,7 @@ from server.recording.read import Recording
 from server.recording.standing import read_standing
 
 ALARMS, PHONE, SETTINGS = "/catgraph/alarms", "/catgraph/phone", "/catgraph/settings"
+MOST_SETTINGS = 200  # changes of the settings: each is a file to read
 MOST = 50_000  # rows of one channel: a day of a phone; a file that holds more is not of our making
 
 
@@ -54,9 +55,10 @@ class Told:
 def read_told(recording: Recording) -> Told:
     """Reads the recording's own channels. What makes no sense in them is left out, and said."""
     words: list[tuple[float, Word]] = []
-    left_out = 0
+    left_out = changes = 0
     metadata: Mapping[str, str] = getattr(recording, "metadata", {})
     at_first: str | None = metadata.get("settings") or None
+    newest = at_first
     events = [(0.0, event) for event in read_standing(metadata)] + list(_rows(recording, ALARMS))
     for at_s, row in events:
         word = _of_event(row, at_s, recording.start_s)
@@ -72,9 +74,12 @@ def read_told(recording: Recording) -> Told:
         if not isinstance(toml, str):
             left_out += 1
         elif at_first is None:
-            at_first = toml
-        elif toml != at_first or any(isinstance(word, NewSettings) for _, word in words):
+            at_first = newest = toml
+        elif toml != newest and changes < MOST_SETTINGS:
             words.append((at_s, NewSettings(toml=toml)))
+            newest, changes = toml, changes + 1
+        elif toml != newest:
+            left_out += 1
     words.sort(key=lambda word: word[0])  # stable: of one moment, each channel keeps its order
     notes = (f"{left_out} entries of catgraph's own make no sense and are left out.",) if left_out else ()
     has_alarms = bool(events) or "session" in metadata

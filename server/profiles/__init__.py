@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from monitor import catalog
 
-SteeringUnit = Literal["percent", "tyre_angle"]
+SteeringUnit = Literal["percent", "tyre_angle", "unknown"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,7 +19,7 @@ class Profile:
 
     name: str
     title: str
-    steering: SteeringUnit = "percent"  # what torque.z of the steering topic means
+    steering: SteeringUnit = "unknown"  # what torque.z of the steering topic means; its ratio is a threshold
     limits: Mapping[str, float] = field(default_factory=dict)  # thresholds that differ from the checks' own defaults
     has: tuple[str, ...] = ()  # topics that a car of this kind has, whatever the case of their letters
     lacks: tuple[str, ...] = ()
@@ -57,7 +57,7 @@ def _read(name: str, body: Mapping[str, Any]) -> Profile:
     return Profile(
         name=name,
         title=body["title"],
-        steering=body.get("steering", "percent"),
+        steering=body.get("steering", "unknown"),
         limits=limits,
         has=tuple(match.get("has", ())),
         lacks=tuple(match.get("lacks", ())),

@@ -26,6 +26,7 @@ from server.recording.folder import DAMAGED, FINISHED, WRITING, is_id
 from server.recording.found_files import TRASH, files_below, id_of, shape_of, started_ms_of, vehicle_of
 from server.recording.survey import VERSION
 from server.recording.surveyor import Surveyor
+from server.supervision import Supervisor
 
 log = logging.getLogger("catgraph.catalog")
 
@@ -68,7 +69,7 @@ class Catalog:
         self._surveyor = Surveyor()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._wake = asyncio.Event()
-        self._task: asyncio.Task[None] | None = None
+        self._supervisor = Supervisor("catalog of recordings")
         self._walk_is_due = True
         self._walked_s: float | None = None
         self._shape: object = None  # of the folders, when they were last walked
@@ -79,17 +80,18 @@ class Catalog:
     async def start(self) -> None:
         """Begins to look through the folder and to read what is new in it."""
         self._loop = asyncio.get_running_loop()
-        self._task = asyncio.create_task(self._work(), name="catalog of recordings")
+        self._supervisor.keep("survey", self._work)
 
     async def stop(self) -> None:
-        if self._task is not None:
-            self._task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._task
+        await self._supervisor.stop()
         await self._surveyor.rest()
         with self._lock:
             self._is_closed = True
             self._database.close()
+
+    def problems(self) -> list[str]:
+        """What is wrong with its task, a sentence each."""
+        return self._supervisor.problems()
 
     async def settled(self) -> None:
         """Returns once all that is there has been read; for tests and scripts."""
@@ -439,6 +441,7 @@ class Catalog:
             "problem": problem,
             "damage": found.get("damage", []),
             "left_out": found.get("left_out", []),
+            "not_received": found.get("not_received", []),
             "ros_version": found.get("ros_version"),
             "ended": found.get("ended"),
             "ended_why": found.get("ended_why"),

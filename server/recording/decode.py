@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
+from server.recording.definition_bounds import demand_few_fields
 from server.recording.errors import Undecodable
 from server.source import RosVersion
 
@@ -51,6 +52,7 @@ def compile_decoder(type: str, definitions: dict[str, Any], version: RosVersion)
     numpy, uint8[] and char[] are bytes. Raises Undecodable here where the type is not known or not supported, and from
     the function where a message's bytes do not fit it.
     """
+    demand_few_fields(type, definitions)
     if version == 1:
         return _compile(type, definitions, _Layout(ros1=True, order="<", start=0), None)
     big: list[Decode] = []  # compiled when first met: hardly any recording has them

@@ -6,6 +6,7 @@ from typing import Any
 
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
+from server.recording.definition_bounds import MAX_LETTERS, bounded
 from server.recording.errors import Undecodable
 from server.recording.source import Channel
 from server.source import RosVersion
@@ -19,12 +20,16 @@ def definitions_of(channel: Channel, version: RosVersion, distro: str | None) ->
         return distribution(version, distro)
     try:
         if channel.format == "msg":
-            return dict(get_types_from_msg(channel.definition, channel.type))
+            return dict(get_types_from_msg(bounded(channel.definition), channel.type))
         found: dict[str, Any] = {}
+        if len(channel.definition) > MAX_LETTERS:
+            raise Undecodable("its definition is too long")
         for part in channel.definition.split(_IDL_SEPARATOR):
             text = part.split("\n", 1)[-1] if part.startswith("IDL: ") else part
             if text.strip():
                 found.update(get_types_from_idl(text))
+    except Undecodable:
+        raise
     except Exception:  # the parsers say what is wrong in many ways
         raise Undecodable(f"the definition of {channel.type} cannot be understood") from None
     return found

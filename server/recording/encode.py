@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
+from server.recording.definition_bounds import demand_few_fields
 from server.recording.errors import Undecodable
 from server.source import RosVersion
 
@@ -62,6 +63,7 @@ def compile_encoder(type: str, definitions: dict[str, Any], version: RosVersion)
     uint8[] may be base64, bytes or a list. Raises Undecodable here where the type is not known or not supported, and
     Misfit from the function.
     """
+    demand_few_fields(type, definitions)
     writer = _Writer(definitions, ros1=version == 1)
     writer.message(type, "m", 0)
     writer.flush()

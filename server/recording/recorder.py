@@ -18,6 +18,8 @@ from typing import Any, Literal
 import orjson
 
 from server.bridge.encoding import Unencodable, json_bytes
+from server.frames import TooManyParts, Unreadable
+from server.raw_frame import RawFrame
 from server.recording import recover, space
 from server.recording.encode import Misfit
 from server.recording.folder import FINISHED, RecordingsFolder, id_of, writing_path
@@ -65,7 +67,7 @@ class Status:
     path: Path | None = None  # what it is called: another name than was asked for, where that was taken
     size: int = 0
     messages: int = 0  # of the car, in this part
-    misfits: int = 0  # of them, that were not of their type and are kept as JSON
+    misfits: int = 0  # of them, kept as JSON: not of their type, or of a type that nobody knows
     space: Space | None = None
     trouble: str | None = None  # why it stopped by itself, as a sentence
 
@@ -84,10 +86,12 @@ class Recorder:
         call: Callable[..., Any],
         on_finished: Callable[[Path], None],
         allowance: Allowance,
+        on_unreadable: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._folder = folder
         self._call = call
         self._on_finished = on_finished
+        self._on_unreadable = on_unreadable
         self.allowance = allowance
         self.status = Status()
         self.is_ready = False  # the types are
@@ -140,7 +144,8 @@ class Recorder:
         self._put(("learn", dict(definitions)))
 
     def take(self, topic: str, type: str | None, message: Any, at_ns: int, size: int, now_s: float) -> None:
-        """A message of the car; it must not be changed afterwards. `size`: bytes of the frame it came in."""
+        """A message of the car, or the RawFrame that holds it; it must not be changed afterwards. `size`: bytes of the
+        frame it came in."""
         if len(self._queue) >= MAX_QUEUED or self._put_bytes - self._taken_bytes > MAX_QUEUED_BYTES:
             self.dropped += 1
             self.dropped_at_s = now_s
@@ -242,10 +247,19 @@ class Recorder:
                 log.exception("a message of %s could not be written, told once", item[1])
 
     def _message(self, file: PartFile, topic: str, type: str | None, at_ns: int, message: Any) -> None:
+        text: bytes | None = None  # of a message that is kept as JSON as it came
+        if isinstance(message, RawFrame):
+            try:
+                message, text = _parsed(message)
+            except Unreadable as why:
+                self._call(self._on_unreadable, str(why))
+                return
         road = self._roads.get((topic, type)) or self._road(file, topic, type)
         channel, schema, loose = road
         if schema.encode is not None:
             try:
+                if text is not None:
+                    raise Misfit("it is too large to be parsed")
                 file.add(channel, at_ns, schema.encode(message))
             except Misfit:
                 if loose is None:
@@ -253,9 +267,10 @@ class Recorder:
                     loose = file.channel(topic, self._book.loose(type))
                     self._roads[topic, type] = (channel, schema, loose)
                 self._misfits += 1
-                file.add(loose, at_ns, _json(message))
+                file.add(loose, at_ns, text or _json(message))
         else:
-            file.add(channel, at_ns, _json(message))
+            self._misfits += 1
+            file.add(channel, at_ns, text or _json(message))
         self._messages += 1
 
     def _road(self, file: PartFile, topic: str, type: str | None) -> tuple[int, Schema, int | None]:
@@ -388,6 +403,16 @@ class Recorder:
                 except OSError as error:
                     log.error("the disk does not keep what is recorded: %s", error)
                     file.failed = error
+
+
+def _parsed(frame: RawFrame) -> tuple[Any, bytes | None]:
+    """The message in a frame, or the text of one that holds too much to be parsed. Raises Unreadable."""
+    try:
+        return frame.message(), None
+    except TooManyParts:
+        if (text := frame.json()) is None:
+            raise
+        return None, text
 
 
 def _json(message: Any) -> bytes:

@@ -11,6 +11,7 @@ import orjson
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from server.recording.definition_bounds import bounded
 from server.recording.encode import Encode, compile_encoder
 from server.source import RosVersion
 
@@ -50,15 +51,15 @@ class TypeBook:
     def learn(self, definitions: Mapping[str, str]) -> None:
         """Takes definitions in .msg text, by type in either spelling; those of the bridge count before ours."""
         for type, text in definitions.items():
-            if text and len(text) <= MAX_DEFINITION and self._texts.get(_long(type)) != text:
-                self._texts[_long(type)] = text
-                self._known.pop(_long(type), None)
+            if text and len(text) <= MAX_DEFINITION and self._texts.get(long_type(type)) != text:
+                self._texts[long_type(type)] = text
+                self._known.pop(long_type(type), None)
 
     def schema(self, type: str | None) -> Schema | None:
         """How messages of a type are written as ROS writes them; None where nobody knows its definition."""
         if not type:
             return None
-        long = _long(type)
+        long = long_type(type)
         if long not in self._known:
             self._known[long] = self._find(long)
         return self._known[long]
@@ -66,7 +67,7 @@ class TypeBook:
     def loose(self, type: str | None) -> Schema:
         """The same as JSON: for a type nobody knows, and for messages that are not of their type."""
         return Schema(
-            name=self._spelled(_long(type)) if type else "",
+            name=self._spelled(long_type(type)) if type else "",
             encoding="jsonschema",
             data=_LOOSE,
             message_encoding="json",
@@ -77,7 +78,7 @@ class TypeBook:
         text = self._texts.get(type)
         if text is not None:
             try:
-                return self._made(type, *self._completed(text, dict(get_types_from_msg(text, type))))
+                return self._made(type, *self._completed(text, dict(get_types_from_msg(bounded(text), type))))
             except Exception:  # the parser says what is wrong in many ways; the distribution may still know it
                 pass
         try:
@@ -157,6 +158,6 @@ def _named(definitions: Mapping[str, Any]) -> set[str]:
     return found
 
 
-def _long(type: str) -> str:
+def long_type(type: str) -> str:
     package, _, name = type.partition("/")
     return type if name.startswith("msg/") else f"{package}/msg/{name}"

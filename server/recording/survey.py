@@ -12,7 +12,6 @@ import hashlib
 import os
 import resource
 import sys
-import tomllib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -21,7 +20,7 @@ from typing import Any
 import orjson
 
 from monitor.state import State
-from server import judging
+from server import bounded_toml, judging
 from server.profiles import GENERIC
 from server.reception import Reception
 from server.recording.read import Recording, RecordingUnreadable, open_recording
@@ -29,7 +28,7 @@ from server.recording.remarks import line
 from server.recording.sketch import sketch
 from server.topics import map_signals
 
-VERSION = 1  # of what is found: with another one, files are read again
+VERSION = 2  # of what is found: with another one, files are read again
 PRIORITIES = ("critical", "warning", "advisory")
 MAX_RAISED = 200  # alarms told one by one; all are counted
 MAX_SENTENCES = 10
@@ -82,10 +81,15 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "ended_why": _text(metadata.get("why")),
         "is_clip": "clip_of" in metadata,
         "clip_of": _text(metadata.get("clip_of")),
-        "left_out": [name[:200] for name in metadata.get("left_out", "").split("\n") if name][:MAX_SENTENCES],
+        "left_out": _names(metadata.get("left_out", "")),
+        "not_received": _names(metadata.get("not_received", "")),
         "damage": damage[:MAX_SENTENCES],
         "sketch": None if drawn is None else drawn.as_json(),
     }
+
+
+def _names(lines: str) -> list[str]:
+    return [name[:200] for name in lines.split("\n") if name][:MAX_SENTENCES]
 
 
 def _drive(recording: Recording, metadata: Mapping[str, str]) -> tuple[State, float | None, list[str]]:
@@ -106,7 +110,14 @@ def _drive(recording: Recording, metadata: Mapping[str, str]) -> tuple[State, fl
                 continue
             at_s = message.at_s - recording.start_s
             changed = judging.receive(
-                sources, message.message, at_s, None, reception=reception, state=state, profile=GENERIC
+                sources,
+                message.message,
+                at_s,
+                None,
+                reception=reception,
+                state=state,
+                profile=GENERIC,
+                tyre_rad_per_unit=0.0,
             )
             for signal in changed:
                 if signal in ("speed", "odometry"):
@@ -124,8 +135,8 @@ def _drive(recording: Recording, metadata: Mapping[str, str]) -> tuple[State, fl
 def _chosen(toml: str) -> dict[str, str]:
     """The topics the operator had picked for signals, by the settings of the drive."""
     try:
-        topics = tomllib.loads(toml).get("topics", {})
-    except (tomllib.TOMLDecodeError, RecursionError):
+        topics = bounded_toml.loads(toml).get("topics", {})
+    except bounded_toml.BadToml:
         return {}
     return {k: v for k, v in topics.items() if isinstance(v, str)} if isinstance(topics, dict) else {}
 

@@ -18,6 +18,7 @@ from typing import Any, cast
 
 from mcap.writer import CompressionType, Writer
 
+from server.recording.chunk_index import ChunkIndexes
 from server.recording.folder import writing_path
 from server.recording.own import LIBRARY, METADATA
 from server.recording.schemas import Schema
@@ -55,6 +56,7 @@ class PartFile:
                 enable_crcs=True,
                 enable_data_crcs=True,
             )
+            vars(self._writer)["_Writer__chunk_indices"] = ChunkIndexes(self._writing)  # there is no public name for it
             self._writer.start(profile=profile, library=f"{LIBRARY} {catgraph_version()}")
             self._writer.add_metadata(METADATA, self._metadata)
             self._stream.drain()  # what came meanwhile waits: the disk is waited for by `sync`
@@ -115,6 +117,7 @@ class PartFile:
         try:
             self._writer.flush()
             self._writer.add_metadata(METADATA, self._metadata | ended)
+            self._stream.drain()  # `finish` reads the chunks' index from the file
             self._writer.finish()
             self._stream.drain()
             os.fsync(self._fd)

@@ -32,6 +32,7 @@ def as_json(report: Report) -> dict[str, Any]:
             "from_s": _number(run.from_s),
             "to_s": _number(run.to_s),
             "messages": run.messages,
+            "nothing_why": report.why_nothing,
             "took_s": _number(report.took_s),
             "times_real_time": _number(report.times_real, 1),
         },

@@ -14,6 +14,9 @@ from pathlib import Path
 
 import orjson
 
+from server import output_file
+from server.memory_limit import TOO_LARGE, bounded_memory
+from server.output_file import Output, output_of
 from server.recording.read import Recording, RecordingUnreadable, open_recording
 from server.rehearsal import summary
 from server.rehearsal.as_json import as_json
@@ -62,14 +65,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0 no critical alarm was raised (with --compare: by B), 1 one was, 2 it cannot be told."""
+    """0 no critical alarm was raised (with --compare: by B), 1 one was, 2 it cannot be told: not all
+    of the recording can be read, or nothing in it could be judged."""
     began_s = time.perf_counter()
     try:
         _demand_sense(args)
         wishes = [read_wishes(path) for path in args.compare or ([args.settings] if args.settings else [])] or [
             Wishes()
         ]
-        with _prompt_threads(), open_recording(args.files) as recording:
+        with bounded_memory(), _prompt_threads(), open_recording(args.files) as recording:
             _demand_extract(recording, args)
             report = _report(recording, wishes, args, began_s)
             _write(report, args)
@@ -80,6 +84,9 @@ def run(args: argparse.Namespace) -> int:
     except (RecordingUnreadable, CannotInject, BadSetting, AssetsMissing, _Impossible) as error:
         _complain(str(error))
         return CANNOT
+    except MemoryError:
+        _complain(f"{args.files[0]}: {TOO_LARGE}")
+        return CANNOT
     except Exception as error:  # the one net: 1 would say that a critical alarm was raised
         traceback.print_exc()
         _complain(f"a fault of catgraph itself, please report it: {type(error).__name__}: {error}")
@@ -88,6 +95,9 @@ def run(args: argparse.Namespace) -> int:
     for sentence in missing:
         _complain(sentence)
     if missing:
+        return CANNOT
+    if report.why_nothing is not None:
+        _complain(report.why_nothing)
         return CANNOT
     return CRITICAL if report.has_critical else NO_CRITICAL
 
@@ -143,47 +153,59 @@ def _rehearse(
 
 
 def _write(report: Report, args: argparse.Namespace) -> None:
-    on_screen = args.json is not None and str(args.json) == "-"
-    _say(orjson.dumps(as_json(report), option=orjson.OPT_INDENT_2).decode() if on_screen else summary.text(report))
-    if args.json is not None and not on_screen:
-        _keep(args.json, orjson.dumps(as_json(report), option=orjson.OPT_INDENT_2) + b"\n")
-    if args.html is not None:
+    json, html = _output(args.json), _output(args.html)
+    text = summary.text(report)
+    if str(args.json) == "-" or (json is not None and json.is_stdout):
+        text, json = orjson.dumps(as_json(report), option=orjson.OPT_INDENT_2).decode(), None
+    content = b""
+    if html is not None:
         from server.rehearsal.page import page  # jinja2 takes its time to load
 
-        _keep(args.html, page(report).encode())
-        if not on_screen:
+        content = page(report).encode()
+        if html.is_stdout:
+            text, html = content.decode(), None
+    _say(text)
+    if json is not None:
+        _keep(json, orjson.dumps(as_json(report), option=orjson.OPT_INDENT_2) + b"\n")
+    if html is not None:
+        _keep(html, content)
+        if str(args.json) != "-":
             _say(f"\nPage: {args.html}")
 
 
-def _demand_writable(path: Path) -> None:
+def _output(path: Path | None) -> Output | None:
     """Before the work and not after it."""
-    if path.is_dir():
-        raise _Impossible(f"{path} cannot be written: it is a directory.")
-    if not path.parent.is_dir():
-        raise _Impossible(f"{path} cannot be written: {path.parent} is no directory.")
-
-
-def _keep(path: Path, content: bytes) -> None:
-    """Whole or not at all."""
-    new = path.with_name(f".{path.name}.{os.getpid()}.new")
+    if path is None or str(path) == "-":
+        return None
     try:
-        new.write_bytes(content)
-        os.replace(new, path)
+        return output_of(path)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            new.unlink()
         raise _Impossible(f"{path} cannot be written: {error.strerror or error}.") from None
+
+
+def _keep(output: Output, content: bytes) -> None:
+    try:
+        output_file.write(output, content)
+    except BrokenPipeError:  # who read the other end of a pipe has seen enough
+        pass
+    except OSError as error:
+        raise _Impossible(f"{output.path} cannot be written: {error.strerror or error}.") from None
 
 
 def _demand_sense(args: argparse.Namespace) -> None:
     if args.compare and args.settings:
         raise _Impossible("--compare names both settings already: leave --settings out.")
-    for path in (args.json, args.html):
-        if path is not None and str(path) != "-":
-            _demand_writable(path)
+    outputs = [_output(path) for path in (args.json, args.html)]
+    if str(args.json) == "-" or (outputs[0] is not None and outputs[0].is_stdout):
+        if outputs[1] is not None and outputs[1].is_stdout and not _is_null(args.html):
+            raise _Impossible("--json and --html cannot both go to the screen.")
     if args.html is not None and str(args.html) == "-":
         raise _Impossible("--html needs the name of a file.")
     Faults(args.inject)
+
+
+def _is_null(path: Path) -> bool:
+    return path.samefile(os.devnull)
 
 
 def _demand_extract(recording: Recording, args: argparse.Namespace) -> None:

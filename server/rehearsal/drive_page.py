@@ -39,6 +39,10 @@ def write_drive_page(
         run = replace(run, episodes=told.episodes, load=told.load, titles={**told.titles, **run.titles})
     path.write_text(page(Report(files=[name], recording=recording, run=run, told=told)), encoding="utf-8")
     notes = [f"{sentence}." for sentence in run.damage]
+    notes += [
+        f"{count} messages on {topic} could not be decoded: {recording.why_rejected.get(topic, 'not JSON')}."
+        for topic, count in sorted(recording.rejected.items())
+    ]
     return Outcome(entries=run.messages, notes=notes + ([] if run.broke_off is None else [f"{run.broke_off}."]))
 
 

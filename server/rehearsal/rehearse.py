@@ -194,7 +194,14 @@ class _Run:
                     continue
                 self._last_message_s = now_s
                 changed = judging.receive(
-                    sources, message, now_s, None, reception=reception, state=state, profile=profile
+                    sources,
+                    message,
+                    now_s,
+                    None,
+                    reception=reception,
+                    state=state,
+                    profile=profile,
+                    tyre_rad_per_unit=monitor.limits.steering.tyre_rad_per_unit,
                 )
                 if changed:
                     transitions = judging.judge(monitor, state, now_s, changed)

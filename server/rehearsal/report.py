@@ -64,6 +64,11 @@ class Report:
         return any(episode.priority is Priority.CRITICAL for episode in self.run.episodes)
 
     @property
+    def why_nothing(self) -> str | None:
+        """Why nothing in the recording could be judged, as a sentence; None: something was."""
+        return why_nothing(self.run, self.recording)
+
+    @property
     def recorded(self) -> datetime | None:
         """When the recording began; None where its clock says nothing sensible."""
         try:
@@ -77,6 +82,23 @@ class Report:
     def settings(self) -> list[tuple[str, str, float, str]]:
         """What differs from the car's defaults: full name, label, value, unit."""
         return settings_of(self.run)
+
+
+def why_nothing(run: Rehearsed, recording: Recording) -> str | None:
+    """A run in which no message of any signal could be read says nothing of the car, whatever it raised."""
+    if any(tally.received > tally.rejected for tally in run.reception.by_signal.values()):
+        return None
+    if not recording.count:
+        return "Nothing could be judged: the recording has no message."
+    if not run.sources:
+        none_is = f"none of its {len(recording.topics)} topics is" if len(recording.topics) > 1 else "its topic is not"
+        return (
+            f"Nothing could be judged: {none_is} one that catgraph knows. "
+            "Name the topics of the signals in a file for --settings."
+        )
+    if not any(tally.received for tally in run.reception.by_signal.values()):
+        return "Nothing could be judged: the topics that catgraph knows have no message here."
+    return "Nothing could be judged: no message on a topic that catgraph knows could be read."
 
 
 def settings_of(run: Rehearsed) -> list[tuple[str, str, float, str]]:

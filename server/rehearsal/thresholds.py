@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -11,9 +10,9 @@ from typing import Any
 
 from monitor import catalog
 from monitor.signals import SIGNALS
-from server import profiles
+from server import bounded_toml, profiles
 from server.profiles import GENERIC
-from server.settings import AUTO, MAX_TOML_BYTES, BadSetting, Settings, SettingsFile, change
+from server.settings import AUTO, BadSetting, Settings, SettingsFile, change
 from server.source import RosVersion
 from server.tuning import Tuning
 
@@ -69,16 +68,14 @@ def tuning_for(wishes: Wishes, topics: Mapping[str, str], ros: RosVersion) -> Tu
 
 def _body(path: Path) -> dict[str, Any]:
     try:
-        raw = path.read_bytes()
+        with path.open("rb") as file:  # not all of it: it may be a device without end
+            raw = file.read(bounded_toml.MAX_BYTES + 1)
     except OSError as error:
         raise BadSettingsFile(f"{path} cannot be read: {error.strerror or error}.") from None
-    if len(raw) > MAX_TOML_BYTES:
-        raise BadSettingsFile(f"{path}: a file of settings has at most {MAX_TOML_BYTES // 1024} kB.")
     try:
-        return tomllib.loads(raw.decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        what = "" if isinstance(error, UnicodeDecodeError) else f": {str(error)[:120]}"
-        raise BadSettingsFile(f"{path} is not TOML{what}.") from None
+        return bounded_toml.loads(raw)
+    except bounded_toml.BadToml as why:
+        raise BadSettingsFile(f"{path}: {why}") from None
 
 
 def _tables(path: Path, body: Mapping[str, Any], wrong: list[str]) -> dict[str, Any]:

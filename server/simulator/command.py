@@ -48,6 +48,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="whoever drives the lap goes on commanding while somebody else does: the last message wins",
     )
     parser.add_argument("--rate", type=float, default=1.0, metavar="X", help="X times as fast as real (default 1)")
+    parser.add_argument(
+        "--like",
+        choices=("helpful", "real"),
+        default="helpful",
+        help="real: behave as the real rosbridge_suite, which says nothing of errors, loses what it cannot encode and "
+        "can be made deaf (default: helpful)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -77,6 +84,7 @@ async def _simulate(args: argparse.Namespace) -> None:
         scenarios=args.scenario,
         has_stopper=not args.no_obstacle_stopper,
         gives_way=not args.competing_controller,
+        like=args.like,
     )
     port = await service.start()
     host = f"[{args.host}]" if ":" in args.host else args.host

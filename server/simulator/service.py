@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from server.bridge.server import CannotListen, RosBridge, ServiceFailed
+from server.bridge.server import CannotListen, Like, RosBridge, ServiceFailed
 from server.simulator.car import SimulatedCar, Step
 from server.simulator.messages import CMD_VEL
 from server.simulator.scenarios import BridgeFault, Planned, UnknownScenario, check_duration, find, planned
@@ -30,7 +30,7 @@ class CarService:
 
     `port` 0 takes a free one. `scenarios` come as NAME, NAME@T or NAME@T+D (T and D in seconds of the drive). `rate` is
     how many times faster than real time the car lives; `clock` tells the time at the beginning [s since 1970]. Raises
-    UnknownScenario and ValueError, each with one sentence for a person.
+    UnknownScenario and ValueError, each with one sentence for a person. `like` is the bridge's.
     """
 
     def __init__(
@@ -46,6 +46,7 @@ class CarService:
         clock: Callable[[], float] = time.time,
         has_stopper: bool = True,
         gives_way: bool = True,
+        like: Like = "helpful",
     ) -> None:
         if not 0 < rate <= 100:
             raise ValueError(f"The rate must lie above 0 and be at most 100, not {rate:g}.")
@@ -60,7 +61,7 @@ class CarService:
             has_stopper=has_stopper,
             gives_way=gives_way,
         )
-        self.bridge = RosBridge(ros_version=ros_version, now=lambda: self.car.now_s, node="/simulated_car")
+        self.bridge = RosBridge(ros_version=ros_version, now=lambda: self.car.now_s, node="/simulated_car", like=like)
         for published in self.car.published:
             self.bridge.advertise(published.topic, published.type)
         self.bridge.on_publish.append(self._on_publish)

@@ -7,6 +7,7 @@ from typing import Any
 
 from server import wire
 from server.link import LinkDown
+from server.outgoing import NotAllowed
 from server.slowing.mouth import Mouth
 from server.slowing.way import GUARD_HEARTBEAT, GUARD_RELEASE, GUARD_STATE
 
@@ -88,7 +89,7 @@ class GuardWatch:
     def _say(self, topic: str, number: int) -> bool:
         try:
             self._mouth.publish(topic, UINT32, {"data": number})
-        except LinkDown:
+        except (LinkDown, NotAllowed):
             return False
         return True
 

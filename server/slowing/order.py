@@ -14,9 +14,11 @@ from server.slowing.ramp import Ramp
 from server.slowing.way import Way
 
 LATE_S = 0.3  # what was pressed longer ago is not obeyed any more
+DESERTED_S = 10.0  # after the last operator's page has gone, slow-down is not armed any more
 BY_HAND = "by hand"
 State = Literal["not_available", "safe", "armed", "ordered", "holding"]
 Ended = Literal["released", "longest", "disconnected"]
+Stands = Literal["before", "unproven"]  # it stood when it was ordered; what stopped it is not shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,6 +52,7 @@ class Order:
     first_sent_s: float | None = None
     sending_s: float | None = None  # since when commands go out without a gap
     slows_s: float | None = None  # when the car's own speed showed it
+    stands: Stands | None = None  # the car stands, and its speed does not show that the order stopped it
     last: Command | None = None
 
 
@@ -62,6 +65,7 @@ class SlowDown:
         self.armed_by: str | None = None
         self.order: Order | None = None
         self.ended_at_longest_s: float | None = None
+        self._operators_s: float | None = None  # a page of an operator was last heard; None: none since it was armed
 
     def state(self, way: Way, now_s: float) -> State:
         if self.order is not None:
@@ -78,6 +82,18 @@ class SlowDown:
         was = self.armed_by
         self.armed_by = was or by
         return was is None
+
+    def is_deserted(self, heard_s: float | None, now_s: float, *, keeps: bool) -> bool:
+        """Whether it is armed without an order, and the last operator's page has gone. `heard_s`: when one was heard
+        last; None: none is here. `keeps`: it stays armed all the same. Armed by a program with no page about, it stays
+        armed."""
+        if self.armed_by is None:
+            self._operators_s = None
+            return False
+        if heard_s is not None:
+            self._operators_s = max(heard_s, self._operators_s or heard_s)
+        gone_s = self._operators_s
+        return gone_s is not None and self.order is None and not keeps and now_s - gone_s >= DESERTED_S
 
     def disarm(self) -> bool:
         """Whether it was armed. Raises Refused while the car is being slowed."""
@@ -109,7 +125,8 @@ class SlowDown:
         return self.order
 
     def next(self, car: Car, now_s: float) -> Command | None:
-        """What the car is to be told now; None: nothing is ordered. Without a known speed the ramp begins at the last
+        """What the car is to be told now; None: nothing is ordered, or no tyre angle is known that could be held: 0
+        would turn the tyres. Without a known speed the ramp begins at the last
         command, or at zero: the car itself limits how hard it brakes."""
         order = self.order
         if order is None:
@@ -117,7 +134,9 @@ class SlowDown:
         if order.ramp is None:
             last = order.last
             known = car.speed_mps if car.speed_mps is not None else (last.speed_mps if last is not None else 0.0)
-            tyre_rad = car.tyre_rad if car.tyre_rad is not None else (last.tyre_rad if last is not None else 0.0)
+            tyre_rad = car.tyre_rad if car.tyre_rad is not None else (last.tyre_rad if last is not None else None)
+            if tyre_rad is None:
+                return None
             order.ramp = Ramp(
                 from_mps=known, tyre_rad=tyre_rad, deceleration_mps2=order.deceleration_mps2, began_s=now_s
             )

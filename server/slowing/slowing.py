@@ -16,20 +16,20 @@ from typing import Any
 
 from monitor.alarm import Alarm, Refused
 from monitor.check import Verdict
-from monitor.checks.slow_down import SlowDownLimits, obeys
+from monitor.checks.slow_down import STANDS_ALREADY, STANDS_UNPROVEN, SlowDownLimits, obeys, proof_of
 from monitor.slowing import SlowingFacts
 from monitor.state import Reading, Snapshot
 from server import commands, wire
 from server.link import LinkDown, RosLink
+from server.outgoing import NotAllowed
 from server.slowing.countdown import Countdown
 from server.slowing.guard import GuardWatch
 from server.slowing.mouth import Mouth
-from server.slowing.note import Note
-from server.slowing.order import BY_HAND, LATE_S, Car, Order, SlowDown
+from server.slowing.note import Note, never_raising, recording_safely
+from server.slowing.order import BY_HAND, DESERTED_S, LATE_S, Car, Order, SlowDown, Stands
 from server.slowing.twist import message
 from server.slowing.urgency import Urgency
 from server.slowing.way import Way
-from server.tuning import PERCENT_A_RAD
 
 log = logging.getLogger("catgraph.slowing")
 
@@ -40,6 +40,11 @@ PERIOD_S = 0.05  # the obstacle stopper lets a command count for 0.2 s
 DOUBT_S = 0.3
 FIRST_SPEED_S = 0.5
 UNDER_WAY = 2  # commands of which the bridge has not yet shown that it read them; where it freezes, no more come late
+STEERING_NOT_KNOWN = (
+    "The steering of this kind of car is not known, and a command would turn its wheels: choose the kind of car, or "
+    "set the tyre angle per unit of steering, in Settings."
+)
+NO_STEERING = "No steering has come from the car: a command would turn its wheels."
 STALL_S = 0.1  # a turn so late was our own fault: what the bridge said meanwhile is still unread
 _URGENCY = Urgency()  # the loop's thread is one for all vehicles
 
@@ -59,11 +64,11 @@ class Slowing:
         number: int,
     ) -> None:
         """`number`: no order up to this one is given again, restarts included."""
-        self._note = note
+        self._note = note = never_raising(note)
         self._now = now
         self._wall_ms = wall_ms
         self._snapshot = snapshot
-        self._record = record
+        self._record = recording_safely(record)
         self._life = SlowDown(number)
         self._mouth = Mouth()
         self._countdown = Countdown(note)
@@ -77,6 +82,9 @@ class Slowing:
         self._opened_s = 0.0  # the newest opening of the link
         self._sent_s = 0.0  # the newest command
         self._told_unconfirmed = False
+        self._tyre_rad: float | None = None  # the last known
+        self._is_steering_old = False
+        self.is_steering_known = False  # whether an angle of the tyres follows from the steering signal
         self.limits = SlowDownLimits()
         self.rivals: tuple[str, ...] | None = None  # who else publishes on the topic; None: not known
 
@@ -103,6 +111,7 @@ class Slowing:
             self._mouth.unadvertise_all()
         self._mouth.attach(None)
         self._link, self.rivals = None, None
+        self._tyre_rad = None
         self._countdown.forget()
         self._way = Way(problem="No car is connected.")
         return said_farewell
@@ -111,6 +120,8 @@ class Slowing:
         """An order stood when the server ended, and the same car is dialled again: it stands until it is released."""
         life = self._life
         life.armed_by = str(order.get("by") or "before the restart")
+        tyre_rad = order.get("tyre_rad")  # held then, and until one is measured
+        self._tyre_rad = float(tyre_rad) if isinstance(tyre_rad, int | float) else None
         life.begin(
             Way(),
             by=life.armed_by,
@@ -121,8 +132,8 @@ class Slowing:
         )
         assert life.order is not None
         text = "The car was being slowed when the server ended: the order stands again, under a new number."
-        self._tell(life.order, "resumed", text)
         self._ordered.set()
+        self._tell(life.order, "resumed", text)
 
     def heard(self, topic: str, said: Any) -> bool:
         """A message that may be the guard's own; whether it was."""
@@ -134,7 +145,8 @@ class Slowing:
         """Ten times a second: the way to the car, the rules, the proof. What the checks are to know."""
         now_s = self._now()
         self._ros_version = ros_version or self._ros_version
-        self._watch_way(way)
+        self._watch_steering()
+        self._watch_way(self._steered(way))
         self._watch_rules(alarms, now_s, is_paused)
         order = self._life.order
         if order is not None:
@@ -148,13 +160,34 @@ class Slowing:
         self._guard.tick(way.has_guard, now_s)
         return self._facts()
 
+    def _watch_steering(self) -> None:
+        """Keeps the last known tyre angle, and notes during an order when it is not measured any more."""
+        measured_rad = self._car().tyre_rad
+        if measured_rad is not None:
+            self._tyre_rad = measured_rad
+        order, was_old = self._life.order, self._is_steering_old
+        self._is_steering_old = order is not None and measured_rad is None
+        if order is not None and self._is_steering_old and not was_old:
+            held = "no angle is known" if order.last is None else f"the last known angle is held ({_said(order)})"
+            self._tell(order, "steering", f"The steering is not measured any more: {held}.")
+
+    def _steered(self, way: Way) -> Way:
+        """The same, or why nothing can be ordered: a command carries a tyre angle, and 0 would turn the wheels."""
+        if way.problem is not None:
+            return way
+        if not self.is_steering_known:
+            return replace(way, problem=STEERING_NOT_KNOWN)
+        return replace(way, problem=NO_STEERING) if self._tyre_rad is None else way
+
     async def speak(self) -> None:
-        """Speaks what is ordered, 20 times a second, for ever: no page, no judge and no disk is waited for."""
+        """Sends what is ordered, 20 times a second, for ever: no page, no judge and no disk is waited for. Started
+        again while an order stands, it goes on with it."""
         while True:
-            await self._ordered.wait()
+            if self._life.order is None:
+                self._ordered.clear()
+                await self._ordered.wait()
             with _URGENCY.held():
                 await self._speak_on()
-            self._ordered.clear()
 
     async def _speak_on(self) -> None:
         """As long as an order stands."""
@@ -165,10 +198,7 @@ class Slowing:
                 continue  # one that was ordered meanwhile has its own time
             _keep(left_s)
             self._due_s = max(self._due_s + PERIOD_S, self._now())
-            try:
-                self._speak()
-            except Exception:  # the one net: a fault in one command must not end the others
-                log.exception("a command to the car failed")
+            self._speak_safely()
 
     async def go_first(self) -> None:
         """Waits where a command is due before a tick would be over: its evenness is worth a later look at the car."""
@@ -182,7 +212,20 @@ class Slowing:
         """The operator's heartbeat for the guard, 5 times a second, as long as this server is itself healthy."""
         while True:
             await asyncio.sleep(self._guard.PERIOD_S)
-            self._guard.beat(self._now())
+            try:
+                self._guard.beat(self._now())
+            except Exception:
+                log.exception("a heartbeat for the guard failed")
+
+    def watch_operators(self, heard_s: float | None) -> None:
+        """When a page of an operator was heard last; None: none is here. Armed ends with the last of them, but not an
+        order, and not where a rule is to slow the car because nobody is there."""
+        if self._life.is_deserted(heard_s, self._now(), keeps=bool(self.limits.on_reach)):
+            self._life.disarm()
+            self._countdown.stop()
+            self._mouth.unadvertise_all()
+            text = f"Slow-down is not armed any more: the last operator's page has been gone for {DESERTED_S:.0f} s."
+            self._note("disarmed", text)
 
     # -- orders ------------------------------------------------------------------------------------------------------
 
@@ -197,7 +240,7 @@ class Slowing:
                 if self._life.disarm():
                     self._countdown.stop()
                     self._mouth.unadvertise_all()
-                    self._note("disarmed", "Slow-down is safe: nothing can be ordered.", by=by)
+                    self._note("disarmed", "Slow-down is not armed any more: nothing can be ordered.", by=by)
             case commands.Decelerate():
                 self._order_by_hand(command, by)
             case commands.Release():
@@ -231,11 +274,11 @@ class Slowing:
         if order is None:
             return  # one stands already
         self._told_unconfirmed = False
+        self._ordered.set()
         self._speak_at_once()  # first to the car, then to the log
         self._tell(order, "ordered", f"Slow down with {order.deceleration_mps2:g} m/s², {why}.", by=by)
         if order.first_sent_s is not None:
             self._tell(order, "sent", f"The first command is on the bridge: {_said(order)}.")
-        self._ordered.set()
 
     def _release(self, number: int, by: str) -> None:
         """Ends the order; where none stands and the guard holds the car by itself, its hold."""
@@ -278,8 +321,15 @@ class Slowing:
 
     def _speak_at_once(self) -> None:
         """Out of turn; the next one is due a period from now."""
-        self._speak()
+        self._speak_safely()
         self._due_s = self._now() + PERIOD_S
+
+    def _speak_safely(self) -> None:
+        """A fault in one command must not end the others, nor the order."""
+        try:
+            self._speak()
+        except Exception:
+            log.exception("a command to the car failed")
 
     def _speak(self) -> None:
         """One command, now or not at all."""
@@ -304,10 +354,15 @@ class Slowing:
             self._cut("the command topic is not confirmed yet")  # after a restart the car is asked first
             return
         car = self._car()
-        if car.speed_mps is None and order.ramp is None and now_s - self._opened_s < FIRST_SPEED_S:
-            return  # a link that is back brings a speed at once: the ramp begins at what is measured
+        is_measured = car.speed_mps is not None and car.tyre_rad is not None
+        if not is_measured and order.ramp is None and now_s - self._opened_s < FIRST_SPEED_S:
+            return  # a link that is back brings both at once: the ramp begins at what is measured
+        if car.tyre_rad is None:
+            car = replace(car, tyre_rad=self._tyre_rad)
         command = self._life.next(car, now_s)
-        assert command is not None
+        if command is None:
+            self._cut("the tyre angle that is to be held is not known")
+            return
         said = message(
             way.kind,
             command.speed_mps,
@@ -321,6 +376,9 @@ class Slowing:
             link.ping()
         except LinkDown:
             self._cut("the link to the car was lost")
+            return
+        except NotAllowed as why:
+            self._cut(f"the command is not a valid message ({why})")
             return
         self._sent_s = now_s
         is_first = self._life.sent(command, now_s)
@@ -336,12 +394,22 @@ class Slowing:
             )
 
     def _car(self) -> Car:
+        """What is measured now. Where that cannot be made, an order goes on without it."""
+        try:
+            return self._measured()
+        except Exception:
+            log.exception("the car's speed and steering cannot be read")
+            return Car(speed_mps=None, tyre_rad=None)
+
+    def _measured(self) -> Car:
         snapshot = self._snapshot()
         speed, steering, ordered = snapshot.get("speed"), snapshot.get("steering"), snapshot.get("command")
         now_s = snapshot.now_s
         tyre_rad = None
-        if steering is not None and self._is_of_now(steering, now_s):
-            tyre_rad = steering.value.percent / PERCENT_A_RAD
+        if not self.is_steering_known:
+            tyre_rad = None
+        elif steering is not None and self._is_of_now(steering, now_s):
+            tyre_rad = steering.value.tyre_rad
         elif ordered is not None and self._is_of_now(ordered, now_s):
             tyre_rad = ordered.value.tyre_angle_rad
         is_known = speed is not None and self._is_of_now(speed, now_s)
@@ -352,17 +420,33 @@ class Slowing:
         return reading.is_fresh(now_s) and reading.received_s >= self._opened_s
 
     def _prove(self, order: Order, now_s: float) -> None:
-        found = obeys(replace(self._snapshot(), slowing=self._facts()), self.limits, self._told_unconfirmed).verdict
-        if found is Verdict.OK and order.first_sent_s is not None and order.sending_s is not None:
-            if self._life.confirm(now_s):
-                took_s = now_s - order.first_sent_s
-                self._tell(
-                    order, "slows", f"The car slows: shown by its own speed {took_s:.1f} s after the first command."
-                )
+        snapshot = replace(self._snapshot(), slowing=self._facts())
+        found = obeys(snapshot, self.limits, self._told_unconfirmed).verdict
+        proof = proof_of(snapshot)
+        if found is Verdict.OK:
             self._told_unconfirmed = False
+            if proof.shown is None:
+                self._tell_standing(order, stood_before=proof.stood_before)
+            elif order.first_sent_s is not None and self._life.confirm(now_s):
+                after = f"{now_s - order.first_sent_s:.1f} s after the first command"
+                text = (
+                    f"The car slows: shown by its own speed {after}."
+                    if proof.shown == "slows"
+                    else f"The car stopped: shown by its own speed {after}."
+                )
+                self._tell(order, "slows", text)
         elif found is Verdict.FAULT and not self._told_unconfirmed:
             self._told_unconfirmed = True
             self._tell(order, "not_confirmed", "NOT CONFIRMED: the car does not slow. Use the physical stop.")
+        if found is not Verdict.OK:
+            order.stands = None
+
+    def _tell_standing(self, order: Order, *, stood_before: bool) -> None:
+        """It stands, and nothing shows that the order did it: no more is claimed."""
+        stands: Stands = "before" if stood_before else "unproven"
+        if order.stands != stands:
+            order.stands = stands
+            self._tell(order, "stands", f"{STANDS_ALREADY if stood_before else STANDS_UNPROVEN}.")
 
     def _facts(self) -> SlowingFacts:
         order = self._life.order
@@ -398,6 +482,8 @@ class Slowing:
             ordered_by=order.by,
             commanded_mps=wire.plain(last.speed_mps, 2) if last else None,
             topic=self._way.topic,
+            stands=order.stands,
+            tyre_rad=wire.plain(last.tyre_rad, 4) if last else None,
         )
 
     # -- what pages see ----------------------------------------------------------------------------------------------
@@ -433,6 +519,7 @@ class Slowing:
             "deceleration_mps2": wire.plain(order.deceleration_mps2, 2),
             "sending": order.sending_s is not None,
             "confirmed": False if self._told_unconfirmed else True if order.slows_s is not None else None,
+            "stands": order.stands,
             "steps": {
                 "pressed_ms": at_ms(order.pressed_s),
                 "server_ms": at_ms(order.ordered_s),

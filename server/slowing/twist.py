@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 Kind = Literal["Twist", "TwistStamped"]
+LAST_STAMP_NS = 2**31 * 1_000_000_000  # an int32 of seconds in ROS 2
 KINDS: tuple[Kind, ...] = ("Twist", "TwistStamped")
 
 
@@ -19,6 +20,7 @@ def message(kind: Kind, speed_mps: float, tyre_rad: float, *, stamp_ns: int, ros
     twist = {"linear": {"x": speed_mps, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": tyre_rad}}
     if kind == "Twist":
         return twist
-    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+    # A stamp that no ROS message can hold is sent as 0, "unknown": a wrong clock here must not stop a slow-down.
+    seconds, nanoseconds = divmod(stamp_ns if 0 <= stamp_ns < LAST_STAMP_NS else 0, 1_000_000_000)
     stamp = {"sec": seconds, "nanosec": nanoseconds} if ros_version == 2 else {"secs": seconds, "nsecs": nanoseconds}
     return {"header": {"stamp": stamp, "frame_id": "base_link"}, "twist": twist}

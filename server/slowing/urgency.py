@@ -42,8 +42,8 @@ class Urgency:
     def _raise(self) -> None:
         if not hasattr(os, "sched_setscheduler"):  # not Linux
             return
-        before = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
         try:
+            before = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
             os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
         except OSError as why:  # no right to it, or a system that does not know it
             if not self._told:

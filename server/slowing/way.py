@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from server.outgoing import is_topic
 from server.slowing.twist import Kind, kind_of
 from server.topics import Source
 
@@ -40,4 +41,6 @@ def way_of(*, phase: str, sources: Mapping[str, Source], offered: Mapping[str, s
     kind = kind_of(type or "")
     if kind is None:
         return Way(topic=topic, type=type, problem=f"{topic} is {type or 'of unknown type'}, no Twist.")
+    if not is_topic(topic):
+        return Way(topic=topic, type=type, problem=f"{topic} is not a topic name that ROS accepts.")
     return Way(topic=topic, type=type, kind=kind, has_guard=has_guard)

@@ -10,10 +10,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import logging
 import socket
 import ssl
+from collections import Counter
 from collections.abc import Callable
+
+from server.web import requests
 
 log = logging.getLogger("catgraph.tls")
 
@@ -27,7 +31,21 @@ Factory = Callable[[], asyncio.Protocol]
 class Doorway:
     """Accepts on a listening socket and leads each connection to one of two protocols."""
 
-    def __init__(self, listening: socket.socket, context: ssl.SSLContext, *, secure: Factory, plain: Factory) -> None:
+    def __init__(
+        self,
+        listening: socket.socket,
+        context: ssl.SSLContext,
+        *,
+        secure: Factory,
+        plain: Factory,
+        most: int,
+        connected: Callable[[str], int],
+    ) -> None:
+        """`most`: connections from one address, those included that are not through their handshake;
+        `connected(address)`: how many are."""
+        self._most = most
+        self._connected = connected
+        self._from: Counter[str] = Counter()  # undecided and in their handshake, by address
         self._listening = listening
         self._context = context
         self._secure = secure
@@ -41,19 +59,32 @@ class Doorway:
         try:
             while True:
                 try:
-                    sock, _ = await loop.sock_accept(self._listening)
+                    sock, peer = await loop.sock_accept(self._listening)
                 except OSError as why:  # out of files, or gone before it was taken
                     log.warning("a connection could not be taken: %s", why)
                     await asyncio.sleep(0.2)
+                    continue
+                address = str(peer[0]) if isinstance(peer, tuple) else ""
+                if self._has_too_many(address):
+                    sock.close()
                     continue
                 if len(self._entering) >= UNDECIDED:
                     next(iter(self._entering)).cancel()
                 task = asyncio.create_task(self._enter(sock), name="enter")
                 self._entering[task] = None
-                task.add_done_callback(lambda done: self._entering.pop(done, None))
+                self._from[address] += 1
+                task.add_done_callback(functools.partial(self._entered, address))
         finally:
             for task in tuple(self._entering):
                 task.cancel()
+
+    def _entered(self, address: str, done: asyncio.Task[None]) -> None:
+        self._entering.pop(done, None)
+        self._from -= Counter((address,))
+
+    def _has_too_many(self, address: str) -> bool:
+        """A handshake that does not come to its end is a connection like any other. This machine's are not counted."""
+        return not requests.is_loopback(address) and self._from[address] + self._connected(address) >= self._most
 
     async def _enter(self, sock: socket.socket) -> None:
         sock.setblocking(False)

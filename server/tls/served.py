@@ -142,7 +142,16 @@ async def serve_secured(
         begun = asyncio.create_task(server.begun.wait())
         await asyncio.wait([serving, begun], return_when=asyncio.FIRST_COMPLETED)
         begun.cancel()
-        doorway = Doorway(listening, context.ssl, secure=_pages(server), plain=plain.protocol)
+        doorway = Doorway(
+            listening,
+            context.ssl,
+            secure=_pages(server),
+            plain=plain.protocol,
+            most=config.limits.connections,
+            connected=lambda address: (
+                requests.connected(server.server_state.connections, address) + plain.connected(address)
+            ),
+        )
         ending.push_async_callback(_cancelled, _supervised(doorway.run))
         ending.callback(listening.close)
         try:
@@ -170,6 +179,9 @@ class _Plain:
     def protocol(self) -> asyncio.Protocol:
         made: Callable[..., asyncio.Protocol] = self._config.http_protocol_class
         return made(config=self._config, server_state=self._state, app_state={})
+
+    def connected(self, address: str) -> int:
+        return requests.connected(self._state.connections, address)
 
     def close(self) -> None:
         for connection in tuple(self._state.connections):

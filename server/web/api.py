@@ -34,7 +34,10 @@ class Done(BaseModel):
 class ConnectRequest(BaseModel):
     model_config = ConfigDict(extra="forbid")
     address: str = Field(
-        max_length=300, examples=["ws://192.168.4.1:9090"], description="host, host:port, ws:// or wss://"
+        default="",
+        max_length=300,
+        examples=["ws://192.168.4.1:9090"],
+        description="host, host:port, ws:// or wss://; empty: the car that was configured",
     )
 
 
@@ -106,20 +109,23 @@ def _json(body: Any) -> Response:
 
 
 @router.get("/api/health", tags=["server"], summary="Is the server well?")
-async def health(request: Request) -> dict[str, Any]:
-    """To who is not known it says no more than that it is well, and of which version it is."""
+async def health(request: Request) -> Response:
+    """200 and "ok", or 503 and "impaired" with the problems. A caller who is not known gets status and version only."""
     app = running(request)
-    if not is_known(request):
-        return {"status": "ok", "version": app.version}
-    return {
-        "status": "ok",
-        "version": app.version,
-        "boot": app.boot,
-        "up_for_s": round(app.now() - app.started_s, 1),
-        "vehicles": {name: session.phase for name, session in app.sessions.items()},
-        "pages": app.hub.pages,
-        "recordings": None if app.recordings is None else app.recordings.totals() | {"unread": app.recordings.waiting},
-    }
+    found = app.problems()
+    body: dict[str, Any] = {"status": "impaired" if found else "ok", "version": app.version}
+    if is_known(request):
+        body |= {
+            "problems": found,
+            "boot": app.boot,
+            "up_for_s": round(app.now() - app.started_s, 1),
+            "vehicles": {name: session.phase for name, session in app.sessions.items()},
+            "pages": app.hub.pages,
+            "recordings": None
+            if app.recordings is None
+            else app.recordings.totals() | {"unread": app.recordings.waiting},
+        }
+    return Response(orjson.dumps(body), status_code=503 if found else 200, media_type="application/json")
 
 
 @router.get("/api/vehicles", tags=["vehicle"], summary="The vehicles this server watches, and those found nearby")
@@ -127,7 +133,7 @@ async def vehicles(request: Request) -> dict[str, Any]:
     app = running(request)
     return {
         "vehicles": [
-            {"name": name, "address": session.address_url, "phase": session.phase}
+            {"name": name, "address": session.address_url or session.configured, "phase": session.phase}
             for name, session in app.sessions.items()
         ],
         "found": [{"name": vehicle.name, "address": vehicle.address} for vehicle in app.config.found],

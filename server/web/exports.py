@@ -130,4 +130,7 @@ def _answer(request: Request, job: Job, path: Path) -> Response:
     form, recordings = FORMATS[job.format], running(request).recordings
     row = recordings.row(job.of) if recordings is not None else None
     name = f"{job.of} {(row or {}).get('title') or ''}".strip()
-    return file_answer(request, path, name=f"{name}.{form.ending}", media_type=form.media_type)
+    answer = file_answer(request, path, name=f"{name}.{form.ending}", media_type=form.media_type)
+    if job.is_whole is False:
+        answer.headers["Catgraph-Not-Whole"] = str(len(job.notes))  # its notes are in the job
+    return answer

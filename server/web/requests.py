@@ -9,6 +9,7 @@ import ipaddress
 import logging
 import socket
 from asyncio.transports import Transport
+from collections.abc import Iterable
 from typing import Any
 
 import h11
@@ -117,14 +118,18 @@ class PageRequests(H11Protocol):
 
     def _is_one_too_many(self) -> bool:
         """A test of many pages runs on this machine; a port of this machine that is forwarded is its owner's own."""
-        if self.client is None or _is_loopback(self.client[0]):
+        if self.client is None or is_loopback(self.client[0]):
             return False
-        clients = (getattr(one, "client", None) for one in self.connections)
-        from_there = sum(1 for client in clients if client is not None and client[0] == self.client[0])
-        return from_there > self.limits.connections
+        return connected(self.connections, self.client[0]) > self.limits.connections
 
 
-def _is_loopback(address: str) -> bool:
+def connected(connections: Iterable[object], address: str) -> int:
+    """How many of uvicorn's connections come from an address."""
+    clients = (getattr(one, "client", None) for one in connections)
+    return sum(1 for client in clients if client is not None and client[0] == address)
+
+
+def is_loopback(address: str) -> bool:
     try:
         return ipaddress.ip_address(address.partition("%")[0]).is_loopback
     except ValueError:

@@ -12,7 +12,6 @@
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -20,6 +19,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from monitor.geo import offset_m
+from server import bounded_toml
 from server.web.mbtiles import MapRefused
 from server.web.pictures import media_type, plain_text
 
@@ -66,7 +66,7 @@ def site_image(path: Path) -> SiteImage:
     if kind is None:
         raise MapRefused(f"The site image {path} is neither png, nor jpg, nor webp.")
     try:
-        told = _Beside.model_validate(tomllib.loads(beside.read_text(encoding="utf-8")))
+        told = _Beside.model_validate(bounded_toml.loads(_beginning(beside)))
     except OSError as why:
         raise MapRefused(f"The corners of the site image must stand in {beside}: {why.strerror or why}.") from None
     except ValidationError as why:
@@ -76,7 +76,9 @@ def site_image(path: Path) -> SiteImage:
             f"The corners of the site image in {beside} are not usable: {where}: {first['msg']}."
         ) from None
     except ValueError as why:  # no TOML, or no UTF-8
-        raise MapRefused(f"The corners of the site image in {beside} are not usable: {why}.") from None
+        raise MapRefused(
+            f"The corners of the site image in {beside} are not usable: {str(why).removesuffix('.')}."
+        ) from None
     corners = (told.corners.top_left, told.corners.top_right, told.corners.bottom_left)
     _check(corners, beside)
     return SiteImage(
@@ -86,6 +88,11 @@ def site_image(path: Path) -> SiteImage:
         corners=corners,
         attribution=plain_text(told.attribution),
     )
+
+
+def _beginning(file: Path) -> bytes:
+    with file.open("rb") as opened:
+        return opened.read(bounded_toml.MAX_BYTES + 1)
 
 
 def _check(corners: tuple[Place, Place, Place], beside: Path) -> None:

@@ -13,6 +13,7 @@ from server.access.who import LOCAL, SCOPE_KEY, Who
 from server.limits import Allowance, Limits, Rate
 from server.web.errors import problem
 
+SLOW_DOWN_PATH = "/api/slow-down/"
 _KEPT = 2000  # devices whose rate is known; addresses of strangers among them
 _LAST = {"Connection": "close"}  # what is still on its way is not read
 
@@ -75,11 +76,16 @@ class Throttle:
         who: Who | None = scope.get(SCOPE_KEY)
         peer = scope.get("client")
         key = f"device {who.id}" if who is not None else f"address {peer[0] if peer else ''}"
+        is_slow_down = scope["type"] == "http" and scope["path"].startswith(SLOW_DOWN_PATH)
+        if is_slow_down:  # has an allowance of its own: whatever else a device asks for does not use it up
+            key = f"slow-down of {key}"
         found = self._known.get(key)
         if found is None:
             if len(self._known) >= _KEPT:
                 self._forget()
-            found = self._known[key] = Allowance(self._rate(who), self._now())
+            found = self._known[key] = Allowance(
+                self._limits.slow_down if is_slow_down else self._rate(who), self._now()
+            )
         return found
 
     def _rate(self, who: Who | None) -> Rate:

@@ -1,7 +1,7 @@
 // Which alarm shows where: one rule a place, none an alarm. Pure functions.
 
 import { stripWords } from './slow-layout.js';
-import { fixed, timeOfDay } from './words.js';
+import { counted, fixed, timeOfDay } from './words.js';
 
 /**
  * @typedef {import('./protocol.js').Alarm} Alarm
@@ -23,11 +23,11 @@ export const isAboutLink = (alarm) => LINK_ACTIONS.some((action) => alarm.action
 const LINK_ACTIONS = ['retry', 'reconnect', 'exit', 'change_address'];
 
 /**
- * Most urgent first, then newest.
+ * What still stands before what has returned; then by danger, then the newest.
  * @param {Alarm[]} alarms
  */
 export function byUrgency(alarms) {
-  return [...alarms].sort((a, b) => RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
+  return [...alarms].sort((a, b) => Number(b.active) - Number(a.active) || RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
 }
 
 /**
@@ -63,7 +63,8 @@ export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
   return LOUD.find((sound) => asking.includes(sound)) ?? null;
 }
 
-/** @typedef {{kind: 'crit' | 'warn' | 'invert' | 'order' | 'armed' | '', icon: string, text: string, end: string, opens: 'log' | 'signals'}} Strip */
+/** @typedef {{kind: 'crit' | 'warn' | 'invert' | 'order' | 'armed' | '', icon: string, text: string, end: string, opens: 'alarms' | 'signals', hasReturned?: boolean}} Strip
+ * hasReturned: nothing urgent stands any more, and nobody has acknowledged it */
 
 /**
  * The one line under the tabs.
@@ -74,24 +75,26 @@ export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
 export function stripOf(frame, { isSilent, chain, paused_s }) {
   if (!frame) return { kind: 'invert', icon: 'unknown', text: 'Nothing received yet', end: 'not checked', opens: 'signals' };
   if (frame.session.paused && !isSilent) {
-    return { kind: 'invert', icon: 'pause', text: `Paused ${paused(paused_s)}: no alarm will come`, end: '', opens: 'log' };
+    return { kind: 'invert', icon: 'pause', text: `Paused ${paused(paused_s)}: no alarm will come`, end: '', opens: 'alarms' };
   }
   if (chain.word === 'Lost') {
-    return { kind: 'crit', icon: 'link-off', text: 'Connection lost', end: chain.since_ms === null ? '' : `since ${timeOfDay(chain.since_ms)}`, opens: 'log' };
+    return { kind: 'crit', icon: 'link-off', text: 'Connection lost', end: chain.since_ms === null ? '' : `since ${timeOfDay(chain.since_ms)}`, opens: 'alarms' };
   }
   if (isSilent) return { kind: 'invert', icon: 'clock', text: 'Values are not live', end: 'not checked', opens: 'signals' };
-  const { standing, worst, shelved } = layOut(frame.alarms);
+  const { standing, shelved } = layOut(frame.alarms);
+  // An advisory that stands does not hide a warning that returned and waits to be acknowledged.
+  const worst = standing.find(({ priority }) => priority !== 'advisory') ?? standing[0];
   const order = stripWords(frame.decelerate, standing.length);
   // A critical alarm comes before the order, whose steps stand beneath; all else after it.
   if (order && order.kind !== 'armed' && worst?.priority !== 'critical') {
-    return { ...order, icon: order.kind === 'crit' ? 'crit' : 'slow', opens: 'log' };
+    return { ...order, icon: order.kind === 'crit' ? 'crit' : 'slow', opens: 'alarms' };
   }
   if (worst && worst.priority !== 'advisory') {
-    const isOne = standing.length === 1 && worst.priority === 'critical';
-    const among = isOne ? `${fixed(worst.for_s)} s` : `${1} of ${standing.length}`;
+    const isOne = standing.length === 1 && worst.priority === 'critical' && worst.active;
+    const among = isOne ? `${fixed(worst.for_s)} s` : counted(standing.length, 'alarm', 'alarms');
     return {
       kind: worst.priority === 'critical' ? 'crit' : 'warn', icon: worst.priority === 'critical' ? 'crit' : 'warn',
-      text: worst.active ? worst.title : `${worst.title}: over`, end: shelved ? `${standing.length} standing, ${shelved} shelved` : among, opens: 'log',
+      text: worst.active ? worst.title : `${worst.title}: returned`, end: among, hasReturned: !worst.active, opens: 'alarms',
     };
   }
   if (chain.cut === 2) {
@@ -101,9 +104,12 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
   const ok = tilesOf(frame.checks).filter((tile) => tile.verdict === 'ok').length;
   const unknown = tilesOf(frame.checks).filter((tile) => tile.verdict === 'unknown' && tile.brief !== 'not published').length;
   const counts = `${ok} OK · ${unknown} not checked`;
-  if (worst) return { kind: '', icon: 'info', text: worst.title, end: counts, opens: 'log' };
-  if (order) return { ...order, icon: 'slow', opens: 'log' };
-  return { kind: '', icon: 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${unknown} not checked` : counts, opens: 'log' };
+  if (worst) {
+    const end = standing.length > 1 ? counted(standing.length, 'alarm', 'alarms') : unknown ? `${unknown} not checked` : `${ok} OK`;
+    return { kind: '', icon: 'info', text: worst.title, end, opens: 'alarms' };
+  }
+  if (order) return { ...order, icon: 'slow', opens: 'alarms' };
+  return { kind: '', icon: 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${unknown} not checked` : counts, opens: 'alarms' };
 }
 
 /**

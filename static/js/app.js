@@ -27,6 +27,7 @@ import { SettingsTab } from './settings-tab.js';
 import { closeSheet, mountSheets } from './sheet.js';
 import { Store } from './store.js';
 import { Tabs } from './tabs.js';
+import { Undrawn } from './undrawn.js';
 import { Voice } from './voice.js';
 import { lossKey, mount as mountDialogs } from './dialogs.js';
 import { mount as mountBadge } from './badge.js';
@@ -55,13 +56,26 @@ const WAITS_MS = 400;
 /** Ends what has begun. */
 let stop = () => {};
 let isOver = false;
+/** @type {Undrawn | null} */
+let undrawn = null;
 
-begin().catch((error) => {
-  console.error(error);
-  isOver = true;
-  stop(); // values that look alive, on a page that could not ask for anybody, would be a lie
-  giveUp();
-});
+void run();
+
+/** Nothing here may need more of the browser than the language itself: it is what remains when the browser fails. */
+async function run() {
+  try {
+    await begin();
+  } catch (error) {
+    isOver = true;
+    console.error(error);
+    try {
+      stop(); // values that look alive, on a page that could not ask for anybody, would be a lie
+    } finally {
+      undrawn?.show();
+      giveUp();
+    }
+  }
+}
 
 /**
  * First what is seen at a glance, with its first values; then, part after part, what answers a finger. As one piece it would
@@ -77,6 +91,7 @@ async function begin() {
   let name = ''; // one, also where nothing can be kept
   const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), () => (name ||= deviceName(navigator.userAgent, keptHere())), ownName);
   const voice = new Voice();
+  store.undrawn = undrawn = new Undrawn(() => store.frame, () => voice.say('high'));
   stop = () => {
     store.stop();
     voice.say(null);
@@ -206,6 +221,7 @@ async function begin() {
   }
 
   function speak() {
+    if (store.drawing.isFailed) return; // undrawn.js sounds
     const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
     voice.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
   }

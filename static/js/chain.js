@@ -15,7 +15,6 @@ const drawn = new WeakMap();
 export function drawChain(root, view) {
   const key = String(view.cut);
   if (drawn.get(root) === key) return;
-  drawn.set(root, key);
   const cut = view.cut ?? 3;
   const parts = [];
   for (let i = 0; i < Math.min(cut, 3); i += 1) parts.push(svg('path', { class: 'wire', d: `M${12 + 24 * i} 12h12` }));
@@ -24,6 +23,7 @@ export function drawChain(root, view) {
     parts.push(svg('rect', { class: i > cut ? 'node q' : 'node', x: 1 + 24 * i, y: 7, width: 10, height: 10 }));
   }
   root.replaceChildren(...parts);
+  drawn.set(root, key);
 }
 
 const NODE_X = [27, 128, 230, 331]; // left edges of the nodes, 22 wide
@@ -36,7 +36,6 @@ const NODE_X = [27, 128, 230, 331]; // left edges of the nodes, 22 wide
 export function drawBigChain(root, view) {
   const key = `${view.cut}|${view.nodes.map((node) => node.mark).join('|')}`;
   if (drawn.get(root) === key) return;
-  drawn.set(root, key);
   const parts = [];
   for (let i = 0; i < 3; i += 1) {
     const from = (NODE_X[i] ?? 0) + 23;
@@ -58,6 +57,7 @@ export function drawBigChain(root, view) {
   });
   root.setAttribute('aria-label', label(view));
   root.replaceChildren(...parts);
+  drawn.set(root, key);
 }
 
 /** @param {ChainView} view */

@@ -71,6 +71,12 @@ export function bare(address) {
   return address.replace(/^ws:\/\//, '').replace(/\/$/, '');
 }
 
+/** Do both name one rosbridge, the usual port written or not? @param {string} one @param {string} other */
+export function isSameCar(one, other) {
+  const [a, b] = [one, other].map((address) => bare(address.trim()).replace(/^(\[[^\]]*\]|[^:/]+)$/, '$1:9090'));
+  return a === b;
+}
+
 /**
  * @param {HTMLElement} root
  * @param {import('./store.js').Store} store
@@ -86,6 +92,7 @@ export function mount(root, store, page, arming) {
   let found = null;
   let asked_ms = -Infinity;
   let isTyped = false;
+  let offered = '';
   let isBusy = false;
   let wasSilent = false;
   let complaint = '';
@@ -142,7 +149,14 @@ export function mount(root, store, page, arming) {
   /** Is the vehicle in the field being monitored all the while? Then nothing is dialled anew. */
   function isBack() {
     const address = store.frame?.session.address;
-    return store.isMonitoring && typeof address === 'string' && bare(address) === bare(input.value.trim());
+    return store.isMonitoring && typeof address === 'string' && isSameCar(address, input.value);
+  }
+
+  /** Is it the car the server was started for that would be dialled? */
+  function isConfigured() {
+    const configured = store.frame?.session.configured;
+    const here = bare(input.value.trim());
+    return typeof configured === 'string' && (here === '' || isSameCar(here, configured));
   }
 
   /** @param {string} sentence */
@@ -207,11 +221,15 @@ export function mount(root, store, page, arming) {
     if (store.now() - asked_ms > LOOK_EVERY_MS) look();
     const { frame } = store;
     const session = frame?.session;
-    if (!isTyped && document.activeElement !== input && !input.value && session?.address) input.value = bare(session.address);
+    // What is dialled, or the car the server was started for, comes before what was typed on this phone some day;
+    // what names the same car stays as the operator wrote it.
+    const address = session?.address ?? session?.configured ?? '';
+    if (!isTyped && document.activeElement !== input && address && address !== offered && !isSameCar(address, input.value)) input.value = bare(address);
+    offered = address;
     const isDialling = isBusy || session?.phase === 'connecting';
-    const isSame = session?.address ? bare(session.address) === bare(input.value.trim()) : false;
+    const isSame = session?.address ? isSameCar(session.address, input.value) : false;
     setAttribute(go, 'data-busy', isDialling && (isSame || isBusy));
-    setWords(go, isDialling && (isSame || isBusy) ? `Connecting ${age(frame?.link.trying_for_s ?? 0)} s` : isBack() ? 'Back to monitoring' : 'Connect and arm alarms');
+    setWords(go, isDialling && (isSame || isBusy) ? `Connecting ${age(frame?.link.trying_for_s ?? 0)} s` : isBack() ? 'Back to monitoring' : isConfigured() ? `Connect to ${frame?.vehicle}` : 'Connect and arm alarms');
     if (store.isSilent !== wasSilent) complain(store.isSilent ? 'The server does not answer; this page keeps trying.' : '');
     wasSilent = store.isSilent;
     drawSays();

@@ -79,8 +79,8 @@ export function setIcon(element, name) {
  */
 export function setText(element, text) {
   if (written.get(element) === text) return;
-  written.set(element, text);
   element.textContent = text;
+  written.set(element, text); // last: what failed is written again
 }
 
 /**
@@ -91,8 +91,8 @@ export function setText(element, text) {
 export function setWords(element, sentence) {
   const shown = inUnits(sentence);
   if (written.get(element) === shown) return;
-  written.set(element, shown);
   element.replaceChildren(...words(shown));
+  written.set(element, shown);
 }
 
 /**

@@ -8,6 +8,7 @@ import { request, sentenceOf } from './files-model.js';
  * @property {number | null} progress 0 to 1
  * @property {string | null} sentence
  * @property {string[]} [notes] what is not in it, and why
+ * @property {boolean | null} [is_whole] false: something of the recording is not in it
  * @property {string | null} [recording] the recording it made
  */
 

@@ -1,5 +1,6 @@
 // How recordings read in the list: their time, length, size and alarms in words. Pure functions, no DOM.
 
+import { missingWords } from './missing-topics.js';
 import { duration, fixed, NOTHING } from './words.js';
 import { speedWords } from './units.js';
 
@@ -25,6 +26,7 @@ import { speedWords } from './units.js';
  * @property {string | null} problem why it cannot be read
  * @property {string[]} damage what of it cannot be read
  * @property {string[]} [left_out] topics that were not recorded
+ * @property {string[]} [not_received] topics that had a publisher, and of which no message came
  * @property {1 | 2 | null} [ros_version] null: not read yet, or unreadable
  * @property {string | null} ended closed, recovered, or null where nobody says
  * @property {string | null} ended_why
@@ -145,7 +147,8 @@ export function warningWords(row) {
   const why = row.ended_why ?? 'the server ended while it was recorded.';
   const recovered = row.ended === 'recovered' ? [/recover/i.test(why) ? why : `Recovered: ${why}`] : [];
   const leftOut = row.left_out?.length ? [`Not recorded: ${row.left_out.join(', ')}.`] : [];
-  return [...recovered, ...row.damage, ...leftOut];
+  const silent = row.not_received?.length ? [`No message came from: ${row.not_received.join(', ')}.`] : [];
+  return [...recovered, ...row.damage, ...leftOut, ...silent];
 }
 
 /** @typedef {{kind: 'all' | 'vehicle' | 'tag' | 'days', value: string}} Choice */
@@ -194,8 +197,12 @@ export function pointsOf(line) {
  * @property {number} [bytes]
  * @property {number} [dropped] messages that were lost because the disk was too slow
  * @property {string | null} [reason] why it is not recording
+ * @property {number} [as_json]
+ * @property {string[]} [left_out]
+ * @property {string[]} [not_received]
+ * @property {{topic: string, mb: number}[]} [too_large]
  *
- * @typedef {{name: string, mark: string, facts: string, isOn: boolean, isBad: boolean, order: boolean | null}} Live order: what a key asks for, true to record; null: no key
+ * @typedef {{name: string, mark: string, facts: string, missing: string, isOn: boolean, isBad: boolean, order: boolean | null}} Live order: what a key asks for, true to record; null: no key
  */
 
 const NAMES = /** @type {Record<string, string>} */ ({ recording: 'Recording now', held: 'Recording held', saving: 'Being saved', stopped: 'Recording stopped', off: 'Not recording' });
@@ -212,8 +219,9 @@ export function liveOf(recorder, { vehicle, isMonitoring, isSilent }) {
   const isOn = state === 'recording';
   const facts = [for_s === null || state === 'off' ? '' : lengthWords(for_s), bytes ? sizeWords(bytes) : '', dropped ? `${dropped} messages lost: the disk is too slow` : ''];
   const mark = isOn ? [vehicle ?? '', (part ?? 1) > 1 ? `part ${part}` : ''] : [reason ?? ''];
-  if (isSilent) return { name: 'Recording?', mark: 'The server does not answer: nobody knows whether it records.', facts: '', isOn: false, isBad: true, order: null };
+  if (isSilent) return { name: 'Recording?', mark: 'The server does not answer: nobody knows whether it records.', facts: '', missing: '', isOn: false, isBad: true, order: null };
   return {
+    missing: isOn || state === 'held' ? missingWords(recorder) : '',
     name: NAMES[state] ?? state, mark: mark.filter(Boolean).join(' · '), facts: facts.filter(Boolean).join(' · '), isOn, isBad: state === 'stopped' || Boolean(dropped),
     order: state === 'saving' || !isMonitoring ? null : !(isOn || state === 'held'),
   };

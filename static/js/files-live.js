@@ -13,9 +13,10 @@ export class FilesLive {
     this.name = html('div', { class: 't' });
     this.mark = html('div', { class: 'm' });
     this.facts = html('div', { class: 'm' });
+    this.missing = html('div', { class: 'm', 'data-f': 'files-missing' });
     this.key = html('button', { type: 'button', class: 'key', 'data-f': 'files-record' });
     this.dot = html('span', { class: 'thumb none' }, icon('rec', 'l'));
-    this.row = html('div', { class: 'file', 'data-live': '', hidden: true }, this.dot, html('div', { class: 'tx' }, this.name, this.mark, this.facts), this.key);
+    this.row = html('div', { class: 'file', 'data-live': '', hidden: true }, this.dot, html('div', { class: 'tx' }, this.name, this.mark, this.facts, this.missing), this.key);
     this.element = html('section', { 'aria-label': 'The recorder' }, this.row);
     this.stop = listen(this.key, 'click', async () => {
       const on = this.key.dataset['on'] === 'true';
@@ -33,9 +34,12 @@ export class FilesLive {
     const live = isWanted ? liveOf(/** @type {import('./files-layout.js').Recorder | undefined} */ (frame?.recording), { vehicle: frame?.vehicle ?? null, isMonitoring: phase === 'monitoring' || phase === 'lost', isSilent: store.isSilent }) : null;
     show(this.row, live !== null);
     if (!live) return;
+    if (store.replaying) live.order = null; // its key is with the live car
     setText(this.name, live.name);
     setWords(this.mark, live.mark);
     setWords(this.facts, live.facts);
+    setWords(this.missing, live.missing);
+    show(this.missing, live.missing !== '');
     setAttribute(this.row, 'data-on', live.isOn);
     setAttribute(this.row, 'data-bad', live.isBad);
     show(this.key, live.order !== null);

@@ -213,7 +213,7 @@ export class FileSheet {
     if (this.#job !== job || !this.sheet.open) return;
     if (over.state === 'done') {
       save(job.address);
-      this.#show(`${label} of ${this.name}`, [html('p', { role: 'status' }, 'It is made. This phone saves it among its downloads.'), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#key('Save again', () => save(job.address)), this.#key('Back', () => this.#download())]);
+      this.#show(`${label} of ${this.name}`, [html('p', { role: 'status' }, `It is made. This phone saves it among its downloads.${over.is_whole === false ? ' Not all of the recording is in it:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#key('Save again', () => save(job.address)), this.#key('Back', () => this.#download())]);
     } else if (over.state === 'cancelled') this.#download();
     else this.#refused('Not made', over.sentence ?? 'The server could not make it.');
   }

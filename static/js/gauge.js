@@ -57,7 +57,6 @@ export function mount(root, store) {
     const scale = scaleOf();
     const key = JSON.stringify([scale, speedUnit()]);
     if (key === drawnFace) return;
-    drawnFace = key;
     const { tracks, rungs, ticks, labels, limit } = faceOf({
       speed_max: speedIn(scale.speed_max_mps), acceleration_max_mps2: scale.acceleration_max_mps2, limit: speedIn(scale.limit_mps),
     });
@@ -71,6 +70,7 @@ export function mount(root, store) {
       svg('path', { class: 'bugline', d: limit.line }), svg('path', { class: 'bug', d: limit.wedge }),
       svg('text', { class: 'lim', x: limit.x, y: limit.y, 'text-anchor': limit.anchor }, 'limit ', svg('tspan', { class: 'num' }, limit.text)),
     ] : []));
+    drawnFace = key;
   }
 
   // Each frame: what moves.

@@ -66,12 +66,16 @@ export function chainOf({ frame, isSilent, silence_s, lag_s, heard_ms }) {
   if (car_s === null) {
     return {
       word: 'Waiting', age_s: older(session.connected_for_s, lag_s), cut: null, since_ms: null,
-      nodes: nodesOf(null, [...live, 'no message yet']), sentence: 'Nothing received yet.', detail: '',
+      nodes: nodesOf(null, [...live, 'no message yet']),
+      sentence: link.problem?.title ?? 'Nothing received yet.',
+      detail: link.problem?.hint ?? '',
     };
   }
   return {
     word: 'Live', age_s: car_s, cut: null, since_ms: null,
-    nodes: nodesOf(null, [...live, `${age(car_s)} s`]), sentence: 'Every part of the chain answers.', detail: '',
+    nodes: nodesOf(null, [...live, link.problem?.mark ?? `${age(car_s)} s`]),
+    sentence: link.problem?.title ?? 'Every part of the chain answers.',
+    detail: link.problem?.hint ?? '',
   };
 }
 

@@ -109,18 +109,18 @@ export function mount(root, store) {
     const lines = byUrgency(alarms).map((alarm) => [alarm.title, standingWords(alarm), timeOfDay(alarm.raised_ms), alarm.priority]);
     const standingKey = JSON.stringify(lines);
     if (standingKey !== stood) {
-      stood = standingKey;
       now.replaceChildren(...lines.map(standingRow));
+      stood = standingKey;
     }
     const { rows, last } = store.log;
     setAttribute(older, 'hidden', past.next === null || (past.next === undefined && (lowest(rows) ?? 2) <= 1));
     const today = new Date(Date.now()).toDateString(); // at midnight "Today" is another day
     const key = JSON.stringify([rows.length, last, past.events.length, filter, today]);
     if (key === drawn) return;
-    drawn = key;
     number.replaceChildren('No. ', html('span', { class: 'n' }, String(last ?? 0)));
     const all = joined(rows, past.events, filter);
     list.replaceChildren(...(all.length ? all.flatMap((one, i) => withDay(one, all[i - 1], all)) : [html('li', { class: 'none' }, html('span'), html('span', { class: 't' }, filter.kind === 'all' && !filter.text.trim() ? 'Nothing has happened yet' : 'Nothing found here'))]));
+    drawn = key;
   }
 
   choose(filter);

@@ -80,7 +80,7 @@ function carSays(ink, age_s, isLost) {
  */
 export function phoneOf(frame, lag_s, page = '') {
   const phone = frame.phone ?? null;
-  if (!phone) return { place: null, isLive: false, age_s: null, accuracy_m: null, label: '', says: 'No phone tells its position.' };
+  if (!phone) return { place: null, isLive: false, age_s: null, accuracy_m: null, label: '', says: 'No phone is sharing its position.' };
   const age_s = phone.age_s === null ? null : phone.age_s + lag_s;
   const place = placeOf(phone);
   // A coarse fix is one of now all the same; every other reason says that there is none of now.

@@ -21,6 +21,8 @@ import { age, fixed } from './words.js';
 const REMEMBERED = 'catgraph.map';
 /** Pointers follow in so long [ms]; what goes farther than this is no movement but a leap [px]. */
 const FOLLOW_MS = 100;
+/** A drawing that was asked for and did not come within this time is asked for again [ms]. */
+const LOST_MS = 1000;
 const LEAP_PX = 120;
 /** A key makes the map so much larger. */
 const KEY_ZOOM = 1.6;
@@ -53,7 +55,8 @@ export function mount(root, store, isShown, say = () => {}) {
   let known = null;
   /** The last place of the car on the glass, and where it goes. @type {{from: Place, to: Place, view: View, began_ms: number} | null} */
   let step = null;
-  let isDue = false;
+  /** When the next drawing was asked for. */
+  let due_ms = -Infinity;
   let spoken = '';
   /** @type {number | null} */
   let trackNumber = null;
@@ -131,12 +134,12 @@ export function mount(root, store, isShown, say = () => {}) {
   // -- drawing ----------------------------------------------------------------------------------------------------------
 
   function drawSoon() {
-    if (isDue || !isShown()) return;
-    isDue = true;
-    requestAnimationFrame(() => {
-      isDue = false;
+    if (store.now() - due_ms < LOST_MS || !isShown()) return;
+    store.picture(() => {
+      due_ms = -Infinity;
       if (isShown()) draw();
     });
+    due_ms = store.now();
   }
 
   function draw() {

@@ -1,4 +1,4 @@
-// Tells the server once a second how this page stands: whether it is seen, and whether an alarm would be heard from it.
+// Tells the server once a second how this page stands: whether it is seen, whether it draws, and whether an alarm would be heard from it.
 
 /** A word so often while nothing changes [ms]; three are missed before control lapses. */
 const EVERY_MS = 1000;
@@ -34,6 +34,7 @@ export class Presence {
     const { voice, arms } = this.arming;
     return {
       visible: !document.hidden,
+      draws: !this.store.drawing.isFailed,
       sound: voice.isInterrupted ? 'interrupted' : arms.sound,
       awake: arms.screen,
       vibrates: this.handset.vibrates,

@@ -63,6 +63,8 @@
  * @property {string | null} [acknowledged_by]
  * @property {string | null} [shelved_by]
  *
+ * @typedef {{id: string, title: string, priority: Priority, by: string[], raised_ms: number | null}} Suppressed not announced, because others explain it
+ *
  * @typedef {{in_10_min: number, flood: boolean, bearable: boolean, chattering: string[]}} AlarmLoad
  *
  * @typedef {{code: string, title: string, hint: string, mark: string}} Problem
@@ -71,6 +73,7 @@
  * @property {'idle' | 'connecting' | 'failed' | 'monitoring' | 'lost'} phase
  * @property {string | null} address
  * @property {string | null} name
+ * @property {string | null} [configured] the car the server was started for
  * @property {number | null} ros_version
  * @property {number} [settings_version]
  * @property {string | null} [profile] the kind of car it is taken for
@@ -108,6 +111,7 @@
  * @property {{time_gap_s: number | null, stopping_m: number | null}} nearest
  * @property {Check[]} checks
  * @property {Alarm[]} alarms
+ * @property {Suppressed[]} [suppressed]
  * @property {AlarmLoad} [alarm_load]
  * @property {string | null} [log_trouble] why the log is not kept on the server's disk
  * @property {Trends} [trends]
@@ -130,7 +134,9 @@
  * @property {number} [messages]
  * @property {number} [as_json]
  * @property {number} [dropped]
- * @property {string[]} [left_out]
+ * @property {string[]} [left_out] topics that are not recorded
+ * @property {string[]} [not_received] topics that have a publisher and of which no message comes
+ * @property {{topic: string, mb: number}[]} [too_large] topics that were left because of the size of their messages
  * @property {number | null} [room_gb]
  * @property {{name: string, until_ms: number} | null} [saved] the newest finished file, and the time of day it reaches
  * @property {string | null} [reason] why it does not record
@@ -156,7 +162,8 @@
  * @property {number | null} ordered_mps the speed that is ordered now
  * @property {number} deceleration_mps2
  * @property {boolean} sending false: its commands do not go out
- * @property {boolean | null} confirmed by the car's own speed; null: not told yet
+ * @property {boolean | null} confirmed by the car's own speed; null: not known
+ * @property {'before' | 'unproven' | null} [stands] the car stands, and its speed does not show that the order stopped it
  * @property {{pressed_ms: number | null, server_ms: number | null, bridge_ms: number | null, slows_ms: number | null}} steps
  * @property {number} [longest_s]
  *

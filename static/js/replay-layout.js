@@ -176,14 +176,14 @@ export function dateOf(at_ms) {
 export function toldOf(frame) {
   const { replay, alarms } = frame;
   if (!replay) return { kind: '', icon: 'unknown', text: '', end: '' };
-  const end = replay.alarms_from === 'recording' ? 'as told then' : 'judged anew';
+  const end = replay.alarms_from === 'recording' ? 'original alarms' : 're-evaluated';
   if (replay.hangs_s) return { kind: 'gap', icon: 'clock', text: `The replay has not answered for ${replay.hangs_s.toFixed(0)} s`, end: '' };
   if (replay.is_seeking) return { kind: '', icon: 'clock', text: `Going to ${clockOf(replay.at_s)}`, end: '' };
   if (replay.silent_s === null) return { kind: 'gap', icon: 'unknown', text: 'No message of the car yet', end: '' };
   if (replay.silent_s > 1) return { kind: 'gap', icon: 'unknown', text: `Nothing recorded for ${replay.silent_s.toFixed(1)} s`, end: '' };
   const standing = alarms.filter((alarm) => alarm.active && alarm.state !== 'SHELVED').sort((a, b) => RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
   const worst = standing[0];
-  const among = standing.length > 1 ? `1 of ${standing.length}, ${end}` : end;
+  const among = standing.length > 1 ? `${counted(standing.length, 'alarm', 'alarms')}, ${end === 're-evaluated' ? end : 'original'}` : end;
   if (worst) {
     const kind = worst.priority === 'critical' ? 'crit' : worst.priority === 'warning' ? 'warn' : '';
     return { kind, icon: kind || 'info', text: worst.title, end: among };

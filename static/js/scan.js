@@ -231,6 +231,7 @@ function carOf(store) {
 /** Else the corridor is straight, because nobody can tell better. @param {import('./store.js').Store} store */
 function isSteeringKnown(store) {
   const { ink } = store.ink('steering');
+  if (store.signal('steering')?.value?.tyre_rad == null) return false;
   return ink === 'fresh' || ink === 'ageing';
 }
 

@@ -11,6 +11,7 @@ import { field, html, listen, need, setText, show, words } from './dom.js';
 
 // Each is fetched when it is first opened: a page that begins has enough to load.
 const SCREENS = /** @type {Record<string, {title: string, load: () => Promise<Mount>}>} */ ({
+  alarms: { title: 'Alarms', load: async () => (await import('./alarms.js')).mount },
   log: { title: 'Alarm log', load: async () => (await import('./log.js')).mount },
   signals: { title: 'Signals', load: async () => (await import('./signals.js')).mount },
   license: { title: 'License', load: async () => (await import('./about.js')).mountLicense },
@@ -38,7 +39,11 @@ export class Screens {
       listen(field(root, 'menu'), 'click', () => openSheet(this.menu)),
       listen(field(root, 'back'), 'click', () => this.show(null)),
       listen(field(root, 'link'), 'click', () => this.show('signals')),
-      listen(field(root, 'strip'), 'click', () => this.show(field(root, 'strip').dataset['opens'] ?? 'log')),
+      listen(field(root, 'strip'), 'click', () => this.show(field(root, 'strip').dataset['opens'] ?? 'alarms')),
+      listen(field(root, 'screen'), 'click', (event) => {
+        const name = /** @type {HTMLElement | null} */ (event.target.closest('button[data-screen]'))?.dataset['screen'];
+        if (name) this.show(name); // a key of one screen that leads to another
+      }),
       listen(window, 'popstate', () => this.#set(history.state?.screen ?? null)),
       listen(window, 'catgraph-units', () => this.#again()), // what it told stands there in the unit of before
       listen(document, 'keydown', (event) => {

@@ -1,6 +1,7 @@
 // The topics of the signals in Settings: which carries what, how fast, and what is wrong with it; a press lets another be picked.
 
 import { html, icon, setAttribute, setIcon, setText, setWords, show } from './dom.js';
+import { missingWords } from './missing-topics.js';
 import { found } from './settings-layout.js';
 import { openTopicPicker } from './topic-picker.js';
 import { age, fixed, NOTHING } from './words.js';
@@ -25,6 +26,10 @@ export function topicWords(signal, picked, isLive) {
     return picked
       ? { topic: picked, says: `${label} · picked by you, and the car does not have it`, icon: 'warn', rate: NOTHING }
       : { topic: signal.label, says: signal.value ? source : 'not published', icon: signal.value ? 'ok' : 'unknown', rate: NOTHING };
+  }
+  if (signal.freshness === 'not_published' && signal.note) {
+    const says = `${label} · ${picked ? `picked by you, ${signal.note}` : signal.note}`;
+    return { topic: signal.topic, says, icon: picked ? 'warn' : 'unknown', rate: NOTHING };
   }
   const told = [
     `${label} · ${kind ?? 'type unknown'}${picked ? ' · picked by you' : ''}`,
@@ -51,7 +56,8 @@ export class SettingsTopics {
     this.model = model;
     this.count = html('span');
     this.list = html('ul', { class: 'topics' });
-    this.element = html('section', { 'aria-label': 'Topics' }, html('div', { class: 'sec' }, html('span', {}, 'Topics'), this.count), this.list);
+    this.missing = html('p', { class: 'm', 'data-f': 'topics-missing', hidden: true });
+    this.element = html('section', { 'aria-label': 'Topics' }, html('div', { class: 'sec' }, html('span', {}, 'Topics'), this.count), this.list, this.missing);
     /** @type {Map<string, ReturnType<SettingsTopics['row']>>} */
     this.rows = new Map();
   }
@@ -85,6 +91,9 @@ export class SettingsTopics {
       setText(at.rate, shown.rate);
       show(at.unit, shown.rate !== NOTHING);
     }
+    const missing = isLive ? missingWords(frame.recording) : '';
+    setWords(this.missing, missing);
+    show(this.missing, missing !== '');
     this.filter(this.#query);
     this.#countThem(frame, isLive);
   }

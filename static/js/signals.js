@@ -165,12 +165,12 @@ function fill(at, name, signal, { ink, age_s }) {
   if (at.more.hasAttribute('hidden')) return;
   const key = JSON.stringify(details(signal, name));
   if (at.more.dataset['key'] === key) return;
-  at.more.dataset['key'] = key;
   at.more.replaceChildren(...details(signal, name).flatMap(([term, text]) => {
     const description = html('dd');
     setWords(description, text);
     return [html('dt', {}, term), description];
   }), html('dt', {}, 'Choice'), html('dd', {}, at.choice));
+  at.more.dataset['key'] = key;
 }
 
 /**

@@ -22,14 +22,17 @@ export const NOT_CONFIRMED = 'NOT CONFIRMED – use the physical stop';
 const AID = 'An aid, not an emergency stop: Wi-Fi and the bridge are in its path. The safety driver stops the car.';
 /** A guard that says nothing for so long is one that cannot be counted on [s]; it speaks at least twice a second. */
 const GUARD_HEARD_S = 2;
+/** A longer reason does not fit the slide; the sheet behind it gives it whole [characters]. */
+const BRIEF = 44;
 
-const STATES = /** @type {Record<string, string>} */ ({ not_available: 'NOT AVAILABLE', safe: 'SAFE', armed: 'ARMED', ordered: 'SLOWING', holding: 'HOLDING' });
+const STATES = /** @type {Record<string, string>} */ ({ not_available: 'NOT AVAILABLE', safe: 'NOT ARMED', armed: 'ARMED', ordered: 'SLOWING', holding: 'HOLDING' });
 
 /** The one word of its state. @param {Seen} seen */
 export function stateWord({ now, isSilent }) {
   if (isSilent || !now) return 'NOT KNOWN';
   const order = orderOf(now);
   if (order && !order.sending) return 'NOT SENDING';
+  if (order?.stands) return 'STANDING';
   if (order && order.confirmed !== true) return order.confirmed === false ? 'NOT CONFIRMED' : 'ORDERED';
   return STATES[now.state] ?? 'NOT AVAILABLE';
 }
@@ -70,7 +73,8 @@ export function slideOf(seen) {
     return { kind: 'armed', title: 'Slide to', why: 'slow down', label: 'Slide to slow down. With a keyboard hold Enter for 1 second' };
   }
   if (now.state === 'safe') return off('Slow-down off', isViewer ? 'a viewer only looks' : 'press to arm');
-  return off('Slow-down off', bare(now.why ?? 'not available'));
+  const why = bare(now.why ?? 'not available');
+  return off('Slow-down off', why.length > BRIEF ? 'press for the reason' : why);
 }
 
 /** @param {string} state @param {SlowOrder} order @returns {[string, string]} */
@@ -78,7 +82,8 @@ function goWords(state, order) {
   if (!order.sending) return ['Not sending', 'to the car now'];
   if (order.confirmed === false) return ['Not confirmed', 'physical stop!'];
   const zero = speedWords(0).join(' ');
-  if (state === 'holding') return ['Holding', `at ${zero}`];
+  if (order.stands) return ['Standing', `held at ${zero}`];
+  if (state === 'holding' && order.confirmed) return ['Holding', `at ${zero}`];
   return [order.confirmed ? 'Slowing' : 'Ordered', `to ${zero}`];
 }
 
@@ -98,7 +103,8 @@ export function stripWords(now, standing) {
   const rate = `−${fixed(order.deceleration_mps2)} m/s²`;
   const alarms = standing === 0 ? '' : ` · ${standing} ${standing === 1 ? 'alarm' : 'alarms'}`;
   if (!order.sending) return { kind: 'order', text: 'Not sending to the car', end: alarms.slice(3) };
-  if (now.state === 'holding') return { kind: 'order', text: 'Holding the car', end: alarms ? `ordered${alarms}` : `${speedWords(0).join(' ')} ordered` };
+  if (order.stands) return { kind: 'order', text: 'The car stands', end: alarms.slice(3) || (order.stands === 'before' ? 'stood already' : 'not proven') };
+  if (now.state === 'holding' && order.confirmed) return { kind: 'order', text: 'Holding the car', end: alarms ? `ordered${alarms}` : `${speedWords(0).join(' ')} ordered` };
   return order.confirmed
     ? { kind: 'order', text: 'Slowing the car', end: alarms ? `${rate}${alarms}` : `${rate} ordered` }
     : { kind: 'order', text: 'Slow-down ordered', end: `${rate}${alarms}` };
@@ -109,7 +115,7 @@ export function stripWords(now, standing) {
  * @param {SlowOrder} order
  * @returns {{label: string, value: string, mark: 'ok' | 'wait' | 'crit'}[]}
  */
-export function stepsOf({ steps, confirmed, sending, why }) {
+export function stepsOf({ steps, confirmed, sending, why, stands }) {
   const begun_ms = steps.pressed_ms ?? steps.server_ms;
   const after = (/** @type {number | null} */ at_ms) => (at_ms === null || begun_ms === null ? '–' : `+${fixed(Math.max(0, at_ms - begun_ms) / 1000, 2)} s`);
   const step = (/** @type {string} */ label, /** @type {number | null} */ at_ms, /** @type {string} */ isMissed) => ({
@@ -117,9 +123,9 @@ export function stepsOf({ steps, confirmed, sending, why }) {
     mark: /** @type {'ok' | 'wait' | 'crit'} */ (at_ms !== null ? 'ok' : isMissed ? 'crit' : 'wait'),
   });
   const isByHand = steps.pressed_ms !== null || why === 'by hand';
-  // Of a car that stood already nothing slows: that it is confirmed is all there is to say.
-  const slows = confirmed && steps.slows_ms === null
-    ? { label: 'Car slows', value: 'confirmed', mark: /** @type {const} */ ('ok') }
+  // No more is claimed of a car that stands than that it stands.
+  const slows = stands
+    ? { label: 'Car stands', value: stands === 'before' ? 'already' : 'not proven', mark: /** @type {const} */ ('wait') }
     : step('Car slows', confirmed === false ? null : steps.slows_ms, confirmed === false ? 'NOT SEEN' : '');
   return [
     { label: isByHand ? 'Pressed' : 'By itself', value: timeOfDay(begun_ms), mark: begun_ms === null ? 'wait' : 'ok' },
@@ -138,6 +144,11 @@ export function stepsOf({ steps, confirmed, sending, why }) {
 export function orderWords(order, lag_s) {
   if (order.confirmed === false) return { text: NOT_CONFIRMED, kind: 'crit' };
   if (!order.sending) return { text: 'Nothing goes out to the car: use the physical stop. It goes on by itself once the link is back.', kind: 'crit' };
+  if (order.stands) {
+    const text = order.stands === 'before' ? 'The car stood already: there is nothing to slow. Zero speed is commanded.'
+      : 'The car stands. Its speed does not show that the order stopped it. Zero speed is commanded.';
+    return { text, kind: '' };
+  }
   const who = order.why === 'by hand' ? `By ${order.by ?? 'hand'}` : `By itself: ${order.why}`;
   const from = order.from_mps === null ? '' : ` from ${speedWords(order.from_mps).join(' ')}`;
   return { text: `${who}${from}, ${age(order.for_s + lag_s)} s ago`, kind: '' };

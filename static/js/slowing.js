@@ -127,7 +127,7 @@ export function mount(root, store, control, say) {
     for (const slide of slides) slide.draw(view);
     const word = stateWord(seen);
     for (const legend of legends) {
-      setText(legend, `the car: ${word}`);
+      setText(legend, `slow-down: ${word.toLowerCase()}`);
       setAttribute(legend, 'data-state', word.toLowerCase());
     }
     const hold = seen.isReplay ? null : holdOf(now);
@@ -141,7 +141,7 @@ export function mount(root, store, control, say) {
     if (releaseSheet.open && (!hold || String(hold.number) !== releaseSheet.dataset['order'] || !may.can)) releaseSheet.close();
     drawSteps(order);
     const guard = guardWords(now?.guard, store.lag_s);
-    setText(field(home, 'slow-state'), `Slow-down ${word}`);
+    setText(field(home, 'slow-state'), `Slow-down: ${word.toLowerCase()}`);
     setWords(field(home, 'slow-guard'), now?.state === 'not_available' && now.why && !seen.isSilent ? `${now.why} ${guard.text}.` : `${guard.text}.`);
     setAttribute(home, 'data-state', word.toLowerCase());
     show(home, !seen.isReplay); // of a recording it would say what holds of no car
@@ -168,11 +168,11 @@ export function mount(root, store, control, say) {
   /** Said aloud by a screen reader, once each. @param {import('./protocol.js').SlowOrder | null} order */
   function tell(order) {
     const words = !order ? (told ? 'The car is released.' : '')
-      : order.confirmed === null ? 'Slow-down ordered.' : order.confirmed ? 'The car slows: confirmed.' : orderWords(order, 0).text;
+      : order.stands ? orderWords(order, 0).text : order.confirmed === null ? 'Slow-down ordered.' : order.confirmed ? 'The car slows: confirmed.' : orderWords(order, 0).text;
     if (!order && told === 'The car is released.') return;
     if (words === told) return;
-    told = words;
     setText(said, words);
+    told = words;
   }
 
   draw();

@@ -1,4 +1,4 @@
-// Warnings: one snackbar at a time over the rail, until it is acknowledged, shelved or over.
+// Warnings: one snackbar at a time over the rail, until it is acknowledged, shelved or over. The list of alarms needs none.
 
 import { layOut } from './alarm-layout.js';
 import { html, icon, setAttribute, setIcon, setText, setWords, show } from './dom.js';
@@ -30,15 +30,16 @@ export function mount(root, store, say) {
   shelve.addEventListener('click', () => shown && openShelve(store, shown, say));
 
   function draw() {
-    const waiting = store.isSilent || !store.frame || store.replaying ? [] : layOut(store.frame.alarms).snackbars;
+    const isListed = document.querySelector('.screen:not([hidden]) [data-f="alarms"]') !== null; // with keys of its own, which this would cover
+    const waiting = store.isSilent || !store.frame || store.replaying || isListed ? [] : layOut(store.frame.alarms).snackbars;
     shown = waiting[0] ?? null;
     show(bar, shown !== null);
     if (!shown) return;
     setAttribute(bar, 'data-priority', shown.priority);
     setIcon(mark, shown.priority === 'advisory' ? 'info' : 'warn');
-    setWords(title, waiting.length > 1 ? `${shown.title} (1 of ${waiting.length})` : shown.title);
+    setWords(title, waiting.length > 1 ? `${shown.title} (${waiting.length} alarms)` : shown.title);
     setWords(text, snackWords(shown));
-    show(shelve, shown.priority !== 'critical' && shown.actions.includes('shelve'));
+    show(shelve, shown.active && shown.priority !== 'critical' && shown.actions.includes('shelve'));
     setText(acknowledge, 'Acknowledge');
   }
 

@@ -7,7 +7,7 @@ import { age, fixed, timeOfDay } from './words.js';
  * @param {import('./protocol.js').Alarm} alarm
  */
 export function standingWords(alarm) {
-  return [alarm.active ? snackWords(alarm) : alarm.text || alarm.trip_text, said(alarm)].filter(Boolean).join(' · ');
+  return [alarm.active ? snackWords(alarm) : alarm.trip_text || alarm.text, said(alarm)].filter(Boolean).join(' · ');
 }
 
 /**
@@ -16,7 +16,8 @@ export function standingWords(alarm) {
  */
 export function snackWords(alarm) {
   const was = alarm.trip_text || alarm.title;
-  if (!alarm.active) return `Over. It was: ${was}`;
+  if (!alarm.active) return `Returned to normal. It was: ${was}`;
+  if (alarm.verdict === 'ok') return `Returning to normal: ${alarm.text || 'OK'}. It was: ${was}`; // it clears once that has lasted
   return alarm.verdict === 'unknown' ? `Not checked now: ${alarm.text || 'unknown'}. It was: ${was}` : alarm.text || was;
 }
 
@@ -28,9 +29,9 @@ export function dialogWords(alarm) {
   const at = timeOfDay(alarm.raised_ms);
   const began = alarm.trip_text && alarm.trip_text !== alarm.text ? ` with ${bare(alarm.trip_text)}` : '';
   const worst = worstWords(alarm);
-  if (!alarm.active) return [`It is over; it began at ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
+  if (!alarm.active) return [`It has returned to normal; it began at ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
   const isBlind = alarm.verdict === 'unknown';
-  const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
+  const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.verdict === 'ok' ? `Returning to normal: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
   return [cause, `Stands for ${age(alarm.for_s)} s, since ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
 }
 
@@ -51,7 +52,7 @@ function said(alarm) {
   const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
   if (alarm.state === 'SHELVED') return `shelved${by(alarm.shelved_by)} until ${timeOfDay(alarm.shelved_until_ms)}`;
   if (alarm.state === 'ACKED') return `acknowledged${by(alarm.acknowledged_by)}`;
-  return alarm.state === 'RTN_UNACKED' ? 'over, not acknowledged' : 'not acknowledged';
+  return alarm.state === 'RTN_UNACKED' ? 'returned unacknowledged' : 'unacknowledged';
 }
 
 /**

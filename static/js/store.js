@@ -2,6 +2,7 @@
 
 import { ServerClock } from './clock.js';
 import { DeadMan } from './dead-man.js';
+import { Drawing } from './drawing.js';
 import { EventLog } from './events.js';
 import { inkOf } from './freshness.js';
 import { chainOf } from './link.js';
@@ -22,8 +23,8 @@ const REPLY_MS = 4000;
  * @typedef {import('./protocol.js').State} State
  * @typedef {import('./protocol.js').AlarmEvent} AlarmEvent
  * @typedef {import('./events.js').Gap} Gap
- * @typedef {'move' | 'draw' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open' | 'replay' | 'refused'} Topic
- *   move: a fresh frame is to be drawn · draw: five times a second, seen or not by a frame · scan: a new scan ·
+ * @typedef {'move' | 'draw' | 'drawn' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open' | 'replay' | 'refused'} Topic
+ *   move: a fresh frame is to be drawn · draw: five times a second, seen or not by a frame · drawn: all of it was, and nothing failed · scan: a new scan ·
  *   beat: a fresh frame came (also while the page is hidden) · tick: time passed (seldom while it is hidden) · log: new events · gap: a blind time is over · open: connected · refused: an order was, with its answer · replay: its time line, or its end
  * @typedef {{ok: boolean, reason?: string, suggestion?: string, version?: number, isConflict?: boolean, heldBy?: string}} Answer suggestion: an address
  *   that would do; version: of the settings, once changed; isConflict: somebody else changed them in between; heldBy: who is in control instead
@@ -47,6 +48,12 @@ export class Store {
   /** The page shows a recording: frames of the live car are none of it, nor the other way round. */
   replaying = false;
   deadMan = new DeadMan();
+  drawing = new Drawing();
+  /** What tells the operator that this page does not draw. @type {{show(): void, hide(): void} | null} */
+  undrawn = null;
+  /** Something failed since the last drawing. */
+  #hasFailed = false;
+  #complained = '';
   /** @type {Set<string>} names of what wants the scan */
   #watchers = new Set();
   #clock = new ServerClock();
@@ -87,7 +94,12 @@ export class Store {
     this.#nameOf = name;
     this.#pageOf = page;
     this.wire = new Wire(
-      { opened: () => this.#opened(), text: (text, at_ms) => this.#heard(text, at_ms), bytes: (bytes) => this.#heardScan(bytes), closed: () => this.#closed() },
+      {
+        opened: () => this.#guard(() => this.#opened()),
+        text: (text, at_ms) => this.#guard(() => this.#heard(text, at_ms)),
+        bytes: (bytes) => this.#guard(() => this.#heardScan(bytes)),
+        closed: () => this.#guard(() => this.#closed()),
+      },
       dial,
     );
   }
@@ -106,11 +118,11 @@ export class Store {
   start() {
     this.#started_ms = this.#looked_ms = this.now();
     this.#lookedWall_ms = Date.now();
-    const timer = setInterval(() => this.#look(), DRAW_EVERY_MS);
+    const timer = setInterval(() => this.#guard(() => this.#look()), DRAW_EVERY_MS);
     this.#stops.push(() => clearInterval(timer));
     for (const [target, type] of /** @type {[EventTarget, string][]} */ ([[document, 'visibilitychange'], [document, 'freeze'], [document, 'resume'], [window, 'pageshow']])) {
       const listener = (/** @type {Event} */ event) => {
-        if (type !== 'pageshow' || /** @type {PageTransitionEvent} */ (event).persisted) this.#slept(type); // a page that begins is “shown” too
+        if (type !== 'pageshow' || /** @type {PageTransitionEvent} */ (event).persisted) this.#guard(() => this.#slept(type)); // a page that begins is “shown” too
       };
       target.addEventListener(type, listener);
       this.#stops.push(() => target.removeEventListener(type, listener));
@@ -192,7 +204,7 @@ export class Store {
     if (!frame?.replay) return frame;
     const { live } = frame;
     const decelerate = live?.decelerate ?? { state: 'not_available', why: null };
-    return live ? { ...frame, alarms: live.alarms, decelerate, session: { ...frame.session, phase: live.phase, paused: live.paused } } : null;
+    return live ? { ...frame, alarms: live.alarms, recording: live.recording, decelerate, session: { ...frame.session, phase: live.phase, paused: live.paused } } : null;
   }
 
   /** Who is in control of the live car, also while a recording is shown. */
@@ -367,7 +379,12 @@ export class Store {
       this.#isUrgent = false;
     };
     if (isFirst) show(); // nothing moves yet that a picture could fall between
-    else requestAnimationFrame(show);
+    else this.picture(show);
+  }
+
+  /** Draw with the next picture; what it throws is a failure of drawing. @param {() => void} draw */
+  picture(draw) {
+    requestAnimationFrame(() => this.#guard(draw));
   }
 
   /** @param {ArrayBuffer} bytes */
@@ -383,6 +400,13 @@ export class Store {
   }
 
   #look() {
+    const wasFailed = this.drawing.isFailed;
+    this.drawing.look(!document.hidden);
+    if (this.drawing.isFailed) {
+      if (!wasFailed) console.error('Nothing was drawn for 1 s');
+      this.undrawn?.show();
+      this.#isMoved = false; // a picture that was asked for may never come
+    }
     const now_ms = this.now();
     // The monotonic clock of a phone stands still while the phone sleeps, its wall clock does not.
     const slept_ms = Date.now() - this.#lookedWall_ms - (now_ms - this.#looked_ms);
@@ -391,13 +415,19 @@ export class Store {
     if (slept_ms > 2000 && this.frame) this.deadMan.cover();
     this.deadMan.look(now_ms);
     this.wire.look(now_ms);
-    if (!document.hidden && now_ms - this.deadMan.heard_ms > FED_MS && now_ms - this.#drew_ms >= DRAW_EVERY_MS - 20) requestAnimationFrame(() => this.#draw());
+    if (!document.hidden && now_ms - this.deadMan.heard_ms > FED_MS && now_ms - this.#drew_ms >= DRAW_EVERY_MS - 20) this.picture(() => this.#draw());
     this.#emit('tick');
   }
 
   #draw() {
     this.#drew_ms = this.now();
     this.#emit('draw');
+    if (!this.#hasFailed) this.#emit('drawn');
+    const isComplete = !this.#hasFailed;
+    this.#hasFailed = false;
+    if (!isComplete) return;
+    this.drawing.completed();
+    if (!this.drawing.isFailed) this.undrawn?.hide();
   }
 
   /**
@@ -408,7 +438,7 @@ export class Store {
     const isBack = type === 'resume' || type === 'pageshow' || !document.hidden;
     if (this.frame && (type !== 'pageshow' || this.silence_s > 1)) this.deadMan.cover();
     if (isBack) this.wire.hurry();
-    if (this.frame) this.#emit('draw'); // before, there is nothing to cover
+    if (this.frame) this.#draw(); // before, there is nothing to cover
   }
 
   #caughtUp() {
@@ -435,9 +465,32 @@ export class Store {
       try {
         listener(detail);
       } catch (error) {
-        // One broken panel must not stop the veil, the sound or the other panels.
-        console.error(error);
+        this.#failed(error); // one broken panel must not stop the veil, the sound or the other panels
       }
+    }
+  }
+
+  /** @param {() => void} act */
+  #guard(act) {
+    try {
+      act();
+    } catch (error) {
+      this.#failed(error);
+    }
+  }
+
+  /** The page covers itself: what was to be drawn, heard or sounded was not. @param {unknown} error */
+  #failed(error) {
+    this.#hasFailed = true;
+    this.drawing.failed();
+    this.undrawn?.show();
+    const complaint = `${error}`;
+    if (complaint === this.#complained) return; // the same ten times a second
+    this.#complained = complaint;
+    try {
+      console.error(error);
+    } catch {
+      // even that may be what is broken
     }
   }
 }
@@ -461,6 +514,6 @@ function urgentOf(frame) {
   if (!frame) return '';
   const { session, link, alarms, decelerate } = frame;
   const { order } = decelerate;
-  const slow = [decelerate.state, order?.number, order?.sending, order?.confirmed, (frame.live?.decelerate ?? decelerate).countdown?.trigger].join(' ');
+  const slow = [decelerate.state, order?.number, order?.sending, order?.confirmed, order?.stands, (frame.live?.decelerate ?? decelerate).countdown?.trigger].join(' ');
   return [session.phase, session.paused, link.cut, slow, ...alarms.map((alarm) => `${alarm.id} ${alarm.occurrence} ${alarm.state}`)].join('|');
 }

@@ -20,6 +20,7 @@ export function mount(root, store) {
       paused_s: (store.frame?.session.paused_for_s ?? 0) + store.lag_s,
     });
     setAttribute(strip, 'data-kind', seen.kind || null);
+    setAttribute(strip, 'data-returned', seen.hasReturned);
     setAttribute(strip, 'data-opens', seen.opens);
     setIcon(mark, seen.icon);
     setWords(text, seen.text);
@@ -40,7 +41,7 @@ function modeOf(store) {
   if (!frame || !store.isMonitoring) return 'none';
   if (frame.session.paused && !store.isSilent) return 'paused';
   if (store.chain.word === 'Lost' && store.silence_s > 2) return 'critical';
-  const critical = frame.alarms.filter((alarm) => alarm.priority === 'critical' && alarm.state !== 'SHELVED');
+  const critical = frame.alarms.filter((alarm) => alarm.priority === 'critical' && alarm.active && alarm.state !== 'SHELVED');
   if (!critical.length || store.isSilent) return 'none';
   return critical.some((alarm) => alarm.state === 'UNACKED') ? 'asking' : 'critical';
 }

@@ -43,7 +43,7 @@ export function mount(root, store, say) {
     setAttribute(link, 'aria-label', `${view.word}${since}: the link to the car. ${view.sentence}`); // begins with what is seen
     const { frame } = store;
     if (!frame) return;
-    const recording = recordingWords(frame.recording, store.isSilent);
+    const recording = recordingWords((store.heeded ?? frame).recording, store.isSilent); // of the car now, whatever is replayed
     setAttribute(rec, 'data-on', recording.isOn);
     setAttribute(rec, 'title', recording.title);
     setWords(recFor, recording.text);

@@ -1,13 +1,11 @@
 // The dead-man veil: covers the values when frames stop. The covering itself is a CSS animation (sheets of
-// instruments.css) that every fresh frame rewinds, so that it comes even when this script hangs.
+// frame.css) that every completed drawing of a fresh frame rewinds, so that it comes even when this script hangs.
 
 import { drawBigChain } from './chain.js';
+import { DrawProof } from './draw-proof.js';
 import { field, html, mirror, need, setAttribute, setText, setWords, show, words } from './dom.js';
 import { speedWords } from './units.js';
 import { age, fixed, timeOfDay } from './words.js';
-
-/** Each rewinding costs a slow phone some milliseconds; a hung page is covered so much sooner than 2 s, never later. */
-const REWIND_EVERY_MS = 190;
 
 /** What is known of the recorder under the veil: what it did then, or what is safe for good. @type {Record<string, string>} */
 const RECORDED = { recording: 'it was recording', held: 'saved', saving: 'it was being saved', stopped: 'it had stopped' };
@@ -31,7 +29,7 @@ export function thenWords(frame) {
  * @param {import('./store.js').Store} store
  */
 export function veilOf(store) {
-  if (store.isSilent) return 'all';
+  if (store.isSilent || store.drawing.isFailed) return 'all';
   const { frame } = store;
   if (!frame) return 'all';
   if (frame.session.phase === 'lost' || store.chain.cut !== null) return 'values';
@@ -49,18 +47,27 @@ export function mount(root, store) {
   if (!title || !sentence || !then || !recName || !rec) throw new Error('The template lacks the veil');
   const sheets = ['#sheet-lost', '#sheet-mute'].map((id) => need(document, id)); // they say it all
   mirror(veil, 'data-told', () => sheets.some((sheet) => sheet.hasAttribute('open')), sheets, { attributeFilter: ['open'] });
+  const proof = new DrawProof();
   let beat = 0;
-  let rewound_ms = -Infinity;
+  /** @type {import('./protocol.js').State | null} */
+  let seen = null;
   let told = '';
   let isDrawn = false;
   const plate = need(veil, '.plate');
 
+  /** Everything was drawn: the page draws, and where it drew a fresh frame, its values are not covered for 2 s more. */
   function rewind() {
-    const now_ms = store.now();
-    if (store.deadMan.covered || now_ms - rewound_ms < REWIND_EVERY_MS) return;
-    rewound_ms = now_ms;
+    if (!proof.isDrawn()) {
+      store.drawing.distrust();
+      throw new Error('What was written is not there');
+    }
     beat = 1 - beat;
-    document.documentElement.dataset.beat = String(beat);
+    const { dataset } = document.documentElement;
+    dataset['drawn'] = String(beat);
+    if (dataset['drawn'] !== String(beat)) throw new Error('The covers are not rewound');
+    if (store.deadMan.covered || store.frame === seen) return;
+    seen = store.frame;
+    dataset['beat'] = String(beat);
   }
 
   function draw() {
@@ -72,15 +79,16 @@ export function mount(root, store) {
     }
     show(plate, true);
     const view = store.chain;
-    // While all is well the plate already says what it will have to say if this script hangs.
-    const shown = kind === null ? { ...view, cut: /** @type {const} */ (0), nodes: view.nodes.map((node, i) => ({ ...node, mark: i === 0 ? 'here' : i === 1 ? 'silent' : 'unknown', isBad: i === 1, isKnown: i === 0 })) } : view;
-    drawBigChain(chain, shown);
-    setWords(title, kind === null || view.age_s === null ? 'Stale' : `${view.word === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
-    const bold = kind === null ? 'The server fell silent.' : view.sentence;
-    const plain = kind === null ? 'Nothing fresh has come for 2 s and more.' : detailOf(view);
+    // While all is well the plate already says what it will have to say if this script hangs: then nobody knows where the chain is cut.
+    const isUnsaid = kind === null || store.drawing.isFailed;
+    show(chain, !isUnsaid);
+    drawBigChain(chain, view);
+    setWords(title, isUnsaid || view.age_s === null ? 'Stale' : `${view.word === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
+    const bold = isUnsaid ? 'Nothing new has been drawn.' : view.sentence;
+    const plain = isUnsaid ? 'The page or the server has stopped. Watch the car.' : detailOf(view);
     if (told !== `${bold}|${plain}`) {
-      told = `${bold}|${plain}`;
       sentence.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
+      told = `${bold}|${plain}`;
     }
     setWords(then, thenWords(store.frame));
     const recording = RECORDED[store.frame?.recording.state ?? 'off'] ?? '';
@@ -90,14 +98,14 @@ export function mount(root, store) {
   }
 
   if (store.frame) draw(); // before the first frame it is not shown
-  const stops = [store.on('beat', rewind), store.on('draw', draw)];
+  const stops = [store.on('drawn', rewind), store.on('draw', draw)];
   return () => stops.forEach((stop) => stop());
 }
 
 /** @param {import('./link.js').ChainView} view */
 function detailOf(view) {
   if (view.word === 'Silent' && view.since_ms !== null) {
-    return `${view.detail} Last word at ${timeOfDay(view.since_ms)}.`;
+    return `${view.detail} Last message at ${timeOfDay(view.since_ms)}.`;
   }
   return view.detail;
 }

@@ -7,7 +7,7 @@ import { burstOf, samplesOf } from './sound-layout.js';
 export class Voice {
   /** @type {AudioContext | null} */
   #context = null;
-  /** @type {AudioBufferSourceNode | null} */
+  /** @type {AudioScheduledSourceNode | null} */
   #source = null;
   /** @type {Loud | null} */
   #sound = null;
@@ -51,7 +51,13 @@ export class Voice {
     this.#hush();
     if (sound === null) return;
     if (isNew || this.#shake === undefined) this.#vibrate(sound);
-    if (this.#context && this.isRunning) this.#play(this.#context, sound);
+    if (!this.#context || !this.isRunning) return;
+    try {
+      this.#play(this.#context, sound);
+    } catch (error) {
+      this.#beep(this.#context); // throws where nothing can sound here: the page then counts as one that fails
+      console.warn('The alarm sounds as a plain tone:', error);
+    }
   }
 
   /**
@@ -94,6 +100,14 @@ export class Voice {
     source.connect(context.destination);
     source.start();
     this.#source = source;
+  }
+
+  /** The plainest sound there is: one tone without an end. @param {AudioContext} context */
+  #beep(context) {
+    const tone = context.createOscillator();
+    tone.connect(context.destination);
+    tone.start();
+    this.#source = tone;
   }
 
   /** @param {Loud} sound */

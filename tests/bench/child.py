@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import orjson
+import psutil
 
 PROJECT = Path(__file__).resolve().parents[2]
 ANSWERS_WITHIN_S = 60.0
@@ -81,6 +82,10 @@ class Child:
         cpu_ns, began_ns = self.ask("cpu"), time.monotonic_ns()
         time.sleep(for_s)
         return 100.0 * (self.ask("cpu") - cpu_ns) / (time.monotonic_ns() - began_ns)
+
+    def memory_mb(self) -> float:
+        """The memory that only it uses (USS)."""
+        return float(psutil.Process(self._process.pid).memory_full_info().uss) / 1e6
 
     def keep_to(self, cores: Collection[int]) -> None:
         """All of its threads on these processors from now on."""

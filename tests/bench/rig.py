@@ -25,13 +25,35 @@ class Pace:
     crowd: int  # pages that look on
     many: int  # pages on the bridge
     most: int  # pages on the server
+    warm_s: float  # until the server's rings and caches are full, before its memory is looked at
+    memory_s: float  # how long memory is looked at
 
 
 FULL = Pace(
-    probes=240, probe_every_s=0.08, load_s=10.0, held_s=40.0, gap_s=10.0, settle_s=1.0, crowd=30, many=50, most=100
+    probes=240,
+    probe_every_s=0.08,
+    load_s=10.0,
+    held_s=40.0,
+    gap_s=10.0,
+    settle_s=1.0,
+    crowd=30,
+    many=50,
+    most=100,
+    warm_s=180.0,
+    memory_s=420.0,
 )
 QUICK = Pace(
-    probes=20, probe_every_s=0.06, load_s=0.8, held_s=0.8, gap_s=2.0, settle_s=0.1, crowd=30, many=50, most=100
+    probes=20,
+    probe_every_s=0.06,
+    load_s=0.8,
+    held_s=0.8,
+    gap_s=2.0,
+    settle_s=0.1,
+    crowd=30,
+    many=50,
+    most=100,
+    warm_s=0.5,
+    memory_s=1.5,
 )
 
 

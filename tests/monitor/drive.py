@@ -62,7 +62,7 @@ VALUES: dict[str, Value] = {
     "speed": Twist(speed_mps=4.0),
     "brake": Effort(percent=0.0),
     "accelerator": Effort(percent=14.0),
-    "steering": Steering(percent=-4.0),
+    "steering": Steering(percent=-4.0, tyre_rad=0.02144),
     "distance": Distance(distance_m=12.4),
     "bearing": Bearing(bearing_rad=-0.05),
     "position": GpsFix(lat_deg=32.23, lon_deg=-110.95),

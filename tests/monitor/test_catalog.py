@@ -60,16 +60,22 @@ def test_what_a_check_must_have(check: AnyCheck) -> None:
     assert list(inspect.signature(check.find).parameters)[-3:] == ["snapshot", "limits", "was_active"]
 
 
+EXPLAIN_MESSAGES = ("link_lost", "link_late", "link_late_moving", "car_silent", "car_unusable", "no_message")
+
+
 @every_check
 def test_only_what_explains_missing_messages_has_a_grace(check: AnyCheck) -> None:
     """A grace delays what is explained; what is judged by values must be told at once when it is seen again."""
-    explains_messages = check.id in ("link_lost", "car_silent", "no_message") or check.id.startswith("signal_stale.")
+    explains_messages = check.id in EXPLAIN_MESSAGES or check.id.startswith(("signal_stale.", "signal_unusable."))
     assert (check.alarm.grace_s > 0.0) == explains_messages
+
+
+OF_THE_LINK = ("connect_failed", "no_message", "link_lost", "link_late", "link_late_moving", "bridge_fault")
 
 
 @every_check
 def test_a_check_of_the_link_is_not_blinded_by_it(check: AnyCheck) -> None:
-    assert (check.scope is Scope.LINK) == (check.id in ("connect_failed", "no_message", "link_lost"))
+    assert (check.scope is Scope.LINK) == (check.id in OF_THE_LINK)
 
 
 def test_a_group_of_thresholds_is_one_class() -> None:
@@ -99,7 +105,7 @@ def test_settings_begin_with_the_first_tile_and_headings_stand_together() -> Non
     assert headings[:2] == ["Speed", "Speed"]
     assert headings[-1] == "Gauge"
     assert {name for name, field in catalog.schema().items() if field["heading"] == "Vehicle"} == {
-        "obstacle.half_width_m", "obstacle.wheelbase_m", "obstacle.laser_ahead_m",
+        "obstacle.half_width_m", "obstacle.wheelbase_m", "obstacle.laser_ahead_m", "steering.tyre_rad_per_unit",
     }  # fmt: skip
 
 

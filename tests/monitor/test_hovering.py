@@ -229,6 +229,8 @@ BY_TIME = {
     "phone_car": "a phone apart",
     "phone_tracks": "a phone on its own way",
     "phone_missing": "a phone with a fix now and then",
+    "link_late": "a link about as late as is allowed",
+    "link_late_moving": "a link about as late as is allowed",
     "recorder_behind": "a disk about as slow as is allowed",
     "disk_nearly_full": "a disk about as full as is allowed",
 }
@@ -237,7 +239,10 @@ BY_TIME = {
 WITHOUT = {
     "scan_shape": "whole beams",
     "gps_quality": "known or not",
+    "signal_unusable": "a value can be used or it cannot",
+    "car_unusable": "values can be used or they cannot",
     "connect_failed": "the link's own word",
+    "bridge_fault": "the bridge's own words",
     "link_lost": "the link's own word",
     "no_message": "time only grows",
     "log_not_kept": "the disk's own word",
@@ -275,6 +280,8 @@ THRESHOLDS = {
     "clock.offset_s": "a clock",
     "fuel_low.low_percent": "fuel",
     "fuel_low.deadband_percent": "fuel",
+    "link_late.late_s": "a link about as late as is allowed",
+    "link_late.critical_s": "a link about as late as is allowed",
     "recording.behind_s": "a disk about as slow as is allowed",
     "recording.warn_gb": "a disk about as full as is allowed",
     **{f"signals.{name}_hz": "rate" for name in SIGNALS},
@@ -283,6 +290,7 @@ NO_LIMIT = {
     "obstacle.time_to_collision_s": "a gap that closes is soon met or opens: it cannot hover",
     "obstacle.wheelbase_m": "a measure of the car",
     "obstacle.laser_ahead_m": "a measure of the car",
+    "steering.tyre_rad_per_unit": "a measure of the car",
     "gps_fix.strict": "a switch",
     "not_moving.after_s": "each stop is one of its own; the speed at which standing begins has its case",
     "clock.jump_s": "each step is one of its own",
@@ -381,6 +389,20 @@ def test_a_disk_about_as_slow_or_as_full_as_is_allowed(alarm: str, seconds: floa
         state.recorder(
             RecorderFacts(state="recording", behind_s=about if is_slow else 0.1, left_gb=90.0 if is_slow else about)
         )
+        told += [t.alarm_id for t in monitor.step(state.snapshot(now_s)) if t.announces]
+    assert 0 < told.count(alarm) <= AT_MOST, told
+
+
+@LONG
+@pytest.mark.world(n=6)
+@pytest.mark.parametrize(("alarm", "late_s"), [("link_late", 1.0), ("link_late_moving", 2.0)])
+def test_a_link_about_as_late_as_is_allowed(alarm: str, late_s: float, seconds: float) -> None:
+    dice, monitor, state, told = random.Random(1), Monitor(), State(), []
+    for n in range(round(10 * seconds)):
+        now_s = n / 10
+        about_s = gauss(dice, late_s, 0.05, now_s)
+        state.link(LinkFacts(phase="monitoring", connected_s=0.0, last_message_s=now_s, late_s=about_s))
+        state.receive("speed", Twist(speed_mps=4.0), now_s, None)
         told += [t.alarm_id for t in monitor.step(state.snapshot(now_s)) if t.announces]
     assert 0 < told.count(alarm) <= AT_MOST, told
 

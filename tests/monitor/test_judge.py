@@ -14,7 +14,10 @@ from monitor.signal_limits import expected_rates
 from monitor.values import Diagnostics, Twist
 from tests.monitor.drive import REAL_HZ, Drive
 
-FOUNDATION = ("speed_limit", "signal_", "all_slow", "car_silent", "link_lost", "no_message", "connect_failed")
+FOUNDATION = (
+    *("speed_limit", "signal_", "all_slow", "car_silent", "car_unusable"),
+    *("link_lost", "link_late", "no_message", "connect_failed", "bridge_fault"),
+)
 FAST = {name for name, hz in REAL_HZ.items() if hz >= 10.0}
 
 

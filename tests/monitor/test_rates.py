@@ -54,6 +54,23 @@ def test_a_clearly_and_steadily_higher_rate_is() -> None:
     assert meter.rate(end_s).expected_hz == pytest.approx(40.0, rel=0.02)
 
 
+@pytest.mark.world(n=20)
+@pytest.mark.parametrize("stall_s", [0.3, 0.6, 0.9])
+@pytest.mark.parametrize("begins_s", [0.5 * n for n in range(1, 24)])
+@pytest.mark.parametrize("drained_in_s", [0.1, 2.0, 4.0])
+def test_a_hiccup_is_not_learned_as_a_faster_source(stall_s: float, begins_s: float, drained_in_s: float) -> None:
+    """A 20 Hz source whose messages wait for a while and are then delivered within some seconds: seen as 22.6 Hz."""
+    meter = RateMeter(20.0)
+    ends_s = begins_s + stall_s
+    share = drained_in_s / (stall_s + drained_in_s)
+    for number in range(20 * 60):
+        at_s = number / 20.0
+        if begins_s <= at_s < ends_s + drained_in_s:
+            at_s = ends_s + (at_s - begins_s) * share
+        meter.receive(at_s)
+    assert meter.rate(60.0).expected_hz == pytest.approx(20.0, rel=0.03)
+
+
 def test_a_burst_on_connecting_is_not_taken_for_the_rate() -> None:
     meter = RateMeter(20.0)
     for _ in range(15):

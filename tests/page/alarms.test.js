@@ -88,13 +88,31 @@ const strip = (frame, more = {}) => stripOf(frame, { isSilent: false, paused_s: 
 test('the strip says the worst that stands', () => {
   const checks = /** @type {any} */ ([{ id: 'a', label: 'A', verdict: 'ok' }, { id: 'b', label: 'B', verdict: 'unknown' }]);
   assert.deepEqual([strip(state({ checks })).text, strip(state({ checks })).end], ['No alarms', '1 OK · 1 not checked']);
-  assert.deepEqual(strip(state({ alarms: [alarm()] })), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: '2.3 s', opens: 'log' });
-  assert.deepEqual([strip(state({ alarms: [warning(), warning({ id: 'b' })] })).kind, strip(state({ alarms: [warning(), warning({ id: 'b' })] })).end], ['warn', '1 of 2']);
+  assert.deepEqual(strip(state({ alarms: [alarm()] })), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: '2.3 s', hasReturned: false, opens: 'alarms' });
+  assert.deepEqual([strip(state({ alarms: [warning(), warning({ id: 'b' })] })).kind, strip(state({ alarms: [warning(), warning({ id: 'b' })] })).end], ['warn', '2 alarms']);
   assert.equal(strip(state({ session: { paused: true } })).text, 'Paused 0:42: no alarm will come');
   assert.equal(strip(state({ session: { phase: 'lost' } })).kind, 'crit');
   assert.equal(strip(state({ link: { cut: 'bridge-car' } })).text, 'Values are not live');
   assert.equal(strip(null).text, 'Nothing received yet');
   assert.equal(strip(state({ alarms: [alarm({ state: 'SHELVED', priority: 'warning' })] })).text, 'No alarms');
+});
+
+test('what still stands comes before what has returned, and the strip says which it is', () => {
+  const returned = alarm({ state: 'RTN_UNACKED', active: false });
+  const both = strip(state({ alarms: [returned, warning({ active: true })] }));
+  assert.deepEqual([both.kind, both.text, both.hasReturned, both.end], ['warn', warning().title, false, '2 alarms']);
+  const only = strip(state({ alarms: [returned] }));
+  assert.deepEqual([only.kind, only.text, only.hasReturned, only.end], ['crit', 'Speed above limit: returned', true, '1 alarm']);
+});
+
+test('an advisory hides neither a warning that waits to be acknowledged nor how many alarms there are', () => {
+  const advisory = warning({ id: 'moving', priority: 'advisory', title: 'Component warns' });
+  const returned = strip(state({ alarms: [advisory, warning({ state: 'RTN_UNACKED', active: false })] }));
+  assert.deepEqual([returned.kind, returned.text, returned.hasReturned, returned.end], ['warn', `${warning().title}: returned`, true, '2 alarms']);
+  assert.equal(strip(state({ alarms: [advisory, { ...advisory, id: 'b' }] })).end, '2 alarms');
+  const checks = /** @type {any} */ ([{ id: 'a', label: 'A', verdict: 'ok' }, { id: 'b', label: 'B', verdict: 'unknown' }]);
+  assert.equal(strip(state({ checks, alarms: [advisory] })).end, '1 not checked');
+  assert.equal(strip(state({ checks: checks.slice(0, 1), alarms: [advisory] })).end, '1 OK');
 });
 
 test('one tile for the checks that share it; the worst speaks', () => {

@@ -130,7 +130,8 @@ def slowed(confirmed: bool | None = True, **more: Any) -> Json:
     steps = {"pressed_ms": begun_ms, "server_ms": begun_ms + 20, "bridge_ms": begun_ms + 30, "slows_ms": slows_ms}
     order = {
         "number": 3, "by": "Pixel 7", "why": "by hand", "for_s": 1.3, "from_mps": 4.2, "ordered_mps": 2.2,
-        "deceleration_mps2": 1.5, "sending": True, "confirmed": confirmed, "steps": steps, "longest_s": 600.0, **more,
+        "deceleration_mps2": 1.5, "sending": True, "confirmed": confirmed, "stands": None, "steps": steps,
+        "longest_s": 600.0, **more,
     }  # fmt: skip
     return slow("ordered", order=order)
 

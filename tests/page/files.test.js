@@ -65,6 +65,7 @@ test('the facts in one sentence, and what is unknown as unknown', () => {
   assert.equal(factWords(row({ state: 'unreadable', problem: 'x.mcap is empty.' })), '38.0 MB. x.mcap is empty.');
   assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'the server was killed.', damage: ['A part is lost.'] })), ['Recovered: the server was killed.', 'A part is lost.']);
   assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'car_1 was recovered.', left_out: ['/camera', '/points'] })), ['car_1 was recovered.', 'Not recorded: /camera, /points.']);
+  assert.deepEqual(warningWords(row({ not_received: ['/imu'] })), ['No message came from: /imu.']);
   assert.deepEqual(warningWords(row({ ended: 'recovered' })), ['Recovered: the server ended while it was recorded.']);
   assert.deepEqual(warningWords(row()), []);
 });
@@ -87,7 +88,7 @@ test('tags as they are typed, points as they are drawn', () => {
 test('what is recorded now, and why nothing is', () => {
   const now = { vehicle: 'car', isMonitoring: true, isSilent: false };
   const on = { state: 'recording', for_s: 252, part: 1, bytes: 18_600_000, dropped: 0, reason: null };
-  assert.deepEqual(liveOf(on, now), { name: 'Recording now', mark: 'car', facts: '04:12 min · 18.6 MB', isOn: true, isBad: false, order: false });
+  assert.deepEqual(liveOf(on, now), { name: 'Recording now', mark: 'car', facts: '04:12 min · 18.6 MB', missing: '', isOn: true, isBad: false, order: false });
   assert.equal(liveOf({ ...on, part: 2 }, now)?.mark, 'car · part 2');
   assert.equal(liveOf({ ...on, dropped: 7 }, now)?.facts, '04:12 min · 18.6 MB · 7 messages lost: the disk is too slow');
   assert.equal(liveOf({ ...on, dropped: 7 }, now)?.isBad, true);
@@ -101,4 +102,8 @@ test('what is recorded now, and why nothing is', () => {
   assert.equal(liveOf(off, { ...now, isMonitoring: false }), null);
   assert.equal(liveOf(undefined, now), null);
   assert.equal(liveOf(on, { ...now, isSilent: true })?.isOn, false, 'nobody knows');
+  const missing = { left_out: ['/points', '/camera'], too_large: [{ topic: '/camera', mb: 40.2 }], not_received: ['/imu', '/names'], as_json: 3 };
+  assert.equal(liveOf({ ...on, ...missing }, now)?.missing, 'Not recorded: /points. Too large to record: /camera (40 MB a message). No message comes from: /imu, /names. '
+    + '3 messages kept as JSON: not of their type, or its definition is not known.');
+  assert.equal(liveOf({ ...off, ...missing }, now)?.missing, '');
 });

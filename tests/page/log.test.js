@@ -4,12 +4,12 @@ import { heldWords } from '../../static/js/connect.js';
 import { asked, dayWords, joined, lowest, tookWords } from '../../static/js/log-layout.js';
 import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/standing.js';
 
-const ALARM = /** @type {any} */ ({ text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
+const ALARM = /** @type {any} */ ({ active: true, text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
 const noon_ms = new Date(2026, 5, 1, 12, 0, 0).getTime();
 
 test('who acknowledged stands where the alarm stands', () => {
-  assert.equal(standingWords(ALARM), '12.6 m/s · not acknowledged');
-  assert.equal(standingWords({ ...ALARM, state: 'RTN_UNACKED' }), '12.6 m/s · over, not acknowledged');
+  assert.equal(standingWords(ALARM), '12.6 m/s · unacknowledged');
+  assert.equal(standingWords({ ...ALARM, active: false, state: 'RTN_UNACKED' }), '11.2 m/s · returned unacknowledged');
   assert.equal(standingWords({ ...ALARM, state: 'ACKED', acknowledged_by: 'Pixel 7 · a3f2' }), '12.6 m/s · acknowledged by Pixel 7 · a3f2');
   assert.equal(standingWords({ ...ALARM, state: 'ACKED', text: '' }), '11.2 m/s · acknowledged');
   assert.equal(
@@ -22,8 +22,14 @@ test('a snackbar never tells of what is over as if it stood', () => {
   assert.equal(
     snackWords({ ...ALARM, active: true, verdict: 'unknown', text: 'No link to the car' }), 'Not checked now: No link to the car. It was: 11.2 m/s',
   );
-  assert.equal(snackWords({ ...ALARM, active: false, state: 'RTN_UNACKED' }), 'Over. It was: 11.2 m/s');
-  assert.equal(snackWords({ ...ALARM, active: false, trip_text: '', title: 'GPS jump' }), 'Over. It was: GPS jump');
+  assert.equal(snackWords({ ...ALARM, active: false, state: 'RTN_UNACKED' }), 'Returned to normal. It was: 11.2 m/s');
+  assert.equal(snackWords({ ...ALARM, active: false, trip_text: '', title: 'GPS jump' }), 'Returned to normal. It was: GPS jump');
+});
+
+test('what its check finds well is never the text of an alarm that stands', () => {
+  const clearing = { ...ALARM, title: 'Phone position missing', verdict: 'ok', text: 'Position of the phone known to 5 m', trip_text: 'No GPS fix on this phone for 16 s' };
+  assert.equal(snackWords(clearing), 'Returning to normal: Position of the phone known to 5 m. It was: No GPS fix on this phone for 16 s');
+  assert.equal(standingWords({ ...clearing, active: false, state: 'RTN_UNACKED' }), 'No GPS fix on this phone for 16 s · returned unacknowledged');
 });
 
 test('too many alarms are told in one line; what can be borne is a number only', () => {
@@ -89,7 +95,7 @@ test('a dialog tells with what it began, and never speaks in the present of what
   assert.equal(dialogWords({ ...near, measured: {}, limit: {}, trip_text: '4.1 m' }), 'Stands for 3.5 s, since 12:00:00. Brake.');
   const lost = { ...near, verdict: 'unknown', text: 'No link to the car.' };
   assert.equal(dialogWords(lost), 'Not checked now: No link to the car. Stands for 3.5 s, since 12:00:00 with 4.8 m. Brake.');
-  assert.equal(dialogWords({ ...lost, active: false }), 'It is over; it began at 12:00:00 with 4.8 m. Brake.');
+  assert.equal(dialogWords({ ...lost, active: false }), 'It has returned to normal; it began at 12:00:00 with 4.8 m. Brake.');
 });
 
 test('a dialog tells how bad it was, where that is not what is measured now', () => {
@@ -97,6 +103,6 @@ test('a dialog tells how bad it was, where that is not what is measured now', ()
   const fast = { ...ALARM, active: true, verdict: 'fault', trip_text: ALARM.text, raised_ms: noon_ms, for_s: 3.5, advice: 'Brake.', measured: speed(12.6), limit: speed(11), worst: { ...speed(12.84), side: 'above' } };
   assert.equal(dialogWords(fast), 'Stands for 3.5 s, since 12:00:00. Highest 12.8 m/s. Brake.');
   assert.equal(dialogWords({ ...fast, measured: speed(12.81) }), 'Stands for 3.5 s, since 12:00:00. Brake.', 'what reads the same is not said twice');
-  assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It is over; it began at 12:00:00. Highest 12.8 m/s. Brake.');
+  assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It has returned to normal; it began at 12:00:00. Highest 12.8 m/s. Brake.');
   assert.match(dialogWords({ ...fast, worst: { ...speed(3.9), side: 'below' } }), /Lowest 3\.9 m\/s\./);
 });

@@ -230,7 +230,7 @@ test('every reason of a phone is said; a coarse fix is still one of now', () => 
   const live = phoneOf(frameOf(FIX, PHONE), 0.1);
   assert.deepEqual([live.isLive, live.label, live.says], [true, 'Phone ±5 m', '']);
   near(live.age_s ?? 0, 0.9, 1e-9);
-  assert.match(phoneOf(frameOf(FIX), 0).says, /^No phone tells its position/);
+  assert.match(phoneOf(frameOf(FIX), 0).says, /^No phone is sharing its position/);
   for (const why of ['denied', 'unavailable', 'timeout', 'insecure', 'hidden', 'old', 'late', 'silent']) {
     const found = phoneOf(frameOf(FIX, { ...PHONE, used: false, why, why_text: `Because of ${why}` }), 0);
     assert.deepEqual([found.isLive, found.says, found.label], [false, `Because of ${why}.`, 'Phone STALE 0.8 s']);

@@ -1,5 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { Store } from '../../static/js/store.js';
 import { badgeOf } from '../../static/js/badge.js';
 import { dialogOf } from '../../static/js/dialogs.js';
 import { chainOf } from '../../static/js/link.js';
@@ -83,9 +84,9 @@ test('times as a person reads and hears them', () => {
 test('the line says first what is wrong with the replay, then what was not recorded, then the alarms', () => {
   const fast = alarm({ title: 'Speed above limit' });
   const told = (more, rest = {}) => toldOf(playing({ replay: replay(more), ...rest }));
-  assert.deepEqual(told({}, { alarms: [fast] }), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: 'judged anew' });
-  assert.equal(told({ alarms_from: 'recording' }, { alarms: [fast] }).end, 'as told then');
-  assert.equal(told({}, { alarms: [fast, alarm({ id: 'b', priority: 'warning' })] }).end, '1 of 2, judged anew');
+  assert.deepEqual(told({}, { alarms: [fast] }), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: 're-evaluated' });
+  assert.equal(told({ alarms_from: 'recording' }, { alarms: [fast] }).end, 'original alarms');
+  assert.equal(told({}, { alarms: [fast, alarm({ id: 'b', priority: 'warning' })] }).end, '2 alarms, re-evaluated');
   assert.equal(told({}, { alarms: [alarm({ active: false, state: 'RTN_UNACKED' })] }).text, 'No alarms', 'what was over then is no alarm of this moment');
   assert.equal(told({ silent_s: 3.42 }, { alarms: [fast] }).text, 'Nothing recorded for 3.4 s');
   assert.equal(told({ silent_s: null }).text, 'No message of the car yet');
@@ -129,4 +130,10 @@ test('what is no time line is not taken for one', () => {
   assert.equal(readMessage(JSON.stringify({ ...line, marks: null })), null);
   assert.equal(readMessage('{"kind":"replay"}'), null);
   assert.equal(new Track().lacks('a', 3), 0);
+});
+
+test('while a recording is shown, whether the car is recorded is said of the car now', () => {
+  const store = new Store(() => /** @type {any} */ ({}));
+  store.frame = /** @type {any} */ ({ replay: {}, recording: { state: 'off', for_s: null }, alarms: [], session: {}, live: { recording: { state: 'recording', for_s: 9 }, alarms: [], phase: 'monitoring', paused: false } });
+  assert.equal(store.heeded?.recording.state, 'recording');
 });

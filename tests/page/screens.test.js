@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { armWords, bare, foundIn, remembered } from '../../static/js/connect.js';
+import { armWords, bare, foundIn, isSameCar, remembered } from '../../static/js/connect.js';
 import { screenOf } from '../../static/js/page.js';
 import { details, headline, kindWords } from '../../static/js/signals.js';
 import { tabByHash, tabByKey } from '../../static/js/tabs.js';
@@ -34,6 +34,9 @@ test('addresses: each once, newest first, and not too many', () => {
   assert.equal(remembered(Array.from({ length: 20 }, (_, i) => String(i)), 'x').length, 8);
   assert.equal(bare('ws://car:9090/'), 'car:9090');
   assert.equal(bare('wss://car:9090'), 'wss://car:9090');
+  for (const written of ['car', 'car:9090', 'ws://car', ' ws://car:9090/ ']) assert.ok(isSameCar('ws://car:9090', written), written);
+  assert.ok(isSameCar('ws://[::1]:9090', '[::1]'));
+  for (const other of ['', 'car:9091', 'cart', 'wss://car:9090']) assert.ok(!isSameCar('ws://car:9090', other), other);
 });
 
 test('found vehicles are listed once, and an answer of another shape is none', () => {

@@ -146,6 +146,9 @@ test('a topic says what it carries, how fast, and what is wrong with it', () => 
   assert.match(topicWords(signal({ rejected: 3, rejected_why: 'x is NaN' }), undefined, true).says, /3 rejected: x is NaN/);
   assert.match(topicWords(signal({ freshness: 'stale', age_s: 7.4 }), undefined, true).says, /silent for 7.4 s/);
   assert.match(topicWords(signal({ freshness: 'never' }), undefined, true).says, /no message yet/);
+  const ghost = { freshness: /** @type {const} */ ('not_published'), note: 'no node publishes it', value: null };
+  assert.deepEqual(topicWords(signal(ghost), undefined, true), { topic: '/vel', says: 'speed · no node publishes it', icon: 'unknown', rate: '–' });
+  assert.deepEqual(topicWords(signal(ghost), '/vel', true), { topic: '/vel', says: 'speed · picked by you, no node publishes it', icon: 'warn', rate: '–' });
   assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null, freshness: 'not_published' }), undefined, true), { topic: 'Speed', says: 'not published', icon: 'unknown', rate: '–' });
   assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null }), '/gone', true), { topic: '/gone', says: 'speed · picked by you, and the car does not have it', icon: 'warn', rate: '–' });
   assert.deepEqual([topicWords(signal(), undefined, false).icon, topicWords(signal(), undefined, false).rate], ['unknown', '–']);

@@ -28,6 +28,7 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
     return `${kind}: ${title} ${why}`;
   };
   assert.equal(words(slow('not_available', { why: 'No link to the car.' })), 'off: Slow-down off No link to the car');
+  assert.equal(words(slow('not_available', { why: 'The steering of this kind of car is not known, and a command would turn its wheels.' })), 'off: Slow-down off press for the reason');
   assert.equal(words(slow('safe')), 'off: Slow-down off press to arm');
   assert.equal(words(slow('safe'), { isViewer: true }), 'off: Slow-down off a viewer only looks');
   assert.equal(words(slow('armed')), 'armed: Slide to slow down');
@@ -45,11 +46,13 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
 
 test('one word of its state, never a comfortable one', () => {
   const word = (/** @type {any} */ now, more = {}) => stateWord(seen(now, more));
-  assert.deepEqual(['not_available', 'safe', 'armed', 'else'].map((name) => word(slow(name))), ['NOT AVAILABLE', 'SAFE', 'ARMED', 'NOT AVAILABLE']);
+  assert.deepEqual(['not_available', 'safe', 'armed', 'else'].map((name) => word(slow(name))), ['NOT AVAILABLE', 'NOT ARMED', 'ARMED', 'NOT AVAILABLE']);
   assert.equal(word(slow('armed'), { isSilent: true }), 'NOT KNOWN');
   assert.deepEqual([true, null, false].map((confirmed) => word(ordered({ confirmed }))), ['SLOWING', 'ORDERED', 'NOT CONFIRMED']);
   assert.equal(word(ordered({ sending: false })), 'NOT SENDING');
   assert.equal(word(ordered({}, 'holding')), 'HOLDING');
+  assert.equal(word(ordered({ confirmed: null }, 'holding')), 'ORDERED', 'zeros are sent: that is not yet a car that is held');
+  assert.deepEqual(['before', 'unproven'].map((stands) => word(ordered({ confirmed: null, stands }, 'holding'))), ['STANDING', 'STANDING']);
 });
 
 test('the strip: armed where nothing else stands, the order above warnings, a critical alarm above the order', () => {
@@ -58,16 +61,17 @@ test('the strip: armed where nothing else stands, the order above warnings, a cr
     return stripOf(frame, { isSilent: false, paused_s: 0, chain: chainOf({ frame, isSilent: false, silence_s: 0.1, lag_s: 0.1, heard_ms: 0 }) });
   };
   const warning = alarm({ id: 'gps', title: 'GPS drift', priority: 'warning', place: 'snackbar' });
-  assert.deepEqual(strip({ decelerate: slow('armed') }), { kind: 'armed', icon: 'slow', text: 'Armed', end: 'an aid, not an emergency stop', opens: 'log' });
+  assert.deepEqual(strip({ decelerate: slow('armed') }), { kind: 'armed', icon: 'slow', text: 'Armed', end: 'an aid, not an emergency stop', opens: 'alarms' });
   assert.equal(strip({ decelerate: slow('armed'), alarms: [warning] }).text, 'GPS drift');
   assert.equal(strip({ decelerate: slow('safe') }).text, 'No alarms');
-  assert.deepEqual(strip({ decelerate: ordered() }), { kind: 'order', icon: 'slow', text: 'Slowing the car', end: '−1.5 m/s² ordered', opens: 'log' });
+  assert.deepEqual(strip({ decelerate: ordered() }), { kind: 'order', icon: 'slow', text: 'Slowing the car', end: '−1.5 m/s² ordered', opens: 'alarms' });
   assert.equal(strip({ decelerate: ordered(), alarms: [warning] }).end, '−1.5 m/s² · 1 alarm');
   assert.equal(strip({ decelerate: ordered(), alarms: [alarm({ state: 'ACKED' })] }).text, 'Speed above limit');
   assert.equal(strip({ decelerate: ordered(), session: { paused: true } }).kind, 'invert');
   assert.deepEqual([strip({ decelerate: ordered({ confirmed: false }) }).text, strip({ decelerate: ordered({ confirmed: false }) }).kind], [NOT_CONFIRMED, 'crit']);
   assert.equal(stripWords(ordered({ confirmed: null }), 0)?.text, 'Slow-down ordered');
   assert.equal(stripWords(ordered({}, 'holding'), 0)?.end, '0.0 m/s ordered');
+  assert.deepEqual([stripWords(ordered({ confirmed: null }, 'holding'), 0)?.text, stripWords(ordered({ confirmed: null, stands: 'before' }, 'holding'), 0)?.text], ['Slow-down ordered', 'The car stands']);
   assert.equal(stripWords(ordered({ sending: false }), 2)?.text, 'Not sending to the car');
   assert.equal(stripWords(undefined, 0), null);
 });
@@ -79,7 +83,8 @@ test('four steps, each with how much later it was; what is not there is not a nu
   assert.deepEqual(told({ confirmed: null, steps: { ...STEPS, bridge_ms: null, slows_ms: null } }).slice(2), ['On the bridge – wait', 'Car slows – wait']);
   assert.equal(told({ confirmed: false })[3], 'Car slows NOT SEEN crit', 'also where it had slowed before');
   assert.equal(told({ sending: false, steps: { ...STEPS, bridge_ms: null, slows_ms: null }, confirmed: null })[2], 'On the bridge no link crit');
-  assert.equal(told({ steps: { ...STEPS, slows_ms: null } })[3], 'Car slows confirmed ok', 'it stood already');
+  assert.equal(told({ confirmed: null, stands: 'before' })[3], 'Car stands already wait', 'nothing was shown to slow');
+  assert.equal(told({ confirmed: null, stands: 'unproven' })[3], 'Car stands not proven wait');
   assert.match(told({ why: 'Speed above limit', steps: { ...STEPS, pressed_ms: null } })[0] ?? '', /^By itself /);
   assert.equal(told({ why: 'Speed above limit', steps: { ...STEPS, pressed_ms: null } })[2], 'On the bridge +0.01 s ok');
   assert.equal(told({ steps: { pressed_ms: null, server_ms: null, bridge_ms: null, slows_ms: null }, confirmed: null })[0], 'Pressed – wait');
@@ -90,6 +95,7 @@ test('the line beneath the steps: who, why and since when; or what is wrong', ()
   assert.equal(orderWords(order({ why: 'Speed above limit', from_mps: null }), 0).text, 'By itself: Speed above limit, 2.1 s ago');
   assert.deepEqual(orderWords(order({ confirmed: false, sending: false }), 0), { text: NOT_CONFIRMED, kind: 'crit' });
   assert.equal(orderWords(order({ sending: false }), 0).kind, 'crit');
+  assert.match(orderWords(order({ confirmed: null, stands: 'before' }), 0).text, /stood already: there is nothing to slow/);
 });
 
 test('the count-down ends at 0 and is none once the order stands; its sound is of its own', () => {

@@ -287,6 +287,7 @@ async def test_a_radio_gap_hides_old_values_and_its_events_come_exactly_once(pho
             await expect(phone.page.locator("#sheet-alarm")).to_contain_text("Speed above limit")
             await phone.page.locator("#sheet-alarm [data-f=acknowledge]").tap()
             await phone.f("strip").tap()
+            await phone.page.locator("[data-f=screen] button[data-screen=log]").tap()
             raised = phone.page.locator("[data-f=happened] .t", has_text=re.compile("^Speed above limit$"))
             await expect(raised).to_have_count(1)
             await expect(phone.page.locator(".log .gap")).to_have_count(1)

@@ -241,7 +241,7 @@ async def test_a_heading_that_is_not_known_points_nowhere(phone: Phone) -> None:
 
 async def test_every_reason_of_the_phone_is_said_in_words(phone: Phone) -> None:
     async with roaming() as car, looking(phone, car) as it:
-        await expect(it.f("phone-says")).to_have_text("No phone tells its position.")
+        await expect(it.f("phone-says")).to_have_text("No phone is sharing its position.")
         await phone.f("sound-off").tap()  # arms the position too: this phone refuses
         await expect(it.f("phone-says")).to_have_text("The phone was not allowed to tell it.")
         await expect(it.f("verdict-why")).to_have_text("denied")

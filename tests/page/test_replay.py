@@ -72,7 +72,7 @@ async def test_a_link_leads_to_a_moment_and_one_tap_back_to_live(phone: Phone, w
     await expect(page.locator(".gauge .speed")).to_have_text("12.4")
     await expect(page.locator(".replay-date")).to_contain_text("Recorded 1 Jun 2016")
     await expect(page.locator(".replay-line")).to_contain_text("Speed above limit")
-    await expect(page.locator(".replay-line")).to_contain_text("judged anew")
+    await expect(page.locator(".replay-line")).to_contain_text("re-evaluated")
     await expect(page).to_have_title(re.compile("REPLAY"))
     assert "catgraph-replay" in str(await page.locator('link[rel="icon"]').get_attribute("href"))
     await expect(page.locator("#monitor > .rail")).to_be_hidden()

@@ -99,7 +99,7 @@ async def nothing_ordered(thumb: Thumb, car: Canned) -> None:
 
 async def test_slid_and_let_go_it_is_ordered_with_what_proves_that_it_is_new(thumb: Thumb, car: Canned) -> None:
     await expect(thumb.phone.f("strip")).to_have_text("Armedan aid, not an emergency stop")
-    await expect(thumb.phone.f("legend-car")).to_have_text("the car: ARMED")
+    await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: armed")
     await thumb.drag(0.95)
     said = await until_heard(thumb, car, "slow_down")
     assert 0 <= said["pressed_ago_s"] < 0.5
@@ -206,7 +206,7 @@ async def test_a_refusal_is_unmistakable(thumb: Thumb, car: Canned) -> None:
 async def test_off_it_says_why_or_arms(thumb: Thumb, car: Canned) -> None:
     car.state["decelerate"] = slow("not_available", why="/catvehicle/cmd_vel is not on the car.")
     await expect(thumb.slide()).to_contain_text("/catvehicle/cmd_vel is not on the car")
-    await expect(thumb.phone.f("legend-car")).to_have_text("the car: NOT AVAILABLE")
+    await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: not available")
     await thumb.slide().tap()
     sheet = thumb.phone.page.locator("#sheet-slow")
     await expect(sheet).to_contain_text("Slow-down not available")
@@ -218,7 +218,7 @@ async def test_off_it_says_why_or_arms(thumb: Thumb, car: Canned) -> None:
         "An aid, not an emergency stop", "No guard on the car: link loss will NOT slow the car.",
     ):  # fmt: skip
         await expect(sheet).to_contain_text(words)
-    await expect(thumb.phone.f("legend-car")).to_have_text("the car: SAFE")
+    await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: not armed")
     car.refuses["arm"] = "The type of /catvehicle/cmd_vel is not known."
     await sheet.get_by_role("button", name="Arm").tap()
     await expect(sheet).to_contain_text("The type of /catvehicle/cmd_vel is not known.")
@@ -317,7 +317,7 @@ async def test_an_order_that_the_car_does_not_follow_is_on_every_tab(thumb: Thum
         await expect(thumb.phone.f("strip")).to_have_text("NOT CONFIRMED – use the physical stop")
         await expect(thumb.phone.f("order-line")).to_have_text("NOT CONFIRMED – use the physical stop")
     await expect(thumb.phone.page.locator(".order li").last).to_have_text("Car slowsNOT SEEN")
-    await expect(thumb.phone.f("legend-car")).to_have_text("the car: NOT CONFIRMED")
+    await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: not confirmed")
 
 
 async def test_a_viewer_sees_all_of_it_and_orders_nothing(browser: Browser, car: Canned) -> None:
@@ -346,7 +346,7 @@ async def test_a_viewer_sees_all_of_it_and_orders_nothing(browser: Browser, car:
 async def test_when_the_server_falls_silent_nothing_is_armed_any_more(thumb: Thumb, car: Canned) -> None:
     car.silent = True
     await expect(thumb.slide()).to_contain_text("the server does not answer")
-    await expect(thumb.phone.f("legend-car")).to_have_text("the car: NOT KNOWN")
+    await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: not known")
     car.silent = False
     await expect(thumb.slide()).to_have_attribute("data-kind", "armed")
 
@@ -434,7 +434,7 @@ async def test_the_simulated_car_slows_holds_and_is_released(phone: Phone, tmp_p
         ]
         assert after_s == sorted(after_s)
         assert after_s[-1] < 2.0  # from the press to the car's own speed
-        await expect(phone.f("legend-car")).to_have_text("the car: HOLDING", timeout=20_000)
+        await expect(phone.f("legend-car")).to_have_text("slow-down: holding", timeout=20_000)
         await expect(phone.page.locator(".gauge .speed")).to_have_text(re.compile(r"^[−]?0\.\d$"), timeout=20_000)
         await phone.acknowledge_all()
         await phone.f("release").tap()
@@ -451,7 +451,7 @@ async def test_with_another_who_commands_too_it_is_not_confirmed(phone: Phone, t
         await thumb.drag(1.0)
         await expect(phone.f("order-line")).to_have_text("NOT CONFIRMED – use the physical stop")
         await expect(phone.page.locator("#sheet-alarm")).to_be_visible()
-        await expect(phone.f("legend-car")).to_have_text("the car: NOT CONFIRMED")
+        await expect(phone.f("legend-car")).to_have_text("slow-down: not confirmed")
 
 
 @pytest.mark.timeout(120)

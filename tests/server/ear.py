@@ -43,6 +43,9 @@ class Ear:
     def junk_received(self, why: str) -> None:
         self.told.append(("junk", why))
 
+    def large_skipped(self, topic: str | None, size: int) -> None:
+        self.told.append(("large", (topic, size)))
+
     def all(self, kind: str) -> list[Any]:
         return [what for name, what in self.told if name == kind]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from monitor import catalog
@@ -37,9 +37,11 @@ def judged(
     seed: int = 1,
     limits: Mapping[str, float] | None = None,
     phone: bool = False,
+    crew: Callable[[State, float], None] = lambda state, now_s: None,
 ) -> list[Raised]:
     """Every alarm that a drive of so long with these faults raises. `limits` are thresholds by their full names;
-    `phone`: there is one in the car, and it knows where it is.
+    `phone`: there is one in the car, and it knows where it is. `crew(state, now_s)` is called before each tick: what
+    pages tell of themselves.
 
     A fault of the bridge is what a session would see of it: no messages, and the link lost when that is found out.
     """
@@ -75,6 +77,7 @@ def judged(
             return raised
         while tick_s <= now_s:
             state.link(link(tick_s))
+            crew(state, tick_s)
             note(judging.judge(monitor, state, tick_s))
             tick_s += judging.TICK_S
         if any(one.from_s <= now_s < one.to_s for one in bridge.laid):
@@ -90,7 +93,14 @@ def judged(
                 continue
             last_s = now_s
             changed = judging.receive(
-                heard, message.message, now_s, None, reception=reception, state=state, profile=GENERIC
+                heard,
+                message.message,
+                now_s,
+                None,
+                reception=reception,
+                state=state,
+                profile=GENERIC,
+                tyre_rad_per_unit=-0.00536,  # the car that is simulated
             )
             note(judging.judge(monitor, state, now_s, changed))
     return raised

@@ -143,7 +143,14 @@ def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[P
             heard = sources.get(message.topic)
             if heard is not None:
                 changed = judging.receive(
-                    heard, message.message, now_s, None, reception=reception, state=state, profile=GENERIC
+                    heard,
+                    message.message,
+                    now_s,
+                    None,
+                    reception=reception,
+                    state=state,
+                    profile=GENERIC,
+                    tyre_rad_per_unit=0.0,
                 )
                 judge(now_s, changed)
         while tick_s <= now_s:

@@ -206,11 +206,11 @@ NUMBERS: dict[str, tuple[Any, float | str]] = {
     "minus zero": (-0.0, 0.0),
     "a numpy number": (np.float32(1.5), 1.5),
     "a numpy whole number": (np.int16(-3), -3.0),
-    "null": (None, "data is null"),
-    "NaN": (NAN, "data is null"),
-    "infinity": (INF, "data is null"),
-    "minus infinity": (-INF, "data is null"),
-    "a numpy NaN": (np.float32(NAN), "data is null"),
+    "null": (None, "data is not a number"),
+    "NaN": (NAN, "data is not a number"),
+    "infinity": (INF, "data is not a number"),
+    "minus infinity": (-INF, "data is not a number"),
+    "a numpy NaN": (np.float32(NAN), "data is not a number"),
     "a whole number beyond floats": (10**400, "data is too large"),
     "true": (True, "data is not a number"),
     "false": (False, "data is not a number"),
@@ -245,7 +245,7 @@ MISSING: dict[str, tuple[Any, str]] = {
     "a number for a vector": ({"linear": 5}, "linear.x is missing"),
     "a vector as a list": ({"linear": [1, 0, 0]}, "linear.x is missing"),
     "no x": ({"linear": {"y": 1}}, "linear.x is missing"),
-    "x null": ({"linear": {"x": None}}, "linear.x is null"),
+    "x null": ({"linear": {"x": None}}, "linear.x is not a number"),
     "angular a number": ({"linear": {"x": 1}, "angular": 3}, "angular.z is missing"),
 }
 
@@ -368,7 +368,7 @@ def test_odometry_without_a_pose_or_with_half_a_twist() -> None:
     odometry["pose"]["pose"]["orientation"] = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
     assert decode.odometry(odometry).yaw_rad is None
     odometry["pose"]["pose"]["position"]["x"] = None
-    with pytest.raises(Rejected, match=r"^position\.x is null$"):
+    with pytest.raises(Rejected, match=r"^position\.x is not a number$"):
         decode.odometry(odometry)
     del odometry["pose"]["pose"]
     with pytest.raises(Rejected, match=r"^pose is missing$"):
@@ -456,7 +456,7 @@ STATUSES: dict[str, tuple[Any, int | str]] = {
     "half a status": (0.5, "status.status is no status"),
     "no byte": (128, "status.status is no status"),
     "far from it": (1e300, "status.status is no status"),
-    "null": (None, "status.status is null"),
+    "null": (None, "status.status is not a number"),
     "true": (True, "status.status is not a number"),
 }
 
@@ -479,8 +479,8 @@ PLACES: dict[str, tuple[Any, Any, int, tuple[float, float] | str]] = {
     "the date line from the other side": (0.0, -180.0, 0, (0.0, -180.0)),
     "east all the way round": (0.0, 249.1, 0, (0.0, -110.9)),
     "more than round": (0.0, 361.0, 0, "latitude or longitude out of range"),
-    "a number that is none": (None, 0.0, 0, "latitude or longitude is null"),
-    "the other": (0.0, None, 0, "latitude or longitude is null"),
+    "a number that is none": (None, 0.0, 0, "latitude or longitude is not a number"),
+    "the other": (0.0, None, 0, "latitude or longitude is not a number"),
     "no fix, a place": (32.2, -110.9, -1, (32.2, -110.9)),
     "no fix, no place": (None, None, -1, (NAN, NAN)),
     "no fix, half a place": (1e300, None, -1, (NAN, NAN)),
@@ -556,8 +556,8 @@ SCANS: dict[str, tuple[dict[str, Any], str | None]] = {
     "no beams": (scan([]), None),
     "one beam too many": (scan([5.0] * 65536, angle_increment=1e-4), "more than 65535 beams"),
     "all beams in one": (scan([5.0] * 3, angle_increment=0.0), "angle_increment is zero"),
-    "no increment": (scan([5.0] * 3, angle_increment=None), "angle_increment is null"),
-    "no beginning": (scan([5.0] * 3, angle_min=None), "angle_min is null"),
+    "no increment": (scan([5.0] * 3, angle_increment=None), "angle_increment is not a number"),
+    "no beginning": (scan([5.0] * 3, angle_min=None), "angle_min is not a number"),
     "degrees": (scan([5.0] * 181, angle_min=-90.0, angle_max=90.0, angle_increment=1.0), "angles beyond two turns"),
     "round and round": (scan([5.0] * 2000, angle_increment=0.1), "angles beyond two turns"),
     "an angle beyond floats of 32 bits": (scan([5.0], angle_min=1e300), "angles beyond two turns"),
@@ -565,7 +565,7 @@ SCANS: dict[str, tuple[dict[str, Any], str | None]] = {
     "nothing may be measured": (scan([5.0], range_min=5.0, range_max=5.0), "range_min and range_max contradict"),
     "the limits changed over": (scan([5.0], range_min=81.0, range_max=0.1), "range_min and range_max contradict"),
     "below zero": (scan([5.0], range_min=-1.0), "range_min and range_max contradict"),
-    "no limit below": (scan([5.0], range_min=None), "range_min is null"),
+    "no limit below": (scan([5.0], range_min=None), "range_min is not a number"),
     "no limits given": (scan([5.0], range_min=0.0, range_max=0.0), "range_min and range_max contradict"),
     "texts": (scan([5.0, "5.0"]), "ranges holds something that is not a number"),
     "bools": (scan([5.0, True]), "ranges holds something that is not a number"),

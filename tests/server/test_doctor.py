@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import sys
 
+import pytest
+
 from server.bridge.server import RosBridge
 from tests.environment import users_own
 from tests.server.cars import driving
@@ -22,6 +24,7 @@ async def doctor(address: str) -> tuple[int, str, str]:
     return process.returncode, out.decode(), err.decode()
 
 
+@pytest.mark.world(n=17)
 async def test_a_car_is_told_signal_by_signal(bridge: RosBridge) -> None:
     bridge.advertise("/catvehicle/distanceEstimator/dist", "std_msgs/Float64")
     bridge.advertise("/chatter", "std_msgs/String")
@@ -36,6 +39,9 @@ async def test_a_car_is_told_signal_by_signal(bridge: RosBridge) -> None:
     assert "not published" in lines["fuel"]
     assert "/chatter" in out
     assert "Missing or silent: brake" in out
+    assert "Not there, and not needed: " in out
+    assert "fuel" in out.split("Not there, and not needed: ")[1].splitlines()[0]
+    assert "Every signal of the page" not in out
     assert "ROS 1" in out
 
 

@@ -142,7 +142,7 @@ async def test_for_a_mail_it_is_made_into_a_folder(drive: Path, tmp_path: Path) 
     (tmp_path / "into").mkdir()
     told: list[float] = []
     made = await make_export(drive, "csv", tmp_path / "into", told.append)
-    assert made == tmp_path / "into" / f"{ID}.csv.zip"
+    assert made.path == tmp_path / "into" / f"{ID}.csv.zip"
     assert told == sorted(told)
     with pytest.raises(ExportRefused, match="does not exist"):
         await make_export(tmp_path / "nope.mcap", "csv", tmp_path / "into")

@@ -81,8 +81,8 @@ BAD = {
     "too deep": (nested(MAX_DEPTH + 1), "a frame that nests too deep"),
     "1000 deep": (nested(1000), "a frame that nests too deep"),
     "1000 objects deep": (b'{"a":' * 1000 + b"1" + b"}" * 1000, "a frame that nests too deep"),
-    "100 000 deep": (nested(100_000), "text that is not JSON"),
-    "100 000 deep with a bare NaN": (b"[" * 100_000 + b"NaN" + b"]" * 100_000, "text that is not JSON"),
+    "100 000 deep": (nested(100_000), "a message of too many parts"),
+    "100 000 deep with a bare NaN": (b"[" * 100_000 + b"NaN" + b"]" * 100_000, "a message of too many parts"),
     "200 deep with a bare NaN": (b'{"a":NaN,"b":' + b"[" * 200 + b"]" * 200 + b"}", "a frame that nests too deep"),
 }
 
@@ -159,7 +159,7 @@ BOMBS = {
 @pytest.mark.parametrize("payload", BOMBS.values(), ids=BOMBS)
 def test_binary_is_refused_at_once(payload: bytes) -> None:
     began_s = time.perf_counter()
-    with pytest.raises(Unreadable, match="binary noise"):
+    with pytest.raises(Unreadable, match=r"binary noise|too many parts"):
         frames.decode(payload, is_binary=True)
     assert time.perf_counter() - began_s < 0.5
 

@@ -356,7 +356,7 @@ async def test_secure(certificate: Path, secure: ssl.SSLContext, monkeypatch: py
     ear = Ear()
     async with bridging(ssl=secure) as bridge, linked(f"wss://127.0.0.1:{bridge.port}", ear) as link:
         await ear.hears("opened")
-        link.send_now({"op": "publish"})
+        link.send_now({"op": "unsubscribe", "id": "a", "topic": "/a"})
         await until(lambda: bridge.operations)
         await bridge.say({"op": "publish", "topic": "/a", "msg": 1})
         assert await ear.hears("message") == ("/a", 1, None)

@@ -121,21 +121,22 @@ async def test_a_slow_way_is_not_a_silent_one() -> None:
         assert pings
 
 
-async def test_pings_are_few_and_none_where_the_car_talks() -> None:
+async def test_pings_come_at_one_rate_also_where_the_car_talks() -> None:
+    """Each answer bounds how old what comes after it can be."""
     ear = Ear()
     pings: list[float] = []
     async with bridging() as bridge, linked(bridge.address, ear) as link:
         await ear.hears("opened")
         count_pings(bridge, pings)
         await asyncio.sleep(1.1)
-        assert 2 <= len(pings) <= 6
+        assert 4 <= len(pings) <= 13
         assert link.heard_s is not None
         assert time.monotonic() - link.heard_s < 0.4
         pings.clear()
         for _ in range(60):
             await bridge.say({"op": "publish", "topic": "/a", "msg": {}})
             await asyncio.sleep(0.013)
-        assert len(pings) <= 1
+        assert 3 <= len(pings) <= 25
 
 
 def hold_up(seconds: float) -> None:

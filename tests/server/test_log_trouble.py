@@ -67,7 +67,7 @@ async def test_a_damaged_log_stops_no_start(bridge: RosBridge, tmp_path: Path, b
         await raised(one, "speed_limit")
         assert one.states[-1]["log_trouble"] is None
         if body:
-            assert one.events[0]["text"].startswith("The alarm log was damaged: it is set aside as events.damaged-1")
+            assert one.events[0]["text"].startswith("The alarm log was damaged: it is set aside as events.damaged")
         else:
             assert one.events[0]["change"] == "started"
 

@@ -29,6 +29,7 @@ def test_of_a_server_that_nobody_looks_at_nobody_hears_anything() -> None:
         (READY, FRESH_S + 0.01, "silent"),
         (replace(READY, is_visible=False), 0.0, "hidden"),
         (replace(READY, lag_s=BLIND_S), 0.0, None),
+        (replace(READY, is_drawing=False), 0.0, "undrawn"),
         (replace(READY, lag_s=BLIND_S + 0.1), 0.0, "blind"),  # it is heard, and hears nothing itself
         (replace(READY, is_replaying=True), 0.0, "replay"),
         (replace(READY, sound="refused"), 0.0, "sound"),

@@ -26,7 +26,7 @@ def seen(
     scan: LaserScan, *, speed_mps: float | None = 4.2, percent: float | None = 0.0, age_s: float = 0.0
 ) -> Snapshot:
     speed = None if speed_mps is None else Twist(speed_mps=speed_mps, yaw_rate_radps=None)
-    steering = None if percent is None else Steering(percent=percent)
+    steering = None if percent is None else Steering(percent=percent, tyre_rad=percent * -0.00536)
     return known(scan=scan, speed=speed, steering=steering, age_s=age_s)
 
 

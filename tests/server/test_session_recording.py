@@ -18,6 +18,9 @@ from server.recording.folder import RecordingsFolder
 from server.recording.read import open_recording
 from server.recording.standing import read_standing
 from server.rehearsal.told import told_by
+from server.session_recording import SessionRecording
+from server.settings import SettingsFile
+from server.tuning import Tuning
 from tests.page.processes import Process
 from tests.server.cars import driving
 from tests.server.conftest import serving
@@ -304,3 +307,32 @@ def test_which_topics_are_recorded_besides(also: Any, expected: dict[str, str], 
     }
     asked = {"geometry_msgs/msg/Twist", "x/A", "sensor_msgs/msg/PointCloud2", "std_msgs/msg/String"}
     assert choose(offered, without={"/vel"}, also=also, asked=asked) == (expected, left_out)
+
+
+@pytest.mark.world(n=4)
+async def test_a_version_of_ros_that_becomes_known_later_begins_another_part(tmp_path: Path) -> None:
+    """A rosapi that answers late: what came before must not decide how all that follows is kept."""
+    clock = {"s": 0.0}
+    recording = SessionRecording(
+        "car",
+        RecordingsFolder(tmp_path),
+        Tuning(SettingsFile(None)),
+        now=lambda: clock["s"],
+        wall_ms=lambda: 1_700_000_000_000 + round(clock["s"] * 1000),
+    )
+    recording.prepare()
+    recording.link_opened("ws://car:9090")
+    speed = {"linear": {"x": 4.2, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
+    recording.take("/vel", None, speed, clock["s"], 100)
+    recording.ros_version = 2
+    clock["s"] = 0.1
+    recording.tick(clock["s"])
+    recording.take("/vel", "geometry_msgs/msg/Twist", speed, clock["s"], 100)
+    clock["s"] = 0.2
+    recording.tick(clock["s"])
+    await recording.stop()
+    first, second = sorted(tmp_path.rglob("*.mcap"))
+    with open_recording([first]) as source:
+        assert source.ros_version == 1
+    with open_recording([second]) as source:
+        assert source.ros_version == 2

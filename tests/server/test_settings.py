@@ -244,7 +244,11 @@ def test_killed_while_writing_the_old_or_the_new_is_found_never_a_broken_one(tmp
 def test_a_default_of_the_new_kind_of_car_is_not_kept() -> None:
     tuning = Tuning(SettingsFile(None))
     lines = tuning.change(values={LIMIT: 9.0}, topics={}, profile="catvehicle", version=0)
-    assert lines == ["Speed limit: 11 → 9 m/s", "Profile: catvehicle"]
+    assert lines == [
+        "Tyre angle per unit of steering: 0 → -0.00536 rad",
+        "Speed limit: 11 → 9 m/s",
+        "Profile: catvehicle",
+    ]
     assert tuning.as_json()["profile"] == {
         "name": "catvehicle", "title": "CATVehicle", "chosen": "catvehicle", "recognised": "Any car",
     }  # fmt: skip

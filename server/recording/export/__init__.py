@@ -6,13 +6,13 @@ from pathlib import Path
 
 from server.recording.export.formats import FORMATS
 from server.recording.export.outcome import ExportRefused, Progress, nothing
-from server.recording.export.worker import run_worker
+from server.recording.export.worker import Made, run_worker
 
-__all__ = ["ExportRefused", "make_export"]
+__all__ = ["ExportRefused", "Made", "make_export"]
 
 
-async def make_export(path: Path, format: str, into: Path, progress: Progress = nothing) -> Path:
-    """Writes a recording in a format of FORMATS into a folder, by a process of its own; answers the file.
+async def make_export(path: Path, format: str, into: Path, progress: Progress = nothing) -> Made:
+    """Writes a recording in a format of FORMATS into a folder, by a process of its own.
 
     `progress` is told parts from 0 to 1. Raises ExportRefused with one sentence, ValueError for an unknown format,
     OSError. Where it is cancelled the process is ended and leaves nothing behind.
@@ -20,5 +20,4 @@ async def make_export(path: Path, format: str, into: Path, progress: Progress = 
     if format not in FORMATS:
         raise ValueError(f"There is no format {format[:40]!r}.")
     out = into / f"{path.name.partition('.')[0]}.{FORMATS[format].ending}"
-    made = await run_worker([str(path), "--format", format, "--out", str(out)], progress)
-    return made.path
+    return await run_worker([str(path), "--format", format, "--out", str(out)], progress)

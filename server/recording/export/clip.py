@@ -71,7 +71,7 @@ def write_clip(
         with contextlib.suppress(OSError):
             path.with_name(id_of(path) + WRITING).unlink()
         raise
-    outcome.notes += _short(window, first_ns, last_ns)
+    outcome.remarks += _short(window, first_ns, last_ns)
     outcome.notes += _damage(recording, first_ns)
     return outcome
 

@@ -40,13 +40,15 @@ def write_csv_zip(recording: Recording, path: Path, *, progress: Progress = noth
                 table = TABLES[said.signal]
                 for row in table.rows(said.value):
                     tables.add(f"{said.signal}.csv", table.columns, said.at_s, said.stamp_s, row)
-            _own_tables(recording, tables)
+            unfit = _own_tables(recording, tables)
         texts = _settings(recording)
         if not tables.rows and not texts:
             raise ExportRefused("Nothing in this recording can be put into tables.")
         outcome.entries = sum(tables.rows.values())
-        outcome.notes = _notes(drive)
-        about = readme(drive, [Written(name=name, rows=rows) for name, rows in tables.rows.items()], outcome.notes)
+        outcome.notes = [*_without_table(drive), *unfit, *drive.losses()]
+        outcome.remarks = [f"{note}." for note in recording.notes]
+        notes = [*outcome.remarks, *outcome.notes]
+        about = readme(drive, [Written(name=name, rows=rows) for name, rows in tables.rows.items()], notes)
         _pack(path, Path(folder), list(tables.rows), {"README.txt": about, **texts}, progress)
     return outcome
 
@@ -98,13 +100,20 @@ def when(at_s: float) -> str:
         return f"{at_s:.6f}"
 
 
-def _own_tables(recording: Recording, tables: _Tables) -> None:
+def _own_tables(recording: Recording, tables: _Tables) -> list[str]:
+    """Writes them; what of them is no row, as sentences."""
+    unfit = 0
     for _, event in recording.own("/catgraph/alarms"):
-        with contextlib.suppress(KeyError, TypeError, ValueError, OverflowError):  # no event as we write them
-            tables.add_whole("alarms.csv", ALARM_COLUMNS, event_row(event))
+        try:
+            row = event_row(event)
+        except (KeyError, TypeError, ValueError, OverflowError):  # no event as we write them
+            unfit += 1
+            continue
+        tables.add_whole("alarms.csv", ALARM_COLUMNS, row)
     for topic, table in OWN_TABLES.items():
         for at_s, told in recording.own(topic):
             tables.add(table.file, (*table.columns, "details"), at_s, None, _own_row(table, told))
+    return [f"{unfit} events of the log are left out: they have no time or no number."] if unfit else []
 
 
 def _own_row(table: OwnTable, told: Mapping[str, Any]) -> list[Any]:
@@ -133,23 +142,12 @@ def _settings(recording: Recording) -> dict[str, str]:
     return texts
 
 
-def _notes(drive: Drive) -> list[str]:
-    recording = drive.recording
-    notes = [f"{note}." for note in recording.notes]
-    notes += [
+def _without_table(drive: Drive) -> list[str]:
+    return [
         f"{topic} ({kind}, {count} messages) fills no signal and has no table."
         for topic, (kind, count) in drive.other_topics().items()
+        if count
     ]
-    notes += [
-        f"{tally.rejected} of {tally.received} messages for {signal} were no proper ones: {tally.last_reason}."
-        for signal, tally in sorted(drive.reception.by_signal.items())
-        if tally.rejected
-    ]
-    notes += [
-        f"{count} messages on {topic} could not be decoded: {recording.why_rejected.get(topic, 'not JSON')}."
-        for topic, count in sorted(recording.rejected.items())
-    ]
-    return notes + [f"{sentence}." for sentence in recording.damage]
 
 
 def _pack(path: Path, folder: Path, names: Sequence[str], texts: Mapping[str, str], progress: Progress) -> None:

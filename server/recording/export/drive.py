@@ -71,6 +71,22 @@ class Drive:
             topic: (info.type, info.count) for topic, info in sorted(self.recording.topics.items()) if topic not in used
         }
 
+    def losses(self) -> list[str]:
+        """What was read and could not be used, in sentences; complete once all was read."""
+        recording = self.recording
+        return [
+            *(
+                f"{tally.rejected} of {tally.received} messages for {signal} were no proper ones: {tally.last_reason}."
+                for signal, tally in sorted(self.reception.by_signal.items())
+                if tally.rejected
+            ),
+            *(
+                f"{count} messages on {topic} could not be decoded: {recording.why_rejected.get(topic, 'not JSON')}."
+                for topic, count in sorted(recording.rejected.items())
+            ),
+            *(f"{sentence}." for sentence in recording.damage),
+        ]
+
     def _sources_by_topic(self, signals: Collection[str] | None) -> dict[str, tuple[Source, ...]]:
         """Topic as the recording spells it → the signals it fills."""
         wanted: dict[str, tuple[Source, ...]] = {}

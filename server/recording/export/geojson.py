@@ -36,7 +36,7 @@ def write_geojson(recording: Recording, path: Path, *, progress: Progress = noth
             file.write(separator + orjson.dumps(_alarm(place)))
             separator = b",\n"
         file.write(b"\n]}\n")
-    return Outcome(entries=tracks.points, notes=tracks.notes)
+    return Outcome(entries=tracks.points, notes=tracks.notes, remarks=tracks.remarks)
 
 
 def _lines(kind: str, name: str, track: Track) -> Iterator[dict[str, Any]]:

@@ -42,7 +42,7 @@ def write_gpx(recording: Recording, path: Path, *, progress: Progress = nothing)
         for name, track in tracks.phones.items():
             _track(file, name, "phone", track)
         file.write("</gpx>\n")
-    return Outcome(entries=tracks.points, notes=tracks.notes)
+    return Outcome(entries=tracks.points, notes=tracks.notes, remarks=tracks.remarks)
 
 
 def _track(file: TextIO, name: str, kind: str, track: Track) -> None:

@@ -17,7 +17,10 @@ class Outcome:
     """A file was written."""
 
     entries: int = 0  # messages, rows, points: whatever the format counts
-    notes: list[str] = field(default_factory=list)  # what is not in it, and why, in sentences for a person
+    notes: list[str] = field(
+        default_factory=list
+    )  # what is not in it, and why, in sentences for a person; empty: whole
+    remarks: list[str] = field(default_factory=list)  # what else is to be known of it; nothing is missing for it
 
 
 def nothing(part: float) -> None:

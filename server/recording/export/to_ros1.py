@@ -17,6 +17,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from server.recording.definition_bounds import bounded
 from server.recording.definitions import definitions_of, times
 from server.recording.errors import Undecodable
 from server.recording.export.ros1_definition import md5sum
@@ -68,7 +69,7 @@ def _is_told_by_a_bridge(channel: Channel) -> bool:
     if channel.type not in _noetic().fielddefs or "=" in channel.definition.replace("=" * 80, ""):
         return False
     try:
-        told = _store(dict(get_types_from_msg(channel.definition, channel.type)))
+        told = _store(dict(get_types_from_msg(bounded(channel.definition), channel.type)))
         return bool(is_same_wireformat(told, _noetic(), channel.type, channel.type)) and _names(told, channel.type) == (
             _names(_noetic(), channel.type)
         )

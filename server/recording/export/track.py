@@ -84,7 +84,8 @@ class Tracks:
     car: Track = field(default_factory=Track)
     phones: dict[str, Track] = field(default_factory=dict)
     alarms: list[Place] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)  # what is not in it
+    remarks: list[str] = field(default_factory=list)
 
     @property
     def points(self) -> int:
@@ -103,9 +104,9 @@ def tracks_of(drive: Drive, progress: Progress = nothing) -> Tracks:
     if not tracks.points:
         raise ExportRefused("No position was recorded in this drive: there is no track to export.")
     if not tracks.car.at_s:
-        tracks.notes.append("The car told no position: only that of the phone is in the file.")
+        tracks.remarks.append("The car told no position: only that of the phone is in the file.")
     _alarms(drive, tracks)
-    tracks.notes += [f"{sentence}." for sentence in recording.damage]
+    tracks.notes += drive.losses()
     return tracks
 
 
@@ -119,19 +120,26 @@ def when(at_s: float) -> str:
 
 
 def _phones(drive: Drive, tracks: Tracks) -> None:
+    unfit, beyond = 0, set()
     for at_s, told in drive.recording.own("/catgraph/phone"):
         fix = told.get("fix")
         if not isinstance(fix, Mapping):
             continue
         lat_deg, lon_deg = _number(fix.get("lat_deg")), _number(fix.get("lon_deg"))
         if lat_deg is None or lon_deg is None or not _is_place(lat_deg, lon_deg):
+            unfit += 1
             continue
         name = str(told.get("phone") or "phone")[:80]
         if name not in tracks.phones and len(tracks.phones) >= MOST_PHONES:
+            beyond.add(name)
             continue
         age_s = _number(fix.get("age_s")) or 0.0
         measured_s = at_s - age_s if 0.0 <= age_s <= 60.0 else at_s
         tracks.phones.setdefault(name, Track()).add(measured_s, lat_deg, lon_deg, _number(fix.get("alt_m")))
+    if unfit:
+        tracks.notes.append(f"{unfit} positions of phones are left out: they are no places on the Earth.")
+    if beyond:
+        tracks.notes.append(f"{len(beyond)} phones are left out: {MOST_PHONES} are the most.")
 
 
 def _alarms(drive: Drive, tracks: Tracks) -> None:

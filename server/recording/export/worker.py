@@ -28,7 +28,8 @@ class Made:
 
     path: Path
     entries: int
-    notes: list[str]  # what is not in it, and why
+    notes: list[str]  # what is not in it, and why, and what else is to be known of it
+    is_whole: bool = True  # False: something of the recording is not in it
 
 
 async def run_worker(arguments: Sequence[str], progress: Progress) -> Made:
@@ -56,7 +57,12 @@ async def run_worker(arguments: Sequence[str], progress: Progress) -> Made:
         if said:
             log.error("an export failed: %s", said)
         raise ExportRefused(str(answer["refused"]))
-    return Made(path=Path(answer["done"]), entries=int(answer["entries"]), notes=[str(n) for n in answer["notes"]])
+    return Made(
+        path=Path(answer["done"]),
+        entries=int(answer["entries"]),
+        notes=[str(note) for note in answer["notes"]],
+        is_whole=bool(answer["is_whole"]),
+    )
 
 
 async def _listen(process: asyncio.subprocess.Process, progress: Progress) -> dict[str, Any] | None:

@@ -79,8 +79,12 @@ def test_a_blind_laser_says_nothing_of_obstacles() -> None:
 def test_steering_looks_round_the_bend() -> None:
     wall = (60.0, 0.0, 50.0)
     scan = sweep([(7.0, 1.9, 0.4), wall])
-    straight = known(scan=scan, speed=Twist(speed_mps=4.5, yaw_rate_radps=None), steering=Steering(percent=0.0))
-    left = known(scan=scan, speed=Twist(speed_mps=4.5, yaw_rate_radps=None), steering=Steering(percent=-20.0))
+    straight = known(
+        scan=scan, speed=Twist(speed_mps=4.5, yaw_rate_radps=None), steering=Steering(percent=0.0, tyre_rad=0.0)
+    )
+    left = known(
+        scan=scan, speed=Twist(speed_mps=4.5, yaw_rate_radps=None), steering=Steering(percent=-20.0, tyre_rad=0.1072)
+    )
     assert ask("obstacle", straight).verdict == "ok"
     assert ask("obstacle", left).verdict == "fault"
 

@@ -19,9 +19,11 @@ from monitor.rates import Rate
 from monitor.reach import ReachFacts
 from monitor.recorder import RecorderFacts
 from monitor.repeats import Repeats
+from monitor.slow_proof import SlowProof
 from monitor.slowing import SlowingFacts
 from monitor.stamps import ClockJump
 from monitor.state import Reading, Snapshot
+from monitor.unusable import Unusable
 from monitor.values import (
     Component,
     Diagnostics,
@@ -73,6 +75,18 @@ def diagnosed(*levels: int) -> Snapshot:
 
 def seen(gap_m: float) -> LaserScan:
     return sweep([(gap_m, 0.0, 0.5), (60.0, 0.0, 50.0)])
+
+
+def late(late_s: float) -> Snapshot:
+    return replace(known(speed=DRIVES, link=replace(LINK, late_s=late_s)), heard_s=NOW_S)
+
+
+def useless(*signals: str, for_s: float) -> Snapshot:
+    """These signals come, and nothing they say can be used."""
+    one = Unusable(
+        reason="linear.x is not a number", at_s=NOW_S, since_s=NOW_S - for_s, count=20, horizon_s=1.0, period_s=0.05
+    )
+    return replace(known(), unusable=dict.fromkeys(signals, one))
 
 
 def one(name: str, *, age_s: float = 0.0, stamp_s: float | None = None, **more: Any) -> Reading[Any]:
@@ -145,8 +159,8 @@ def ordered(mps: float, slope_mps2: float | None = 0.0, *, age_s: float = 0.0) -
     return with_more(snapshot, readings={**snapshot.readings, "command": command}, speed_slope_mps2=slope_mps2)
 
 
-def slowed(slope_mps2: float, **facts: Any) -> Snapshot:
-    """A car that drives 5 m/s while 2 m/s are ordered."""
+def slowed(slope_mps2: float, *, shown: bool = True, **facts: Any) -> Snapshot:
+    """A car that drives 5 m/s while 2 m/s are ordered; `shown`: its speed has shown that the order slows it."""
     said: dict[str, Any] = {
         "is_armed": True,
         "topic": "/cmd_vel",
@@ -155,7 +169,9 @@ def slowed(slope_mps2: float, **facts: Any) -> Snapshot:
         "deceleration_mps2": 1.5,
         "commanded_mps": 2.0,
     }
-    return with_more(known(NOW_S, speed=DRIVES), speed_slope_mps2=slope_mps2, slowing=SlowingFacts(**said | facts))
+    order = SlowingFacts(**said | facts)
+    proof = SlowProof(ordered_s=order.ordered_s, shown="slows" if shown else None, shown_s=NOW_S - 1.2)
+    return with_more(known(NOW_S, speed=DRIVES), speed_slope_mps2=slope_mps2, slowing=order, slow_proof=proof)
 
 
 def silent_for(seconds: float, *, proved: bool = True) -> Snapshot:
@@ -226,8 +242,23 @@ ROWS: dict[str, Row | Callable[[str], Row]] = {
         fault=linked(connected_s=NOW_S - 9.0, last_message_s=None),
         unknown=linked(connected_s=NOW_S - 1.0, last_message_s=None),
     ),
+    "bridge_fault": Row(
+        ok=linked(), fault=linked(behind_title="rosapi has ended."), unknown=linked(phase="connecting")
+    ),
     "link_lost": Row(ok=linked(), fault=linked(phase="lost"), unknown=linked(phase="connecting")),
     "car_silent": Row(ok=silent_for(0.0), fault=silent_for(2.0), unknown=silent_for(1.45, proved=False)),
+    "signal_unusable": lambda signal: Row(
+        ok=known(**{signal: RESTING[signal]}),
+        fault=useless(signal, for_s=1.5),
+        unknown=useless(signal, for_s=0.5),
+    ),
+    "car_unusable": Row(
+        ok=useless("speed", for_s=5.0),
+        fault=useless("speed", "brake", "steering", for_s=1.5),
+        unknown=useless("speed", "brake", "steering", for_s=0.5),
+    ),
+    "link_late": Row(ok=linked(late_s=0.2), fault=late(1.5), unknown=linked(late_s=None)),
+    "link_late_moving": Row(ok=late(1.5), fault=late(2.5), unknown=linked(late_s=2.5)),
     "clock_jump": Row(
         ok=clock(0.0),
         fault=with_more(clock(0.0), clock_jump=ClockJump(at_s=NOW_S, by_s=-30.0, signals=("position",))),
@@ -267,7 +298,7 @@ ROWS: dict[str, Row | Callable[[str], Row]] = {
     "slow_down_unconfirmed": Row(
         ok=slowed(-1.4),
         fault=slowed(-0.2),
-        unknown=slowed(-0.2, sending_s=NOW_S - 0.4),
+        unknown=slowed(-0.2, shown=False, sending_s=NOW_S - 0.4),
     ),
     "slow_down_hold_ended": Row(
         ok=slowed(-1.4), fault=slowed(-1.4, ended_at_longest_s=NOW_S - 1.0), unknown=known(speed=DRIVES)

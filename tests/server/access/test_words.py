@@ -208,7 +208,7 @@ def test_a_damaged_list_lets_nobody_in_and_is_kept(tmp_path: Path, content: str)
     assert devices.all() == []
     assert len(devices.signing_key) == 64
     if content != "null":
-        assert (tmp_path / "devices.json.damaged").read_text() == content
+        assert (tmp_path / "devices.damaged.json").read_text() == content
 
 
 def test_a_file_that_others_could_read_is_closed_and_a_link_is_not_followed(tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ const [velocities, [scan], [echo], points] = await hearing;
 
 const add = new Service({ ros, name: "/add", serviceType: "demo/Add" });
 const sum = await new Promise((resolve, reject) => add.callService({ a: 2, b: 3 }, resolve, reject));
-const none = new Service({ ros, name: "/rosapi/get_param", serviceType: "rosapi/GetParam" });
+const none = new Service({ ros, name: "/rosapi/not_there", serviceType: "rosapi/GetParam" });
 const failure = await new Promise((resolve) => none.callService({ name: "/x" }, () => resolve(null), resolve));
 const details = await ask("getMessageDetails", "geometry_msgs/Twist");
 const wrong = new Topic({ ros, name: "/vel", messageType: "std_msgs/Float64" });

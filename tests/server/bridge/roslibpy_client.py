@@ -36,7 +36,7 @@ def main(transport: str, port: int) -> dict[str, Any]:
     wait_for(lambda: len(velocities) >= VELOCITIES and len(scans) >= SCANS and echoes)
     failures: list[Any] = []
     failed = threading.Event()
-    roslibpy.Service(ros, "/rosapi/get_param", "rosapi/GetParam").call(
+    roslibpy.Service(ros, "/rosapi/not_there", "rosapi/GetParam").call(
         roslibpy.ServiceRequest({"name": "/x"}),
         lambda _: failed.set(),
         lambda why: (failures.append(why), failed.set()),

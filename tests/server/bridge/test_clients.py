@@ -91,7 +91,7 @@ async def test_roslibpy(car: RosBridge, port: int, transport: str) -> None:
     assert_driven(found)
     assert abs(found["time"] - car.now()) < 20
     assert found["details"] == ["linear", "angular"]
-    assert found["failures"] == ["Service /rosapi/get_param does not exist"]
+    assert found["failures"] == ["Service /rosapi/not_there does not exist"]
     assert found["complaints"] == []
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from server.mail.mailer import Mailer
 from server.mail.order import Letter, Order
+from server.recording.export import Made
 
 START_MS = 1_790_000_000_000
 OVER = ("sent", "failed", "cancelled")
@@ -21,6 +22,7 @@ class Shelf:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self.notes: list[str] = []  # what of a recording its exports do not hold
         folder.mkdir(parents=True, exist_ok=True)
 
     def put(self, name: str, content: bytes = b"a drive") -> Path:
@@ -32,13 +34,13 @@ class Shelf:
         path = self.folder / f"{recording}.mcap"
         return path if path.is_file() else None
 
-    async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Path:
+    async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Made:
         if format == "bag":
             raise ValueError("its messages have no definition")
         made = into / f"{path.stem}.{'zip' if format == 'csv' else format}"
         shutil.copyfile(path, made)
         progress(1.0)
-        return made
+        return Made(path=made, entries=1, notes=self.notes, is_whole=not self.notes)
 
 
 class Clock:

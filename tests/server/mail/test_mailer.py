@@ -17,6 +17,7 @@ import pytest
 from server.mail.mailer import Mailer, MailRefused
 from server.mail.pauses import pause_s
 from server.mail.settings import BadMailSetting, MailSettingsFile
+from server.recording.export import Made
 from tests.server.mail.mailing import START_MS, Clock, Shelf, mailing, order, over, settings, until
 from tests.server.mail.post import Post, certificates, posting
 
@@ -293,7 +294,7 @@ async def test_what_is_made_can_be_cancelled(tmp_path: Path, shelf: Shelf, post:
     begun, ended = asyncio.Event(), asyncio.Event()
 
     class Slow(Shelf):
-        async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Path:
+        async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Made:
             progress(0.5)
             begun.set()
             try:

@@ -484,4 +484,4 @@ async def test_a_thousand_recordings_are_listed_fast(tmp_path: Path) -> None:
 
 
 def _found(entry: Entry, sketched: dict[str, Any]) -> Entry:
-    return replace(entry, found={"survey": 1, "length_s": 1.0, "sketch": sketched})
+    return replace(entry, found={"survey": 2, "length_s": 1.0, "sketch": sketched})

@@ -192,7 +192,7 @@ async def test_what_is_no_http_is_answered_with_all_headers() -> None:
 
 async def test_one_address_gets_so_many_connections(monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of this machine are not counted, and a test has no other: for it, this machine is another."""
-    monkeypatch.setattr(requests, "_is_loopback", lambda _: False)
+    monkeypatch.setattr(requests, "is_loopback", lambda _: False)
     async with serving(Config(limits=Limits(connections=5))) as base, contextlib.AsyncExitStack() as stack:
         lines = [await stack.enter_async_context(plugged(base)) for _ in range(5)]
         async with plugged(base) as (reader, _):
@@ -210,7 +210,7 @@ async def test_one_address_gets_so_many_connections(monkeypatch: pytest.MonkeyPa
     [("127.0.0.1", True), ("::1", True), ("192.168.4.2", False), ("fe80::1%eth0", False), ("", False)],
 )
 def test_only_loopback_is_this_machine(address: str, is_here: bool) -> None:
-    assert requests._is_loopback(address) is is_here
+    assert requests.is_loopback(address) is is_here
 
 
 def test_what_is_taken_for_granted_of_h11() -> None:

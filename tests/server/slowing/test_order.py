@@ -165,10 +165,14 @@ def test_a_ramp_that_was_cut_begins_anew_at_the_measured_speed() -> None:
     assert (again.speed_mps, again.tyre_rad) == (5.5, -0.2)
 
 
-@pytest.mark.parametrize(("was_sent", "begins_mps", "tyre_rad"), [(True, 6.0, 0.1), (False, 0.0, 0.0)])
-def test_without_a_speed_it_begins_at_the_last_command_or_at_zero(
-    was_sent: bool, begins_mps: float, tyre_rad: float
-) -> None:
+def test_without_a_tyre_angle_nothing_is_commanded() -> None:
+    life = SlowDown()
+    begun(life)
+    assert life.next(Car(speed_mps=6.0, tyre_rad=None), 10.0) is None
+
+
+@pytest.mark.parametrize(("was_sent", "begins_mps"), [(True, 6.0), (False, 0.0)])
+def test_without_a_speed_it_begins_at_the_last_command_or_at_zero(was_sent: bool, begins_mps: float) -> None:
     life = SlowDown()
     begun(life)
     if was_sent:
@@ -176,9 +180,9 @@ def test_without_a_speed_it_begins_at_the_last_command_or_at_zero(
         assert said is not None
         life.sent(said, 10.0)
         life.cut()
-    blind = life.next(Car(speed_mps=None, tyre_rad=None), 12.0)
+    blind = life.next(Car(speed_mps=None, tyre_rad=None if was_sent else 0.1), 12.0)
     assert blind is not None
-    assert (blind.speed_mps, blind.tyre_rad) == (begins_mps, tyre_rad)
+    assert (blind.speed_mps, blind.tyre_rad) == (begins_mps, 0.1)
 
 
 def test_only_the_order_that_is_named_is_released() -> None:

@@ -172,6 +172,39 @@ async def test_who_connects_and_says_nothing_is_let_go(served: Field, monkeypatc
     writer.close()
 
 
+@pytest.mark.world(n=24)
+@pytest.mark.parametrize("sent", [b"", b"\x16\x03\x01", b"GET / HT"])
+async def test_one_address_gets_so_many_connections_handshakes_included(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sent: bytes
+) -> None:
+    """Those of this machine are not counted, and a test has no other: for it, this machine is another."""
+    config = Config(data=tmp_path, tls=Tls(mode="auto"), limits=Limits(connections=5))
+    secured = secure(config)
+    assert secured is not None
+    async with field(secured, config) as one:
+        monkeypatch.setattr(requests, "is_loopback", lambda _: False)
+        held = []
+        for _ in range(5):
+            held.append(await asyncio.open_connection("127.0.0.1", one.port))
+            held[-1][1].write(sent)
+        await asyncio.sleep(0.1)
+        for _ in range(3):
+            reader, writer = await asyncio.open_connection("127.0.0.1", one.port)
+            async with asyncio.timeout(3):
+                with contextlib.suppress(ConnectionError):
+                    assert await reader.read() == b"", "hung up on, before any handshake"
+            writer.close()
+        for _, writer in held:
+            writer.close()
+        async with asyncio.timeout(10), one.client() as client:
+            while True:
+                try:
+                    assert (await client.get("/api/health")).status_code == 200
+                    break
+                except httpx.TransportError:
+                    await asyncio.sleep(0.05)
+
+
 class Roaming:
     """A laptop that is carried from one network to another."""
 

@@ -24,7 +24,7 @@ from tests.server.recording.export.ours import OurFile
 from tests.server.recording.made import BEGAN_MS, record
 
 DRIVE, STILL = "car_20260921T141320Z", "car_20260921T151320Z"
-JOB = {"job", "of", "format", "state", "progress", "sentence", "notes", "size_bytes", "recording"}
+JOB = {"job", "of", "format", "state", "progress", "sentence", "notes", "is_whole", "size_bytes", "recording"}
 
 
 @pytest.fixture(scope="module")

@@ -116,6 +116,7 @@ async def serving(upstream: MapUpstream, data: Path, clock: Clock | None = None,
             yield Server(client, clock)
     finally:
         app.state.running.ground.close()
+        app.state.running.folder.close()
 
 
 def drawn(path: str) -> bytes:

@@ -7,9 +7,11 @@ import time
 
 import rclpy
 from geometry_msgs.msg import Twist
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.clock import Clock, ClockType
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node as RosNode
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String, UInt32
 
 from ocu_guard import words
@@ -18,12 +20,18 @@ from ocu_guard.guard import DECELERATION_MPS2, HEARTBEAT_S, Command, Guard
 
 class Node(RosNode):
     """Runs in one thread, so nothing is locked. Ticks by the steady clock: the guard must not stand still with a
-    simulated one."""
+    simulated one.
+
+    Subscriptions are volatile: rosbridge publishes transient local, and a guard that starts again must not receive the
+    operator's commands of before. Controllers and the speed are subscribed best effort: a reliable subscription
+    receives nothing from a best-effort publisher, the usual one for measurements.
+    """
 
     def __init__(self) -> None:
         super().__init__("ocu_guard")
-        self.declare_parameter("deceleration_mps2", DECELERATION_MPS2)
-        self.declare_parameter("heartbeat_s", HEARTBEAT_S)
+        any_number = ParameterDescriptor(dynamic_typing=True)  # else `deceleration_mps2:=3` is refused: an integer
+        self.declare_parameter("deceleration_mps2", DECELERATION_MPS2, any_number)
+        self.declare_parameter("heartbeat_s", HEARTBEAT_S, any_number)
         self._guard = Guard(
             float(self.get_parameter("deceleration_mps2").value), float(self.get_parameter("heartbeat_s").value)
         )
@@ -32,14 +40,16 @@ class Node(RosNode):
         self._cmd_vel = self.create_publisher(Twist, words.CMD_VEL, 1)
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._state = self.create_publisher(String, words.STATE, kept)
-        for topic, kind, hear in (
-            (words.CONTROLLER, Twist, self._controller),
-            (words.OPERATOR, Twist, self._operator),
-            (words.HEARTBEAT, UInt32, self._heartbeat),
-            (words.RELEASE, UInt32, self._release),
-            (words.SPEED, Twist, self._speed),
+        reliable = QoSProfile(depth=1)
+        best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        for topic, kind, receive, qos in (
+            (words.CONTROLLER, Twist, self._controller, best_effort),
+            (words.OPERATOR, Twist, self._operator, reliable),
+            (words.HEARTBEAT, UInt32, self._heartbeat, reliable),
+            (words.RELEASE, UInt32, self._release, reliable),
+            (words.SPEED, Twist, self._speed, best_effort),
         ):
-            self.create_subscription(kind, topic, hear, 1)
+            self.create_subscription(kind, topic, receive, qos)
         self.create_timer(1 / words.TICK_HZ, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _tick(self) -> None:
@@ -82,7 +92,7 @@ def main() -> None:
     node = Node()
     try:
         rclpy.spin(node)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, ExternalShutdownException):  # Ctrl-C, and SIGTERM
         pass
     finally:
         node.destroy_node()

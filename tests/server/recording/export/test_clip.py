@@ -131,7 +131,7 @@ def test_what_of_it_was_not_recorded_is_said(
     outcome = cut(drive, tmp_path / "clip.mcap", at_s)
     with open_recording([tmp_path / "clip.mcap"]) as clip:
         assert clip.topics["/n"].count == count
-    assert outcome.notes == notes
+    assert (outcome.notes, outcome.remarks) == ([], notes)
 
 
 @pytest.mark.parametrize("at_s", [-3.1, 22.0, 1e6])

@@ -163,8 +163,8 @@ def test_a_phone_alone_is_a_track_and_alarms_without_a_place_are_counted(tmp_pat
     drive: list[Row] = [(0.0, "/catvehicle/vel", TWIST, {"linear": {"x": 1.0}})]
     root, outcome = gpx(made(tmp_path, drive, TOLD), tmp_path)
     assert [t.findtext("g:type", namespaces=GPX) for t in root.findall("g:trk", GPX)] == ["phone"]
+    assert outcome.remarks == ["The car told no position: only that of the phone is in the file."]
     assert outcome.notes == [
-        "The car told no position: only that of the phone is in the file.",
         "1 alarm was raised while the car's position was not known, and cannot be drawn.",
     ]
 

@@ -1,0 +1,138 @@
+"""Is the link too slow, so that what comes is old when it comes?"""
+
+from __future__ import annotations
+
+from monitor.check import (
+    Action,
+    AlarmSpec,
+    Check,
+    Finding,
+    Limits,
+    Place,
+    Priority,
+    Quantity,
+    Scope,
+    Sound,
+    absent,
+    fault,
+    ok,
+    threshold,
+    unknown,
+)
+from monitor.inhibition import GRACE_S
+from monitor.motion import MOVES_ABOVE_MPS
+from monitor.state import Snapshot
+
+QUIET_S = 2.0  # nothing for longer than this and the delay: that is silence, which has its own alarms
+HYSTERESIS = 0.7
+
+
+class LateLimits(Limits):
+    late_s: float = threshold(
+        1.0, "Messages late by", unit="s", low=0.3, high=10.0, step=0.1, help="From the car to this server."
+    )
+    critical_s: float = threshold(
+        2.0,
+        "Critical while moving, late by",
+        unit="s",
+        low=0.5,
+        high=20.0,
+        step=0.1,
+        help="Once the car moves, or may move.",
+    )
+
+
+def late(snapshot: Snapshot, limits: LateLimits, was_active: bool) -> Finding:
+    return _judge(snapshot, limits.late_s, was_active)
+
+
+def late_moving(snapshot: Snapshot, limits: LateLimits, was_active: bool) -> Finding:
+    found = _judge(snapshot, limits.critical_s, was_active)
+    speed = snapshot.get("speed")
+    if speed is None:
+        return absent("Whether the car moves is not known", brief="no speed")
+    if abs(speed.value.speed_mps) <= MOVES_ABOVE_MPS:
+        return ok("The car stood when it was last measured")
+    return found
+
+
+def _judge(snapshot: Snapshot, limit_s: float, was_active: bool) -> Finding:
+    link, now_s = snapshot.link, snapshot.now_s
+    if link.phase != "monitoring" or link.late_s is None:
+        return absent("How late messages are is not known", brief="not known")
+    late_s = link.late_s
+    text = f"{late_s:.1f} s late"
+    if late_s <= limit_s * (HYSTERESIS if was_active else 1.0):
+        return ok(f"Messages come {text}")
+    heard_s = max((at_s for at_s in (link.last_message_s, snapshot.heard_s) if at_s is not None), default=None)
+    if heard_s is None or now_s - heard_s > QUIET_S + late_s:
+        return unknown("No message comes", short="silent")
+    rest = f". {link.reduced}" if link.reduced else ""
+    return fault(
+        f"{text}: the link is too slow{rest}",
+        brief=text,
+        measured=Quantity(label="Late", value=late_s, unit="s"),
+        limit=Quantity(label="Allowed", value=limit_s, unit="s"),
+        causes=("link",),
+    )
+
+
+def is_harmless(snapshot: Snapshot, limits: LateLimits) -> bool:
+    late_s = snapshot.link.late_s
+    return late_s is None or late_s <= min(limits.late_s, limits.critical_s)
+
+
+def _alarm(priority: Priority, place: Place, sound: Sound, advice: str, *, by: tuple[str, ...]) -> AlarmSpec:
+    return AlarmSpec(
+        title="The link is too slow",
+        priority=priority,
+        place=place,
+        sound=sound,
+        needs_ack=True,
+        on_delay_s=0.5,  # a hiccup of the radio is over by then
+        off_delay_s=3.0,
+        actions=(Action.ACKNOWLEDGE,),
+        advice=advice,
+        inhibited_by=by,
+        grace_s=GRACE_S,
+    )
+
+
+CHECKS = (
+    Check(
+        id="link_late",
+        label="Link delay",
+        tile="Link",
+        order=120,
+        group="link_late",
+        alarm=_alarm(
+            Priority.WARNING,
+            Place.SNACKBAR,
+            Sound.MEDIUM,
+            "What is shown is as old as it says: wait, or bring car and server nearer together.",
+            by=("link_late_moving", "link_lost"),
+        ),
+        limits=LateLimits,
+        find=late,
+        is_harmless=is_harmless,
+        scope=Scope.LINK,
+    ),
+    Check(
+        id="link_late_moving",
+        label="Link delay, moving",
+        tile="Link",
+        order=120,
+        group="link_late",
+        alarm=_alarm(
+            Priority.CRITICAL,
+            Place.DIALOG,
+            Sound.HIGH,
+            "The car is not where it is shown: watch the car.",
+            by=("link_lost",),
+        ),
+        limits=LateLimits,
+        find=late_moving,
+        is_harmless=is_harmless,
+        scope=Scope.LINK,
+    ),
+)

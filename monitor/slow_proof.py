@@ -1,0 +1,354 @@
+"""Whether the car's own speed shows that an order slows it: a change that the order explains.
+
+Before an order the car may cruise, accelerate, brake or coast. All of that goes on without the order and proves
+nothing. The speeds are therefore explained twice: by a motion that changed at most once, and before the order could
+act, and by the same with one change more, after the first command. The order is shown where the second explanation is
+far better than the noise allows, the car now brakes with a fair share of what was ordered, and its speed is clearly
+below where its motion before led (a likelihood-ratio test for a change of slope, after Quandt, JASA 53, 1958).
+
+A car that reaches standstill where its motion before did not lead to one is shown to have stopped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from monitor.motion import STANDS_BELOW_MPS
+from monitor.slowing import SlowingFacts
+
+Shown = Literal["slows", "stopped"]
+Floats = npt.NDArray[np.float64]
+
+SHARE = 0.5  # of the ordered deceleration: a real car follows loosely
+SHARE_ERRORS = 2.0  # standard errors by which the measured deceleration is above that share
+BEFORE_S = 3.0  # of the speeds before the order; a trend and its noise are known well after so long
+LEAST_BEFORE_S = 0.4  # with less nothing is known of the motion before
+LEAST_BEFORE = 4  # speeds, likewise
+NEWEST_BEFORE_S = 1.0  # before the first command the newest of them is no older
+REACTS_WITHIN_S = 3.0  # a change that begins later is not explained by the order
+SEARCHED_S = 6.0  # after the first command: a proof is searched for so long
+BIN_S = 0.04  # speeds that come faster are averaged
+LEAST_AFTER = 3  # speeds after the change
+SIGMAS = 5.0  # by which the change must stand out …
+SIGMAS_AT_FIRST = 6.0  # … and as long as it has lasted no longer than this: a change shortly before looks alike
+AT_FIRST_S = 0.6
+LEAST_DROP_MPS = 0.15
+LEAST_EXTRA_MPS2 = 0.3  # deceleration beyond what was there before …
+LEAST_EXTRA_SHARE = 0.35  # … and as a share of the ordered one
+LEAST_CHANGED_S = 0.35  # from the change to the newest speed
+MOST_UNSURE_S = 0.5
+STEPS = 1.5  # quanta of the reported speed that a drop must exceed
+NOISE_FLOOR_MPS = 0.01
+FINEST_STEP_MPS = 1e-4  # values nearer to each other differ by rounding
+HARDEST_MPS2 = 8.0  # no car brakes harder: a speed that falls faster is a fault of the sensor
+SLACK_MPS = 0.3  # of a single speed, likewise
+STOOD_S = 0.3  # at rest for so long
+STOPS_WITHIN_S = 2.5  # of the first command; a faster car brakes for longer, and is shown by that
+ROLLS_OUT_MPS2 = 0.15  # by which a car may slow without any cause of its own
+STILL_MOVES_MPS = 0.25  # at this speed the motion before would not have led to standstill
+SPANS_S = (
+    1.2,
+    0.7,
+    0.4,
+)  # of the speeds before the order that are fitted by themselves: the motion may have changed lately
+BEFORE_KNOTS_S = (
+    *(2.6 - 0.15 * n for n in range(11)),
+    *(1.0 - 0.05 * n for n in range(19)),
+)  # a change between two of them must fit well
+MOST_SPEEDS = 1024
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowProof:
+    """What the speeds show of the order that stands."""
+
+    ordered_s: float | None = None  # of which order; None: none stands
+    shown: Shown | None = None  # None: nothing that the order explains
+    shown_s: float | None = None
+    stood_before: bool = False  # the car stood when it was ordered: there was nothing to slow
+
+
+NOTHING_SHOWN = SlowProof()
+
+
+class ProofFollower:
+    """Follows one vehicle's speed and the orders to slow it. Times are on the clock of `received_s`."""
+
+    def __init__(self) -> None:
+        self._speeds: deque[tuple[float, float]] = deque(maxlen=MOST_SPEEDS)
+        self._ordered_s: float | None = None
+        self._since_s: float | None = None  # the first command of the commands that go out without a gap
+        self._motion: _Before | None = None
+        self._evaluated_s = -math.inf
+        self._deceleration_mps2 = 0.0
+        self.proof = NOTHING_SHOWN
+
+    def forget(self) -> None:
+        """The clock went back: what was measured does not fit what comes."""
+        self._speeds.clear()
+        self._motion = None
+
+    def order(self, facts: SlowingFacts) -> None:
+        """What is known of the order now."""
+        if facts.ordered_s != self._ordered_s:
+            self._ordered_s, self._since_s = facts.ordered_s, None
+            self.proof = SlowProof(ordered_s=facts.ordered_s)
+        self._deceleration_mps2 = facts.deceleration_mps2
+        if facts.ordered_s is None or facts.sending_s is None or facts.sending_s == self._since_s:
+            return
+        self._since_s, self._evaluated_s = facts.sending_s, -math.inf
+        self._motion = _before(list(self._speeds), facts.sending_s)
+        if self.proof.shown is None and self._motion is not None:
+            self.proof = replace(self.proof, stood_before=abs(self._motion.level_mps) < STANDS_BELOW_MPS)
+
+    def add(self, at_s: float, speed_mps: float) -> None:
+        """A speed as the car reports it."""
+        if not math.isfinite(speed_mps):
+            return
+        if self._speeds and at_s < self._speeds[-1][0]:
+            return
+        self._speeds.append((at_s, speed_mps))
+        motion, since_s = self._motion, self._since_s
+        if motion is None or since_s is None or self.proof.shown is not None or self.proof.stood_before:
+            return
+        if not BIN_S <= at_s - max(self._evaluated_s, since_s) or at_s - since_s > SEARCHED_S:
+            return
+        self._evaluated_s = at_s
+        shown = _evaluate(motion, [one for one in self._speeds if one[0] > since_s], since_s, self._deceleration_mps2)
+        if shown is not None:
+            self.proof = replace(self.proof, shown=shown, shown_s=at_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Before:
+    """The motion of the seconds before the first command; times count from it, speeds along the way of the car."""
+
+    sign: float  # −1: it rolled backwards
+    times_s: Floats
+    speeds_mps: Floats
+    lines: tuple[_Line, ...]  # through the last seconds, the longest first
+
+    @property
+    def level_mps(self) -> float:
+        """At the first command."""
+        return self.lines[0].level_mps
+
+    def led_mps(self, at_s: float) -> float:
+        """Where it led to."""
+        return self.lines[0].level_mps + self.lines[0].slope_mps2 * at_s
+
+    def lowest_mps(self, at_s: float) -> float:
+        """The lowest to which it may have led."""
+        return min(one.lowest_mps(at_s) for one in self.lines)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Line:
+    """A straight line through speeds, with its standard errors; times count from the first command."""
+
+    level_mps: float
+    slope_mps2: float
+    level_error_mps: float
+    slope_error_mps2: float
+    sigma_mps: float  # of one speed
+
+    def lowest_mps(self, at_s: float) -> float:
+        slope_mps2 = min(0.0, self.slope_mps2 - 2 * self.slope_error_mps2) - ROLLS_OUT_MPS2
+        return self.level_mps - 2 * self.level_error_mps + slope_mps2 * at_s
+
+
+def _line(times: Floats, values: Floats, least_sigma: float) -> _Line:
+    middle_s = float(times.mean())
+    spread = float(((times - middle_s) ** 2).sum())
+    slope = float(((times - middle_s) * values).sum()) / spread
+    level = float(values.mean()) - slope * middle_s
+    rest = values - level - slope * times
+    sigma = math.sqrt(max(float(rest @ rest) / (len(times) - 2), least_sigma**2))
+    return _Line(
+        level_mps=level,
+        slope_mps2=slope,
+        level_error_mps=sigma * math.sqrt(1 / len(times) + middle_s**2 / spread),
+        slope_error_mps2=sigma / math.sqrt(spread),
+        sigma_mps=sigma,
+    )
+
+
+def _before(speeds: list[tuple[float, float]], since_s: float) -> _Before | None:
+    """None: too little is known of it."""
+    known = [(at_s - since_s, speed) for at_s, speed in speeds if -BEFORE_S <= at_s - since_s <= 0.0]
+    if len(known) < LEAST_BEFORE or known[-1][0] - known[0][0] < LEAST_BEFORE_S or known[-1][0] < -NEWEST_BEFORE_S:
+        return None
+    times, values = np.array(known).T
+    sign = -1.0 if float(np.median(values)) < 0.0 else 1.0
+    times, values = _binned(times, values * sign)
+    if len(times) < LEAST_BEFORE:
+        return None
+    lines = [_line(times, values, NOISE_FLOOR_MPS)]
+    for span_s in SPANS_S:
+        late = times >= -span_s
+        if LEAST_BEFORE <= int(late.sum()) < len(times):
+            lines.append(_line(times[late], values[late], NOISE_FLOOR_MPS))
+    return _Before(sign=sign, times_s=times, speeds_mps=values, lines=tuple(lines))
+
+
+def _binned(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Means over BIN_S; a line through them is a line through the speeds."""
+    bins = np.floor(times / BIN_S)
+    starts = np.flatnonzero(np.diff(bins, prepend=-math.inf))
+    counts = np.diff(np.append(starts, len(times)))
+    return np.add.reduceat(times, starts) / counts, np.add.reduceat(values, starts) / counts
+
+
+def _evaluate(
+    motion: _Before, after: list[tuple[float, float]], since_s: float, deceleration_mps2: float
+) -> Shown | None:
+    if len(after) < LEAST_AFTER:
+        return None
+    times, values = np.array(after).T
+    times, values = times - since_s, values * motion.sign
+    step = _quantum(motion.speeds_mps, values)
+    newest_s = float(times[-1])
+    newest_mps = float(values[-LEAST_AFTER:].mean())
+    led_mps = motion.led_mps(float(times[-LEAST_AFTER:].mean()))
+    if led_mps - newest_mps < max(LEAST_DROP_MPS, STEPS * step):
+        return None
+    if _falls_too_fast(motion, times, values, step):
+        return None
+    if _stopped(motion, times, values, step):
+        return "stopped"
+    standing = np.flatnonzero(values < 2 * STANDS_BELOW_MPS)
+    until = int(standing[0]) if len(standing) else len(values)
+    if until < LEAST_AFTER or newest_s > SEARCHED_S:
+        return None
+    times, values = _binned(times[:until], values[:until])
+    return "slows" if _slows(motion, times, values, step, deceleration_mps2) else None
+
+
+def _quantum(before: Floats, after: Floats) -> float:
+    """The step in which the speed is reported, as far as it shows; 0: it shows none."""
+    values = np.unique(np.concatenate((before, after)))
+    gaps = np.diff(values)
+    gaps = gaps[gaps > FINEST_STEP_MPS]
+    return float(gaps.min()) if len(gaps) else 0.0
+
+
+def _falls_too_fast(motion: _Before, times: Floats, values: Floats, step: float) -> bool:
+    all_times = np.append(motion.times_s[-1:], times)
+    all_values = np.append(motion.speeds_mps[-1:], values)
+    falls = -np.diff(all_values)
+    slack_mps = SLACK_MPS + 2 * step + 6 * motion.lines[0].sigma_mps
+    return bool((falls > HARDEST_MPS2 * np.diff(all_times) + slack_mps).any())
+
+
+def _stopped(motion: _Before, times: Floats, values: Floats, step: float) -> bool:
+    """The newest speeds are those of a standing car, and the motion before did not lead there."""
+    newest_s = float(times[-1])
+    last = values[times >= newest_s - STOOD_S]
+    if newest_s < STOOD_S or len(last) < LEAST_AFTER or len(values) <= len(last):
+        return False
+    if abs(float(last.mean())) > STANDS_BELOW_MPS or float(np.abs(last).max()) > 4 * STANDS_BELOW_MPS:
+        return False
+    return newest_s <= STOPS_WITHIN_S and motion.lowest_mps(newest_s) > STILL_MOVES_MPS + step
+
+
+def _slows(motion: _Before, times: Floats, values: Floats, step: float, deceleration_mps2: float) -> bool:
+    changes = _changes(times) if len(times) >= LEAST_AFTER else times[:0]
+    if not len(changes):
+        return False
+    all_times, all_values = np.append(motion.times_s, times), np.append(motion.speeds_mps, values)
+    early = np.array([one for one in BEFORE_KNOTS_S if int((motion.times_s < -one).sum()) >= 2])
+    fit = _Fit.of(all_times, all_values, early, changes)
+    sigma = math.sqrt(fit.rest_with / _least_chi2(max(1, len(all_times) - 4)))
+    sigma = max(NOISE_FLOOR_MPS, step / math.sqrt(12.0), sigma)
+    rate_hz = len(all_times) / float(all_times[-1] - all_times[0])
+    # Within this a change before the order looks like one after it.
+    unsure_s = (6 * sigma / math.sqrt(rate_hz) + STEPS * step) / deceleration_mps2
+    unsure_s = min(MOST_UNSURE_S, max(BEFORE_KNOTS_S[-1], unsure_s))
+    sigmas = SIGMAS if float(times[-1]) - fit.changed_s > AT_FIRST_S else SIGMAS_AT_FIRST
+    if fit.rest_without(unsure_s) - fit.rest_with < (sigmas * sigma) ** 2:
+        return False
+    extra_mps2, slope_mps2 = fit.slopes()
+    least_mps2 = max(LEAST_EXTRA_MPS2, LEAST_EXTRA_SHARE * deceleration_mps2)
+    if extra_mps2 > -least_mps2 or slope_mps2 > -SHARE * deceleration_mps2:
+        return False
+    since = times[times >= fit.changed_s]
+    lasted_s = float(times[-1]) - fit.changed_s
+    error_mps2 = sigma / math.sqrt(float(((since - since.mean()) ** 2).sum())) + step / (2 * lasted_s)
+    drop_mps = -slope_mps2 * lasted_s
+    if -slope_mps2 - SHARE_ERRORS * error_mps2 < SHARE * deceleration_mps2:
+        return False  # it may brake with less than its share, or only have stopped accelerating
+    return drop_mps >= max(LEAST_DROP_MPS, STEPS * step) and -slope_mps2 - 3 * error_mps2 > least_mps2
+
+
+def _changes(times: Floats) -> Floats:
+    """The moments at which the order may have begun to act."""
+    last_s = min(float(times[-LEAST_AFTER]), float(times[-1]) - LEAST_CHANGED_S, REACTS_WITHIN_S)
+    return np.linspace(0.0, last_s, min(16, 2 + int(last_s / 0.08))) if last_s > 0.0 else np.empty(0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Fit:
+    """Speeds as a line with at most one change before the order and one after it: least squares for all pairs."""
+
+    times: Floats
+    values: Floats
+    early: Floats  # seconds before the order
+    late: Floats  # and after it
+    rests: Floats  # sums of squares without a late change: of no early change, then of each
+    rest_with: float  # the least, with one
+    pair: tuple[int, int]  # the changes that leave it; the first counts from 1, 0: none
+
+    @classmethod
+    def of(cls, times: Floats, values: Floats, early: Floats, late: Floats) -> _Fit:
+        base = np.stack((np.ones_like(times), times - times.mean()), axis=1)
+        base /= np.sqrt((base * base).sum(axis=0))
+        every = np.concatenate(
+            (np.maximum(0.0, times[:, None] + early), np.maximum(0.0, times[:, None] - late)), axis=1
+        )
+        every -= base @ (base.T @ every)
+        first, second = every[:, : len(early)], every[:, len(early) :]
+        rest = values - base @ (base.T @ values)
+        square = float(rest @ rest)
+        weight = np.maximum((first * first).sum(axis=0), 1e-9)
+        along = rest @ first
+        rests = np.append(square, np.maximum(0.0, square - along * along / weight))
+        common = first.T @ second
+        left = np.maximum(
+            (second * second).sum(axis=0) - np.vstack((0.0 * common[:1], common**2 / weight[:, None])), 1e-9
+        )
+        towards = rest @ second - np.vstack((0.0 * common[:1], common * (along / weight)[:, None]))
+        gains = np.where(towards < 0.0, towards * towards / left, 0.0)
+        with_both = np.maximum(0.0, rests[:, None] - gains)
+        at = int(np.argmin(with_both))
+        pair = divmod(at, len(late))
+        return cls(
+            times=times, values=values, early=early, late=late, rests=rests, rest_with=float(with_both[pair]), pair=pair
+        )
+
+    def rest_without(self, unsure_s: float) -> float:
+        """The least without a late change, where an early one is no later than `unsure_s` before the order."""
+        return float(self.rests[np.append(True, self.early >= unsure_s - 1e-9)].min())
+
+    @property
+    def changed_s(self) -> float:
+        return float(self.late[self.pair[1]])
+
+    def slopes(self) -> tuple[float, float]:
+        """The change of slope at the late change, and the slope from then on [m/s²]."""
+        columns = [np.ones_like(self.times), self.times, np.maximum(0.0, self.times - self.changed_s)]
+        if self.pair[0]:
+            columns.append(np.maximum(0.0, self.times + self.early[self.pair[0] - 1]))
+        found = np.linalg.lstsq(np.stack(columns, axis=1), self.values, rcond=None)[0]
+        return float(found[2]), float(found[1:].sum())
+
+
+def _least_chi2(freedom: int) -> float:
+    """A sum of squares is smaller in one case of a hundred only (Wilson and Hilferty, PNAS 17, 1931)."""
+    share = 2.0 / (9.0 * freedom)
+    return max(0.02, float(freedom * max(0.0, 1.0 - share - 2.33 * math.sqrt(share)) ** 3))

@@ -1,0 +1,212 @@
+"""How old a message was when it came: an upper bound of its transport delay, from pings, queues and stamps.
+
+Pings are marks in the stream. The bridge answers one as soon as it reads it, behind all that it has already written to
+the connection. So what arrives after the answer was written after the ping was sent, by our own clock: no clock of the
+car is needed, and a delay that was there from the first message on is seen too.
+
+A message may have waited before it was written. ROS 1's rosbridge, and ours, keep a queue for each subscription and
+hold one message more in the hand while the connection takes nothing. A message cannot have entered a queue of `q`
+before the message that came `q + 1` before it was written; the mark known at *that* arrival bounds its age.
+
+Stamps only make the bound a little tighter. Any clock will do: its offset is bounded by the message that waited least,
+as the pings bound it, and each other message is then placed by its own stamp. They are not trusted further: stamps at
+four times the pace, over a link that carries a quarter, look as even as those of a healthy one.
+
+What waited before the bridge, in a node or in the bridge's own processor, no ping sees. There the clock of ROS helps,
+where stamps are of that clock; signals without a stamp are as late as the least late of those that carry one.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+
+from monitor.car_clock import CarClock, StampedDelay
+
+WINDOW_S = 3.0  # round trips are compared over so long, or over two of the longest
+JITTER_S = 0.05  # round trips that differ by less do not come from a connection that takes nothing
+EXACT_WITHIN_S = 0.12  # a bound by the queue that costs no more than this is taken as it is
+TRIM_S = 0.18  # the bound is at most so much too high where the link is healthy; stamps take no more off it
+KEPT_S = 10.0  # the offset of a clock is the least of the last one to two of these: ±200 ppm are 4 ms
+RECENT_S = 3.0  # a topic that was silent for longer says nothing of the link now …
+FAST_S = 0.5  # … nor does one that comes less often than this, where others come more often
+USUAL_S = 30.0  # what a link needs when nothing waits is the least round trip of one to two of these …
+USUAL_AT_MOST_S = 1.0
+EXCESS_S = 0.1
+NEIGHBOURS, NEIGHBOUR_S = 2, 1.0
+PERIOD_WEIGHT = 0.1
+MOST_UNANSWERED = 600
+
+
+class _Clock:
+    """The clock of one topic's stamps: the least that it can be ahead of ours."""
+
+    __slots__ = ("_before_s", "_now_s", "_since_s", "_stamp_s")
+
+    def __init__(self) -> None:
+        self._stamp_s = self._since_s = -float("inf")
+        self._now_s = self._before_s = float("inf")
+
+    def place(self, stamp_s: float, at_s: float, bound_s: float) -> float:
+        """The delay by the stamp: at most `bound_s`, and little less, for stamps may run at any pace."""
+        ahead_s = stamp_s - at_s
+        if stamp_s < self._stamp_s:
+            self._now_s = self._before_s = float("inf")
+        if at_s - self._since_s > KEPT_S:
+            self._before_s, self._now_s, self._since_s = self._now_s, float("inf"), at_s
+        self._stamp_s = stamp_s
+        self._now_s = min(self._now_s, ahead_s + bound_s)
+        return max(min(self._now_s, self._before_s) - ahead_s, bound_s - TRIM_S, 0.0)
+
+
+class _Topic:
+    """What is kept of one subscription."""
+
+    __slots__ = ("at_s", "by_clock", "clock", "delay_s", "excess_s", "marks", "period_s", "queue_length", "throttle_s")
+
+    def __init__(self, queue_length: int) -> None:
+        self.queue_length = queue_length
+        self.throttle_s = 0.0
+        self.period_s: float | None = None  # between two messages while all are sent
+        self.marks: deque[float] = deque(maxlen=queue_length + 1)  # the mark known when each of the last ones came
+        self.clock = _Clock()
+        self.by_clock = StampedDelay()
+        self.at_s: float | None = None
+        self.delay_s = 0.0
+        self.excess_s: float | None = None  # later by the clock of ROS than by the pings; None: it cannot tell
+
+    def restart(self) -> None:
+        """What came over another connection says nothing of this one, but for how often it comes."""
+        self.marks.clear()
+        self.clock = _Clock()
+        self.by_clock = StampedDelay()
+        self.at_s = self.excess_s = None
+        self.delay_s = 0.0
+
+    def follow_period(self, at_s: float) -> None:
+        if self.at_s is None or self.throttle_s or at_s < self.at_s:
+            return
+        gap_s = at_s - self.at_s
+        self.period_s = gap_s if self.period_s is None else self.period_s + PERIOD_WEIGHT * (gap_s - self.period_s)
+
+    @property
+    def held_s(self) -> float:
+        """How long the bridge may hold a message back to send fewer: until the next one takes its place."""
+        return self.throttle_s if self.period_s is None else min(self.throttle_s, self.period_s)
+
+
+class TransportDelay:
+    """Follows one link. All times are seconds of our own clock, but for stamps."""
+
+    def __init__(self) -> None:
+        self._topics: dict[str, _Topic] = {}
+        self.clock = CarClock()
+        self.open(0.0)
+
+    def open(self, at_s: float) -> None:
+        """The connection opens: nothing that comes was sent before."""
+        self._opened_s = self._mark_s = at_s
+        for topic in self._topics.values():
+            topic.restart()
+        self.clock = CarClock()
+        self._unanswered: deque[float] = deque(maxlen=MOST_UNANSWERED)
+        self._trips: deque[tuple[float, float]] = deque()  # (answered, round trip)
+        self._trip_s = self._least_trip_s = self._longest_trip_s = 0.0
+        self._is_measured = False
+        self._usual_trip_s = self._usual_before_s = float("inf")
+        self._usual_since_s = at_s
+
+    def sent(self, at_s: float) -> None:
+        """A ping was sent."""
+        self._unanswered.append(at_s)
+
+    def answered(self, sent_s: float, at_s: float) -> None:
+        """The answer to a ping came."""
+        if sent_s < self._mark_s or at_s < sent_s:
+            return
+        self._mark_s, self._is_measured = sent_s, True
+        while self._unanswered and self._unanswered[0] <= sent_s:
+            self._unanswered.popleft()
+        trip_s = self._trip_s = at_s - sent_s
+        trips = self._trips
+        trips.append((at_s, trip_s))
+        since_s = at_s - max(WINDOW_S, 2.0 * max(self._longest_trip_s, trip_s))
+        while trips[0][0] < since_s:
+            trips.popleft()
+        self._least_trip_s = min(trip for _, trip in trips)
+        self._longest_trip_s = max(trip for _, trip in trips)
+        if at_s - self._usual_since_s > USUAL_S:
+            self._usual_since_s, self._usual_before_s, self._usual_trip_s = at_s, self._usual_trip_s, float("inf")
+        self._usual_trip_s = min(self._usual_trip_s, trip_s)
+
+    def subscribe(self, topic: str, queue_length: int, throttle_s: float = 0.0) -> None:
+        """So many messages of a topic may wait in the bridge, which sends one every `throttle_s` at most."""
+        known = self._topics.get(topic)
+        if known is None:
+            known = self._topics[topic] = _Topic(queue_length)
+        known.throttle_s = throttle_s
+        if known.queue_length != queue_length:
+            # What came under the longer queue still counts: its marks are the older ones.
+            known.queue_length = queue_length
+            known.marks = deque(known.marks, maxlen=queue_length + 1)
+
+    def receive(self, topic: str, at_s: float, stamp_s: float | None = None) -> float:
+        """A message came: how old it may have been [s]."""
+        known = self._topics.get(topic)
+        if known is None:
+            known = self._topics[topic] = _Topic(1)
+        known.follow_period(at_s)
+        bound_s = self._bound_s(known, at_s)
+        delay_s = bound_s
+        if stamp_s is not None:
+            delay_s = known.clock.place(stamp_s, at_s, bound_s)
+            late_s = known.by_clock.late_s(stamp_s, at_s, self.clock)
+            known.excess_s = None if late_s is None else late_s - delay_s
+            if late_s is not None and late_s > delay_s + EXCESS_S:
+                delay_s = late_s
+        else:
+            delay_s += self._excess_s(at_s)
+        known.at_s, known.delay_s = at_s, delay_s
+        return delay_s
+
+    def _bound_s(self, topic: _Topic, at_s: float) -> float:
+        since_mark_s = max(0.0, at_s - self._mark_s)
+        marks, places = topic.marks, topic.queue_length + 1
+        queued_s = at_s - (marks[0] if len(marks) == places else self._opened_s)
+        marks.append(self._mark_s)
+        if queued_s - since_mark_s <= EXACT_WITHIN_S:
+            return queued_s
+        # The connection takes nothing until it is empty; so long the answer of a ping waits too. Each time it takes
+        # something again, at least one message of each topic goes.
+        is_settled = at_s - self._opened_s > WINDOW_S + 2.0 * self._longest_trip_s
+        shut_s = max(0.0, self._longest_trip_s - (self._least_trip_s if is_settled else 0.0) - JITTER_S)
+        return min(queued_s, since_mark_s + places * shut_s + topic.held_s)
+
+    def _excess_s(self, at_s: float) -> float:
+        """How much later the stamped neighbours are than the pings tell: all of them, and more than one."""
+        found = list(self._excesses(at_s))
+        least_s = min(found, default=0.0)
+        return least_s if len(found) >= NEIGHBOURS and least_s > EXCESS_S else 0.0
+
+    def _excesses(self, at_s: float) -> Iterator[float]:
+        for topic in self._topics.values():
+            if topic.excess_s is not None and topic.at_s is not None and at_s - topic.at_s <= NEIGHBOUR_S:
+                yield topic.excess_s
+
+    def late_s(self, now_s: float) -> float:
+        """How late is what comes now: the most of the topics that come often."""
+        recent = [
+            (topic.delay_s, topic.period_s is not None and topic.period_s <= FAST_S)
+            for topic in self._topics.values()
+            if topic.at_s is not None and now_s - topic.at_s <= RECENT_S
+        ]
+        fast = [delay_s for delay_s, is_fast in recent if is_fast]
+        return max(fast or [delay_s for delay_s, _ in recent], default=self._trip_s)
+
+    def queued_s(self, now_s: float) -> float:
+        """How much of that is because more is asked of the link than it carries."""
+        return max(0.0, self.late_s(now_s) - min(self._usual_trip_s, self._usual_before_s, USUAL_AT_MOST_S))
+
+    def waiting_s(self, now_s: float) -> float:
+        """Since the oldest ping was sent that is not answered yet."""
+        return now_s - self._unanswered[0] if self._unanswered else 0.0

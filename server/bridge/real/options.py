@@ -1,0 +1,21 @@
+"""How a real bridge was started."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+BOUND_BYTES = 64_000_000  # where the real one takes anything
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RealOptions:
+    """The parameters of its launch file that a client can notice. Empty globs let everything through."""
+
+    topics_glob: tuple[str, ...] = ()
+    services_glob: tuple[str, ...] = ()  # /rosapi/* is always let through
+    rosapi_topics_glob: tuple[str, ...] = ()
+    rosapi_services_glob: tuple[str, ...] = ()
+    rosapi_params_glob: tuple[str, ...] = ()
+    authenticate: bool = False  # ROS 1 only; there is no rosauth node, so nobody gets in
+    max_message_bytes: int | None = None  # None: no limit in ROS 1, 10 MB in ROS 2
+    distro: str | None = "humble"  # ROS_DISTRO of ROS 2's rosapi; without it get_ros_version ends rosapi

@@ -1,0 +1,179 @@
+"""What of a car's topics arrives: which have no publisher, which are published and not received, which to renew.
+
+A bridge does not say that it cannot deliver a topic, and lists topics that are only subscribed to. So what arrives is
+compared with what rosapi says of publishers. It is asked only of topics from which nothing comes: each such call costs
+the bridge a walk through all nodes, and on ROS 2 may meet one that is just going.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+JUDGED_AFTER_S = 1.0  # without a message: so long after subscribing the publishers of a signal's topic are asked
+RECORDED_AFTER_S = 4.0  # the same for a topic that is only recorded
+RENEW_AFTER_S = 4.0  # published, and nothing since subscribing: subscribed anew, as JSON
+STOPPED_AFTER_S = 4.0  # a topic that came and stopped is looked at after so long, and
+STOPPED_PERIODS = 10  # so many of its mean periods
+ABSENT_AGAIN_S = 3.0  # the publishers of a signal's topic without one are asked again so often
+SILENT_AGAIN_S = 10.0  # those of a signal's topic that is published and not received, and it is subscribed anew
+RECORDED_AGAIN_S = (10.0, 30.0, 60.0, 120.0, 300.0)  # the same of a recorded topic, which may be one that says little
+FIRST_WITHIN_S = 5.0  # the first message of a publisher that came later
+FLOWS_S = 2.0  # anything within so long: the bridge delivers, so it is this topic and not all of them
+AT_ONCE = 8  # topics that are asked for in one look
+
+
+@dataclass(slots=True)
+class _Row:
+    """One topic that is subscribed to."""
+
+    since_s: float  # when it was subscribed to, the last time
+    is_judged: bool
+    first_s: float | None = None  # of its messages on this connection
+    newest_s: float | None = None
+    count: int = 0
+    publishers: tuple[str, ...] | None = None  # None: not known
+    asked_s: float = -math.inf
+    renewed: int = 0  # times in a row, without a message since
+
+    def heard(self, now_s: float) -> None:
+        if self.first_s is None:
+            self.first_s = now_s
+        self.newest_s = now_s
+        self.count += 1
+        self.renewed = 0
+
+    def is_silent(self, now_s: float) -> bool:
+        """Whether something ought to have come."""
+        if self.newest_s is None or self.first_s is None:
+            return now_s - self.since_s >= (JUDGED_AFTER_S if self.is_judged else RECORDED_AFTER_S)
+        if not self.is_judged or self.count < 2:
+            return False
+        period_s = (self.newest_s - self.first_s) / (self.count - 1)
+        return now_s - max(self.newest_s, self.since_s) >= max(STOPPED_AFTER_S, STOPPED_PERIODS * period_s)
+
+    def again_s(self) -> float:
+        """How long its publishers are not asked again."""
+        if self.is_judged:
+            if self.publishers == ():
+                return ABSENT_AGAIN_S
+            return SILENT_AGAIN_S if self.renewed else JUDGED_AFTER_S
+        return RECORDED_AGAIN_S[min(self.renewed, len(RECORDED_AGAIN_S) - 1)] if self.renewed else RECORDED_AFTER_S
+
+
+@dataclass(slots=True)
+class Delivery:
+    """One car's, over all openings of its link. Times are on the session's monotonic clock, in seconds."""
+
+    unpublished: set[str] = field(default_factory=set)  # topics without a publisher, of those that were asked for
+    delivered: set[str] = field(default_factory=set)  # topics of which anything ever came
+    _rows: dict[str, _Row] = field(default_factory=dict)
+    _came_s: dict[str, float] = field(default_factory=dict)  # when a publisher came to a topic that had none
+    _absent_asked_s: dict[str, float] = field(default_factory=dict)
+    _newest_s: float = -math.inf  # of any topic
+
+    def opened(self, now_s: float) -> None:
+        """The link was opened: all is subscribed to anew."""
+        self._rows = {topic: _Row(now_s, row.is_judged) for topic, row in self._rows.items()}
+
+    def follow(self, judged: Collection[str], recorded: Collection[str], now_s: float) -> None:
+        """What is subscribed to from now on, for signals and only to be recorded."""
+        rows: dict[str, _Row] = {}
+        for topics, is_judged in ((recorded, False), (judged, True)):
+            for topic in topics:
+                row = self._rows.get(topic) or _Row(now_s, is_judged)
+                row.is_judged = is_judged
+                rows[topic] = row
+        self._rows = rows
+
+    def heard(self, topic: str, now_s: float) -> bool:
+        """A message; whether it is the first one of a topic that was thought to have no publisher."""
+        self._newest_s = now_s
+        row = self._rows.get(topic)
+        if row is not None:
+            row.heard(now_s)
+        self.delivered.add(topic)
+        if topic in self.unpublished:
+            self.unpublished.discard(topic)
+            self._came_s[topic] = now_s
+            return True
+        return False
+
+    def has_its_time(self, topic: str, now_s: float) -> bool:
+        """Whether a topic's publisher has only just come, so that no message yet is no silence."""
+        return now_s - self._came_s.get(topic, -math.inf) < FIRST_WITHIN_S
+
+    def only_silent(self) -> str | None:
+        """The one topic of which nothing ever came, where there is exactly one."""
+        silent = [topic for topic, row in self._rows.items() if row.newest_s is None]
+        return silent[0] if len(silent) == 1 else None
+
+    def to_ask(self, now_s: float, candidates: Collection[str] = ()) -> list[str]:
+        """Topics whose publishers are to be asked for now. Of `candidates`, topics that could carry a signal, those
+        known to have no publisher are asked for again."""
+        due = [
+            (row.asked_s, topic)
+            for topic, row in self._rows.items()
+            if row.is_silent(now_s) and now_s - row.asked_s >= row.again_s()
+        ]
+        asked = {topic for _, topic in due}
+        for topic in candidates:
+            before_s = self._absent_asked_s.get(topic, -math.inf)
+            if topic in self.unpublished and topic not in asked and now_s - before_s >= ABSENT_AGAIN_S:
+                due.append((before_s, topic))
+        return [topic for _, topic in sorted(due)[:AT_ONCE]]
+
+    def answered(self, topic: str, publishers: tuple[str, ...] | None, now_s: float) -> bool:
+        """What rosapi says of a topic's publishers, None: it does not say. Answers whether the topic now has to be
+        subscribed to anew, as JSON."""
+        row = self._rows.get(topic)
+        self._absent_asked_s[topic] = now_s
+        if publishers == () and topic not in self.delivered:
+            self.unpublished.add(topic)
+        elif publishers is not None:
+            if topic in self.unpublished:
+                self._came_s[topic] = now_s
+            self.unpublished.discard(topic)
+        if row is None:
+            return False
+        row.asked_s = now_s
+        if publishers is None:
+            return False
+        if row.publishers == () and publishers:
+            row.since_s = now_s  # it has its time from here on
+        row.publishers = publishers
+        if not publishers or not row.is_silent(now_s):
+            return False
+        if (row.newest_s is not None or not row.is_judged) and now_s - self._newest_s > FLOWS_S:
+            return (
+                False  # nothing comes: the car is silent, not this topic; another client may block all of a few signals
+            )
+        if now_s - max(row.since_s, row.newest_s or -math.inf) < RENEW_AFTER_S:
+            return False
+        row.since_s = now_s
+        row.renewed += 1
+        return True
+
+    def never_came(self, now_s: float) -> list[str]:
+        """Topics of signals that have a publisher and of which nothing came on this connection."""
+        return [
+            topic
+            for topic, row in self._rows.items()
+            if row.is_judged and row.publishers and row.newest_s is None and (row.renewed or row.is_silent(now_s))
+        ]
+
+    def never_heard(self, topic: str) -> bool:
+        """Whether nothing came of a topic on this connection."""
+        row = self._rows.get(topic)
+        return row is None or row.newest_s is None
+
+    def not_received(self, now_s: float) -> Mapping[str, tuple[str, ...]]:
+        """Topic → its publishers, where nothing came although it was subscribed to anew, and other topics flow."""
+        return {
+            topic: row.publishers
+            for topic, row in sorted(self._rows.items())
+            if row.publishers
+            and row.newest_s is None
+            and (row.renewed > 1 or (row.renewed and now_s - row.since_s >= RENEW_AFTER_S))
+        }

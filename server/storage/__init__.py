@@ -1,0 +1,1 @@
+"""What is kept on the disk: who may use a data folder, and files that cannot be read."""

@@ -1,0 +1,117 @@
+"""A bridge that sends what it is told to send, as a process of its own: `python -m tests.server.security.heavy_bridge`.
+
+Prints its port, and to how many each message went. It publishes speed at 20 Hz on /catvehicle/vel, and a large message
+each time a line with a name of `MESSAGES` comes on its input, to whoever subscribed to its topic.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+import time
+from typing import Any
+
+import cbor2
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.server import ServerConnection, serve
+
+OTHER, JUDGED = "/heavy", "/diagnostics"
+TOPICS = {
+    "/catvehicle/vel": "geometry_msgs/Twist",
+    OTHER: "my_msgs/Heavy",
+    JUDGED: "diagnostic_msgs/DiagnosticArray",
+}
+
+
+def _json(topic: str, body: str) -> str:
+    return f'{{"op": "publish", "topic": "{topic}", "msg": {{"items": {body}}}}}'
+
+
+def _cbor(topic: str, body: bytes) -> bytes:
+    return b"\xa3" + b"".join(cbor2.dumps(text) for text in ("op", "publish", "topic", topic, "msg")) + body
+
+
+MESSAGES = {
+    "objects": lambda topic: _json(topic, "[" + ",".join(['{"a":1.5}'] * 1_400_000) + "]"),
+    "nests": lambda topic: _json(topic, "[" + ",".join(["[[[[[]]]]]"] * 1_000_000) + "]"),
+    "numbers": lambda topic: _json(topic, "[" + ",".join(["1.25"] * 2_500_000) + "]"),
+    "texts": lambda topic: _json(topic, "[" + ",".join(['"a"'] * 2_500_000) + "]"),
+    "nan": lambda topic: _json(topic, "[" + ",".join(["NaN"] * 2_500_000) + "]"),
+    "cbor lists": lambda topic: _cbor(topic, b"\xa1\x61a\x9a" + (10_000_000).to_bytes(4, "big") + b"\x80" * 10_000_000),
+    "cbor tags": lambda topic: _cbor(
+        topic, b"\xa1\x61a\x9a" + (5_000_000).to_bytes(4, "big") + b"\xd8\x55\x40" * 5_000_000
+    ),
+    "cbor promise": lambda topic: _cbor(topic, b"\xa1\x61a\x9b" + b"\x00\x00\xff" * 3_000_000),
+}
+
+
+class Bridge:
+    """What is sent, to whom."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.subscribers: list[tuple[ServerConnection, str]] = []
+
+    def answer(self, socket: ServerConnection) -> None:
+        try:
+            for raw in socket:
+                operation = json.loads(raw)
+                match operation["op"]:
+                    case "subscribe":
+                        with self.lock:
+                            self.subscribers.append((socket, operation["topic"]))
+                    case "call_service":
+                        said = {"op": "service_response", "id": operation.get("id"), "service": operation["service"]}
+                        values = _values(operation["service"])
+                        self.send(socket, json.dumps(said | {"values": values, "result": values is not None}))
+        except ConnectionClosed:
+            pass
+
+    def send(self, socket: ServerConnection, frame: str | bytes) -> None:
+        try:
+            socket.send(frame)
+        except ConnectionClosed:
+            with self.lock:
+                self.subscribers = [row for row in self.subscribers if row[0] is not socket]
+
+    def publish(self, topic: str, frame: str | bytes) -> int:
+        """To how many."""
+        with self.lock:
+            to = [socket for socket, subscribed in self.subscribers if subscribed == topic]
+        for socket in to:
+            self.send(socket, frame)
+        return len(to)
+
+    def drive(self) -> None:
+        zero = {"x": 0.0, "y": 0.0, "z": 0.0}
+        while True:
+            message = {"linear": zero | {"x": 3.0 + time.time() % 1.0}, "angular": zero}
+            self.publish("/catvehicle/vel", json.dumps({"op": "publish", "topic": "/catvehicle/vel", "msg": message}))
+            time.sleep(0.05)
+
+
+def _values(service: str) -> dict[str, Any] | None:
+    match service:
+        case "/rosapi/topics":
+            return {"topics": list(TOPICS), "types": list(TOPICS.values())}
+        case "/rosapi/get_time":
+            return {"time": {"secs": 1, "nsecs": 0}}
+        case "/rosapi/publishers":
+            return {"publishers": ["/car"]}
+    return None
+
+
+def main() -> None:
+    bridge = Bridge()
+    with serve(bridge.answer, "127.0.0.1", 0, max_size=None, compression=None) as server:
+        print(server.socket.getsockname()[1], flush=True)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        threading.Thread(target=bridge.drive, daemon=True).start()
+        for line in sys.stdin:
+            name, _, topic = line.strip().partition(" on ")
+            print(bridge.publish(topic, MESSAGES[name](topic)), flush=True)
+
+
+if __name__ == "__main__":
+    main()

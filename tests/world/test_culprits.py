@@ -1,0 +1,249 @@
+"""What failed is named: login, rosapi, a dead node, roscore, a neighbour, a glob; and nothing else is blamed."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from server import problems
+from server.diagnosis import SILENT_S, Diagnosis
+from server.link import CallFailed, LinkDown, RosLink
+from server.passing import BLOCKED_AFTER_S, Passing
+from server.questions import Questions
+from tests.server.ear import Bridge, Ear, bridging, linked, until
+from tests.server.test_doctor import doctor
+from tests.world.bridge_player import FILES, name_of, playing
+
+pytestmark = pytest.mark.world(n=8)
+
+MISSING = "Service /rosapi/get_time does not exist"
+NO_MASTER = "Unable to communicate with master!"
+KILLED = "Unable to communicate with service [/rosapi/get_time], address [rosrpc://127.0.0.1:40583]"
+NO_NODE = "failed to get service names and types: rcl node's context is invalid, at /project/src/rcl/node.c:401"
+
+# Answers one a second, None: good; what is named at the end, while messages of the car come.
+ENDINGS = {
+    "all is well": ([None, None], None),
+    "one failure is none": ([None, MISSING], None),
+    "never there": ([MISSING, MISSING], "no_rosapi"),
+    "ended": ([None, MISSING, MISSING], "rosapi_ended"),
+    "killed": ([None, KILLED, KILLED], "rosapi_ended"),
+    "roscore is gone": ([None, NO_MASTER], "roscore_gone"),
+    "another roscore, without rosapi": ([None, NO_MASTER, MISSING], "roscore_restarted"),
+    "another roscore, with rosapi": ([None, NO_MASTER, MISSING, None], "roscore_restarted"),
+    "the node has died": ([None, NO_NODE], "bridge_node_dead"),
+    "the node is dead from the beginning": ([NO_NODE], "bridge_node_dead"),
+    "mended": ([None, MISSING, MISSING, None], None),
+    "other words": ([None, "busy", "busy"], None),
+}
+
+
+@pytest.mark.parametrize(("answers", "code"), ENDINGS.values(), ids=ENDINGS)
+def test_the_words_of_a_real_bridge_name_the_part_that_failed(answers: list[str | None], code: str | None) -> None:
+    one = Diagnosis()
+    one.opened()
+    for second, words in enumerate(answers):
+        if words is None:
+            one.answered(float(second))
+        else:
+            one.failed(words)
+    found = one.problem(len(answers) - 0.9, flows=True)
+    assert (found.code if found else None) == code
+    assert one.is_rosbridge
+
+
+def test_a_restarted_rosbridge_has_nothing_left_to_mend() -> None:
+    one = Diagnosis()
+    one.answered(0.0)
+    one.failed(NO_MASTER)
+    one.opened()
+    one.answered(1.0)
+    assert one.problem(1.1, flows=True) is None
+
+
+def test_the_subscriptions_are_renewed_once_roscore_is_back() -> None:
+    one = Diagnosis()
+    one.answered(0.0)
+    assert not one.master_came_back()
+    one.failed(NO_MASTER)
+    assert not one.master_came_back()
+    one.answered(2.0)
+    assert one.master_came_back()
+    assert not one.master_came_back()
+
+
+@pytest.mark.parametrize(
+    ("was_there", "flows", "code"),
+    [(True, True, "rosapi_silent"), (True, False, "ros_gone"), (False, False, "bridge_deaf")],
+)
+def test_no_answer_is_named_after_a_while(was_there: bool, flows: bool, code: str) -> None:
+    one = Diagnosis()
+    if was_there:
+        one.answered(0.0)
+    one.unanswered(1.0)
+    assert one.problem(1.0 + SILENT_S - 0.1, flows=flows) is None
+    found = one.problem(1.0 + SILENT_S + 0.1, flows=flows)
+    assert found is not None
+    assert found.code == code
+    one.answered(9.0)
+    assert one.problem(9.1, flows=flows) is None
+
+
+def passing(subscribers: tuple[str, ...] | None, *, clients: int | None = None) -> Passing:
+    one = Passing(bridges=frozenset({"/rosbridge_websocket"}))
+    one.follow(["/gps_fix"], 0.0)
+    assert one.to_ask(0.0) == ["/gps_fix"]
+    one.answered("/gps_fix", subscribers, 0.0)
+    if clients is not None:
+        one.counted({"data": clients + 2})
+    return one
+
+
+def test_a_topic_that_the_bridge_did_not_subscribe_to_is_hidden() -> None:
+    found = passing(("/logger",)).problem(0.1)
+    assert found is not None
+    assert found.code == "topics_hidden"
+    assert "/gps_fix" in found.title
+    assert "topics_glob" in found.hint
+
+
+def test_a_topic_that_is_subscribed_and_does_not_come_is_blocked_by_a_neighbour() -> None:
+    one = passing(("/rosbridge_websocket",), clients=1)
+    assert one.problem(BLOCKED_AFTER_S - 0.1) is None
+    found = one.problem(BLOCKED_AFTER_S + 0.1)
+    assert found is not None
+    assert found.code == "topics_blocked"
+    assert "cbor-raw" in found.hint
+    one.follow([], 9.0)  # it came
+    assert one.problem(9.0) is None
+
+
+@pytest.mark.parametrize(
+    "one", [passing(None), passing(("/rosbridge_websocket",)), passing(("/rosbridge_websocket",), clients=0)]
+)
+def test_an_idle_publisher_is_nobody_elses_fault(one: Passing) -> None:
+    assert one.problem(99.0) is None
+
+
+def test_without_the_bridges_name_nothing_is_asked_and_nothing_blamed() -> None:
+    one = Passing()
+    one.follow(["/gps_fix"], 0.0)
+    assert one.to_ask(0.0) == []
+    assert one.problem(99.0) is None
+
+
+# -- questions -------------------------------------------------------------------------------------------------------
+
+
+def answered(values: Any = None, *, result: bool = True) -> Callable[[dict[str, Any]], dict[str, Any] | None]:
+    def answer(operation: dict[str, Any]) -> dict[str, Any] | None:
+        if operation["op"] != "call_service":
+            return None
+        return {"op": "service_response", "id": operation["id"], "values": values, "result": result}
+
+    return answer
+
+
+async def opened(link: RosLink, ear: Ear) -> tuple[Questions, Diagnosis]:
+    await ear.hears("opened")
+    diagnosis = Diagnosis()
+    return Questions(link, diagnosis, now=time.monotonic), diagnosis
+
+
+async def test_a_question_that_is_not_answered_holds_up_no_command() -> None:
+    """On ROS 2 the bridge reads nothing more from a connection until its call is answered."""
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        asks, _ = await opened(link, ear)
+        with pytest.raises(CallFailed):
+            await asks.call("/rosapi/get_time", timeout_s=0.05)
+        link.unsubscribe_all()
+        link.send_now({"op": "advertise", "id": "a", "topic": "/cmd", "type": "geometry_msgs/Twist"})
+        await until(lambda: any(said for said in bridge.connections if said and said[0]["op"] == "advertise"))
+        assert [[one["op"] for one in said] for said in bridge.connections] == [["advertise"], ["call_service"]]
+        asks.stop()
+
+
+async def test_while_a_question_waits_no_other_is_put_behind_it_and_a_late_answer_frees_it() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        asks, diagnosis = await opened(link, ear)
+        for _ in range(3):
+            with pytest.raises(CallFailed):
+                await asks.call("/rosapi/get_time", timeout_s=0.05)
+        assert len(bridge.operations) == 1
+        await bridge.say({"op": "service_response", "id": bridge.operations[0]["id"], "values": {}, "result": True})
+        bridge.answer = answered({"time": {}})
+        await until(lambda: diagnosis.is_rosbridge)
+        assert await asks.call("/rosapi/get_time") == {"time": {}}
+        asks.stop()
+
+
+async def test_a_slow_link_is_not_held_against_rosapi() -> None:
+    """Only where the bridge has answered the ping behind a question has it read the question."""
+    ear = Ear()
+
+    async def slow(bridge: Bridge) -> None:
+        for socket in bridge.sockets:
+            socket.transport.pause_reading()  # type: ignore[attr-defined]
+
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        asks, diagnosis = await opened(link, ear)
+        bridge.answer = answered({"time": {}})
+        await asks.call("/rosapi/get_time")
+        await slow(bridge)
+        with pytest.raises(CallFailed):
+            await asks.call("/rosapi/get_time", timeout_s=0.1)
+        assert diagnosis.problem(time.monotonic() + 60.0, flows=True) is None
+        asks.stop()
+
+
+async def test_rosapi_that_does_not_answer_is_named_where_the_bridge_has_read_the_question() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        asks, diagnosis = await opened(link, ear)
+        with pytest.raises(CallFailed):
+            await asks.call("/rosapi/get_time", timeout_s=0.3)
+        found = diagnosis.problem(time.monotonic() + 60.0, flows=True)
+        assert found == problems.ROSAPI_SILENT
+        asks.stop()
+
+
+async def test_questions_end_with_the_link() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        asks, _ = await opened(link, ear)
+        link.abort()
+        await ear.hears("closed")
+        if not link.is_open:
+            with pytest.raises(LinkDown):
+                await asks.call("/rosapi/get_time")
+        asks.stop()
+        assert bridge.connections is not None
+
+
+# -- doctor, on transcripts of real bridges --------------------------------------------------------------------------
+
+SAID = {
+    "ros1/auth": (2, "wants a login"),
+    "ros1/discover_no_rosapi": (1, "rosapi does not run"),
+    "ros1/lifecycle_roscore": (2, "roscore"),
+    "ros2/lifecycle_sigterm": (2, "ROS node has died"),
+}
+
+
+@pytest.mark.skipif(not FILES, reason="the transcripts of real bridges are not here")
+@pytest.mark.parametrize("name", SAID)
+async def test_doctor_names_it(name: str) -> None:
+    path = next(path for path in FILES if name_of(path) == name)
+    code, words = SAID[name]
+    async with playing(path) as player:
+        async with asyncio.timeout(60):
+            found, out, err = await doctor(f"127.0.0.1:{player.port}")
+    assert words in out + err
+    assert "not a rosbridge" not in out + err
+    assert found == code

@@ -1,0 +1,221 @@
+"""What arrives of a car's topics: when publishers are asked for, what is renewed, what is named as missing."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from server import doctor
+from server.delivery import AT_ONCE, Delivery
+from server.discovery import Offer
+from server.others import choose
+from server.topics import could_carry, map_signals
+
+
+def drive(
+    delivery: Delivery,
+    publishers: dict[str, tuple[str, ...] | None],
+    *,
+    flows: dict[str, float],
+    seconds: float,
+    start_s: float = 0.0,
+    candidates: tuple[str, ...] = (),
+) -> tuple[list[tuple[float, str]], list[tuple[float, str]]]:
+    """Time passes, topics of `flows` come with their period. Which were asked for, and which were renewed, and when."""
+    asked, renewed = [], []
+    step = 0
+    while (now_s := start_s + step * 0.1) <= start_s + seconds:
+        for topic, period_s in flows.items():
+            if step % max(1, round(period_s / 0.1)) == 0:
+                delivery.heard(topic, now_s)
+        if step % 10 == 0:
+            for topic in delivery.to_ask(now_s, candidates):
+                asked.append((now_s, topic))
+                if delivery.answered(topic, publishers[topic], now_s):
+                    renewed.append((now_s, topic))
+        step += 1
+    return asked, renewed
+
+
+@pytest.mark.world(n=4)
+def test_a_published_topic_of_which_nothing_comes_is_subscribed_to_anew_and_then_named() -> None:
+    delivery = Delivery()
+    delivery.opened(0.0)
+    delivery.follow(["/vel"], ["/imu"], 0.0)
+    asked, renewed = drive(delivery, {"/imu": ("/car",)}, flows={"/vel": 0.1}, seconds=5.0)
+    assert asked
+    assert [topic for _, topic in renewed] == ["/imu"]
+    assert renewed[0][0] <= 5.0
+    assert delivery.not_received(5.0) == {}  # it has its time as JSON
+    drive(delivery, {"/imu": ("/car",)}, flows={"/vel": 0.1}, seconds=5.0, start_s=5.1)
+    assert delivery.not_received(10.1) == {"/imu": ("/car",)}
+    delivery.heard("/imu", 10.2)
+    assert delivery.not_received(10.2) == {}
+
+
+@pytest.mark.world(n=4)
+def test_while_nothing_flows_at_all_no_topic_is_to_blame() -> None:
+    delivery = Delivery()
+    delivery.follow([], ["/imu", "/tf"], 0.0)
+    _, renewed = drive(delivery, {"/imu": ("/car",), "/tf": ("/car",)}, flows={}, seconds=60.0)
+    assert renewed == []
+    assert delivery.not_received(60.0) == {}
+
+
+@pytest.mark.world(n=4)
+def test_without_a_publisher_or_an_answer_nothing_is_missing() -> None:
+    delivery = Delivery()
+    delivery.follow(["/vel"], ["/goal", "/unknown"], 0.0)
+    _, renewed = drive(delivery, {"/goal": (), "/unknown": None}, flows={"/vel": 0.1}, seconds=60.0)
+    assert renewed == []
+    assert delivery.not_received(60.0) == {}
+
+
+@pytest.mark.world(n=4)
+def test_a_slow_topic_that_comes_in_time_is_never_renewed_again() -> None:
+    """A latched topic says one thing and is silent for the rest of the drive."""
+    delivery = Delivery()
+    delivery.follow(["/vel"], ["/map"], 0.0)
+    delivery.heard("/map", 0.2)
+    asked, renewed = drive(delivery, {"/map": ("/car",)}, flows={"/vel": 0.1}, seconds=600.0)
+    assert asked == renewed == []
+
+
+@pytest.mark.world(n=4)
+def test_a_topic_that_stays_silent_is_asked_for_ever_more_seldom() -> None:
+    delivery = Delivery()
+    delivery.follow(["/vel"], [f"/quiet_{n}" for n in range(30)], 0.0)
+    nodes = {f"/quiet_{n}": ("/car",) for n in range(30)}
+    asked, renewed = drive(delivery, nodes, flows={"/vel": 0.1}, seconds=1800.0)
+    of_one = [at_s for at_s, topic in renewed if topic == "/quiet_7"]
+    gaps = [b - a for a, b in pairwise(of_one)]
+    assert len(of_one) <= 10
+    assert gaps == sorted(gaps)
+    assert max(gaps) < 400
+    assert len(asked) / 1800 < 0.3  # calls a second
+    most = max(sum(1 for at_s, _ in asked if at_s == when) for when, _ in asked)
+    assert most <= AT_ONCE
+
+
+@pytest.mark.world(n=4)
+def test_a_signal_s_topic_that_a_neighbour_blocks_is_renewed_until_it_comes() -> None:
+    delivery = Delivery()
+    delivery.follow(["/vel", "/brake"], [], 0.0)
+    _, renewed = drive(delivery, {"/brake": ("/car",)}, flows={"/vel": 0.1}, seconds=60.0)
+    times = [at_s for at_s, _ in renewed]
+    assert times[0] <= 6.0
+    assert max(b - a for a, b in pairwise(times)) <= 12.0
+    assert delivery.not_received(60.0) == {"/brake": ("/car",)}
+
+
+@pytest.mark.world(n=4)
+def test_a_signal_s_topic_that_stops_is_subscribed_to_anew_while_its_publisher_is_there() -> None:
+    """A publisher that comes back with another quality of service is not received by the old subscription."""
+    for nodes, expected in ((("/car",), True), ((), False)):
+        delivery = Delivery()
+        delivery.follow(["/vel", "/brake"], [], 0.0)
+        drive(delivery, {}, flows={"/vel": 0.1, "/brake": 0.1}, seconds=10.0)
+        _, renewed = drive(delivery, {"/brake": nodes}, flows={"/vel": 0.1}, seconds=10.0, start_s=10.1)
+        assert bool(renewed) is expected
+
+
+@pytest.mark.world(n=9)
+def test_a_topic_nobody_publishes_is_known_as_such_and_asked_again_until_somebody_does() -> None:
+    delivery = Delivery()
+    delivery.follow(["/vel", "/brake"], [], 0.0)
+    asked, _ = drive(delivery, {"/brake": ()}, flows={"/vel": 0.1}, seconds=2.0)
+    assert delivery.unpublished == {"/brake"}
+    assert asked[0][0] <= 1.5
+    delivery.follow(["/vel"], [], 2.0)  # it carries no signal any more
+    asked, _ = drive(delivery, {"/brake": ()}, flows={"/vel": 0.1}, seconds=60.0, start_s=2.1, candidates=("/brake",))
+    assert 15 <= len(asked) <= 21
+    drive(delivery, {"/brake": ("/late",)}, flows={"/vel": 0.1}, seconds=4.0, start_s=62.2, candidates=("/brake",))
+    assert delivery.unpublished == set()
+
+
+@pytest.mark.world(n=9)
+def test_what_comes_has_a_publisher_and_is_not_asked_for() -> None:
+    delivery = Delivery()
+    delivery.follow(["/vel"], ["/tf"], 0.0)
+    asked, _ = drive(delivery, {}, flows={"/vel": 0.1, "/tf": 0.1}, seconds=600.0)
+    assert asked == []
+
+
+@pytest.mark.world(n=9)
+def test_a_publisher_that_died_after_it_published_leaves_its_topic_mapped() -> None:
+    delivery = Delivery()
+    delivery.follow(["/vel", "/brake"], [], 0.0)
+    drive(delivery, {}, flows={"/vel": 0.1, "/brake": 0.1}, seconds=5.0)
+    drive(delivery, {"/brake": ()}, flows={"/vel": 0.1}, seconds=60.0, start_s=5.1)
+    assert delivery.unpublished == set()
+
+
+FOUND = {
+    "/catvehicle/vel": "geometry_msgs/Twist",
+    "/vel": "geometry_msgs/Twist",
+    "/fix_of_drone": "sensor_msgs/NavSatFix",
+    "/catvehicle/cmd_vel": "geometry_msgs/Twist",
+    "/cmd_vel": "geometry_msgs/Twist",
+    "/fuel": "std_msgs/Float32",
+}
+
+
+@pytest.mark.world(n=9)
+def test_a_signal_is_mapped_to_a_topic_with_a_publisher() -> None:
+    sources = map_signals(FOUND, {}, {"/catvehicle/vel", "/fix_of_drone", "/fuel"})
+    assert sources["speed"].topic == "/vel"
+    assert sources["speed"].decode is not None
+    for signal, topic in (("position", "/fix_of_drone"), ("fuel", "/fuel")):
+        assert (sources[signal].topic, sources[signal].decode) == (topic, None)
+        assert sources[signal].note == "no node publishes it"
+
+
+@pytest.mark.world(n=9)
+def test_a_topic_that_the_operator_picked_is_kept_and_explained() -> None:
+    sources = map_signals(FOUND, {"speed": "/catvehicle/vel"}, {"/catvehicle/vel"})
+    assert (sources["speed"].topic, sources["speed"].decode) == ("/catvehicle/vel", None)
+    assert sources["speed"].note == "no node publishes it"
+    assert map_signals(FOUND, {"speed": "/catvehicle/vel"}, set())["speed"].decode is not None
+
+
+@pytest.mark.world(n=9)
+def test_the_car_is_commanded_where_it_listens_though_nobody_publishes_there() -> None:
+    source = map_signals(FOUND, {}, {"/catvehicle/cmd_vel"})["command"]
+    assert (source.topic, source.type, source.decode) == ("/catvehicle/cmd_vel", "geometry_msgs/Twist", None)
+
+
+@pytest.mark.world(n=9)
+def test_what_may_carry_a_signal_once_it_is_published() -> None:
+    found = FOUND | {"/camera": "sensor_msgs/Image", "/mine": "std_msgs/Float64"}
+    assert could_carry(found, {"distance": "/mine"}) == {*FOUND, "/mine"}
+
+
+@pytest.mark.world(n=9)
+async def test_the_doctor_looks_for_topics_with_a_publisher() -> None:
+    asked: list[str] = []
+
+    class Link:
+        async def call(self, service: str, arguments: dict[str, str], *, timeout_s: float) -> Any:
+            asked.append(arguments["topic"])
+            return {"publishers": [] if arguments["topic"] in ("/catvehicle/vel", "/fuel") else ["/car"]}
+
+    link: Any = Link()
+    sources = await doctor._map(link, Offer(topics=FOUND, ros=1))
+    assert (sources["speed"].topic, sources["speed"].decode is not None) == ("/vel", True)
+    assert sources["fuel"].decode is None
+    assert len(asked) == len(set(asked)) == len(FOUND) - 1, "each topic once, and none that carries no signal"
+
+
+@pytest.mark.world(n=4)
+def test_a_topic_whose_name_is_not_sent_to_a_bridge_is_named_as_left_out() -> None:
+    offered = {
+        "/good": "std_msgs/String",
+        "relative": "std_msgs/String",
+        "/wrong": "no type",
+        "/a b": "std_msgs/String",
+    }
+    others, left_out = choose(offered, without=(), also="all", asked={*offered.values()})
+    assert set(others) == {"/good"}
+    assert left_out == ("/a b", "/wrong", "relative")
