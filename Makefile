@@ -41,7 +41,7 @@ bench: $(VENV)/.ready-test static/built/built.json ## latency, bytes and load, b
 
 soak: $(VENV)/.ready-test static/built/built.json ## the long proofs
 	$(PY) -m tests.chromium
-	$(PYTEST) -m soak --timeout 7200
+	$(PYTEST) -m soak --timeout 7200 -o faulthandler_timeout=7300
 
 sbom: $(VENV)/.ready-test ## what is shipped of other people's work, as CycloneDX JSON in out/catgraph.cdx.json
 	@mkdir -p out

@@ -11,6 +11,8 @@ import numpy as np
 
 from server.bridge.server import RosBridge
 
+ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
+
 
 def twist(speed_mps: float) -> dict[str, Any]:
     return {"linear": {"x": speed_mps, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
@@ -34,14 +36,26 @@ def scan(ranges: Any, *, range_min: float = 0.1, range_max: float = 81.0) -> dic
 
 @contextlib.asynccontextmanager
 async def driving(
-    bridge: RosBridge, *, speed: Callable[[int], float] = lambda n: 4.2, hz: float = 20.0, scans: bool = False
+    bridge: RosBridge,
+    *,
+    speed: Callable[[int], float] = lambda n: 4.2,
+    hz: float = 20.0,
+    scans: bool = False,
+    steers: bool = False,
 ) -> AsyncIterator[list[int]]:
-    """A car that publishes its speed (and a scan) until the block ends; yields a list whose length counts messages."""
+    """A car that publishes its speed until the block ends; yields a list whose length counts messages.
+
+    `scans`: and a scan. `steers`: and its steering, straight ahead, without which no slow-down can be armed.
+    """
     sent: list[int] = []
+    if steers:
+        bridge.advertise("/catvehicle/steering", "geometry_msgs/Wrench")
 
     async def drive() -> None:
         while True:
             bridge.publish("/catvehicle/vel", twist(speed(len(sent))))
+            if steers:
+                bridge.publish("/catvehicle/steering", {"force": dict(ZERO), "torque": dict(ZERO)})
             if scans:
                 bridge.publish("/scan", scan(np.full(181, 5.0 + len(sent) % 10)))
             sent.append(1)

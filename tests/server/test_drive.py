@@ -128,7 +128,7 @@ def _assert_as_rehearsed(file: Path, events: list[dict[str, Any]], one: Viewer) 
         speed_s = [message.at_s - recording.start_s for message in recording.messages(0.0, {topic})
                    if message.topic == topic]  # fmt: skip
     heard = [
-        (state["server"]["time_ms"] - 1000 * speed["age_s"], speed["count"])
+        (state["server"]["time_ms"] - 1000 * (speed["age_s"] - speed["delay_s"]), speed["count"])
         for state in one.states
         if (speed := state["signals"]["speed"])["count"]
     ]

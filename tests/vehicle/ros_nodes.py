@@ -79,12 +79,13 @@ class Process:
         """Its exit status."""
         with contextlib.suppress(ProcessLookupError):
             self._process.send_signal(by)
-        try:
+        with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(ENDS_WITHIN_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._reader.join(5)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)  # and its children, which hold its output open
+        self._process.wait(ENDS_WITHIN_S)
+        self._reader.join(ENDS_WITHIN_S)
+        assert not self._reader.is_alive()  # closing what is still being read would wait for ever
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         with contextlib.suppress(OSError):

@@ -112,13 +112,14 @@ async def test_whatever_is_called_nothing_is_published_that_was_not_ordered(brid
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
     app = create_app(config)
     async with (
-        driving(bridge),
+        driving(bridge, steers=True),
         serving_app(app, config) as base,
         httpx.AsyncClient(base_url=base, timeout=10.0) as client,
         websockets.connect(base.replace("http", "ws") + "/ws") as page,
     ):
-        while (await client.get("/api/state")).json()["decelerate"]["state"] != "safe":
-            await asyncio.sleep(0.05)
+        async with asyncio.timeout(20):
+            while (await client.get("/api/state")).json()["decelerate"]["state"] != "safe":
+                await asyncio.sleep(0.05)
         walked = 0
         for method, path in all_routes():
             if path not in ("/api/connect", "/api/disconnect"):

@@ -38,7 +38,10 @@ async def test_no_command_arrives_late_and_none_twice(bridge: RosBridge, server:
 
     bridge.on_publish.append(hear)
     dice = random.Random(7)
-    async with driving(bridge, speed=lambda _: 5.0), httpx.AsyncClient(base_url=server, timeout=10.0) as client:
+    async with (
+        driving(bridge, speed=lambda _: 5.0, steers=True),
+        httpx.AsyncClient(base_url=server, timeout=10.0) as client,
+    ):
 
         async def until(what: str, seconds: float = 20.0) -> None:
             ends_s = time.monotonic() + seconds
