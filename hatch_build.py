@@ -51,7 +51,7 @@ class PageHook(BuildHookInterface):
 
     @property
     def _assets(self) -> ModuleType:
-        return load(Path(self.root, "server", "web", "assets.py"))
+        return load(Path(self.root, "server", "system", "page_files.py"))
 
     @property
     def _built(self) -> ModuleType:

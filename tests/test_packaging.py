@@ -17,8 +17,8 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from monitor.check import Check
-from server.cli import main
-from server.web.icons import ICONS
+from server.cli.main import main
+from server.web.assets.icons import ICONS
 from tests.tree import PROJECT, project_files
 
 PYPROJECT: dict[str, Any] = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))

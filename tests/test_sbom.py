@@ -14,7 +14,7 @@ from cyclonedx.validation.json import JsonStrictValidator
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from server.notices import parts
+from server.web.assets.third_party import parts
 from tests.tree import PROJECT
 
 

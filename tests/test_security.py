@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from server.limits import Limits
+from server.protocol.rate_limit import Limits
 from tests.tree import PROJECT, project_files, text_of
 
 SAID = (PROJECT / "docs" / "security.md").read_text(encoding="utf-8")
@@ -72,6 +72,7 @@ def test_no_shell_and_no_code_from_text() -> None:
             continue
         found += [f"{path.as_posix()}: {hit[0]}" for hit in pattern.finditer(text_of(path) or "")]
     compiled = [  # names enter as quoted text only, and into the first the names of our own fields
-        f"{path}.py: exec(" for path in ("monitor/quick", "server/recording/decode", "server/recording/encode")
+        f"{path}.py: exec("
+        for path in ("monitor/quick", "server/recording/read/decode", "server/recording/read/encode")
     ]
     assert sorted(found) == compiled

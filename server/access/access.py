@@ -9,17 +9,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from server import label
-from server.access import secret_file, waiting
+from server.access import pending_invitations, secret_file
+from server.access.active_connections import Visits
 from server.access.cookie import Cookies
 from server.access.devices import Device, Devices
-from server.access.guesses import Guesses
+from server.access.identity import LOCAL, Role, Who
 from server.access.invitations import PIN_DIGITS, Invitation, Invitations
 from server.access.names import Names
+from server.access.pin_throttle import Guesses
 from server.access.tickets import Tickets
-from server.access.visits import Visits
-from server.access.who import LOCAL, Role, Who
-from server.config import Config
+from server.app.config import Config
+from server.control import display_name
 
 log = logging.getLogger("catgraph.access")
 
@@ -99,7 +99,7 @@ class Access:
         self.address = address
         if self._folder is not None and not self.is_open:
             try:
-                waiting.announce(self._folder, address)
+                pending_invitations.announce(self._folder, address)
             except OSError as why:
                 log.warning("catgraph pair will not find this server: %s", why)
 
@@ -112,7 +112,7 @@ class Access:
         """
         now_s = self._now()
         if self._folder is not None:
-            for invitation in waiting.collect(self._folder, now_s=now_s, wall_ms=self._wall_ms()):
+            for invitation in pending_invitations.collect(self._folder, now_s=now_s, wall_ms=self._wall_ms()):
                 self._invitations.add(invitation, now_s=now_s)
         if token is not None:
             found = self._invitations.take(token=token, now_s=now_s)
@@ -167,7 +167,7 @@ class Access:
     def change(self, id: str, *, role: Role | None, name: str | None, but: object = None) -> Device | None:
         """The device with another role or name, which counts at once: its sockets begin anew. Raises OSError."""
         before = self.devices.get(id)
-        clean = None if name is None else label.clean(name)
+        clean = None if name is None else display_name.clean(name)
         device = self.devices.change(id, role=role, name=clean, now_ms=self._wall_ms())
         if device is not None and before is not None and (device.role, device.name) != (before.role, before.name):
             self.visits.end(
@@ -239,7 +239,7 @@ class Access:
         if not self.is_open:
             self.devices.seen_on_disk(now_ms=self._wall_ms())()
         if self._folder is not None:
-            waiting.retire(self._folder)
+            pending_invitations.retire(self._folder)
 
 
 def _peer(address: str) -> str:

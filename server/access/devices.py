@@ -15,9 +15,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from server import label
 from server.access import secret_file
-from server.access.who import Role
+from server.access.identity import Role
+from server.control import display_name
 from server.storage.set_aside import set_aside
 
 log = logging.getLogger("catgraph.access")
@@ -77,7 +77,7 @@ class Devices:
         secret = secrets.token_urlsafe(32)
         device = Device(
             id=secrets.token_hex(6),
-            name=self._own_name(label.clean(name) or "Phone"),
+            name=self._own_name(display_name.clean(name) or "Phone"),
             role=role,
             secret_sha256=_hash(secret),
             paired_ms=now_ms,
@@ -131,7 +131,7 @@ class Devices:
 
     def _own_name(self, name: str) -> str:
         taken = {one.name for one in self._devices.values()}
-        numbers = (f"{name[: label.MAX_LETTERS - 4].strip()} {n}" for n in range(2, MOST + 2))
+        numbers = (f"{name[: display_name.MAX_LETTERS - 4].strip()} {n}" for n in range(2, MOST + 2))
         return name if name not in taken else next(one for one in numbers if one not in taken)
 
     def _drop_oldest(self, now_ms: int) -> None:

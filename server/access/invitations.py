@@ -9,7 +9,7 @@ import hmac
 import secrets
 from dataclasses import dataclass
 
-from server.access.who import Role
+from server.access.identity import Role
 
 LASTS_S = 600.0
 MOST_STANDING = 6  # each PIN that stands makes a guess likelier; the oldest goes

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.access.who import Role, Who
+from server.access.identity import Role, Who
 
 SHORTEST = 20  # letters: `openssl rand -hex 16` gives 32
 _LONGEST = 512

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from enum import Enum
 
-from server.access.who import Role
+from server.access.identity import Role
 
 
 class Needs(Enum):

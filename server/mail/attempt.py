@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from server.mail.order import Mail, Recipient
 from server.mail.outbox import Outcome
-from server.mail.pauses import MAX_ATTEMPTS
 from server.mail.replies import Trouble
-from server.mail.wire import Reply
+from server.mail.retry_backoff import MAX_ATTEMPTS
+from server.mail.smtp_connection import Reply
 
 _TOLD = 5  # recipients named in a sentence
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from server.mail import heads
+from server.mail import headers
 from server.mail.address import MailAddress
 
 _LINE = 57  # bytes that make one line of 76 letters, RFC 2045 6.8
@@ -53,7 +53,7 @@ def write(draft: Draft, path: Path, stop: threading.Event) -> int:
             file.write(_text_part(draft.text))
         else:
             edge = _edge(draft.message_id)
-            file.write(heads.line("Content-Type", f'multipart/mixed; boundary="{edge}"'))
+            file.write(headers.line("Content-Type", f'multipart/mixed; boundary="{edge}"'))
             file.write(f"\r\n--{edge}\r\n".encode())
             file.write(_text_part(draft.text))
             file.write(f"--{edge}\r\n".encode())
@@ -67,12 +67,12 @@ def write(draft: Draft, path: Path, stop: threading.Event) -> int:
 def _head(draft: Draft) -> bytes:
     return b"".join(
         (
-            heads.date_line(draft.at_ms),
-            heads.address_line("From", [draft.sender], draft.sender_name),
-            heads.address_line("To", draft.to),
-            heads.line("Message-ID", draft.message_id),
-            heads.text_line("Subject", draft.subject),
-            heads.line("MIME-Version", "1.0"),
+            headers.date_line(draft.at_ms),
+            headers.address_line("From", [draft.sender], draft.sender_name),
+            headers.address_line("To", draft.to),
+            headers.line("Message-ID", draft.message_id),
+            headers.text_line("Subject", draft.subject),
+            headers.line("MIME-Version", "1.0"),
         )
     )
 
@@ -85,15 +85,17 @@ def _edge(message_id: str) -> str:
 def _text_part(text: str) -> bytes:
     lines = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     body = "\r\n".join(lines) + "\r\n"
-    head = heads.line("Content-Type", "text/plain; charset=utf-8") + heads.line("Content-Transfer-Encoding", "base64")
+    head = headers.line("Content-Type", "text/plain; charset=utf-8") + headers.line(
+        "Content-Transfer-Encoding", "base64"
+    )
     return head + b"\r\n" + _base64(body.encode())
 
 
 def _attach(attachment: Attachment, file: BinaryIO, stop: threading.Event) -> None:
-    name = heads.file_name(attachment.name)
-    file.write(heads.line("Content-Type", f'application/octet-stream; name="{name}"'))
-    file.write(heads.line("Content-Transfer-Encoding", "base64"))
-    file.write(heads.line("Content-Disposition", f'attachment; filename="{name}"'))
+    name = headers.file_name(attachment.name)
+    file.write(headers.line("Content-Type", f'application/octet-stream; name="{name}"'))
+    file.write(headers.line("Content-Transfer-Encoding", "base64"))
+    file.write(headers.line("Content-Disposition", f'attachment; filename="{name}"'))
     file.write(b"\r\n")
     left = attachment.length
     with open(attachment.path, "rb") as source:

@@ -17,19 +17,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from server.mail import address, attempt, pauses
+from server.mail import address, attempt, retry_backoff
 from server.mail.order import Letter, Mail, Order
 from server.mail.outbox import Outbox, OutboxFull, Outcome, WrongState
 from server.mail.prepare import CannotPrepare, prepare
 from server.mail.replies import Trouble
 from server.mail.settings import MailSettings, MailSettingsFile, checked
+from server.mail.smtp_connection import Account, Connection, Envelope, connect
 from server.mail.source import Source
-from server.mail.wire import Account, Connection, Envelope, connect
-from server.supervision import Supervisor
+from server.system.supervision import Supervisor
 
 log = logging.getLogger("catgraph.mail")
 T = TypeVar("T")
-_LONGEST_MS = round(1000 * pauses.LONGEST_S)
+_LONGEST_MS = round(1000 * retry_backoff.LONGEST_S)
 _AGAIN_S = 5.0  # until a task that failed is begun again
 _BREAK_OFF_S = 10.0  # a cancelled mail that was handed over already waits so long for its answer
 
@@ -63,7 +63,7 @@ class Mailer:
         source: Source,
         *,
         wall_ms: Callable[[], int],
-        pause_s: Callable[[int], float] = pauses.pause_s,
+        pause_s: Callable[[int], float] = retry_backoff.pause_s,
     ) -> None:
         self._folder = folder
         self._source = source
@@ -271,7 +271,7 @@ class Mailer:
         earliest = await self._with(Outbox.earliest_ms)
         timeout = None if earliest is None else max(0.0, (earliest - self._wall_ms()) / 1000)
         if timeout is not None:
-            timeout = min(timeout, pauses.LONGEST_S)
+            timeout = min(timeout, retry_backoff.LONGEST_S)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(timeout):  # wait_for of Python 3.11 may swallow the end of the task
                 await self._to_send.wait()

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 from urllib.parse import quote
 
-from server.mail import address, compose, words
+from server.mail import address, compose, mail_text
 from server.mail.order import Letter, Way
 from server.mail.outbox import Composed, Prepared
 from server.mail.pack import NoRoom, Pack, cut, need_room, pack
@@ -119,9 +119,11 @@ def _write(
             "send it as a link."
         )
     if way == "link":
-        texts = [words.linked(order.text, order.recordings, order.format, packed, _links(letter, settings), missing)]
+        texts = [
+            mail_text.linked(order.text, order.recordings, order.format, packed, _links(letter, settings), missing)
+        ]
     else:
-        texts = words.attached(order.text, order.recordings, order.format, packed, parts, missing)
+        texts = mail_text.attached(order.text, order.recordings, order.format, packed, parts, missing)
         need_room(files, packed.size_bytes * 3 // 2)
     sender = address.parse(settings.sender)
     made: list[Composed] = []
@@ -133,7 +135,7 @@ def _write(
             sender=sender,
             sender_name=settings.sender_name,
             to=[address.parse(one) for one in order.to],
-            subject=words.subject_of(order.subject, number, len(texts)),
+            subject=mail_text.subject_of(order.subject, number, len(texts)),
             at_ms=letter.ordered_ms,
             message_id=message_id,
             text=text,

@@ -15,9 +15,9 @@ from urllib.parse import urlsplit
 
 import tomli_w
 
-from server import bounded_toml
 from server.mail import address
-from server.mail.heads import is_one_line
+from server.mail.headers import is_one_line
+from server.storage import bounded_toml
 from server.storage.set_aside import set_aside
 
 Security = Literal["starttls", "tls", "none"]

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import orjson
 
-from server.recording.schemas import Schema
+from server.recording.read.schemas import Schema
 
 PREFIX = "/catgraph/"
 LIBRARY = "catgraph"  # how the header of our files begins to say who wrote them

@@ -17,17 +17,17 @@ from typing import Any, Literal
 
 import orjson
 
-from server.bridge.encoding import Unencodable, json_bytes
-from server.frames import TooManyParts, Unreadable
-from server.raw_frame import RawFrame
+from server.judge.message import RosVersion
 from server.recording import recover, space
-from server.recording.encode import Misfit
 from server.recording.folder import FINISHED, RecordingsFolder, id_of, writing_path
+from server.recording.mcap.write import PartFile
 from server.recording.own import PREFIX, Own, own_schema
-from server.recording.schemas import Schema, TypeBook, standard
+from server.recording.read.encode import Misfit
+from server.recording.read.schemas import Schema, TypeBook, standard
 from server.recording.space import Allowance, Space
-from server.recording.write import PartFile
-from server.source import RosVersion
+from server.rosbridge.codec import TooManyParts, Unreadable
+from server.rosbridge.raw_frame import RawFrame
+from server.rosbridge_server.encoding import Unencodable, json_bytes
 
 log = logging.getLogger("catgraph.recorder")
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from server.judge.message import Json, Message, RosVersion
 from server.simulator import place
 from server.simulator.beams import DENSE_HZ, INTERLACED, SICK_HZ, Beams, dense
 from server.simulator.driver import Driver, Order
@@ -33,7 +34,6 @@ from server.simulator.scenery import Scenery, box
 from server.simulator.sensors import GpsError, effort_percent, steering_percent, wheel_speed_mps
 from server.simulator.stack import Stack
 from server.simulator.vehicle import LASER_AHEAD_M, Motion, MotionCommand, drive, pedals
-from server.source import Json, Message, RosVersion
 
 START_S = 1_790_000_000.0  # seconds since 1970, when nobody says otherwise
 START_STATION_M = 300.0  # half a minute before the bends and the stop

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from server.source import Message
+from server.judge.message import Message
 
 # Where the types that a signal may have keep its number.
 SPEED_PATHS = (("linear", "x"), ("twist", "linear", "x"), ("twist", "twist", "linear", "x"), ("data",))

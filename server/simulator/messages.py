@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from server.judge.message import Json, Message, RosVersion
 from server.simulator.beams import Beams
 from server.simulator.laser import RANGE_MAX_M
-from server.source import Json, Message, RosVersion
 
 Vector = tuple[float, float, float]
 

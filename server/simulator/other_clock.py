@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from server.judge.message import Message
 from server.simulator.effects import Effect
 from server.simulator.fields import with_fields
-from server.source import Message
 
 
 class OtherClock(Effect):

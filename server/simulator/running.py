@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from server.judge.message import Message
 from server.simulator.driver import Order
 from server.simulator.effects import Effect
 from server.simulator.scenarios import SCENARIOS, BridgeFault, Planned, Scenario, laid_over
-from server.source import Message
 
 
 @dataclass(slots=True, kw_only=True)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from server.judge.message import Message
 from server.simulator.driver import Order
 from server.simulator.effects import (
     BlindLaser,
@@ -23,7 +24,6 @@ from server.simulator.effects import (
 )
 from server.simulator.other_clock import OtherClock
 from server.simulator.sensor_faults import CutScan, FrozenPosition, FrozenScan, NearObject, NoFix
-from server.source import Message
 
 BridgeFault = Literal["freeze", "kill"]
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from server.judge.message import Message
 from server.simulator.effects import Effect
 from server.simulator.fields import with_fields
-from server.source import Message
 
 
 class FrozenPosition(Effect):

@@ -8,11 +8,11 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from server.bridge.server import CannotListen, Like, RosBridge, ServiceFailed
+from server.judge.message import Json, RosVersion
+from server.rosbridge_server.server import CannotListen, Like, RosBridge, ServiceFailed
 from server.simulator.car import SimulatedCar, Step
 from server.simulator.messages import CMD_VEL
 from server.simulator.scenarios import BridgeFault, Planned, UnknownScenario, check_duration, find, planned
-from server.source import Json, RosVersion
 
 SCENARIO_SERVICE = "/catgraph/simulator/scenario"
 STATE_SERVICE = "/catgraph/simulator/state"

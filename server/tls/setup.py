@@ -19,10 +19,10 @@ from starlette.responses import RedirectResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
+from server.system.page_files import static_dir, templates_dir
 from server.tls.authority import Authority
 from server.tls.profile import MEDIA_TYPE, mobileconfig
 from server.tls.steps import PLATFORMS, Platform, platform_of
-from server.web.assets import static_dir, templates_dir
 
 CERTIFICATE = "application/x-x509-ca-cert"
 FONTS = ("catgraph-numerals-500.woff2", "catgraph-numerals-700.woff2")

@@ -11,11 +11,11 @@ import random
 import time
 from typing import Any
 
-from server.bridge.server import RosBridge
-from server.serving import uvloop_runner
+from server.app.process import uvloop_runner
+from server.judge.message import Json
+from server.rosbridge_server.server import RosBridge
 from server.simulator.car import SimulatedCar
 from server.simulator.messages import CMD_VEL, VEL
-from server.source import Json
 from tests.bench.orders import obey, options
 
 TAPE_S = 20.0

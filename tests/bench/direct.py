@@ -13,9 +13,9 @@ from typing import Any
 import cbor2
 import orjson
 
-from server.serving import uvloop_runner
+from server.app.process import uvloop_runner
 from server.simulator.messages import SCAN, VEL
-from server.slowing.urgency import Urgency
+from server.slowdown.urgency import Urgency
 from tests.bench.lean_socket import LeanSocket, open_socket
 from tests.bench.orders import obey, options
 

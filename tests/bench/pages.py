@@ -8,7 +8,7 @@ from typing import Any
 
 import orjson
 
-from server.serving import uvloop_runner
+from server.app.process import uvloop_runner
 from tests.bench.lean_socket import LeanSocket, open_socket
 from tests.bench.orders import obey, options
 

@@ -13,7 +13,7 @@ from typing import Any
 import orjson
 from websockets.asyncio.server import ServerConnection, broadcast, serve
 
-from server.serving import uvloop_runner
+from server.app.process import uvloop_runner
 from server.simulator.messages import SCAN
 from tests.bench.lean_socket import LeanSocket, open_socket
 from tests.bench.orders import obey, options

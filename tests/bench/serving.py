@@ -18,9 +18,10 @@ from typing import Any
 
 from monitor import catalog
 from monitor.runner import Monitor
-from server import app, frames, serving
-from server.config import Config
-from server.session import Session
+from server.app import app, process
+from server.app.config import Config
+from server.rosbridge import codec
+from server.vehicle.session import Session
 from tests.bench.orders import obey, options
 
 VEHICLE = "car"
@@ -56,7 +57,7 @@ class Timed:
 
 async def main() -> None:
     timed = {
-        "parse": Timed(frames, "decode"),
+        "parse": Timed(codec, "decode"),
         "message": Timed(Session, "message_received"),
         "step": Timed(Monitor, "step"),
         "tick": Timed(Session, "tick"),
@@ -68,11 +69,11 @@ async def main() -> None:
         made.append(app.create_app(config, checks=impatient_checks()))
         return made[-1]
 
-    serving.create_app = create_app  # so that uvicorn is set up as the product sets it up
+    process.create_app = create_app  # so that uvicorn is set up as the product sets it up
     announced = io.StringIO()
     kept = tempfile.TemporaryDirectory()  # the alarm log is on a disk, as in earnest
     with contextlib.redirect_stdout(announced):
-        running = asyncio.create_task(serving.serve(Config(port=0, data=Path(kept.name))))
+        running = asyncio.create_task(process.serve(Config(port=0, data=Path(kept.name))))
         while "listens on" not in announced.getvalue() or not made[-1].state.running.bus.vehicles:
             if running.done():
                 running.result()
@@ -97,5 +98,5 @@ async def main() -> None:
 
 
 if __name__ == "__main__":
-    with serving.uvloop_runner() as runner:
+    with process.uvloop_runner() as runner:
         runner.run(main(**options()))

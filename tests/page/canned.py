@@ -21,13 +21,13 @@ from fastapi.staticfiles import StaticFiles
 from fastapi.templating import Jinja2Templates
 
 from monitor.tracks import TrackPoint
-from server.compression import PageSocket
-from server.recording.sketch import sketch
-from server.settings import SettingsFile
-from server.topics import candidates
-from server.tuning import Tuning
-from server.web.assets import static_dir, templates_dir
-from server.web.pages import parts_of
+from server.judge.active_settings import Tuning
+from server.judge.settings import SettingsFile
+from server.judge.topics import candidates
+from server.recording.catalog.sketch import sketch
+from server.system.page_files import static_dir, templates_dir
+from server.web.compression import PageSocket
+from server.web.routes.pages import parts_of
 
 Json = dict[str, Any]
 TILES = (

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from server.web.built import join
-from server.web.icons import draw
+from server.web.assets.bundle import join
+from server.web.assets.icons import draw
 from tests.tree import PROJECT
 
 MODULES = PROJECT / "node_modules"

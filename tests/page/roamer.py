@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator
 from typing import Any
 
 from monitor.geo import radii_m
-from server.bridge.server import RosBridge
+from server.rosbridge_server.server import RosBridge
 from tests.server.cars import twist
 
 TICK_S = 0.05

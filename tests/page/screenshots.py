@@ -475,7 +475,7 @@ async def replay(server: Canned, page: Page) -> None:
         alarm("Speed", "Speed above limit", priority="critical", state="ACKED", text="12.1 m/s, limit 11.0 m/s")
     ]
     server.state = state
-    await page.goto(f"{server.address}/?replay=car_0&t={at_s:.0f}")
+    await page.goto(f"{server.rosbridge.address}/?replay=car_0&t={at_s:.0f}")
     await page.wait_for_selector("#monitor:not([hidden])")
     await page.tap(".gauge")  # any touch lets the page sound
 

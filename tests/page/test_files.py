@@ -14,8 +14,8 @@ import pytest_asyncio
 from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import Locator, expect
 
-from server.recording import remarks
-from server.recording.remarks import Remarks
+from server.recording.catalog import annotations as remarks
+from server.recording.catalog.annotations import Remarks
 from tests.page.conftest import Phone
 from tests.page.drives import steady
 from tests.page.processes import Process, replay, running, server

@@ -10,10 +10,10 @@ from typing import Any
 import httpx
 from playwright.async_api import expect
 
-from server.bridge.graph import SOURCE, Topic
-from server.config import Config, Vehicle
-from server.recording import remarks
-from server.recording.remarks import Remarks
+from server.app.config import Config, Vehicle
+from server.recording.catalog import annotations as remarks
+from server.recording.catalog.annotations import Remarks
+from server.rosbridge_server.graph import SOURCE, Topic
 from tests.page.conftest import Phone
 from tests.page.roamer import Roamer, roaming
 from tests.page.test_policy import NOTE_VIOLATIONS, violations

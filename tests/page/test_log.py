@@ -13,7 +13,7 @@ import pytest_asyncio
 from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import expect
 
-from server.journal import Journal
+from server.bus.journal import Journal
 from tests.page.conftest import Phone
 from tests.page.drives import steady
 from tests.page.processes import Process, replay, running, server

@@ -14,14 +14,14 @@ import pytest
 from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import expect
 
-from server.config import Config, Vehicle
+from server.app.config import Config, Vehicle
 from tests.page.conftest import Phone
 from tests.page.radio import Radio
 from tests.page.roamer import Roamer, roaming
 from tests.server.conftest import serving
 from tests.server.web import maps
 from tests.server.web.maps import png
-from tests.server.web.test_upstream import Source
+from tests.server.web.maps.test_tile_proxy import Source
 
 FIRST = 0.135  # metres a pixel at the first look
 MIDDLE = """() => { const { width, height } = document.querySelector('.mapbox').getBoundingClientRect();

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from playwright.async_api import expect
 
-from server.cli import main
+from server.cli.main import main
 from tests.page.conftest import Phone
 from tests.server.recording.bags import Drive, write_ros1
 

@@ -6,7 +6,7 @@ import resource
 import sys
 from pathlib import Path
 
-from server.journal import Journal
+from server.bus.journal import Journal
 
 
 def main() -> None:

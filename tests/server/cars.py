@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from server.bridge.server import RosBridge
+from server.rosbridge_server.server import RosBridge
 
 ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
 

@@ -12,10 +12,10 @@ import pytest
 import uvicorn
 from fastapi import FastAPI
 
-from server.app import create_app
-from server.bridge.server import RosBridge
-from server.config import Config, Vehicle
-from server.web import requests
+from server.app.app import create_app
+from server.app.config import Config, Vehicle
+from server.rosbridge_server.server import RosBridge
+from server.web.middleware import http_protocol
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -39,7 +39,7 @@ async def serving_app(app: FastAPI, config: Config) -> AsyncIterator[str]:
     listening = socket.socket()
     listening.bind(("127.0.0.1", 0))
     patient = {"ws_ping_timeout": 60.0}  # a test stops reading for half a minute
-    server = uvicorn.Server(uvicorn.Config(app, **requests.options(config.limits) | patient))
+    server = uvicorn.Server(uvicorn.Config(app, **http_protocol.options(config.limits) | patient))
     running = asyncio.create_task(server.serve(sockets=[listening]))
     while not server.started:
         await asyncio.sleep(0.01)

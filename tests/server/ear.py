@@ -12,9 +12,9 @@ import orjson
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
-from server.address import parse
-from server.link import RosLink
-from server.problems import Problem
+from server.rosbridge.address import parse
+from server.rosbridge.connection_errors import Problem
+from server.rosbridge.link import RosLink
 
 Handler = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 

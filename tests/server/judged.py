@@ -12,13 +12,13 @@ from monitor.phones import PhoneWord
 from monitor.runner import Monitor, Transition
 from monitor.state import State
 from monitor.values import PhoneFix
-from server import judging
-from server.profiles import GENERIC
-from server.reception import Reception
-from server.rehearsal.faults import Faults
+from server.analysis.faults import Faults
+from server.judge import pipeline
+from server.judge.profiles import GENERIC
+from server.judge.reception_stats import Reception
+from server.judge.topics import map_signals
 from server.simulator.car import SimulatedCar
 from server.simulator.scenarios import Planned
-from server.topics import map_signals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,12 +48,12 @@ def judged(
     own = [one for one in plan if one.scenario.bridge is None]
     bridge = Faults([one for one in plan if one.scenario.bridge is not None])
     car = SimulatedCar(seed=seed, plan=own)
-    sources = judging.by_topic(map_signals({p.topic: p.type for p in car.published}).values())
+    sources = pipeline.by_topic(map_signals({p.topic: p.type for p in car.published}).values())
     monitor = Monitor(limits=catalog.changed(AllLimits(), limits or {}))
     reception, state = Reception(), State()
     raised: list[Raised] = []
     start_s, tick_s, last_s, phone_s = car.now_s, 0.0, None, 0.0
-    published = judging.published(source for group in sources.values() for source in group)
+    published = pipeline.published(source for group in sources.values() for source in group)
 
     def note(transitions: Iterable[Transition]) -> None:
         raised.extend(Raised(at_s=t.at_s, alarm=t.alarm_id, text=t.text) for t in transitions if t.announces)
@@ -78,8 +78,8 @@ def judged(
         while tick_s <= now_s:
             state.link(link(tick_s))
             crew(state, tick_s)
-            note(judging.judge(monitor, state, tick_s))
-            tick_s += judging.TICK_S
+            note(pipeline.judge(monitor, state, tick_s))
+            tick_s += pipeline.TICK_S
         if any(one.from_s <= now_s < one.to_s for one in bridge.laid):
             continue
         if phone and now_s >= phone_s:
@@ -92,7 +92,7 @@ def judged(
             if heard is None:
                 continue
             last_s = now_s
-            changed = judging.receive(
+            changed = pipeline.receive(
                 heard,
                 message.message,
                 now_s,
@@ -102,5 +102,5 @@ def judged(
                 profile=GENERIC,
                 tyre_rad_per_unit=-0.00536,  # the car that is simulated
             )
-            note(judging.judge(monitor, state, now_s, changed))
+            note(pipeline.judge(monitor, state, now_s, changed))
     return raised

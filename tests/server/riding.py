@@ -13,13 +13,15 @@ from monitor.catalog import CHECKS
 from monitor.link import LinkFacts
 from monitor.runner import Monitor
 from monitor.state import State
-from server import commands, judging, phone
-from server.profiles import GENERIC
-from server.reception import Reception
+from server.judge import pipeline
+from server.judge.profiles import GENERIC
+from server.judge.reception_stats import Reception
+from server.judge.topics import map_signals
+from server.protocol import commands
 from server.simulator.car import SimulatedCar
 from server.simulator.place import metres_per_degree
 from server.simulator.scenarios import Planned
-from server.topics import map_signals
+from server.vehicle import phone
 
 WANDER_S = 40.0  # the error of a receiver wanders slowly
 WALL_MS = 1_790_000_000_000  # the server's time of day at the beginning
@@ -109,7 +111,7 @@ class Ride:
 def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[Planned] = ()) -> Ride:
     """The car's speed and position and the phone's words before the checks of both, for so long."""
     car = SimulatedCar(seed=seed, plan=plan)
-    sources = judging.by_topic(
+    sources = pipeline.by_topic(
         source
         for source in map_signals({p.topic: p.type for p in car.published}).values()
         if source.signal in ("speed", "position")
@@ -123,7 +125,7 @@ def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[P
     def judge(now_s: float, changed: tuple[str, ...] | None) -> None:
         told.extend(
             Told(at_s=t.at_s, alarm=t.alarm_id, change=t.change, text=t.text)
-            for t in judging.judge(monitor, state, now_s, changed)
+            for t in pipeline.judge(monitor, state, now_s, changed)
         )
 
     for step in car.steps():
@@ -142,7 +144,7 @@ def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[P
         for message in step.messages:
             heard = sources.get(message.topic)
             if heard is not None:
-                changed = judging.receive(
+                changed = pipeline.receive(
                     heard,
                     message.message,
                     now_s,
@@ -158,5 +160,5 @@ def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[P
             for name, finding in monitor.findings.items():
                 if name in briefs:
                     briefs[name].add(finding.brief)
-            tick_s += judging.TICK_S
+            tick_s += pipeline.TICK_S
     return Ride(told=told, briefs=briefs)

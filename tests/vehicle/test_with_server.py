@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from tests.server.slowing.conftest import simulated, watching
+from tests.server.slowdown.conftest import simulated, watching
 from tests.vehicle.conftest import Guard
 from tests.vehicle.over_bridge import run_controller, run_guard, task
 

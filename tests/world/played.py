@@ -19,10 +19,10 @@ import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-from server.bridge.real.client import RealClient
-from server.bridge.real.shape import Field, fields
-from server.bridge.server import Like, RealOptions, RosBridge, ServiceFailed
-from server.source import RosVersion
+from server.judge.message import RosVersion
+from server.rosbridge_server.real.client import RealClient
+from server.rosbridge_server.real.shape import Field, fields
+from server.rosbridge_server.server import Like, RealOptions, RosBridge, ServiceFailed
 from tests.world.transcripts import Line, Transcript, read
 
 BEGAN_S = 1_795_403_000.0  # about when the transcripts were made

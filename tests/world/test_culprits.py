@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from server import problems
-from server.diagnosis import SILENT_S, Diagnosis
-from server.link import CallFailed, LinkDown, RosLink
-from server.passing import BLOCKED_AFTER_S, Passing
-from server.questions import Questions
+from server.rosbridge import connection_errors
+from server.rosbridge.diagnosis import SILENT_S, Diagnosis
+from server.rosbridge.link import CallFailed, LinkDown, RosLink
+from server.rosbridge.rosapi_client import Questions
+from server.vehicle.undelivered import BLOCKED_AFTER_S, Passing
+from tests.server.cli.test_doctor import doctor
 from tests.server.ear import Bridge, Ear, bridging, linked, until
-from tests.server.test_doctor import doctor
 from tests.world.bridge_player import FILES, name_of, playing
 
 pytestmark = pytest.mark.world(n=8)
@@ -209,7 +209,7 @@ async def test_rosapi_that_does_not_answer_is_named_where_the_bridge_has_read_th
         with pytest.raises(CallFailed):
             await asks.call("/rosapi/get_time", timeout_s=0.3)
         found = diagnosis.problem(time.monotonic() + 60.0, flows=True)
-        assert found == problems.ROSAPI_SILENT
+        assert found == connection_errors.ROSAPI_SILENT
         asks.stop()
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from server import discovery
-from server.link import CallFailed
-from server.recording.schemas import TypeBook
-from server.source import RosVersion
+from server.judge.message import RosVersion
+from server.recording.read.schemas import TypeBook
+from server.rosbridge.link import CallFailed
+from server.vehicle import discovery
 from tests.world.test_encoding_choice import VERSIONS, definitions, transcript
 
 pytestmark = pytest.mark.world(n=5)

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from server import doctor
-from server.delivery import AT_ONCE, Delivery
-from server.discovery import Offer
-from server.others import choose
-from server.topics import could_carry, map_signals
+from server.cli import doctor
+from server.judge.topics import could_carry, map_signals
+from server.recording.recorded_topics import choose
+from server.vehicle.delivery import AT_ONCE, Delivery
+from server.vehicle.discovery import Offer
 
 
 def drive(

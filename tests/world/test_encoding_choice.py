@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from server.encoding_choice import fit_for_cbor
-from server.source import RosVersion
-from server.topics import TOPICS
+from server.judge.message import RosVersion
+from server.judge.topics import TOPICS
+from server.vehicle.encoding_choice import fit_for_cbor
 from tests.tree import RECORDINGS
 
 TRANSCRIPTS = RECORDINGS / "rosbridge"

@@ -10,11 +10,10 @@ from typing import Any
 import pytest
 import websockets
 
-from server.bridge import replay
-from server.bridge.server import RealOptions, RosBridge
-from server.simulator import command
+from server.cli import replay, simulate
+from server.rosbridge_server.server import RealOptions, RosBridge
 from server.simulator.service import CarService
-from tests.server.bridge.conftest import bridging
+from tests.server.rosbridge_server.conftest import bridging
 
 pytestmark = pytest.mark.world(n=1)
 
@@ -117,7 +116,7 @@ async def test_errors_are_status_messages_only_of_the_helpful_bridge(like: Any, 
 
 
 def test_both_commands_take_it() -> None:
-    for module, rest in ((command, []), (replay, ["drive.bag"])):
+    for module, rest in ((simulate, []), (replay, ["drive.bag"])):
         parser = argparse.ArgumentParser()
         module.add_arguments(parser)
         assert parser.parse_args(rest).like == "helpful"

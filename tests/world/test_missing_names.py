@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from server.others import LONGEST_NAME, Missing
+from server.recording.recorded_topics import LONGEST_NAME, Missing
 
 
 @pytest.mark.world(n=24)

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from server.bridge.server import Like, RealOptions, RosBridge
+from server.rosbridge_server.server import Like, RealOptions, RosBridge
 from tests.world.compared import streams
 from tests.world.played import BEGAN_S, LATE, Played, run
 from tests.world.transcripts import names, needs_transcripts, read

@@ -17,10 +17,10 @@ import numpy as np
 import orjson
 import pytest
 
-from server.bus import LocalBus
-from server.config import Vehicle
-from server.journal import Journal
-from server.session import Session
+from server.app.config import Vehicle
+from server.bus.bus import LocalBus
+from server.bus.journal import Journal
+from server.vehicle.session import Session
 from tests.world.bridge_player import FILES, Player, name_of, playing
 
 pytestmark = [
@@ -159,11 +159,11 @@ def check_resubscribed(player: Player) -> None:
 
 
 async def test_a_number_of_64_bits_arrives_whole_in_cbor_too() -> None:
-    from server import frames
+    from server.rosbridge import codec
 
-    operation, _ = frames.decode(cbor2.dumps({"op": "publish", "msg": {"data": 2**64 - 1}}), True)
+    operation, _ = codec.decode(cbor2.dumps({"op": "publish", "msg": {"data": 2**64 - 1}}), True)
     assert operation["msg"]["data"] == 2**64 - 1
     tagged = b"\xa1\x62op\xc2\x48" + b"\xff" * 8
-    assert frames.decode(tagged, True)[0] == {"op": 2**64 - 1}
-    with pytest.raises(frames.Unreadable):
-        frames.decode(b"\xa1\x62op\xc2\x49" + b"\xff" * 9, True)
+    assert codec.decode(tagged, True)[0] == {"op": 2**64 - 1}
+    with pytest.raises(codec.Unreadable):
+        codec.decode(b"\xa1\x62op\xc2\x49" + b"\xff" * 9, True)

@@ -18,20 +18,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.interfaces import Nodetype
 
-from server import discovery
-from server.address import parse
-from server.conversation import Conversation
-from server.link import LinkDown, RosLink, Subscription
-from server.outgoing import PUBLISHED, SERVICES, NotAllowed, Outgoing
-from server.recording.schemas import standard
-from server.settings import SettingsFile
-from server.slowing.guard import GuardWatch
-from server.slowing.mouth import Mouth
-from server.slowing.slowing import Slowing
-from server.slowing.twist import message
-from server.slowing.way import way_of
-from server.topics import Source
-from server.tuning import Tuning
+from server.judge.active_settings import Tuning
+from server.judge.settings import SettingsFile
+from server.judge.topics import Source
+from server.recording.read.schemas import standard
+from server.rosbridge.address import parse
+from server.rosbridge.link import LinkDown, RosLink, Subscription
+from server.rosbridge.outgoing import PUBLISHED, SERVICES, NotAllowed, Outgoing
+from server.slowdown.command_target import way_of
+from server.slowdown.guard_client import GuardWatch
+from server.slowdown.publisher import Mouth
+from server.slowdown.sender import Slowing
+from server.slowdown.twist import message
+from server.vehicle import discovery
+from server.vehicle.subscriptions import Conversation
 from tests.server.ear import Ear
 from tests.tree import RECORDINGS
 

@@ -10,20 +10,20 @@ from typing import Any
 
 import pytest
 
-from server import delivery, discovery
-from server.bridge.server import RosBridge
-from server.cli import main
-from server.config import Config, Vehicle
-from server.link import CallFailed
-from server.passing import CLIENT_COUNT, Passing
-from server.questions import Asks
+from server.app.config import Config, Vehicle
+from server.cli.main import main
+from server.judge.message import RosVersion
 from server.recording.folder import RecordingsFolder
-from server.recording.read import open_recording
-from server.source import RosVersion
-from tests.server.bridge.conftest import bridging
-from tests.server.bridge.probe import Probe, probing
+from server.recording.read.read import open_recording
+from server.rosbridge.link import CallFailed
+from server.rosbridge.rosapi_client import Asks
+from server.rosbridge_server.server import RosBridge
+from server.vehicle import delivery, discovery
+from server.vehicle.undelivered import CLIENT_COUNT, Passing
 from tests.server.cars import scan, twist
 from tests.server.conftest import serving
+from tests.server.rosbridge_server.conftest import bridging
+from tests.server.rosbridge_server.probe import Probe, probing
 from tests.server.viewer import Viewer, viewer
 
 FIXED, NAMES, FLAGS = "float64[3] fixed\n", "string[] names\n", "bool[] flags\n"

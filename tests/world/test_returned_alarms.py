@@ -8,7 +8,7 @@ from monitor.alarm import Alarm, AlarmState, advance
 from monitor.catalog import CHECKS
 from monitor.check import OK, fault
 from monitor.response import acknowledge
-from server import wire
+from server.protocol import serialize
 
 KEPT = [check for check in CHECKS if check.alarm.needs_ack and not check.alarm.latches]
 FAULT = fault("it happened", causes=("a",))
@@ -28,7 +28,7 @@ def returned(check_id: str) -> Alarm:
 def test_what_has_returned_offers_its_acknowledgement_and_takes_it(check_id: str) -> None:
     alarm = returned(check_id)
     assert alarm.state is AlarmState.RTN_UNACKED
-    assert "acknowledge" in wire.alarm(alarm, 41.0, 0)["actions"]
+    assert "acknowledge" in serialize.alarm(alarm, 41.0, 0)["actions"]
     after, happened = acknowledge(alarm, alarm.occurrence, "Ann", 41.0)
     assert [one.change for one in happened] == ["acknowledged"]
     assert after.state is AlarmState.NORMAL
@@ -42,6 +42,6 @@ def test_what_is_offered_fits_the_state(check_id: str) -> None:
     for n in range(200):
         alarm, _ = advance(alarm, FAULT, n * 0.1)
     assert alarm.state is AlarmState.UNACKED
-    assert "acknowledge" in wire.alarm(alarm, 20.0, 0)["actions"]
+    assert "acknowledge" in serialize.alarm(alarm, 20.0, 0)["actions"]
     known, _ = acknowledge(alarm, alarm.occurrence, "Ann", 20.0)
-    assert "acknowledge" not in wire.alarm(known, 20.0, 0)["actions"]
+    assert "acknowledge" not in serialize.alarm(known, 20.0, 0)["actions"]

@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from monitor.transport import TransportDelay
-from server.link_load import LEVELS, RESTORE_AFTER_S, LinkLoad
+from server.vehicle.link_load import LEVELS, RESTORE_AFTER_S, LinkLoad
 from tests.monitor.slow_links import Link, Stream, run
 
 SHORT = 40

@@ -9,13 +9,13 @@ import cbor2
 import orjson
 import pytest
 
-from server.bridge.server import RosBridge
-from server.config import Config, Vehicle
-from server.large_message import ENDS_BYTES, topic_of
-from server.link import MAX_MESSAGE_BYTES
-from tests.server.bridge.conftest import bridging
+from server.app.config import Config, Vehicle
+from server.rosbridge.large_message import ENDS_BYTES, topic_of
+from server.rosbridge.link import MAX_MESSAGE_BYTES
+from server.rosbridge_server.server import RosBridge
 from tests.server.cars import driving
 from tests.server.conftest import serving
+from tests.server.rosbridge_server.conftest import bridging
 from tests.server.viewer import viewer
 
 pytestmark = pytest.mark.world(n=10)

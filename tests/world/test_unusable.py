@@ -6,10 +6,10 @@ import pytest
 
 from monitor.state import LinkFacts, Reading, State
 from monitor.values import Effort, Twist
-from server import judging
-from server.profiles import GENERIC
-from server.reception import Reception
-from server.topics import map_signals
+from server.judge import pipeline
+from server.judge.profiles import GENERIC
+from server.judge.reception_stats import Reception
+from server.judge.topics import map_signals
 from tests.monitor.drive import REAL_HZ, Drive
 
 pytestmark = pytest.mark.world(n=7)
@@ -57,7 +57,7 @@ def test_a_message_that_cannot_be_used_is_counted_as_one_that_came() -> None:
     reception = Reception()
     sources = tuple(map_signals({"/vel": "geometry_msgs/Twist"}).values())
     for n in range(100):
-        judging.receive(
+        pipeline.receive(
             sources,
             {"linear": {"x": None}},
             n * 0.05,
@@ -72,7 +72,7 @@ def test_a_message_that_cannot_be_used_is_counted_as_one_that_came() -> None:
     assert snapshot.unusable["speed"].count == 100
     assert snapshot.unusable["speed"].words == "not a number (linear.x)"
     assert snapshot.rates["speed"].measured_hz == pytest.approx(20.0, rel=0.1)
-    judging.receive(
+    pipeline.receive(
         sources,
         {"linear": {"x": 1.0}},
         5.0,

@@ -8,8 +8,8 @@ from typing import Any
 import orjson
 import pytest
 
-from server.cli import main
-from server.mail import words
+from server.cli.main import main
+from server.mail import mail_text
 from server.mail.pack import Pack, Stretch
 from server.recording.export import make_export
 from server.recording.export.formats import FORMATS
@@ -111,9 +111,9 @@ async def test_a_mail_names_what_is_not_in_it(tmp_path: Path) -> None:
     shelf.put("car_1")
     shelf.notes = ["/tf (27331 messages) is left out: it was recorded as JSON."]
     pack = Pack(path=tmp_path, name="car_1.zip", size_bytes=1, sha256="0")
-    (text,) = words.attached("Hello", ["car_1"], "csv", pack, [Stretch(start=0, length=1, name="x")], shelf.notes)
+    (text,) = mail_text.attached("Hello", ["car_1"], "csv", pack, [Stretch(start=0, length=1, name="x")], shelf.notes)
     assert "Not all of the recording is in the file:\n- /tf (27331 messages) is left out" in text
-    linked = words.linked("Hello", ["car_1"], "csv", pack, ["http://x"], [f"note {n}" for n in range(40)])
+    linked = mail_text.linked("Hello", ["car_1"], "csv", pack, ["http://x"], [f"note {n}" for n in range(40)])
     assert "- note 29\n- and 10 more." in linked
     async with posting(tmp_path / "post") as post, mailing(tmp_path / "mail", shelf) as mailer:
         await mailer.change(settings(post.port))

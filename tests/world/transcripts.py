@@ -10,7 +10,7 @@ from typing import Any, Literal, cast
 
 import pytest
 
-from server.source import RosVersion
+from server.judge.message import RosVersion
 from tests.tree import RECORDINGS
 
 FOLDER = RECORDINGS / "rosbridge"

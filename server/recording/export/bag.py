@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from server.recording.errors import Undecodable
 from server.recording.export.bag_file import BagFile, BagTimeOutOfRange, Compression
 from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
 from server.recording.export.raw import OWN, Raw, raw_messages
 from server.recording.export.ros1_definition import md5sum
 from server.recording.export.to_ros1 import Ros1Form, ros1_form
-from server.recording.read import Recording
-from server.recording.source import Channel, FileSource
+from server.recording.read.errors import Undecodable
+from server.recording.read.read import Recording
+from server.recording.read.source import Channel, FileSource
 
 _STRING_TYPE, _STRING = "std_msgs/String", "string data\n"
 

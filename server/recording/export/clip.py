@@ -16,16 +16,16 @@ from typing import Any
 
 import orjson
 
-from server.recording.errors import RecordingUnreadable
 from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
 from server.recording.export.raw import OWN, Raw, raw_messages, span_ns
 from server.recording.folder import WRITING, id_of
+from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema
-from server.recording.read import Recording
-from server.recording.schemas import Schema, TypeBook
-from server.recording.source import Channel, Damage
+from server.recording.read.errors import RecordingUnreadable
+from server.recording.read.read import Recording
+from server.recording.read.schemas import Schema, TypeBook
+from server.recording.read.source import Channel, Damage
 from server.recording.standing import Stood, read_standing
-from server.recording.write import PartFile
 
 BEFORE_S = AFTER_S = 30.0
 LONGEST_S = 3600.0  # before and after: beyond that it is a drive and no clip

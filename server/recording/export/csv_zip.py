@@ -17,13 +17,13 @@ from typing import IO, Any
 
 import orjson
 
-from server.event_rows import COLUMNS as ALARM_COLUMNS
-from server.event_rows import event_row, safe_cell
+from server.bus.event_table import COLUMNS as ALARM_COLUMNS
+from server.bus.event_table import event_row, safe_cell
 from server.recording.export.columns import OWN_TABLES, TABLES, TIMES, OwnTable
 from server.recording.export.drive import Drive
 from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
 from server.recording.export.readme import Written, readme
-from server.recording.read import Recording
+from server.recording.read.read import Recording
 
 _READING = 0.85  # of the work; the rest is packing
 _BLOCK = 1 << 20

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from monitor.values import Steering
-from server.bridge.names import BadName, canonical_name
-from server.decode import stamp_s
-from server.profiles import load as load_profiles
-from server.reception import Reception
+from server.judge.active_settings import PERCENT_A_RAD, Tuning
+from server.judge.decoders import stamp_s
+from server.judge.profiles import load as load_profiles
+from server.judge.reception_stats import Reception
+from server.judge.ros_names import BadName, canonical_name
+from server.judge.settings import AUTO, Settings, SettingsFile, salvage
+from server.judge.topics import Source, map_signals
 from server.recording.export.outcome import Progress, nothing
-from server.recording.read import Recording
-from server.settings import AUTO, Settings, SettingsFile, salvage
-from server.topics import Source, map_signals
-from server.tuning import PERCENT_A_RAD, Tuning
+from server.recording.read.read import Recording
 
 _TOLD_EVERY = 1000  # messages
 

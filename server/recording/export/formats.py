@@ -62,7 +62,7 @@ FORMATS: dict[str, Form] = {
             what="one page with plots, works offline",
             ending="html",
             media_type="text/html; charset=utf-8",
-            writer="server.rehearsal.drive_page:write_drive_page",
+            writer="server.analysis.drive_page:write_drive_page",
             options=("name",),
         ),
     )

@@ -15,7 +15,7 @@ import orjson
 from server.recording.export.drive import Drive
 from server.recording.export.outcome import Outcome, Progress, nothing
 from server.recording.export.track import Place, Track, tracks_of, when
-from server.recording.read import Recording
+from server.recording.read.read import Recording
 
 Position = list[float]
 

@@ -10,7 +10,7 @@ from xml.sax.saxutils import escape
 from server.recording.export.drive import Drive
 from server.recording.export.outcome import Outcome, Progress, nothing
 from server.recording.export.track import Track, tracks_of, when
-from server.recording.read import Recording
+from server.recording.read.read import Recording
 from server.version import catgraph_version
 
 _HEAD = (

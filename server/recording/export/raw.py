@@ -6,9 +6,9 @@ import heapq
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from server.recording.errors import RecordingUnreadable
-from server.recording.read import Recording
-from server.recording.source import Channel, FileSource
+from server.recording.read.errors import RecordingUnreadable
+from server.recording.read.read import Recording
+from server.recording.read.source import Channel, FileSource
 
 OWN = "/catgraph/"  # topics that catgraph itself wrote: alarms, phone, settings …
 TOLD_EVERY = 2000  # messages

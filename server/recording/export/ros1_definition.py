@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 
-from server.recording.errors import Undecodable
+from server.recording.read.errors import Undecodable
 
 _BUILTIN = frozenset(
     "bool byte char float32 float64 string time duration int8 int16 int32 int64 uint8 uint16 uint32 uint64".split()

@@ -18,12 +18,12 @@ from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, Qo
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from server.recording.definitions import definitions_of, distribution, times
-from server.recording.errors import Undecodable
 from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
 from server.recording.export.raw import OWN, raw_messages
-from server.recording.read import Recording
-from server.recording.source import Channel, FileSource
+from server.recording.read.definitions import definitions_of, distribution, times
+from server.recording.read.errors import Undecodable
+from server.recording.read.read import Recording
+from server.recording.read.source import Channel, FileSource
 
 VERSION: Literal[8] = (
     8  # of the bag's metadata; 9 spells the quality of service in a way that ROS 2 Humble does not read

@@ -17,11 +17,11 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from server.recording.definition_bounds import bounded
-from server.recording.definitions import definitions_of, times
-from server.recording.errors import Undecodable
 from server.recording.export.ros1_definition import md5sum
-from server.recording.source import Channel, FileSource
+from server.recording.read.definition_bounds import bounded
+from server.recording.read.definitions import definitions_of, times
+from server.recording.read.errors import Undecodable
+from server.recording.read.source import Channel, FileSource
 
 _PLACEHOLDER = "structure_needs_at_least_one_member"  # how ROS 2 writes a message without fields
 _WITHOUT_COUNTERPART = ("wstring", "float128")

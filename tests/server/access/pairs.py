@@ -11,10 +11,10 @@ import httpx
 import websockets
 
 from server.access.access import Access
+from server.access.identity import Role
 from server.access.keys import keys_of
-from server.access.who import Role
-from server.app import create_app
-from server.config import Config, Tls
+from server.app.app import create_app
+from server.app.config import Config, Tls
 from tests.server.conftest import serving_app
 
 OPERATOR_KEY = "operator-key-of-the-tests"

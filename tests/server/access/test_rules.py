@@ -16,10 +16,10 @@ import pytest
 from fastapi.routing import APIRoute, APIWebSocketRoute
 from starlette.routing import BaseRoute, Mount, Route
 
-from server import commands
+from server.access.identity import Role
 from server.access.rules import Needs, needs_of
-from server.access.who import Role
-from server.app import create_app
+from server.app.app import create_app
+from server.protocol import commands
 from tests.server.access.pairs import VIEWER_KEY, config, cookie_of, keyed, paired_server
 
 # What anybody may ask for, and what a viewer may order. A line here is a decision, and needs a reason like a door does.

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from server.access import secret_file, waiting
+from server.access import pending_invitations, secret_file
 from server.access.access import Access
 from server.access.cookie import Cookies
 from server.access.devices import FORGOTTEN_AFTER_MS, MOST, Devices
-from server.access.guesses import FEW, MANY, Guesses
+from server.access.identity import Role
 from server.access.invitations import LASTS_S, MOST_STANDING, Invitations
 from server.access.keys import BadKey, keys_from, keys_of
 from server.access.names import Names
+from server.access.pin_throttle import FEW, MANY, Guesses
 from server.access.tickets import Tickets
-from server.access.who import Role
-from server.config import Config, is_loopback
+from server.app.config import Config, is_loopback
 from tests.server.access.pairs import config
 
 DAY_MS = 86_400_000
@@ -185,7 +185,7 @@ def test_only_the_hash_of_a_secret_is_on_the_disk_and_only_for_the_servers_user(
     access = Access(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 1000)
     device, secret = access.pair(token=access.invite(), pin=None, name="Pixel", peer="")
     access.listens_at("http://192.168.4.1:8000/")
-    waiting.lay(tmp_path / "access", Role.VIEWER, wall_ms=0)
+    pending_invitations.lay(tmp_path / "access", Role.VIEWER, wall_ms=0)
     files = [path for path in (tmp_path / "access").rglob("*") if path.is_file()]
     assert {path.name for path in files} >= {"devices.json", "running.json"}
     assert [oct(path.stat().st_mode & 0o777) for path in files] == ["0o600"] * len(files)
@@ -265,30 +265,30 @@ def test_a_device_that_cannot_be_kept_is_not_paired(tmp_path: Path, monkeypatch:
 
 
 def test_an_invitation_laid_into_the_folder_is_taken_once_and_grows_old(tmp_path: Path) -> None:
-    laid = waiting.lay(tmp_path, Role.VIEWER, wall_ms=1_000_000)
-    found = waiting.collect(tmp_path, now_s=50.0, wall_ms=1_060_000)
+    laid = pending_invitations.lay(tmp_path, Role.VIEWER, wall_ms=1_000_000)
+    found = pending_invitations.collect(tmp_path, now_s=50.0, wall_ms=1_060_000)
     assert [(one.token, one.pin, one.role, one.until_s) for one in found] == [
         (laid.token, laid.pin, Role.VIEWER, 590.0)
     ]
-    assert waiting.collect(tmp_path, now_s=50.0, wall_ms=1_060_000) == []
-    waiting.lay(tmp_path, Role.VIEWER, wall_ms=1_000_000)
-    assert waiting.collect(tmp_path, now_s=50.0, wall_ms=1_600_000) == []
-    waiting.lay(tmp_path, Role.VIEWER, wall_ms=9_000_000)  # from the future: ten minutes, not more
-    assert waiting.collect(tmp_path, now_s=50.0, wall_ms=1_600_000)[0].until_s == 650.0
+    assert pending_invitations.collect(tmp_path, now_s=50.0, wall_ms=1_060_000) == []
+    pending_invitations.lay(tmp_path, Role.VIEWER, wall_ms=1_000_000)
+    assert pending_invitations.collect(tmp_path, now_s=50.0, wall_ms=1_600_000) == []
+    pending_invitations.lay(tmp_path, Role.VIEWER, wall_ms=9_000_000)  # from the future: ten minutes, not more
+    assert pending_invitations.collect(tmp_path, now_s=50.0, wall_ms=1_600_000)[0].until_s == 650.0
     (tmp_path / "waiting" / "x.json").write_text('{"token": "short", "pin": "1"}')
-    assert waiting.collect(tmp_path, now_s=50.0, wall_ms=0) == []
+    assert pending_invitations.collect(tmp_path, now_s=50.0, wall_ms=0) == []
     assert list((tmp_path / "waiting").iterdir()) == []
 
 
 def test_a_server_that_ended_is_not_found(tmp_path: Path) -> None:
-    assert waiting.running(tmp_path) is None
-    waiting.announce(tmp_path, "https://192.168.4.1:8000/")
-    assert waiting.running(tmp_path) == "https://192.168.4.1:8000/"
+    assert pending_invitations.running(tmp_path) is None
+    pending_invitations.announce(tmp_path, "https://192.168.4.1:8000/")
+    assert pending_invitations.running(tmp_path) == "https://192.168.4.1:8000/"
     secret_file.write(tmp_path / "running.json", {"pid": 2**22 + 1, "address": "https://x/"})
-    assert waiting.running(tmp_path) is None
-    waiting.announce(tmp_path, "https://x/")
-    waiting.retire(tmp_path)
-    assert waiting.running(tmp_path) is None
+    assert pending_invitations.running(tmp_path) is None
+    pending_invitations.announce(tmp_path, "https://x/")
+    pending_invitations.retire(tmp_path)
+    assert pending_invitations.running(tmp_path) is None
 
 
 # -- keys ------------------------------------------------------------------------------------------------------------

@@ -15,13 +15,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.mail import address, compose, heads
+from server.mail import address, compose, headers
 from server.mail.compose import Attachment, Draft, Stopped
 from tests.server.mail.mailing import START_MS
 from tests.server.mail.post import read
 
 ANN, JORG = address.parse("ann@example.org"), address.parse("jörg@bücher.example")
-LINE = st.text(st.characters(exclude_categories=("Cc", "Cs", "Zl", "Zp")), max_size=120).filter(heads.is_one_line)
+LINE = st.text(st.characters(exclude_categories=("Cc", "Cs", "Zl", "Zp")), max_size=120).filter(headers.is_one_line)
 
 
 def draft(**more: Any) -> Draft:
@@ -76,7 +76,7 @@ def test_lines_are_short_ascii_and_end_as_the_wire_wants_it(tmp_path: Path) -> N
 @settings(deadline=None)  # beside other work a machine stops for longer than any limit
 @given(LINE)
 def test_any_subject_reads_back_as_it_was(subject: str) -> None:
-    head = heads.text_line("Subject", subject)
+    head = headers.text_line("Subject", subject)
     assert max(len(line) for line in head.split(b"\r\n")) <= 78
     mail = email.message_from_bytes(head + b"X-Next: 1\r\n\r\n")
     assert mail.keys() == ["Subject", "X-Next"]
@@ -87,7 +87,7 @@ def test_any_subject_reads_back_as_it_was(subject: str) -> None:
 @settings(deadline=None)  # beside other work a machine stops for longer than any limit
 @given(LINE)
 def test_any_name_of_a_sender_stays_a_name(name: str) -> None:
-    head = heads.address_line("From", [ANN], name.strip())
+    head = headers.address_line("From", [ANN], name.strip())
     mail = email.message_from_bytes(head + b"\r\n", policy=policy.default)
     assert mail.keys() == ["From"]
     assert [one.addr_spec for one in mail["From"].addresses] == ["ann@example.org"]
@@ -97,11 +97,11 @@ def test_any_name_of_a_sender_stays_a_name(name: str) -> None:
     "text", ["a\r\nBcc: evil@x", "a\nb", "a\rb", "a\x00", "a\u2028b", "a\u202eb", "a\x85b", "\ud800"]
 )
 def test_no_line_break_gets_into_a_head(text: str) -> None:
-    assert not heads.is_one_line(text)
+    assert not headers.is_one_line(text)
     with pytest.raises(ValueError, match="line"):
-        heads.text_line("Subject", text)
+        headers.text_line("Subject", text)
     with pytest.raises(ValueError, match=r"written|line"):
-        heads.line("X-Any", text)
+        headers.line("X-Any", text)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_no_line_break_gets_into_a_head(text: str) -> None:
 )
 def test_no_name_of_a_file_breaks_out(name: str) -> None:
     with pytest.raises(ValueError, match="no name"):
-        heads.file_name(name)
+        headers.file_name(name)
 
 
 @settings(deadline=None)  # beside other work a machine stops for longer than any limit

@@ -15,7 +15,7 @@ import psutil
 import pytest
 
 from server.mail.mailer import Mailer, MailRefused
-from server.mail.pauses import pause_s
+from server.mail.retry_backoff import pause_s
 from server.mail.settings import BadMailSetting, MailSettingsFile
 from server.recording.export import Made
 from tests.server.mail.mailing import START_MS, Clock, Shelf, mailing, order, over, settings, until

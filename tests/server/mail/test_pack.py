@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from server.mail import words
+from server.mail import mail_text
 from server.mail.compose import Stopped
 from server.mail.pack import NoRoom, Pack, cut, need_room, pack
 from tests.server.mail.mailing import START_MS
@@ -110,7 +110,7 @@ def test_a_disk_that_would_be_filled_is_not(tmp_path: Path) -> None:
 
 def test_the_words_say_how_parts_are_joined(tmp_path: Path) -> None:
     one = Pack(path=tmp_path, name="drive.zip", size_bytes=60_000_000, sha256="ab" * 32)
-    texts = words.attached("See alarm 3.", ["drive"], "mcap", one, cut(one, 18_000_000))
+    texts = mail_text.attached("See alarm 3.", ["drive"], "mcap", one, cut(one, 18_000_000))
     assert len(texts) == 4
     for number, text in enumerate(texts, 1):
         assert text.startswith("See alarm 3.\n\n")

@@ -10,9 +10,9 @@ from typing import Any
 
 import orjson
 
+from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema
-from server.recording.schemas import Schema, TypeBook
-from server.recording.write import PartFile
+from server.recording.read.schemas import Schema, TypeBook
 
 BEGAN_MS = 1_790_000_000_000
 NORTH_M = 111_000.0  # of one degree of latitude, near enough

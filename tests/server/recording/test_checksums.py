@@ -10,7 +10,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from server.recording.read import RecordingUnreadable, open_recording
+from server.recording.read.read import RecordingUnreadable, open_recording
 
 MESSAGES = 400
 EVERY_NS = 10_000_000

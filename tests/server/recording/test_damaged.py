@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from server.recording.read import RecordingUnreadable, open_recording
+from server.recording.read.read import RecordingUnreadable, open_recording
 from tests.server.recording.bags import Drive, write_ros1, write_ros2
-from tests.server.recording.test_read import ROWS
+from tests.server.recording.read.test_read import ROWS
 
 LONG = Drive(messages=[(n * 0.01, "/text", "std_msgs/msg/String", {"data": f"{n:04d} " * 40}) for n in range(300)])
 MAKERS: dict[str, Callable[[Path], Path]] = {

@@ -12,15 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from server.bridge.server import RosBridge
 from server.recording import recorder as recorder_module
 from server.recording.folder import RecordingsFolder
-from server.recording.read import open_recording
+from server.recording.read.read import open_recording
 from server.recording.recover import recover, recover_all
+from server.rosbridge_server.server import RosBridge
 from tests.server.cars import driving
+from tests.server.recording.mcap.test_write import written
+from tests.server.recording.test_controller import watched
 from tests.server.recording.test_recorder import Desk
-from tests.server.recording.test_write import written
-from tests.server.test_session_recording import watched
 
 SIZE = 2_000_000
 

@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
+from server.judge.message import RosVersion
 from server.recording import recorder as recorder_module
 from server.recording.folder import RecordingsFolder
-from server.recording.read import open_recording
+from server.recording.read.read import open_recording
 from server.recording.recorder import Part, Recorder
 from server.recording.space import Allowance, amount
-from server.source import RosVersion
 
 AT_NS = 1_700_000_000_000_000_000
 PLENTY = Allowance(quota=0, min_free=0)

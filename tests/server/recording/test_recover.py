@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from server.recording.chunks import HEAD_BYTES, Walk, WholeChunk
+from server.judge.message import RosVersion
 from server.recording.folder import RecordingsFolder
-from server.recording.read import open_recording
+from server.recording.mcap.chunks import HEAD_BYTES, Walk, WholeChunk
+from server.recording.read.read import open_recording
 from server.recording.recover import recover, recover_all
-from server.source import RosVersion
-from tests.server.recording.test_write import written
+from tests.server.recording.mcap.test_write import written
 
 
 def left_by(tmp_path: Path, *, version: RosVersion = 1, n: int = 6) -> Path:

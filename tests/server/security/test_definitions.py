@@ -6,11 +6,11 @@ import time
 
 import pytest
 
-from server.recording.decode import compile_decoder
-from server.recording.definitions import definitions_of
-from server.recording.errors import Undecodable
-from server.recording.schemas import TypeBook
-from server.recording.source import Channel
+from server.recording.read.decode import compile_decoder
+from server.recording.read.definitions import definitions_of
+from server.recording.read.errors import Undecodable
+from server.recording.read.schemas import TypeBook
+from server.recording.read.source import Channel
 
 pytestmark = pytest.mark.world(n=21)
 

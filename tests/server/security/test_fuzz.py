@@ -23,7 +23,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis.errors import Unsatisfiable
 from schemathesis.generation import GenerationMode
 
-from server import commands
+from server.protocol import commands
 from tests.server.recording.made import record
 from tests.tree import PROJECT
 

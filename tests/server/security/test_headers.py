@@ -12,12 +12,12 @@ import pytest
 import websockets
 from fastapi import Request
 
-from server.app import create_app
-from server.config import Config
-from server.web.assets import static_dir
-from server.web.built import find
-from server.web.headers import FOR_ALL, PERMISSIONS, POLICY, POLICY_OF_DATA, POLICY_OF_PARTS, policy_of
-from server.web.pages import early_of
+from server.app.app import create_app
+from server.app.config import Config
+from server.system.page_files import static_dir
+from server.web.assets.bundle import find
+from server.web.middleware.headers import FOR_ALL, PERMISSIONS, POLICY, POLICY_OF_DATA, POLICY_OF_PARTS, policy_of
+from server.web.routes.pages import early_of
 from tests.server.conftest import serving, serving_app
 from tests.server.recording.made import record
 

@@ -16,11 +16,11 @@ import numpy as np
 import orjson
 import pytest
 
-from server import frames
-from server.config import Config, Vehicle
-from server.frames import TooManyParts, Unreadable, decode
-from server.raw_frame import raw_frame
-from server.recording.read import open_recording
+from server.app.config import Config, Vehicle
+from server.recording.read.read import open_recording
+from server.rosbridge import codec
+from server.rosbridge.codec import TooManyParts, Unreadable, decode
+from server.rosbridge.raw_frame import raw_frame
 from tests.server.conftest import serving
 from tests.server.security.heavy_bridge import JUDGED, MESSAGES, OTHER
 from tests.server.viewer import viewer
@@ -211,9 +211,9 @@ def test_large_messages_of_real_cars_are_read(message: dict[str, Any], is_binary
 
 
 def test_the_largest_frames_that_are_read_are_read_quickly() -> None:
-    objects = b",".join([b'{"a":1.5}'] * (frames.MAX_CONTAINERS - 2))
-    numbers = b",".join([b"1.25"] * frames.MAX_ELEMENTS)
-    nan = b",".join([b"NaN", *[b"1.25"] * (frames.MAX_SLOW_ELEMENTS - 1)])
+    objects = b",".join([b'{"a":1.5}'] * (codec.MAX_CONTAINERS - 2))
+    numbers = b",".join([b"1.25"] * codec.MAX_ELEMENTS)
+    nan = b",".join([b"NaN", *[b"1.25"] * (codec.MAX_SLOW_ELEMENTS - 1)])
     for payload in (b"[" + objects + b"]", b"[" + numbers + b"]", b"[" + nan + b"]"):
         took_s = []
         for _ in range(3):

@@ -13,10 +13,10 @@ import pytest
 import websockets
 from h11 import IDLE
 
-from server.app import create_app
-from server.config import Config
-from server.limits import MAX_DEPTH, Allowance, Limits, Rate, nests_deeper
-from server.web import requests
+from server.app.app import create_app
+from server.app.config import Config
+from server.protocol.rate_limit import MAX_DEPTH, Allowance, Limits, Rate, nests_deeper
+from server.web.middleware import http_protocol
 from tests.server.conftest import serving
 from tests.server.viewer import viewer
 
@@ -192,7 +192,7 @@ async def test_what_is_no_http_is_answered_with_all_headers() -> None:
 
 async def test_one_address_gets_so_many_connections(monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of this machine are not counted, and a test has no other: for it, this machine is another."""
-    monkeypatch.setattr(requests, "is_loopback", lambda _: False)
+    monkeypatch.setattr(http_protocol, "is_loopback", lambda _: False)
     async with serving(Config(limits=Limits(connections=5))) as base, contextlib.AsyncExitStack() as stack:
         lines = [await stack.enter_async_context(plugged(base)) for _ in range(5)]
         async with plugged(base) as (reader, _):
@@ -210,7 +210,7 @@ async def test_one_address_gets_so_many_connections(monkeypatch: pytest.MonkeyPa
     [("127.0.0.1", True), ("::1", True), ("192.168.4.2", False), ("fe80::1%eth0", False), ("", False)],
 )
 def test_only_loopback_is_this_machine(address: str, is_here: bool) -> None:
-    assert requests.is_loopback(address) is is_here
+    assert http_protocol.is_loopback(address) is is_here
 
 
 def test_what_is_taken_for_granted_of_h11() -> None:

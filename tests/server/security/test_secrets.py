@@ -17,7 +17,7 @@ import httpx
 import websockets
 from mcap.reader import make_reader
 
-from server.bridge.server import RosBridge
+from server.rosbridge_server.server import RosBridge
 from tests.server.cars import driving
 from tests.tree import PROJECT
 

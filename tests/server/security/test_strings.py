@@ -21,13 +21,13 @@ import httpx
 import pytest
 from starlette.routing import Mount, Route
 
-from server.address import BadAddress, parse, refuse_forbidden
-from server.app import create_app
-from server.config import Config, Vehicle
+from server.app.app import create_app
+from server.app.config import Config, Vehicle
 from server.mail import address as mail_address
 from server.mail import compose
 from server.mail.compose import Attachment, Draft
-from server.web.ranges import disposition, file_name
+from server.rosbridge.address import BadAddress, parse, refuse_forbidden
+from server.web.middleware.ranges import disposition, file_name
 from tests.server.conftest import serving
 from tests.server.recording.made import record
 from tests.server.viewer import viewer

@@ -9,12 +9,12 @@ import json
 import httpx
 import pytest
 
-from server import commands
-from server.bridge.server import RosBridge
-from server.clean_text import clean, cleaned
-from server.config import Config, Vehicle
-from server.event_rows import safe_cell
-from server.hub import Page
+from server.app.config import Config, Vehicle
+from server.bus.event_table import safe_cell
+from server.protocol import commands
+from server.rosbridge_server.server import RosBridge
+from server.system.clean_text import clean, cleaned
+from server.web.page_socket import Page
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.viewer import viewer

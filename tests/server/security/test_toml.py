@@ -12,15 +12,15 @@ from pathlib import Path
 import httpx
 import pytest
 
-from server.bounded_toml import MAX_BYTES, MAX_ENTRIES, MAX_LINE, MAX_NESTING, MAX_PARTS, BadToml, loads
-from server.config import Config
+from server.analysis.thresholds import BadSettingsFile, read_wishes
+from server.app.config import Config
+from server.judge.settings import BadSetting, SettingsFile, from_toml, salvage
 from server.mail.settings import MailSettingsFile
-from server.playback.told import MOST_SETTINGS, read_told
-from server.recording.survey import _chosen
-from server.rehearsal.thresholds import BadSettingsFile, read_wishes
-from server.settings import BadSetting, SettingsFile, from_toml, salvage
-from server.web.mbtiles import MapRefused
-from server.web.site_image import site_image
+from server.recording.catalog.survey import _chosen
+from server.replay.recorded_events import MOST_SETTINGS, read_told
+from server.storage.bounded_toml import MAX_BYTES, MAX_ENTRIES, MAX_LINE, MAX_NESTING, MAX_PARTS, BadToml, loads
+from server.web.maps.mbtiles import MapRefused
+from server.web.maps.site_image import site_image
 from tests.server.conftest import serving
 from tests.tree import PROJECT
 
@@ -175,7 +175,7 @@ def test_only_one_module_parses_toml_from_outside() -> None:
         for path in (PROJECT / folder).rglob("*.py")
         if "import tomllib" in path.read_text(encoding="utf-8")
     }
-    assert users == {"server/bounded_toml.py", "server/profiles/__init__.py"}
+    assert users == {"server/storage/bounded_toml.py", "server/judge/profiles/__init__.py"}
 
 
 async def test_no_settings_file_holds_the_server_up() -> None:

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import uvicorn
 
-from server import log_lines
-from server.app import create_app
-from server.config import Config
-from server.limits import Limits, Rate
-from server.web import requests
+from server.app.app import create_app
+from server.app.config import Config
+from server.cli import logging
+from server.protocol.rate_limit import Limits, Rate
+from server.web.middleware import http_protocol
 
 ALL = Rate(per_s=1e6, at_once=10**6)  # what is tried here is what comes through
 
@@ -24,10 +24,10 @@ async def main(data: Path) -> None:
     config = Config(data=data, allowed_hosts=("127.0.0.1",), limits=limits)
     listening = socket.create_server(("127.0.0.1", 0))
     print(f"http://127.0.0.1:{listening.getsockname()[1]}", flush=True)
-    server = uvicorn.Server(uvicorn.Config(create_app(config), **requests.options(limits)))
+    server = uvicorn.Server(uvicorn.Config(create_app(config), **http_protocol.options(limits)))
     await server.serve(sockets=[listening])
 
 
 if __name__ == "__main__":
-    log_lines.begin()
+    logging.begin()
     asyncio.run(main(Path(sys.argv[1])))

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from server.judge.message import Message
 from server.simulator.messages import SIGNAL_OF_TOPIC
-from server.source import Message
 
 SPEED_LIMIT_MPS = 11.0
 HALF_CORRIDOR_M = 1.2

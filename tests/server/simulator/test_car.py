@@ -11,12 +11,12 @@ import numpy as np
 import orjson
 import pytest
 
-from server.bridge.encoding import json_bytes
+from server.judge.message import Message, RosVersion
+from server.judge.topics import map_signals
+from server.rosbridge_server.encoding import json_bytes
 from server.simulator.car import START_S, SimulatedCar
 from server.simulator.messages import PUBLISHED
 from server.simulator.scenarios import planned
-from server.source import Message, RosVersion
-from server.topics import map_signals
 
 TYPES = {
     "/catvehicle/vel": "geometry_msgs/Twist",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from server.judge.message import Message
 from server.simulator.effects import (
     BlindLaser,
     BothPedals,
@@ -25,7 +26,6 @@ from server.simulator.effects import (
 from server.simulator.other_clock import OtherClock
 from server.simulator.scenarios import SCENARIOS, inject, planned
 from server.simulator.sensor_faults import CutScan, FrozenPosition, FrozenScan, NearObject, NoFix
-from server.source import Message
 
 EVERY_EFFECT: list[Callable[[], Effect]] = [
     scenario.effect for scenario in SCENARIOS.values() if scenario.effect is not None

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from server.bridge.server import CannotListen
+from server.judge.message import RosVersion
+from server.rosbridge_server.server import CannotListen
 from server.simulator.messages import PUBLISHED
 from server.simulator.scenarios import SCENARIOS, UnknownScenario
 from server.simulator.service import SCENARIO_SERVICE, STATE_SERVICE, CarService, serve_car
-from server.source import RosVersion
 from tests.server.simulator.conftest import PATIENCE_S, bridge_client, running_car, until
 
 Car = tuple[CarService, int]

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from server.bus import LocalBus
-from server.journal import Journal
-from server.web.log import Which, _page
+from server.bus.bus import LocalBus
+from server.bus.journal import Journal
+from server.web.routes.log import Which, _page
 
 EVENTS = 5200
 

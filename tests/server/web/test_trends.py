@@ -5,7 +5,7 @@ from __future__ import annotations
 import httpx
 import pytest
 
-from server.bridge.server import RosBridge
+from server.rosbridge_server.server import RosBridge
 from tests.server.cars import driving
 from tests.server.viewer import viewer
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import orjson
 
+from server.judge.message import Message, RosVersion
+from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema
-from server.recording.schemas import TypeBook
-from server.recording.write import PartFile
+from server.recording.read.schemas import TypeBook
 from server.simulator.car import START_S, SimulatedCar
-from server.source import Message, RosVersion
 from tests.server.recording.export.ours import TOML, event
 
 

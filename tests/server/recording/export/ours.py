@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, cast
 
 from server.recording.export.raw import raw_messages
+from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema
-from server.recording.read import open_recording
-from server.recording.schemas import Schema
-from server.recording.write import PartFile
+from server.recording.read.read import open_recording
+from server.recording.read.schemas import Schema
 
 Own = tuple[int, str, Mapping[str, Any]]  # ns since 1970, topic, what it says
 TOML = 'profile = "auto"\n\n[limits.speed_limit]\nmax_mps = 3.0\n'

@@ -12,7 +12,7 @@ from server.recording.export.bag import write_bag
 from server.recording.export.clip import Window, first_raised_ns, write_clip
 from server.recording.export.outcome import ExportRefused, Outcome
 from server.recording.folder import writing_path
-from server.recording.read import open_recording
+from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1, write_ros2
 from tests.server.recording.export.ours import TOML, OurFile, Own, as_ours, event
 

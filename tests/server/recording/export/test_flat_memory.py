@@ -15,7 +15,7 @@ from tests.server.recording.export.hour import drive
 MOST_MB = 150
 _MEASURED = (
     # VmHWM is of this program alone; ru_maxrss begins with what its parent took before it.
-    "import sys; from server.cli import main; code = main(sys.argv[1:]); "
+    "import sys; from server.cli.main import main; code = main(sys.argv[1:]); "
     "print(code, next(int(row.split()[1]) // 1024 for row in open('/proc/self/status') if row.startswith('VmHWM')))"
 )
 

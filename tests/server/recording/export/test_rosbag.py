@@ -20,7 +20,7 @@ import pytest
 from rosbags.rosbag1 import Reader
 
 from server.recording.export.bag import write_bag
-from server.recording.read import open_recording
+from server.recording.read.read import open_recording
 from tests.server.recording.export.ours import Own, as_ours, event
 
 pytestmark = [

@@ -15,7 +15,7 @@ from server.recording.export.geojson import write_geojson
 from server.recording.export.gpx import write_gpx
 from server.recording.export.outcome import ExportRefused, Outcome
 from server.recording.export.track import Track
-from server.recording.read import open_recording
+from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1
 from tests.server.recording.export.ours import Own, as_ours, event
 

@@ -1,0 +1,54 @@
+"""One drive as one page that works offline: the page of `catgraph check`, with what the recording says was told and
+done, and the settings in force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from server.analysis.page import page
+from server.analysis.recorded_events import told_by
+from server.analysis.rehearse import rehearse
+from server.analysis.report import Report
+from server.analysis.thresholds import Wishes
+from server.judge import profiles
+from server.judge.settings import salvage
+from server.recording.export.drive import settings_at_start
+from server.recording.export.outcome import Outcome
+from server.recording.read.read import Recording
+
+
+def write_drive_page(
+    recording: Recording, path: Path, *, name: str, progress: Callable[[float], None] = lambda part: None
+) -> Outcome:
+    """Writes the page; `name` is what it calls the drive. Raises RecordingUnreadable, AssetsMissing, OSError.
+
+    Where the recording is ours, the alarms are those that were told while the car drove; the checks beside the curves
+    are judged again by the settings that were in force when it began.
+    """
+    length_s = max(recording.duration_s, 1e-9)
+    told = told_by(recording)
+    run = rehearse(
+        recording,
+        wishes=_wishes(recording),
+        with_traces=True,
+        on_progress=lambda at_s: progress(min(1.0, at_s / length_s)),
+    )
+    if told is not None:
+        run = replace(run, episodes=told.episodes, load=told.load, titles={**told.titles, **run.titles})
+    path.write_text(page(Report(files=[name], recording=recording, run=run, told=told)), encoding="utf-8")
+    notes = [f"{sentence}." for sentence in run.damage]
+    notes += [
+        f"{count} messages on {topic} could not be decoded: {recording.why_rejected.get(topic, 'not JSON')}."
+        for topic, count in sorted(recording.rejected.items())
+    ]
+    return Outcome(entries=run.messages, notes=notes + ([] if run.broke_off is None else [f"{run.broke_off}."]))
+
+
+def _wishes(recording: Recording) -> Wishes:
+    toml = settings_at_start(recording)
+    if toml is None:
+        return Wishes()
+    settings, _ = salvage(toml, profiles.load())
+    return Wishes(name="as recorded", values=settings.values, topics=settings.topics, profile=settings.profile)

@@ -1,0 +1,186 @@
+"""The report as one HTML file: no other file, no network, every text from the recording escaped."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from datetime import UTC, datetime
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from monitor.alarm_spec import Priority
+from server.analysis import plots, report_text
+from server.analysis.episodes import Episode
+from server.analysis.report import Report, differences, name_of, not_checked
+from server.system.page_files import check_vendor, static_dir
+from server.version import catgraph_version
+
+_RIBBON_TEXTS = 400  # reasons in one file; more tell nobody anything
+
+
+def page(report: Report) -> str:
+    """The whole document. Raises AssetsMissing where the page's third-party files are not there."""
+    check_vendor()
+    script, style = _script(), _style()
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {
+        "clock": report_text.clock,
+        "lasting": report_text.length,
+        "grouped": report_text.grouped,
+        "line": report_text.printable,
+        "day_time": _day_time,
+    }
+    template = environment.from_string(_text("report.html"))
+    return template.render(
+        **_facts(report),
+        style=Markup(style),
+        script=Markup(script),
+        data=Markup(_json(_data(report))),
+        policy=_policy(script, style),
+    )
+
+
+def _policy(script: str, style: str) -> str:
+    """What the page may do: run this script, look like this, and nothing from anywhere."""
+    return (
+        f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; font-src data:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def _facts(report: Report) -> dict[str, Any]:
+    """What the template shows without any script."""
+    run, recording = report.run, report.recording
+    counts = {priority: sum(one.priority is priority for one in run.episodes) for priority in Priority}
+    worst = next((priority for priority in Priority if counts[priority]), None)
+    return {
+        "version": catgraph_version(),
+        "name": ", ".join(report_text.printable(_base(file), 80) for file in report.files),
+        "files": report.files,
+        "report": report,
+        "told": report.told,
+        "brand": "catgraph check"
+        if report.told is None
+        else f"catgraph {'incident' if report.told.clip_of else 'drive'}",
+        "run": run,
+        "recording": recording,
+        "recorded": report.recorded,
+        "worst": None if worst is None else str(worst),
+        "counts": ", ".join(f"{number} {priority}" for priority, number in counts.items() if number),
+        "episodes": run.episodes,
+        "unchecked": not_checked(run),
+        "signals": [row for row in report.signals() if row.topic is not None or not row.optional],
+        "settings": report.settings(),
+        "settings_name": name_of(run.wishes),
+        "changes": report.changes,
+        "differences": [] if report.before is None else differences(report.before, run),
+        "before_name": "" if report.before is None else name_of(report.before.wishes),
+        "load_words": {"bearable": "bearable", "demanding": "demanding", "flood": "a flood"}[run.load.verdict],
+        "chattering": [run.titles[name] for name in run.load.chattering],
+    }
+
+
+def _data(report: Report) -> dict[str, Any]:
+    """What the script draws."""
+    run = report.run
+    traces = run.traces
+    return {
+        "from": round(run.from_s, 3),
+        "to": round(max(run.to_s, run.from_s + 0.1), 3),
+        "startMs": round(report.recording.start_s * 1000) if report.recorded is not None else None,
+        "panels": [] if traces is None else plots.panels(traces),
+        "track": None if traces is None else plots.track(traces),
+        "episodes": [_bar(episode) for episode in run.episodes],
+        "before": [_bar(change.before) for change in report.changes if change.before is not None],
+        "ribbons": _ribbons(report),
+        "injected": [[laid.name, round(laid.from_s, 2), round(laid.to_s, 2)] for laid in run.faults],
+    }
+
+
+def _bar(episode: Episode) -> dict[str, Any]:
+    return {
+        "alarm": episode.alarm_id,
+        "title": report_text.printable(episode.title, 100),
+        "priority": str(episode.priority),
+        "from": round(episode.raised_s, 3),
+        "to": round(episode.until_s, 3),
+        "open": episode.cleared_s is None,
+        "said": [round(said.at_s, 3) for said in episode.said],
+        "hidden": [[round(from_s, 3), round(to_s, 3)] for from_s, to_s in episode.suppressed],
+    }
+
+
+def _ribbons(report: Report) -> list[dict[str, Any]]:
+    left = _RIBBON_TEXTS
+    rows = []
+    for ribbon in report.run.ribbons:
+        spans = []
+        for from_s, to_s, verdict, text in ribbon.spans:
+            left -= 1
+            spans.append(
+                [round(from_s, 2), round(to_s, 2), str(verdict), report_text.printable(text, 160) if left > 0 else ""]
+            )
+        rows.append({"label": ribbon.label, "priority": str(ribbon.priority), "spans": spans})
+    return rows
+
+
+def _json(value: Any) -> str:
+    """JSON that can stand inside a script element whatever is in it."""
+    text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _hash(text: str) -> str:
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
+
+def _day_time(at_ms: int) -> str:
+    """A time of day, UTC; nothing where no calendar has it."""
+    try:
+        return datetime.fromtimestamp(at_ms / 1000, UTC).strftime("%H:%M:%S")
+    except (OverflowError, ValueError, OSError):
+        return ""
+
+
+def _base(path: str) -> str:
+    return path.rstrip("/\\").replace("\\", "/").rpartition("/")[2] or path
+
+
+@cache
+def _text(name: str) -> str:
+    return (files("server.analysis") / "html" / name).read_text(encoding="utf-8")
+
+
+@cache
+def _script() -> str:
+    """uPlot and our own script as one module."""
+    plot = (static_dir() / "vendor" / "uPlot.esm.js").read_text(encoding="utf-8")
+    plot = re.sub(r"export\s*\{\s*uPlot as default\s*\};?", "", plot)
+    return _no_end(f"{plot}\n{_text('report.js')}")
+
+
+@cache
+def _style() -> str:
+    static = static_dir()
+    tokens = (static / "css" / "tokens.css").read_text(encoding="utf-8")
+
+    def inlined(match: re.Match[str]) -> str:
+        font = (static / "fonts" / match[1]).read_bytes()
+        return f'url("data:font/woff2;base64,{base64.b64encode(font).decode()}")'
+
+    tokens = re.sub(r'url\("\.\./fonts/([\w.-]+)"\)', inlined, tokens)
+    plot = (static / "vendor" / "uPlot.min.css").read_text(encoding="utf-8")
+    return _no_end(f"{tokens}\n{plot}\n{_text('report.css')}")
+
+
+def _no_end(text: str) -> str:
+    """Nothing in our own files may end the element they stand in."""
+    if "</script" in text.lower() or "</style" in text.lower() or "<!--" in text:
+        raise ValueError("a file of the page would end its own element")
+    return text

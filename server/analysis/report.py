@@ -1,0 +1,159 @@
+"""What one call of `catgraph check` found, of all its runs, for the writers of text, JSON and HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from monitor import catalog
+from monitor.alarm_spec import Priority
+from monitor.signals import SIGNALS
+from server.analysis.compare import Change, compare
+from server.analysis.recorded_events import Told
+from server.analysis.rehearse import Rehearsed
+from server.analysis.thresholds import Wishes
+from server.recording.read.read import Recording
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalRow:
+    """One signal as the recording has it."""
+
+    name: str
+    label: str
+    topic: str | None
+    type: str | None
+    note: str | None
+    count: int
+    rate_hz: float | None  # over all that was judged
+    expected_hz: float | None
+    rejected: int
+    why_rejected: str | None
+    lowest: float | None
+    highest: float | None
+    unit: str
+    optional: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """One recording, judged once or, to compare, twice."""
+
+    files: Sequence[str]
+    recording: Recording
+    run: Rehearsed
+    before: Rehearsed | None = None  # with the first settings of two, or without the injected faults
+    open_s: float = 0.0  # what opening the files took
+    told: Told | None = None  # what the recording says was told and done: of a drive's own page
+
+    @property
+    def changes(self) -> list[Change]:
+        return [] if self.before is None else compare(self.before.episodes, self.run.episodes)
+
+    @property
+    def took_s(self) -> float:
+        return self.open_s + self.run.took_s
+
+    @property
+    def times_real(self) -> float:
+        return self.run.judged_s / self.took_s if self.took_s > 0 else 0.0
+
+    @property
+    def has_critical(self) -> bool:
+        return any(episode.priority is Priority.CRITICAL for episode in self.run.episodes)
+
+    @property
+    def why_nothing(self) -> str | None:
+        """Why nothing in the recording could be judged, as a sentence; None: something was."""
+        return why_nothing(self.run, self.recording)
+
+    @property
+    def recorded(self) -> datetime | None:
+        """When the recording began; None where its clock says nothing sensible."""
+        try:
+            return datetime.fromtimestamp(self.recording.start_s, UTC) if self.recording.count else None
+        except (OverflowError, ValueError, OSError):
+            return None
+
+    def signals(self) -> list[SignalRow]:
+        return [_row(self.run, name) for name in SIGNALS]
+
+    def settings(self) -> list[tuple[str, str, float, str]]:
+        """What differs from the car's defaults: full name, label, value, unit."""
+        return settings_of(self.run)
+
+
+def why_nothing(run: Rehearsed, recording: Recording) -> str | None:
+    """A run in which no message of any signal could be read says nothing of the car, whatever it raised."""
+    if any(tally.received > tally.rejected for tally in run.reception.by_signal.values()):
+        return None
+    if not recording.count:
+        return "Nothing could be judged: the recording has no message."
+    if not run.sources:
+        none_is = f"none of its {len(recording.topics)} topics is" if len(recording.topics) > 1 else "its topic is not"
+        return (
+            f"Nothing could be judged: {none_is} one that catgraph knows. "
+            "Name the topics of the signals in a file for --settings."
+        )
+    if not any(tally.received for tally in run.reception.by_signal.values()):
+        return "Nothing could be judged: the topics that catgraph knows have no message here."
+    return "Nothing could be judged: no message on a topic that catgraph knows could be read."
+
+
+def settings_of(run: Rehearsed) -> list[tuple[str, str, float, str]]:
+    """What a run was judged by beyond the car's defaults: full name, label, value, unit."""
+    if not run.tuning.settings.values:
+        return []
+    schema = catalog.schema()
+    return [
+        (name, str(schema[name]["title"]), value, str(schema[name]["unit"]))
+        for name, value in sorted(run.tuning.settings.values.items())
+    ]
+
+
+def differences(before: Rehearsed, after: Rehearsed) -> list[tuple[str, float, float, str]]:
+    """Thresholds in which two runs differ: label, before, after, unit."""
+    old, new = catalog.flat(before.tuning.limits), catalog.flat(after.tuning.limits)
+    if old == new:
+        return []
+    schema = catalog.schema()
+    return [
+        (str(schema[name]["title"]), old[name], new[name], str(schema[name]["unit"]))
+        for name in new
+        if old.get(name) != new[name]
+    ]
+
+
+def not_checked(run: Rehearsed) -> list[tuple[str, list[str]]]:
+    """Why, and which checks could never be made for that reason: no alarm of theirs means nothing."""
+    by_reason: dict[str, list[str]] = {}
+    for one in run.unchecked:
+        by_reason.setdefault(one.why, []).append(one.label)
+    return list(by_reason.items())
+
+
+def name_of(wishes: Wishes) -> str:
+    return wishes.name or "the defaults"
+
+
+def _row(run: Rehearsed, name: str) -> SignalRow:
+    signal, source, tally = SIGNALS[name], run.sources.get(name), run.reception.by_signal.get(name)
+    extent, rate = run.snapshot.extents.get(name), run.snapshot.rates.get(name)
+    proper = 0 if tally is None else tally.received - tally.rejected
+    return SignalRow(
+        name=name,
+        label=signal.label,
+        topic=None if source is None else source.topic,
+        type=None if source is None else source.type,
+        note=None if source is None else source.note,
+        count=0 if tally is None else tally.received,
+        rate_hz=proper / run.judged_s if proper > 1 and run.judged_s > 0 else None,
+        expected_hz=None if rate is None or not rate.settled else rate.expected_hz,
+        rejected=0 if tally is None else tally.rejected,
+        why_rejected=None if tally is None else tally.last_reason,
+        lowest=None if extent is None else extent.lowest,
+        highest=None if extent is None else extent.highest,
+        unit=signal.unit,
+        optional=signal.optional,
+    )

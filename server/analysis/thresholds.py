@@ -1,0 +1,142 @@
+"""Reads a file of settings to rehearse with, and says of each key that is wrong what is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from monitor import catalog
+from monitor.signals import SIGNALS
+from server.judge import profiles
+from server.judge.active_settings import Tuning
+from server.judge.message import RosVersion
+from server.judge.profiles import GENERIC
+from server.judge.settings import AUTO, BadSetting, Settings, SettingsFile, change
+from server.storage import bounded_toml
+
+_SECTIONS = ("version", "profile", "topics", "limits")
+
+
+class BadSettingsFile(Exception):
+    """The file cannot be used; `sentences` say why, one for each thing that is wrong."""
+
+    def __init__(self, *sentences: str) -> None:
+        super().__init__(" ".join(sentences))
+        self.sentences = sentences
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wishes:
+    """What a file asks for; everything else stays as the car's profile has it."""
+
+    name: str = ""  # of the file
+    values: Mapping[str, float] = field(default_factory=dict)  # "speed_limit.max_mps": 9.0
+    topics: Mapping[str, str] = field(default_factory=dict)  # signal → topic
+    profile: str = AUTO
+
+
+def read_wishes(path: Path) -> Wishes:
+    """A file of [group] tables, or a file that catgraph exported, where they are below [limits].
+
+    Raises BadSettingsFile.
+    """
+    body = _body(path)
+    wrong: list[str] = []
+    values = _values(path, _tables(path, body, wrong), wrong)
+    topics = _topics(path, body.get("topics", {}), wrong)
+    profile = body.get("profile", AUTO)
+    known = (AUTO, *profiles.load())
+    if profile not in known:
+        wrong.append(f"{path}: profile: there is {_listed(known)}, not {_shown(profile)}.")
+    if wrong:
+        raise BadSettingsFile(*wrong)
+    return Wishes(name=path.name, values=values, topics=topics, profile=str(profile))
+
+
+def tuning_for(wishes: Wishes, topics: Mapping[str, str], ros: RosVersion) -> Tuning:
+    """How a car with these topics is judged: its profile as live recognises it, then the wishes."""
+    tuning = Tuning(SettingsFile(None))
+    tuning.recognise(topics, ros)
+    if wishes.topics or wishes.profile != AUTO:
+        tuning.change(values={}, topics=dict(wishes.topics), profile=wishes.profile, version=None)
+    if wishes.values:  # after the profile: what is kept of them is what differs from its defaults
+        tuning.change(values=dict(wishes.values), topics={}, profile=None, version=None)
+    return tuning
+
+
+def _body(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:  # not all of it: it may be a device without end
+            raw = file.read(bounded_toml.MAX_BYTES + 1)
+    except OSError as error:
+        raise BadSettingsFile(f"{path} cannot be read: {error.strerror or error}.") from None
+    try:
+        return bounded_toml.loads(raw)
+    except bounded_toml.BadToml as why:
+        raise BadSettingsFile(f"{path}: {why}") from None
+
+
+def _tables(path: Path, body: Mapping[str, Any], wrong: list[str]) -> dict[str, Any]:
+    """Group → its table, from both places where a file may have them."""
+    limits = body.get("limits", {})
+    if not isinstance(limits, dict):
+        wrong.append(f"{path}: limits: this is a table of tables, such as [limits.speed_limit].")
+        limits = {}
+    return limits | {name: table for name, table in body.items() if name not in _SECTIONS}
+
+
+def _values(path: Path, tables: Mapping[str, Any], wrong: list[str]) -> dict[str, float]:
+    schema = catalog.schema()
+    groups = {name.partition(".")[0] for name in schema}
+    values: dict[str, float] = {}
+    for group, table in tables.items():
+        if group not in groups:
+            wrong.append(f"{path}: [{_shown(group)}]: there is no such group of settings{_guess(group, groups)}.")
+            continue
+        if not isinstance(table, dict):
+            wrong.append(f"{path}: {group}: this is a group of settings: write [{group}], and its settings below.")
+            continue
+        for threshold, value in table.items():
+            name = f"{group}.{threshold}"
+            if name not in schema:
+                wrong.append(f"{path}: {_shown(name)}: there is no such setting{_guess(name, schema)}.")
+                continue
+            try:
+                change(Settings(), GENERIC, values={name: value})
+            except BadSetting as why:
+                wrong.append(f"{path}: {name} = {_shown(value)}: {why}")
+                continue
+            values[name] = value
+    return values
+
+
+def _topics(path: Path, given: Any, wrong: list[str]) -> dict[str, str]:
+    if not isinstance(given, dict):
+        wrong.append(f"{path}: topics: this is a table of signals and their topics.")
+        return {}
+    topics: dict[str, str] = {}
+    for signal, topic in given.items():
+        if signal not in SIGNALS:
+            wrong.append(f"{path}: topics.{_shown(signal)}: there is no such signal{_guess(signal, SIGNALS)}.")
+        elif not isinstance(topic, str) or not 1 <= len(topic) <= 300:
+            wrong.append(f"{path}: topics.{signal}: a topic is given as text.")
+        else:
+            topics[signal] = topic
+    return topics
+
+
+def _guess(name: str, known: Any) -> str:
+    near = get_close_matches(name, list(known), n=1, cutoff=0.75)
+    return f"; {near[0]} is near" if near else ""
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def _shown(value: Any) -> str:
+    text = str(value) if not isinstance(value, str) else value
+    return text if len(text) <= 60 and text.isprintable() else repr(text[:60])

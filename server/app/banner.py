@@ -1,0 +1,114 @@
+"""What the terminal says when a server starts: where it is, how a phone gets in, and how to know that it is this one.
+
+The first line is for scripts too: `catgraph listens on URL`.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import segno
+
+from server.app.config import Config
+from server.tls.setup import Whereabouts
+
+_WHITE_ON_BLACK, _AS_BEFORE = "\x1b[97;40m", "\x1b[0m"  # the blocks are the light modules
+WITHOUT_HTTPS = (
+    "Without HTTPS a phone's browser gives this page no position, does not keep the screen awake, installs nothing for",
+    "when the server is away, neither shares files nor copies text; and who is on the network can read along.",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pairing:
+    """What lets the next phone in."""
+
+    token: str
+    pin: str
+    minutes: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Announcement:
+    """All there is to say of one server."""
+
+    config: Config
+    url: str  # of the page, with a slash at its end
+    others: tuple[str, ...] = ()  # further addresses of the page
+    setup: str | None = None  # the plain page that explains
+    fingerprint: str | None = None  # of our own authority
+    authority: str | None = None
+    left_out: tuple[str, ...] = ()  # addresses and names that our certificate cannot cover
+    warning: str | None = None
+    pairing: Pairing | None = None
+
+
+def lines(said: Announcement, *, draws: bool) -> Iterator[str]:
+    """Line by line; `draws`: with QR codes, for a person before a terminal."""
+    config = said.config
+    yield f"catgraph listens on {said.url}"
+    for vehicle in config.vehicles:
+        yield f"  {vehicle.name}: {vehicle.address or 'waits for an address from the page'}"
+    if config.is_open:
+        yield "  Only this machine can open it; for phones start it with --host 0.0.0.0."
+    if said.others and not config.is_open:
+        yield f"  Also: {'  '.join(said.others)}"
+    if said.warning:
+        yield f"  Mind: {said.warning}."
+    if said.left_out:
+        shown = ", ".join(said.left_out)
+        yield f"  Not covered by the server's own certificate, for they are not private: {shown} (use --tls CERT KEY)."
+    if not config.is_tls and not config.is_open:
+        yield from (f"  {line}" for line in WITHOUT_HTTPS)
+    if said.setup is not None and said.fingerprint is not None:
+        yield ""
+        yield f"  1. A phone that was never here, once: {said.setup}"
+        if draws:
+            yield from code(said.setup)
+        yield f"     It shows a fingerprint. Go on only if it is this one, of “{said.authority}” (SHA-256):"
+        yield from (f"       {line}" for line in fingerprint_lines(said.fingerprint))
+        yield ""
+    yield from _pairing(said, draws=draws)
+    yield "  Ctrl-C ends it."
+
+
+def _pairing(said: Announcement, *, draws: bool) -> Iterator[str]:
+    step = "2. " if said.setup is not None else ""
+    if said.pairing is None or said.config.is_open:
+        return
+    if draws:
+        yield from invitation(said.url, said.pairing, f"  {step}Pair a device:")
+    else:  # what is not read by a person at a terminal ends in a log, where no PIN belongs
+        yield f"  {step}Pair a device: on this machine `catgraph pair` shows a code and a PIN."
+
+
+def invitation(url: str, pairing: Pairing, lead: str) -> Iterator[str]:
+    """How the next device gets in, for a person before a terminal."""
+    yield f"{lead} {url} with PIN {pairing.pin}, one device within {pairing.minutes} min; later: catgraph pair"
+    yield from code(f"{url}#pair={pairing.token}")
+
+
+def code(text: str) -> list[str]:
+    """A QR code in half blocks: black on white, whatever the terminal's colours are, for some readers take no other."""
+    out = io.StringIO()
+    segno.make(text, error="l").terminal(out, compact=True)
+    return [f"{_WHITE_ON_BLACK}{line}{_AS_BEFORE}" for line in out.getvalue().rstrip("\n").split("\n")]
+
+
+def fingerprint_lines(fingerprint: str) -> list[str]:
+    """Four lines of eight pairs, as the page that explains has them, to be compared line by line."""
+    pairs = fingerprint.split(":")
+    return [" ".join(pairs[i : i + 8]) for i in range(0, len(pairs), 8)]
+
+
+def addresses(where: Whereabouts) -> tuple[str, tuple[str, ...]]:
+    """The page's likeliest address, and the others that another device may try."""
+    first = where.secure()
+    others = [where.secure(host) for host in where.hosts if not _is_of_this_machine(host)]
+    return first, tuple(one for one in others if one != first)
+
+
+def _is_of_this_machine(host: str) -> bool:
+    return host in ("localhost", "::1") or host.startswith("127.") or host.lower().startswith("fe80:")

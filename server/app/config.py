@@ -1,0 +1,89 @@
+"""How one server is set up: what the command line and the environment decide before it starts."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from server.access.keys import Keys
+from server.protocol.rate_limit import Limits
+from server.web.maps.map_options import MapUpstream
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vehicle:
+    """A vehicle to watch; without an address it waits for one from the connect screen."""
+
+    name: str
+    address: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tls:
+    """How the page is served: over HTTPS by a certificate of our own (auto) or a given one (files), or without."""
+
+    mode: Literal["auto", "off", "files"] = "auto"
+    cert: Path | None = None  # the chain as PEM, the server's certificate first; with mode files
+    key: Path | None = None
+    setup_port: int | None = None  # of the plain listener that explains; None: the one after `port`, 0: a free one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Config:
+    """Everything `create_app` needs."""
+
+    vehicles: tuple[Vehicle, ...] = (Vehicle(name="car"),)
+    data: Path | None = None  # None: nothing is kept beyond this run
+    host: str = "127.0.0.1"
+    port: int = 8000
+    allowed_hosts: tuple[str, ...] = ()  # non-empty: no other car is ever dialled
+    found: tuple[Vehicle, ...] = field(default=())  # offered on the connect screen
+    maps: tuple[Path, ...] = ()  # MBTiles under the map, the last on top
+    site_image: Path | None = None  # above them; its corners stand in a .toml beside it
+    map_upstream: MapUpstream | None = None  # below the maps; None: no tile is ever fetched
+    worker: bool = True  # phones keep the page's shell; False: what they kept goes at their next visit
+    names: tuple[str, ...] = ()  # what else this server is called: hosts, or origins (https://…) of a proxy before it
+    keys: Keys = field(default_factory=Keys)  # of programs, where devices are paired
+    tls: Tls | None = None  # None: off on loopback, else auto
+    limits: Limits = field(default_factory=Limits)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether only programs of this machine can reach it: nobody pairs then."""
+        return is_loopback(self.host)
+
+    @property
+    def is_tls(self) -> bool:
+        """Whether the page is served over HTTPS."""
+        return not self.is_open if self.tls is None else self.tls.mode != "off"
+
+
+def is_loopback(host: str) -> bool:
+    """Whether `host` means this machine and nothing else; no name but localhost is looked up."""
+    if host.lower() == "localhost":
+        return True
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    mapped = getattr(address, "ipv4_mapped", None)
+    return (mapped or address).is_loopback
+
+
+def default_data() -> Path:
+    """The folder for what is kept, where none is named."""
+    base = os.environ.get("XDG_DATA_HOME")
+    return (Path(base) if base else Path.home() / ".local" / "share") / "catgraph"
+
+
+def vehicle_from_text(text: str, *, index: int) -> Vehicle:
+    """`NAME=ws://car:9090` or only the address. Raises ValueError with one sentence."""
+    name, separator, address = text.partition("=")
+    if not separator or "://" in name:
+        name, address = ("car" if index == 0 else f"car{index + 1}"), text
+    if not name or not name.replace("-", "").replace("_", "").isalnum() or len(name) > 40:
+        raise ValueError(f"“{name[:40]}” is no name for a vehicle: use letters, digits, - and _.")
+    return Vehicle(name=name, address=address)

@@ -1,0 +1,1 @@
+"""State and events between sessions and pages; the journal of events."""

@@ -1,0 +1,204 @@
+"""The numbered log of what happened to each vehicle, in SQLite, one row an event, never rewritten.
+
+Numbers count from 1 for each vehicle and go on over restarts, so that a page can ask for what it missed. A disk that
+takes nothing more stops nobody: events stay in memory, are kept as soon as it takes them, and `trouble` says so.
+"""
+
+from __future__ import annotations
+
+import logging
+import sqlite3
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any, TypeVar
+
+import orjson
+
+from server.bus import journal_db
+
+log = logging.getLogger("catgraph.journal")
+
+_PORTION = 100  # events a transaction: one that is refused has cost little
+RECENT = 200  # events of a vehicle that are told from memory: every page asks for each of them as it comes
+MAX_UNSAVED = 10_000  # events of a vehicle that wait in memory for the disk; some 5 MB
+T = TypeVar("T")
+
+
+class Journal:
+    """Appends and reads events; one connection, used from the event loop (an append is some 30 µs). Never raises for
+    what the disk does."""
+
+    def __init__(self, path: Path | None) -> None:
+        """At `path`, or in memory where it is None."""
+        opened = journal_db.open_at(path)
+        self._database = opened.database
+        self.complaint = opened.complaint  # what was found wrong at the start and put right, for the log
+        self._last = dict(opened.last)
+        self._unsaved: dict[str, deque[dict[str, Any]]] = {}
+        self._recent: dict[str, deque[dict[str, Any]]] = {}  # of this run, without a gap up to the newest
+        self._lost = 0
+        self._why = opened.why
+        if self._why:
+            log.error("%s", self.trouble)
+
+    @property
+    def trouble(self) -> str | None:
+        """Why what happens now is not kept on the disk, as a sentence; None: it is."""
+        if self._why is None:
+            return None
+        waiting = sum(len(events) for events in self._unsaved.values())
+        in_memory = f" {_events(waiting)} in memory only." if waiting else ""
+        lost = f" {_events(self._lost)} lost." if self._lost else ""
+        return f"The alarm log is not kept: {self._why}.{in_memory}{lost}"
+
+    def last(self, vehicle: str) -> int:
+        """The number of the newest event, 0 where there is none."""
+        return self._last.get(vehicle, 0)
+
+    def append(self, vehicle: str, events: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """Numbers the events (`at_ms`, `alarm`, `change`, …) and keeps them; answers them with their numbers `n`."""
+        numbered = [{"n": n, **event} for n, event in enumerate(events, self.last(vehicle) + 1)]
+        if numbered:
+            self._last[vehicle] = numbered[-1]["n"]
+            self._recent.setdefault(vehicle, deque(maxlen=RECENT)).extend(numbered)
+            waiting = self._unsaved.setdefault(vehicle, deque())
+            waiting.extend(numbered)
+            self.save()
+            while len(waiting) > MAX_UNSAVED:
+                waiting.popleft()
+                self._lost += 1
+        return numbered
+
+    def save(self) -> None:
+        """Tries to keep what waits in memory; to be called now and then while there is trouble."""
+        while waiting := self._next():
+            if not self._try(partial(self._write, waiting), False):
+                return
+            for vehicle, _ in waiting:
+                self._unsaved[vehicle].popleft()
+            if self._why is not None:
+                log.warning("the alarm log is kept again")
+                self._why = None
+
+    def _next(self) -> list[tuple[str, dict[str, Any]]]:
+        every = ((vehicle, event) for vehicle, events in self._unsaved.items() for event in events)
+        return list(islice(every, _PORTION))
+
+    def _write(self, events: Sequence[tuple[str, Mapping[str, Any]]]) -> bool:
+        if self._database is None:
+            return False
+        self._database.execute("BEGIN IMMEDIATE")
+        self._database.executemany(
+            "INSERT INTO event VALUES (?, ?, ?, ?, ?, ?)",
+            ((v, e["n"], e["at_ms"], e.get("alarm"), e["change"], orjson.dumps(e)) for v, e in events),
+        )
+        self._database.execute("COMMIT")
+        return True
+
+    def after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
+        """The events that follow number `n`, in order, at most `limit`."""
+        if n >= self.last(vehicle):
+            return []
+        recent = self._recent.get(vehicle, ())
+        if recent and recent[0]["n"] <= n + 1:
+            return [event for event in recent if event["n"] > n][:limit]
+        found = self._read("vehicle = ? AND n > ? ORDER BY n LIMIT ?", (vehicle, n, limit))
+        waiting = [event for event in self._unsaved.get(vehicle, ()) if event["n"] > n]
+        return [*found, *waiting][:limit]
+
+    def find(
+        self,
+        vehicle: str,
+        *,
+        before: int | None = None,
+        limit: int = 100,
+        alarm: str | None = None,
+        change: str | None = None,
+        since_ms: int | None = None,
+        until_ms: int | None = None,
+    ) -> list[dict[str, Any]]:
+        """Events newest first, numbered below `before`, of one alarm, one kind of change, one span of time.
+
+        `alarm` "" asks for those of no alarm.
+        """
+        conditions: list[str] = ["vehicle = ?"]  # `unlikely` has SQLite look into the index of the alarms
+        values: list[str | int] = [vehicle]
+        for condition, value in (
+            ("n < ?", before),
+            ("unlikely(alarm = ?)", alarm or None),
+            ("change = ?", change),
+            ("at_ms >= ?", since_ms),
+            ("at_ms < ?", until_ms),
+        ):
+            if value is not None:
+                conditions.append(condition)
+                values.append(value)
+        if alarm == "":
+            conditions.append("unlikely(alarm IS NULL)")
+        waiting = [
+            event
+            for event in reversed(self._unsaved.get(vehicle, ()))
+            if (before is None or event["n"] < before)
+            and (alarm is None or (event.get("alarm") or "") == alarm)
+            and (change is None or event["change"] == change)
+            and (since_ms is None or event["at_ms"] >= since_ms)
+            and (until_ms is None or event["at_ms"] < until_ms)
+        ]
+        found = self._read(f"{' AND '.join(conditions)} ORDER BY n DESC LIMIT ?", (*values, limit))
+        return [*waiting, *found][:limit]
+
+    def alarms(self, vehicle: str) -> list[str]:
+        """The ids of all alarms that anything was ever told of."""
+        database = self._database
+        waiting = {event["alarm"] for event in self._unsaved.get(vehicle, ()) if event.get("alarm")}
+        if database is None:
+            return sorted(waiting)
+
+        def walk() -> set[str]:
+            found: set[str] = set()
+            name = ""
+            while True:  # from one to the next by the index: there are some dozens, in any number of events
+                row = database.execute(
+                    "SELECT MIN(alarm) FROM event WHERE vehicle = ? AND alarm > ?", (vehicle, name)
+                ).fetchone()
+                if row is None or row[0] is None:
+                    return found
+                name = row[0]
+                found.add(name)
+
+        none: set[str] = set()
+        return sorted(self._try(walk, none) | waiting)
+
+    def close(self) -> None:
+        if self._database is not None:
+            self._database.close()
+
+    def _read(self, which: str, values: Iterable[str | int]) -> list[dict[str, Any]]:
+        database = self._database
+        if database is None:
+            return []
+        query = f"SELECT body FROM event WHERE {which}"  # its conditions are ours
+        return self._try(lambda: [orjson.loads(body) for (body,) in database.execute(query, tuple(values))], [])
+
+    def _try(self, work: Callable[[], T], else_: T) -> T:
+        """What the database answers; where it does not, why is kept, and `else_` is the answer."""
+        try:
+            return work()
+        except (sqlite3.Error, orjson.JSONDecodeError) as error:
+            if self._database is not None and self._database.in_transaction:
+                try:
+                    self._database.execute("ROLLBACK")
+                except sqlite3.Error:
+                    log.debug("nothing to roll back", exc_info=True)
+            why = journal_db.why(error)
+            if why != self._why:
+                log.error("the alarm log is not kept: %s (%s)", why, error)
+            self._why = why
+            return else_
+
+
+def _events(number: int) -> str:
+    return f"{number} event is" if number == 1 else f"{number} events are"

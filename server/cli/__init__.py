@@ -1,0 +1,1 @@
+"""The commands of `catgraph`, one file each: parse, call, print."""

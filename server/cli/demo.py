@@ -1,0 +1,56 @@
+"""`catgraph demo`: a simulated car, its bridge and the page in one process, nothing to set up."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+
+from server.access.keys import keys_from
+from server.app import tls_options
+from server.app.config import Config, Vehicle
+from server.app.process import CannotServe, add_common_arguments, serve
+from server.app.process import run as run_server
+from server.cli.simulate import CarService
+from server.web.maps import map_options
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--seed", type=int, default=1, help="another seed, another noise (default 1)")
+    parser.add_argument(
+        "--scenario", action="append", default=[], metavar="NAME[@T[+D]]", help="a fault at T s for D s; see simulate"
+    )
+    add_common_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serves until it is ended; 2 when it cannot start."""
+    try:
+        return run_server(_demo(args))
+    except (CannotServe, ValueError) as why:
+        print(f"catgraph: {why}", file=sys.stderr)
+        return 2
+
+
+async def _demo(args: argparse.Namespace) -> int:
+    service = CarService(seed=args.seed, scenarios=args.scenario)
+    port = await service.start()
+    address = f"ws://127.0.0.1:{port}"
+    config = Config(
+        vehicles=(Vehicle(name="demo", address=address),),
+        data=args.data,
+        host=args.host,
+        port=args.port,
+        found=(Vehicle(name="Simulated car", address=address),),
+        maps=tuple(args.map),
+        site_image=args.site_image,
+        tls=tls_options.read(args),
+        names=tuple(args.name),
+        keys=keys_from(os.environ),
+        map_upstream=map_options.read(args),
+        worker=not args.no_worker,
+    )
+    try:
+        return await serve(config)
+    finally:
+        await service.stop()

@@ -1,0 +1,243 @@
+"""`catgraph doctor`: what a car publishes, how often, and which signals catgraph makes of it."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import sys
+import time
+from typing import Any
+
+from server.judge.reception_stats import Reception
+from server.judge.topics import BY_SIGNAL, TOPICS, Source, map_signals
+from server.rosbridge.address import Address, BadAddress, parse
+from server.rosbridge.connection_errors import LOGIN_WANTED, ROSAPI_ENDED, ROSAPI_MISSING, Problem, not_proved
+from server.rosbridge.diagnosis import SILENT_S, Diagnosis
+from server.rosbridge.link import LinkDown, RosLink, Subscription
+from server.rosbridge.rosapi_client import Questions
+from server.vehicle import discovery
+from server.vehicle.undelivered import BLOCKED_AFTER_S, CLIENT_COUNT, Passing
+
+CONNECT_WITHIN_S = 5.0
+ROS_SILENT = "DOES NOT ANSWER (get_time); after a restart of roscore restart rosbridge"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("address", help="the car's rosbridge: host, host:port, ws:// or wss://")
+    parser.add_argument("--seconds", type=float, default=5.0, help="how long to listen (default 5)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0: every report signal is there and speaks; 1: something is missing; 2: the car cannot be reached."""
+    try:
+        address = parse(args.address)
+    except BadAddress as why:
+        print(f"catgraph: {why} {why.hint}".strip(), file=sys.stderr)
+        return 2
+    try:
+        return asyncio.run(_examine(address, max(0.5, min(args.seconds, 600.0))))
+    except KeyboardInterrupt:
+        return 130
+
+
+class _Ear:
+    """Listens to the link for the doctor."""
+
+    def __init__(self) -> None:
+        self.opened = asyncio.Event()
+        self.decided = asyncio.Event()  # opened, or the first try failed
+        self.spoke = asyncio.Event()
+        self.problem: Problem | None = None
+        self.reception = Reception()
+        self.by_topic: dict[str, tuple[Source, ...]] = {}
+        self.counts: dict[str, int] = {}
+        self.values: dict[str, Any] = {}
+        self.client_count: Any = None  # of the bridge, as it last published it
+        self.words: list[str] = []
+
+    def link_opened(self) -> None:
+        self.opened.set()
+        self.decided.set()
+
+    def link_closed(self, problem: Problem) -> None:
+        self.problem = problem
+
+    def dial_failed(self, problem: Problem) -> None:
+        self.problem = problem
+        self.decided.set()
+
+    def message_received(self, topic: str, message: Any, note: str | None) -> None:
+        self.spoke.set()
+        if topic == CLIENT_COUNT:
+            self.client_count = message
+        self.counts[topic] = self.counts.get(topic, 0) + 1
+        for source in self.by_topic.get(topic, ()):
+            value = self.reception.read(source, message, note)
+            if value is not None:
+                self.values[source.signal] = value
+
+    def status_received(self, level: str, text: str) -> None:
+        self.spoke.set()
+        self.words.append(f"{level}: {text}")
+
+    def junk_received(self, why: str) -> None:
+        self.reception.junk(why)
+
+    def large_skipped(self, topic: str | None, size: int) -> None:
+        """It is counted among the frames that are no operations."""
+
+
+async def _examine(address: Address, seconds: float) -> int:
+    ear = _Ear()
+    link = RosLink(address, ear, now=time.monotonic)
+    link.start()
+    try:
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(ear.decided.wait(), CONNECT_WITHIN_S)
+        if not ear.opened.is_set():
+            problem = ear.problem
+            print(
+                f"catgraph: {problem.title} {problem.hint}"
+                if problem
+                else f"catgraph: {address.shown} does not answer.",
+                file=sys.stderr,
+            )
+            return 2
+        return await _report(address, link, ear, seconds)
+    except LinkDown:
+        print("catgraph: the bridge closed the connection while it was being examined.", file=sys.stderr)
+        return 2
+    finally:
+        link.stop()
+        await asyncio.sleep(0)
+
+
+def _cannot(problem: Problem | None) -> int:
+    if problem is not None:
+        print(f"catgraph: {problem.title} {problem.hint}", file=sys.stderr)
+    return 2
+
+
+async def _report(address: Address, link: RosLink, ear: _Ear, seconds: float) -> int:
+    diagnosis = Diagnosis()
+    asks = Questions(link, diagnosis, now=time.monotonic)
+    try:
+        return await _tell(address, link, ear, asks, diagnosis, seconds)
+    finally:
+        asks.stop()
+
+
+async def _tell(
+    address: Address, link: RosLink, ear: _Ear, asks: Questions, diagnosis: Diagnosis, seconds: float
+) -> int:
+    server_software = link.server_software
+    asked_s = time.monotonic()
+    offer = await discovery.ask_topics(asks)
+    alive = await discovery.ask_alive(asks)
+    if asks.login is not None or (ear.problem is not None and ear.problem.code == LOGIN_WANTED):
+        return _cannot(asks.login or ear.problem)
+    if not alive:
+        while (wait_s := asked_s + SILENT_S + 0.2 - time.monotonic()) > 0 and not alive:
+            await asyncio.sleep(min(wait_s, 0.5))  # ROS 2 finds rosapi a little later; an answer may be late
+            alive = await discovery.ask_alive(asks)
+        offer = offer or (await discovery.ask_topics(asks) if alive else None)
+    behind = diagnosis.problem(time.monotonic(), flows=False)
+    if offer is None and not diagnosis.is_rosbridge and not ear.spoke.is_set():
+        return _cannot(not_proved(address, server_software, link.junk_count))
+    if behind is not None and behind not in (ROSAPI_MISSING, ROSAPI_ENDED) and offer is None:
+        return _cannot(behind)
+    print(f"rosbridge on {address.shown}: answers" + (f", ROS {offer.ros}" if offer and offer.ros else ""))
+    print(f"ROS behind it: {'answers' if alive else ROS_SILENT}")
+    if offer is None:
+        problem = behind or ROSAPI_MISSING
+        print(f"{problem.title} {problem.hint}")
+        return 1
+    sources = await _map(asks, offer)
+    ear.by_topic = {}
+    for source in sources.values():
+        ear.by_topic[source.topic] = (*ear.by_topic.get(source.topic, ()), source)
+    for topic, kind in offer.topics.items():
+        mapped = [source for source in ear.by_topic.get(topic, ()) if source.decode is not None]
+        cbor = any(BY_SIGNAL[source.signal].compression == "cbor" for source in mapped)
+        if mapped or topic == CLIENT_COUNT:
+            link.subscribe(
+                Subscription(topic=topic, type=kind or None, compression="cbor" if cbor else "none", queue_length=50)
+            )
+    print(f"Listening for {seconds:g} s …", flush=True)
+    await asyncio.sleep(seconds)
+    not_passed = await _not_passed(offer, sources, ear, asks)
+    if not_passed is not None:
+        print(f"{not_passed.title} {not_passed.hint}")
+    return _print(offer, sources, ear, seconds)
+
+
+async def _map(asks: Questions, offer: discovery.Offer) -> dict[str, Source]:
+    """The topic of each signal, of those that a node publishes."""
+    published: set[str] = set()
+    unpublished: set[str] = set()
+    while True:
+        sources = map_signals(offer.topics, unpublished=unpublished)
+        unknown = {source.topic for source in sources.values()} - published - unpublished
+        if not unknown:
+            return sources
+        for topic in sorted(unknown):
+            nodes = await discovery.ask_publishers(asks, topic, and_bridge=True)
+            (unpublished if nodes == () else published).add(topic)
+
+
+async def _not_passed(offer: discovery.Offer, sources: dict[str, Source], ear: _Ear, asks: Questions) -> Problem | None:
+    """Why topics of signals that have a publisher do not come through the bridge; None: they do, or it is not known."""
+    silent = [topic for topic in {source.topic for source in sources.values()} if not ear.counts.get(topic)]
+    published = [topic for topic in silent if await discovery.ask_publishers(asks, topic)]
+    passing = Passing()
+    passing.follow(published, 0.0)
+    passing.counted(ear.client_count)
+    passing.bridges = frozenset(await discovery.ask_publishers(asks, CLIENT_COUNT, and_bridge=True) or ())
+    for topic in published if passing.bridges else ():
+        passing.answered(topic, await discovery.ask_subscribers(asks, topic), 0.0)
+    return passing.problem(BLOCKED_AFTER_S)
+
+
+def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Ear, seconds: float) -> int:
+    missing = []
+    print(f"\n{'signal':<14}{'topic':<46}{'type':<34}{'rate':>9}")
+    for row in TOPICS:
+        source = sources.get(row.signal)
+        if source is None:
+            print(f"{row.signal:<14}{'not published':<46}{row.expected_type + ' looked for':<34}")
+            missing.append(row.signal)
+            continue
+        count = ear.counts.get(source.topic, 0)
+        rate = f"{count / seconds:.1f} Hz" if count else "silent"
+        print(f"{row.signal:<14}{source.topic:<46}{source.type or 'unknown':<34}{rate:>9}")
+        tally = ear.reception.by_signal.get(row.signal)
+        if source.note:
+            print(f"{'':<14}{source.note}")
+        if tally is not None and tally.rejected:
+            print(f"{'':<14}{tally.rejected} of {tally.received} rejected: {tally.last_reason}")
+        if not count or source.decode is None or (tally is not None and tally.rejected == tally.received):
+            missing.append(row.signal)
+    others = sorted(set(offer.topics) - {source.topic for source in sources.values()})
+    print(f"\n{len(others)} other topics" + (":" if others else ""))
+    for topic in others:
+        print(f"  {topic:<44}{offer.topics[topic]}")
+    for words in ear.words[:10]:
+        print(f"The bridge says {words}")
+    if ear.reception.frames.rejected:
+        print(
+            f"{ear.reception.frames.rejected} frames were no rosbridge operations: {ear.reception.frames.last_reason}"
+        )
+    needed = [signal for signal in missing if signal in REPORT_SIGNALS]
+    optional = [signal for signal in missing if signal not in REPORT_SIGNALS]
+    print(f"\n{'Missing or silent: ' + ', '.join(needed) if needed else 'Every signal that the page needs is there.'}")
+    if optional:
+        print(f"Not there, and not needed: {', '.join(optional)}")
+    print(
+        "rosbridge asks nobody who they are: everyone on this network can read this car and command it. "
+        "docs/safety.md says how to close it."
+    )
+    return 1 if needed else 0
+
+
+REPORT_SIGNALS = ("speed", "brake", "accelerator", "steering", "distance", "bearing", "position", "scan", "diagnostics")

@@ -1,0 +1,64 @@
+"""The command line: one sub-command a job, each answering with an exit code and, where it cannot go on, one
+sentence."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import io
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from server.cli import logging
+from server.version import catgraph_version
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Command:
+    """A sub-command; its module has `add_arguments(parser)` and `run(args) -> int` and is loaded only when it is
+    asked for."""
+
+    module: str
+    help: str
+
+
+COMMANDS = {
+    "serve": _Command(module="server.cli.serve", help="watch a car and serve the page"),
+    "pair": _Command(module="server.cli.pair", help="a code and a PIN that let one more device into a running server"),
+    "demo": _Command(module="server.cli.demo", help="a simulated car, its bridge and the page, in one process"),
+    "simulate": _Command(module="server.cli.simulate", help="a simulated car behind a rosbridge of its own"),
+    "replay": _Command(module="server.cli.replay", help="a recording behind a rosbridge, at its true speed"),
+    "check": _Command(module="server.cli.check", help="every check over a recording, faster than real time"),
+    "export": _Command(
+        module="server.cli.export", help="a recording as ROS 1 bag, tables, tracks or page, or a part of it"
+    ),
+    "doctor": _Command(module="server.cli.doctor", help="what a car publishes and how it maps to signals"),
+    "health": _Command(module="server.cli.health", help="asks a running server whether it is well"),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command; 0 done, 1 a finding, 2 cannot be done, 130 interrupted."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that has no × shows a question mark
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    parser = argparse.ArgumentParser(prog="catgraph", description="Operator control unit for a test vehicle.")
+    parser.add_argument("--version", action="version", version=f"catgraph {catgraph_version()}")
+    subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    asked = next((word for word in given if not word.startswith("-")), None)
+    for name, command in COMMANDS.items():
+        sub = subparsers.add_parser(
+            name, help=command.help, description=f"{command.help[0].upper()}{command.help[1:]}."
+        )
+        if name == asked:
+            module = importlib.import_module(command.module)
+            module.add_arguments(sub)
+            sub.set_defaults(run=module.run)
+    args = parser.parse_args(given)
+    logging.begin()
+    try:
+        return int(args.run(args))
+    except KeyboardInterrupt:
+        return 130

@@ -1,0 +1,217 @@
+"""`catgraph replay`: a recording behind a rosbridge, at its true speed."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import math
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import uvloop
+
+from server.cli.replay_report import Report, say
+from server.judge.message import Message
+from server.judge.ros_names import BadName, canonical_name, canonical_type
+from server.recording.read.read import Recording, RecordingUnreadable, open_recording
+from server.rosbridge_server.player import play
+from server.rosbridge_server.server import CannotListen, RosBridge
+
+SETTLED_S = 1.0  # --wait: so long without a new subscription
+AHEAD = 512  # messages read before they are due: unpacking a chunk must not make others late
+LAST_BYTES_S = 10.0  # clients may take so long to fetch the end
+SHORTEST_ROUND_S = 0.1  # --loop over a recording without length
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the command's arguments."""
+    parser.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE", help="ROS 1 bag, ROS 2 bag directory, .mcap, .db3"
+    )
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="address to listen on; 0.0.0.0 for all (default: %(default)s)"
+    )
+    parser.add_argument("--port", type=int, default=9090, help="port, 0 for any free one (default: %(default)s)")
+    parser.add_argument("--rate", type=_rate, default=1.0, metavar="X", help="so many times true speed (default: 1)")
+    parser.add_argument("--start", type=_seconds, default=0.0, metavar="S", help="begin S seconds after the start")
+    parser.add_argument("--loop", action="store_true", help="begin again at the end, until interrupted")
+    parser.add_argument(
+        "--remap",
+        type=_remap,
+        action="append",
+        default=[],
+        metavar="A:=B",
+        help="publish topic A as B; may be repeated",
+    )
+    parser.add_argument(
+        "--wait", action="store_true", help="begin when a client has subscribed, so that it misses no message"
+    )
+    parser.add_argument("--stay", action="store_true", help="keep the bridge up after the end, until interrupted")
+    parser.add_argument(
+        "--like",
+        choices=("helpful", "real"),
+        default="helpful",
+        help="real: behave as the real rosbridge_suite, which says nothing of errors, loses what it cannot encode and "
+        "can be made deaf (default: helpful)",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Plays the recording: 0 at its end, 2 with one sentence where it cannot be played, 130 when interrupted."""
+    try:
+        with open_recording(args.files) as recording:
+            return uvloop.run(_Replay(recording, args).run())
+    except (RecordingUnreadable, CannotListen, _Impossible) as error:
+        print(f"catgraph replay: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+class _Impossible(Exception):
+    """What was asked for cannot be played. The text is one sentence."""
+
+
+class _Replay:
+    def __init__(self, recording: Recording, args: argparse.Namespace) -> None:
+        self._recording = recording
+        self._args = args
+        self._bridge = RosBridge(ros_version=recording.ros_version, node="/replay", like=args.like)
+        self._names = _renamed(recording, dict(args.remap))
+        self._report = Report(recording, self._bridge)
+        self._subscribed = asyncio.Event()  # a client subscribed to something
+        if not any(recording.topics[topic].count for topic in self._names):
+            raise _Impossible(f"{args.files[0]} holds no messages that can be played")
+        if args.start > recording.duration_s:
+            raise _Impossible(
+                f"--start {args.start:g} lies behind the end: the recording has {recording.duration_s:.1f} s"
+            )
+
+    async def run(self) -> int:
+        interrupted = asyncio.get_running_loop().create_future()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(number, _settle, interrupted, 128 + number)
+        for topic, name in self._names.items():
+            info = self._recording.topics[topic]
+            self._bridge.advertise(name, info.type, info.definition, latch=info.is_latched)
+        self._bridge.on_subscribe.append(lambda _: self._subscribed.set())
+        port = await self._bridge.start(self._args.host, self._args.port)
+        self._report.open(self._args, self._names, port)
+        playing, progress = asyncio.ensure_future(self._play()), asyncio.ensure_future(self._report.show_progress())
+        try:
+            await asyncio.wait({playing, interrupted}, return_when=asyncio.FIRST_COMPLETED)
+            code = 0 if playing.done() else int(interrupted.result())
+            if playing.done():
+                playing.result()  # raises what went wrong
+                if not await self._bridge.drain(LAST_BYTES_S):
+                    print("catgraph replay: a client did not fetch the last messages in time", file=sys.stderr)
+        finally:
+            for task in (playing, progress):
+                task.cancel()
+            await asyncio.wait({playing, progress})
+            self._report.close()
+            if self._args.stay and not interrupted.done() and _is_well(playing):
+                say("The bridge stays up until interrupted (Ctrl-C).")
+                code = int(await interrupted)
+            await self._bridge.stop()
+        return code
+
+    async def _play(self) -> None:
+        if self._args.wait:
+            await self._wait_for_subscribers()
+        self._report.begin()
+        while True:
+            round_ends_s = time.monotonic() + SHORTEST_ROUND_S
+            await play(self._messages(), self._bridge, rate=self._args.rate, ahead=AHEAD, on_message=self._report.note)
+            if not self._args.loop:
+                return
+            await asyncio.sleep(max(0.0, round_ends_s - time.monotonic()))
+
+    def _messages(self) -> Iterator[Message]:
+        for message in self._recording.messages(self._args.start):
+            name = self._names.get(message.topic)
+            if name is not None:
+                yield message if name == message.topic else replace(message, topic=name)
+
+    async def _wait_for_subscribers(self) -> None:
+        say("Waiting for a subscriber …")
+        while True:
+            self._subscribed.clear()
+            if not self._is_heard():
+                await self._subscribed.wait()
+                continue
+            try:
+                await asyncio.wait_for(self._subscribed.wait(), SETTLED_S)
+            except TimeoutError:
+                if self._is_heard():
+                    return
+
+    def _is_heard(self) -> bool:
+        topics = (self._bridge.graph.find(name) for name in self._names.values())
+        return any(topic is not None and topic.subscribers for topic in topics)
+
+
+def _renamed(recording: Recording, remap: dict[str, str]) -> dict[str, str]:
+    """The name under which each recorded topic is published; topics that no bridge could carry are noted."""
+    names: dict[str, str] = {}
+    types: dict[str, str] = {}
+    for topic, info in recording.topics.items():
+        try:
+            full = canonical_name(topic)
+            canonical_type(info.type, recording.ros_version)
+        except BadName as error:
+            recording.notes.append(f"{topic!r} ({info.count} messages) is left out: {error}")
+            continue
+        name = names[topic] = remap.pop(full, full)
+        if types.setdefault(name, info.type) != info.type:
+            raise _Impossible(f"two topics of different types would both be {name}: {types[name]} and {info.type}")
+    if remap:
+        raise _Impossible(f"--remap: there is no topic {next(iter(remap))} in the recording")
+    return names
+
+
+def _rate(text: str) -> float:
+    value = _number(text)
+    if not 0.001 <= value <= 1000.0:
+        raise argparse.ArgumentTypeError("must lie between 0.001 and 1000")
+    return value
+
+
+def _seconds(text: str) -> float:
+    value = _number(text)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError("must be 0 or more")
+    return value
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
+    return value
+
+
+def _remap(text: str) -> tuple[str, str]:
+    old, sign, new = text.partition(":=")
+    if not sign:
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form A:=B")
+    try:
+        return canonical_name(old), canonical_name(new)
+    except BadName as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _settle(interrupted: asyncio.Future[int], code: int) -> None:
+    if not interrupted.done():
+        interrupted.set_result(code)
+
+
+def _is_well(task: asyncio.Future[None]) -> bool:
+    return task.done() and not task.cancelled() and task.exception() is None

@@ -1,0 +1,58 @@
+"""`catgraph serve`: watch a car and serve the page."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+
+from server.access.keys import keys_from
+from server.app import tls_options
+from server.app.config import Config, Vehicle, vehicle_from_text
+from server.app.process import CannotServe, add_common_arguments, serve
+from server.app.process import run as run_server
+from server.web.maps import map_options
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--vehicle",
+        action="append",
+        default=[],
+        metavar="[NAME=]ws://CAR:9090",
+        help="a car to watch from the start; several make several vehicles; without it the page asks for an address",
+    )
+    parser.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        metavar="HOST",
+        help="dial nothing but this host (may be given several times)",
+    )
+    add_common_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serves until it is ended; 2 when it cannot start."""
+    try:
+        vehicles = tuple(vehicle_from_text(text, index=i) for i, text in enumerate(args.vehicle))
+        if len({vehicle.name for vehicle in vehicles}) < len(vehicles):
+            raise ValueError("Two vehicles have the same name.")
+        config = Config(
+            vehicles=vehicles or (Vehicle(name="car"),),
+            data=args.data,
+            host=args.host,
+            port=args.port,
+            allowed_hosts=tuple(args.only),
+            maps=tuple(args.map),
+            site_image=args.site_image,
+            tls=tls_options.read(args),
+            names=tuple(args.name),
+            keys=keys_from(os.environ),
+            map_upstream=map_options.read(args),
+            worker=not args.no_worker,
+        )
+        return run_server(serve(config))
+    except (CannotServe, ValueError) as why:
+        print(f"catgraph: {why}", file=sys.stderr)
+        return 2

@@ -1,0 +1,1 @@
+"""Who may command a car."""

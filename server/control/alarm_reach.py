@@ -1,0 +1,160 @@
+"""Which phones can alarm right now: from what each page says of itself once a second. Pure: time is an argument."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from monitor.reach import ReachFacts
+from server.control.lease import Operator
+from server.protocol import serialize
+
+FRESH_S = 3.0  # a page that said nothing for longer: its phone sleeps, or the radio is gone
+BLIND_S = 2.0  # a page that heard nothing for longer covers its values, and hears of no alarm
+FORGOTTEN_S = 300.0  # a phone that sleeps still counts as one that should hear, for so long
+MOST = 64
+MOST_SHOWN = 12
+
+Ready = Literal["ready", "refused", "asks", "missing", "interrupted"]
+Why = Literal["silent", "blind", "hidden", "undrawn", "sound", "replay"]
+WORDS: dict[Why, str] = {
+    "silent": "not heard",
+    "blind": "link slow",
+    "hidden": "page in the background",
+    "undrawn": "page cannot draw",
+    "sound": "sound off",
+    "replay": "shows a replay",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Present:
+    """What a page says of itself."""
+
+    is_visible: bool
+    sound: Ready
+    awake: Ready  # whether the screen is kept on: a phone without that can alarm, until it falls asleep
+    vibrates: bool = False
+    battery: float | None = None  # 0 … 1; None: the browser does not tell
+    is_charging: bool | None = None
+    lag_s: float = 0.0  # age of the newest state there
+    is_replaying: bool = False
+    is_drawing: bool = True  # false: it covers what it shows, because drawing failed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Here:
+    """One page of an operator, as last heard."""
+
+    of: Operator
+    word: Present
+    heard_s: float
+
+    def is_fresh(self, now_s: float) -> bool:
+        return now_s - self.heard_s <= FRESH_S
+
+    def is_seen(self, now_s: float) -> bool:
+        """Whether somebody may be looking at it now."""
+        return self.word.is_visible and self.is_fresh(now_s)
+
+    def why_not(self, now_s: float) -> Why | None:
+        """Why an alarm would not be heard from it now; None: it would."""
+        if not self.is_fresh(now_s):
+            return "silent"
+        if not self.word.is_visible:
+            return "hidden"
+        if self.word.lag_s > BLIND_S:
+            return "blind"
+        if not self.word.is_drawing:
+            return "undrawn"
+        if self.word.is_replaying:
+            return "replay"
+        return None if self.word.sound == "ready" else "sound"
+
+
+class Reach:
+    """The pages of operators that are here, or were within the last minutes."""
+
+    def __init__(self) -> None:
+        self._pages: dict[tuple[str, str], Here] = {}  # the one heard longest ago first
+
+    def hear(self, operator: Operator, word: Present, now_s: float) -> None:
+        """One page says how it stands."""
+        key = operator.who, operator.page
+        self._pages.pop(key, None)
+        self._pages[key] = Here(of=operator, word=word, heard_s=now_s)
+        self._forget(now_s)
+
+    def leave(self, operator: Operator) -> None:
+        """A page said farewell: nobody looks at it, and nobody expects it to alarm."""
+        self._pages.pop((operator.who, operator.page), None)
+
+    def _forget(self, now_s: float) -> None:
+        old = [key for key, one in self._pages.items() if now_s - one.heard_s > FORGOTTEN_S]
+        for key in (*old, *list(self._pages)[: max(0, len(self._pages) - len(old) - MOST)]):
+            self._pages.pop(key, None)
+
+    def heard_s(self) -> float | None:
+        """When any page was heard last; None: none is here."""
+        return max((one.heard_s for one in self._pages.values()), default=None)
+
+    def is_here(self, operator: Operator, now_s: float) -> bool:
+        one = self._pages.get((operator.who, operator.page))
+        return one is not None and one.is_seen(now_s)
+
+    def find(self, page: str, now_s: float) -> Operator | None:
+        """The operator of a page that is here and seen."""
+        return next((one.of for one in self._pages.values() if one.of.page == page and one.is_seen(now_s)), None)
+
+    def all(self, now_s: float) -> list[Here]:
+        """Every page that counts, in the order of their names."""
+        self._forget(now_s)
+        return sorted(self._pages.values(), key=lambda one: (one.of.name, one.of.page))
+
+    def facts(self, now_s: float) -> ReachFacts:
+        """For the check. Two pages of one device are one operator."""
+        best = _by_device(self.all(now_s), now_s)
+        reasons = Counter(WORDS[why] for why in best.values() if why is not None)
+        return ReachFacts(
+            can=sum(why is None for why in best.values()),
+            of=len(best),
+            why=", ".join(why if many == 1 else f"{many} × {why}" for why, many in sorted(reasons.items())),
+        )
+
+    def as_json(self, now_s: float) -> dict[str, Any]:
+        """The `reach` of a state."""
+        pages, facts = self.all(now_s), self.facts(now_s)
+        return {
+            "can": facts.can,
+            "of": facts.of,
+            "why": facts.why,
+            "pages": [
+                {
+                    "page": one.of.page,
+                    "name": one.of.name,
+                    "can": (why := one.why_not(now_s)) is None,
+                    "why": why,
+                    "why_text": WORDS[why] if why else None,
+                    "here": one.is_seen(now_s),
+                    "awake": one.word.awake,
+                    "vibrates": one.word.vibrates,
+                    "battery": serialize.plain(one.word.battery, 2),
+                    "charging": one.word.is_charging,
+                    "heard_s": serialize.plain(max(0.0, now_s - one.heard_s), 1),
+                }
+                for one in pages[:MOST_SHOWN]
+            ],
+            "left_out": max(0, len(pages) - MOST_SHOWN),
+        }
+
+
+def _by_device(pages: Iterable[Here], now_s: float) -> dict[tuple[str, str], Why | None]:
+    """Of each operator's device why none of its pages can alarm; None: one of them can."""
+    best: dict[tuple[str, str], Why | None] = {}
+    for one in pages:
+        key, why = (one.of.who, one.of.name), one.why_not(now_s)
+        if key not in best or why is None:
+            best[key] = why
+    return best

@@ -1,0 +1,209 @@
+"""The one gate through which the orders to a vehicle pass: who may order what now, from a page or a program.
+
+It keeps the lease of control and what the pages say of themselves, and writes both into the log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from monitor.reach import ReachFacts
+from monitor.runner import Refused
+from server.control import display_name
+from server.control.alarm_reach import Present, Reach
+from server.control.lease import ANSWER_S, LEASE_S, RETURN_S, Act, Control, NotInControl, Operator
+from server.protocol import commands, serialize
+
+MAX_FENCE = 2**53
+
+
+class Note(Protocol):
+    """Writes an event of no alarm into the log."""
+
+    def __call__(self, change: str, text: str, *, by: str | None = None, **more: Any) -> None: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Caller:
+    """Who sent an order, as the edge of the server found out: nothing of it is the page's own word but the number."""
+
+    name: str
+    who: str = ""
+    page: str | None = None  # None: a program, or a page's request over HTTP
+    fence: int | None = None
+    is_console: bool = False  # a request over HTTP to a server that only this machine reaches: its own console
+    is_replaying: bool = False
+
+    @classmethod
+    def of(cls, message: Mapping[str, Any]) -> Caller:
+        page, fence = message.get("page"), message.get("fence")
+        return cls(
+            name=display_name.clean(message.get("by")) or display_name.NAMELESS,
+            who=str(message.get("who") or ""),
+            page=page if isinstance(page, str) else None,
+            fence=fence if type(fence) is int and 0 <= fence <= MAX_FENCE else None,
+            is_console=message.get("console") is True,
+            is_replaying=message.get("replaying") is True,
+        )
+
+    @property
+    def operator(self) -> Operator | None:
+        """The page that may be in control; None: no page sent this."""
+        return None if self.page is None else Operator(page=self.page, who=self.who, name=self.name)
+
+
+class Gate:
+    """Time is an argument; it must not go back."""
+
+    def __init__(self, note: Note, *, fence: int) -> None:
+        """`fence`: no number up to this one is ever given: numbers do not come twice, restarts included."""
+        self._note = note
+        self._control = Control(fence)
+        self._reach = Reach()
+
+    def tick(self, now_s: float) -> bool:
+        """Time passes; whether control changed by it."""
+        acts = self._control.advance(now_s, lambda one: self._reach.is_here(one, now_s))
+        for act in acts:
+            self._tell(act)
+        return bool(acts)
+
+    def admit(self, command: commands.Command, caller: Caller, now_s: float) -> None:
+        """Lets an order pass or raises NotInControl. What needs control takes it for a page that is seen, where nobody
+        has it: so the tap on Connect does."""
+        if command.needs != "control":
+            return
+        self.tick(now_s)
+        operator, control = caller.operator, self._control
+        if operator is not None:
+            control.admit(operator, caller.fence)
+            if control.holder is None and self._reach.is_here(operator, now_s):
+                self._tell(control.take(operator, now_s))
+            return
+        if caller.is_console:
+            return
+        control.admit_fence(caller.fence)
+        lease = control.lease
+        if lease is not None and not (caller.fence == lease.fence and caller.who == lease.holder.who):
+            raise NotInControl(f"{lease.holder.name} is in control.", lease.holder)
+
+    def obey(self, command: commands.TakeControl, caller: Caller, now_s: float) -> int | None:
+        """Control is taken, given, asked for. The number of the lease, where this page has it now. Raises Refused."""
+        self.tick(now_s)
+        by, control, fence = caller.operator, self._control, caller.fence
+        if by is None:
+            raise Refused("Only a page can be in control: a program cannot show that somebody looks.")
+        if command.do in ("take", "take_over", "request") and not self._reach.is_here(by, now_s):
+            raise Refused("Only a page that is seen can be in control: this one is in the background.")
+        acts: list[Act | None] = []
+        match command.do:
+            case "take":
+                acts = [control.take(by, now_s)]
+            case "take_over":
+                acts = [control.take_over(by, now_s)]
+            case "request":
+                acts = [control.request(by, now_s)]
+            case "withdraw":
+                acts = [control.withdraw(by)]
+            case "release":
+                acts = [*control.release(by, fence, now_s)]
+            case "hand_over":
+                to = self._reach.find(command.to or "", now_s)
+                if to is None:
+                    raise Refused("That page is not there any more, or nobody sees it.")
+                acts = [control.hand_over(by, fence, to, now_s)]
+            case "keep":
+                acts = [control.keep(by, fence, command.to or "")]
+        for act in acts:
+            self._tell(act)
+        return self.fence_of(caller)
+
+    def hear(self, word: commands.PresentWord, caller: Caller, now_s: float) -> bool:
+        """A page says how it stands; whether control changed by it."""
+        operator = caller.operator
+        if operator is None:
+            return False
+        if word.leaves:
+            self._reach.leave(operator)
+            given_up = self._control.leave(operator, now_s)
+            for released in given_up:
+                self._tell(released)
+            return bool(given_up)
+        said = Present(
+            is_visible=word.visible,
+            sound=word.sound,
+            awake=word.awake,
+            vibrates=word.vibrates,
+            battery=word.battery,
+            is_charging=word.charging,
+            lag_s=word.lag_s,
+            is_drawing=word.draws,
+            is_replaying=caller.is_replaying,
+        )
+        self._reach.hear(operator, said, now_s)
+        changed = self.tick(now_s)
+        if word.visible:
+            act = self._control.present(operator, now_s)
+            self._tell(act)
+            changed = changed or act is not None
+        return changed
+
+    def fence_of(self, caller: Caller) -> int | None:
+        """The number of the lease that this page has; None: it has none."""
+        lease, operator = self._control.lease, caller.operator
+        return lease.fence if lease is not None and operator is not None and operator.is_same(lease.holder) else None
+
+    def heard_s(self) -> float | None:
+        """When a page of an operator was heard last; None: none is here."""
+        return self._reach.heard_s()
+
+    def facts(self, now_s: float) -> ReachFacts:
+        return self._reach.facts(now_s)
+
+    def as_json(self, now_s: float, wall_ms: float) -> dict[str, Any]:
+        """The `control` and the `reach` of a state."""
+        control = self._control
+        lease, lapsed = control.lease, control.lapsed
+        return {
+            "control": {
+                "holder": lease.holder.name if lease else None,
+                "page": lease.holder.page if lease else None,
+                "fence": lease.fence if lease else None,
+                "since_ms": round(wall_ms - (now_s - lease.since_s) * 1000) if lease else None,
+                "renewed_s": serialize.plain(max(0.0, now_s - lease.renewed_s), 1) if lease else None,
+                "lapses_s": LEASE_S,
+                "former": None
+                if lapsed is None
+                else {
+                    "name": lapsed.holder.name,
+                    "page": lapsed.holder.page,
+                    "may_return_s": serialize.plain(max(0.0, RETURN_S - (now_s - lapsed.at_s)), 1),
+                },
+                "requests": [
+                    {
+                        "page": one.of.page,
+                        "name": one.of.name,
+                        "left_s": serialize.plain(max(0.0, ANSWER_S - (now_s - one.asked_s)), 1),
+                    }
+                    for one in control.requests
+                ],
+            },
+            "reach": self._reach.as_json(now_s),
+        }
+
+    def _tell(self, act: Act | None) -> None:
+        if act is not None:
+            self._note(
+                "control",
+                act.text,
+                by=act.by.name if act.by else None,
+                act=act.change,
+                by_page=act.by.page if act.by else None,
+                holder=act.holder.name if act.holder else None,
+                page=act.holder.page if act.holder else None,
+                before=act.before.name if act.before else None,
+                before_page=act.before.page if act.before else None,
+                fence=act.fence,
+            )

@@ -1,0 +1,1 @@
+"""From a message to a judgement: the same for live drives, replays and checks."""

@@ -1,0 +1,136 @@
+"""How one vehicle is judged: its settings, the kind of car it was recognised as, and the thresholds that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from monitor import catalog
+from monitor.catalog import AllLimits
+from server.judge import profiles
+from server.judge.profiles import GENERIC, Profile
+from server.judge.settings import AUTO, Conflict, Settings, SettingsFile, change, differences, from_toml, to_toml
+
+PERCENT_A_RAD = -1 / 0.00536  # the CATVehicle's steering: measured on its recordings, negative percent = left
+
+
+class Tuning:
+    """The one owner of a vehicle's settings."""
+
+    def __init__(self, file: SettingsFile) -> None:
+        self._file = file
+        self._profiles = profiles.load()
+        self._recognised = GENERIC
+        self.settings: Settings = file.read()
+        self.complaint = file.complaint
+        self._limits: tuple[Settings, Profile, AllLimits] | None = None  # as they follow from those two
+        self._told = self.in_force()
+
+    @property
+    def profile(self) -> Profile:
+        """The kind of car: what the operator chose, else what was recognised."""
+        return self._profile_named(self.settings.profile)
+
+    @property
+    def limits(self) -> AllLimits:
+        """Asked for many times a tick, and made anew only when what they follow from is another."""
+        known, profile = self._limits, self.profile
+        if known is None or known[0] is not self.settings or known[1] is not profile:
+            known = self._limits = (self.settings, profile, self.settings.limits(profile))
+        return known[2]
+
+    def recognise(self, topics: Mapping[str, str], ros: int | None) -> bool:
+        """Looks at what the car offers; True when it is now taken for another kind of car."""
+        before = self.profile
+        self._recognised = profiles.choose(self._profiles, topics, ros)
+        return self.profile is not before
+
+    def change(
+        self,
+        *,
+        values: Mapping[str, float | None],
+        topics: Mapping[str, str | None],
+        profile: str | None,
+        version: int | None,
+    ) -> list[str]:
+        """Puts changes in force and keeps them; what changed, a line each. Raises BadSetting, Conflict, OSError."""
+        self._demand(version)
+        new = change(
+            self.settings,
+            self._profile_named(profile or self.settings.profile),  # a default of the new kind of car is not kept
+            values=values,
+            topics=topics,
+            profile_name=profile,
+            known_profiles=self._profiles,
+        )
+        return self._adopt(new)
+
+    def read(self, toml: str) -> Settings:
+        """The settings in a file, for `replace`; takes some 30 ms at most, on any thread. Raises BadSetting."""
+        return from_toml(toml, self._recognised, self._profiles)
+
+    def replace(self, read: Settings) -> list[str]:
+        """As `change`, with all settings from a file that was read."""
+        return self._adopt(
+            Settings(version=self.settings.version + 1, profile=read.profile, values=read.values, topics=read.topics)
+        )
+
+    def number_on(self, version: int) -> bool:
+        """Counts on from a version that the log knows: a number names one set of settings for ever. True where what
+        was kept is older than that, so that something was lost."""
+        if version <= self.settings.version:
+            return False
+        self.settings = replace(self.settings, version=version + 1)
+        return True
+
+    def in_force(self) -> dict[str, Any]:
+        """Everything that is judged by: the kind of car, each threshold in SI, each topic that was picked."""
+        return {"profile": self.profile.name, "topics": dict(self.settings.topics)} | catalog.flat(self.limits)
+
+    def changes(self) -> dict[str, list[Any]]:
+        """What is in force otherwise than when this was last asked: name → [from, to]; topics are "topics.speed"."""
+        before, after = _flat(self._told), _flat(now := self.in_force())
+        self._told = now
+        names = sorted({*before, *after})
+        return {name: [before.get(name), after.get(name)] for name in names if before.get(name) != after.get(name)}
+
+    def as_toml(self) -> str:
+        return to_toml(self.settings)
+
+    def as_json(self) -> dict[str, Any]:
+        """What `GET /api/settings` answers; `schema` says what may be set, `defaults` what the profile gives."""
+        return {
+            "version": self.settings.version,
+            "profile": {
+                "name": self.profile.name,
+                "title": self.profile.title,
+                "chosen": self.settings.profile,
+                "recognised": self._recognised.title,
+            },
+            "profiles": [{"name": p.name, "title": p.title} for p in self._profiles.values()],
+            "values": catalog.flat(self.limits),
+            "defaults": catalog.flat(catalog.changed(catalog.AllLimits(), self.profile.limits)),
+            "changed": sorted(self.settings.values),
+            "topics": dict(self.settings.topics),
+            "schema": catalog.schema(),
+        }
+
+    def _profile_named(self, name: str) -> Profile:
+        return self._recognised if name == AUTO else self._profiles.get(name, self._recognised)
+
+    def _adopt(self, new: Settings) -> list[str]:
+        lines = differences(self.settings, new, self.profile, self._profile_named(new.profile))
+        if lines:
+            self._file.write(new)  # first kept, then in force: what is in force is what a restart finds
+            self.settings = new
+        return lines
+
+    def _demand(self, version: int | None) -> None:
+        if version is not None and version != self.settings.version:
+            raise Conflict("Somebody else has changed the settings meanwhile. Look at them again.")
+
+
+def _flat(in_force: Mapping[str, Any]) -> dict[str, Any]:
+    topics = {f"topics.{signal}": topic for signal, topic in in_force["topics"].items()}
+    return {name: value for name, value in in_force.items() if name != "topics"} | topics

@@ -1,0 +1,83 @@
+"""From a message that came to a judgement: decoded, applied, judged. What is live and what is rehearsed go this way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from monitor.runner import Monitor, Transition
+from monitor.state import State
+from monitor.transport import TransportDelay
+from monitor.values import Steering
+from server.judge.active_settings import PERCENT_A_RAD
+from server.judge.decoders import stamp_s
+from server.judge.profiles import Profile
+from server.judge.reception_stats import Reception
+from server.judge.topics import Source
+
+TICK_S = 0.1  # time judges this often
+
+ByTopic = Mapping[str, tuple[Source, ...]]
+
+
+def by_topic(sources: Iterable[Source]) -> dict[str, tuple[Source, ...]]:
+    """Which signals each topic fills."""
+    found: dict[str, tuple[Source, ...]] = {}
+    for source in sources:
+        found[source.topic] = (*found.get(source.topic, ()), source)
+    return found
+
+
+def published(sources: Iterable[Source]) -> frozenset[str]:
+    """The signals that the car has in a form that can be read."""
+    return frozenset(source.signal for source in sources if source.decode is not None)
+
+
+def receive(
+    sources: tuple[Source, ...],
+    message: Any,
+    at_s: float,
+    note: str | None,
+    *,
+    reception: Reception,
+    state: State,
+    profile: Profile,
+    tyre_rad_per_unit: float,
+    transport: TransportDelay | None = None,
+) -> tuple[str, ...]:
+    """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock;
+    `tyre_rad_per_unit` of the steering signal, 0: not known; `transport` None: it came without delay, as from a file.
+    """
+    reception.received += 1
+    stamp = stamp_s(message)
+    delay_s = 0.0 if transport is None else transport.receive(sources[0].topic, at_s, stamp)
+    changed: tuple[str, ...] = ()
+    is_proper = True
+    for source in sources:
+        value = reception.read(source, message, note)
+        if value is None:
+            is_proper = False
+            if source.decode is not None:
+                state.refuse(source.signal, reception.tally(source.signal).last_reason or "unreadable", at_s)
+            continue
+        if type(value) is Steering:
+            value = steered(value, profile, tyre_rad_per_unit)
+        changed += state.receive(source.signal, value, at_s, stamp, delay_s)
+    if not is_proper:
+        reception.rejected += 1
+    return changed
+
+
+def steered(signal: Steering, profile: Profile, tyre_rad_per_unit: float) -> Steering:
+    """The steering as the kind of car means it, from the number of its signal."""
+    percent = signal.percent * PERCENT_A_RAD if profile.steering == "tyre_angle" else signal.percent
+    return Steering(percent=percent, tyre_rad=signal.percent * tyre_rad_per_unit if tyre_rad_per_unit else None)
+
+
+def judge(
+    monitor: Monitor, state: State, now_s: float, changed: tuple[str, ...] | None = None
+) -> tuple[Transition, ...]:
+    """Judges what changed, at once; None: time passed, everything."""
+    if changed is not None and not monitor.heeds(changed, state):
+        return ()
+    return monitor.step(state.snapshot(now_s), changed)

@@ -1,0 +1,75 @@
+"""What was heard on each topic: counted, decoded, and where it was no proper message, rejected with its reason."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+from server.judge import decoders
+from server.judge.decoders import Rejected
+from server.judge.topics import Source
+
+MAX_REASONS = 20  # a hostile bridge must not fill the memory with reasons
+OTHER = "other reasons"
+
+
+@dataclass(slots=True)
+class Tally:
+    """The counts of one topic or one signal."""
+
+    received: int = 0  # proper or not
+    rejected: int = 0
+    repaired: int = 0  # read, but with indulgence
+    reasons: Counter[str] = field(default_factory=Counter)
+    last_reason: str | None = None
+    repaired_why: str | None = None
+
+    def reject(self, reason: str) -> None:
+        self.rejected += 1
+        key = reason if reason in self.reasons or len(self.reasons) < MAX_REASONS else OTHER
+        self.reasons[key] += 1
+        self.last_reason = reason
+
+
+@dataclass(slots=True)
+class Reception:
+    """All tallies of one vehicle since it was connected."""
+
+    by_signal: dict[str, Tally] = field(default_factory=dict)
+    frames: Tally = field(default_factory=Tally)  # what was no message at all
+    received: int = 0
+    rejected: int = 0
+    unasked: int = 0  # messages on topics nobody subscribed to
+
+    def tally(self, signal: str) -> Tally:
+        found = self.by_signal.get(signal)
+        if found is None:
+            found = self.by_signal[signal] = Tally()
+        return found
+
+    def read(self, source: Source, message: Any, note: str | None) -> Any | None:
+        """The decoded value, or None where it was rejected; either way it is counted."""
+        tally = self.by_signal.get(source.signal) or self.tally(source.signal)
+        tally.received += 1
+        if note is not None:
+            tally.repaired += 1
+            tally.repaired_why = note
+        if source.decode is None:
+            tally.reject(source.note or "of a type that cannot be read")
+            return None
+        try:
+            return source.decode(message)
+        except Rejected as why:
+            tally.reject(str(why))
+        except (KeyError, TypeError, ValueError, OverflowError, AttributeError, IndexError) as error:
+            # a decoder of ours did not foresee this shape: the message is refused all the same, and the shape is named
+            tally.reject(f"unexpected shape: {type(error).__name__}")
+        return None
+
+    def junk(self, reason: str) -> None:
+        self.frames.received += 1
+        self.frames.reject(reason)
+
+
+stamp_s = decoders.stamp_s

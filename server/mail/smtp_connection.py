@@ -1,0 +1,397 @@
+"""One connection to the SMTP server: dialled, encrypted, logged in, mails handed over piece by piece.
+
+The only file that knows aiosmtplib (written against 5.1). Its own way of sending takes a whole mail as bytes and works
+through it with expressions on the loop; here a mail is read off the loop and written as fast as the line takes it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ipaddress
+import socket
+import ssl
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import aiosmtplib
+from aiosmtplib.protocol import SMTPProtocol
+
+from server.mail.replies import Trouble, clean
+from server.mail.settings import MailSettings
+from server.rosbridge.address import BadAddress, refuse_forbidden
+
+DIAL_S = 20.0
+REPLY_S = 60.0  # RFC 5321 4.5.3.2 has minutes; a server that thinks so long is tried again
+END_S = 300.0  # for the reply to a whole mail, which a server may take apart and scan first
+_PIECE = 1 << 18
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Account:
+    """Whom to dial and how to log in."""
+
+    host: str
+    port: int
+    security: str  # starttls, tls, none
+    user: str
+    password: str
+    ca: str
+
+    def __repr__(self) -> str:  # no password in any log
+        return f"Account({self.shown})"
+
+    @classmethod
+    def of(cls, settings: MailSettings) -> Account:
+        """Whom these settings name."""
+        return cls(
+            host=settings.host,
+            port=settings.port,
+            security=settings.security,
+            user=settings.user,
+            password=settings.password,
+            ca=settings.ca,
+        )
+
+    @property
+    def shown(self) -> str:
+        return f"{self.host}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Envelope:
+    """One mail as it is handed over."""
+
+    sender: str
+    to: Sequence[str]
+    file: Path
+    size_bytes: int
+    needs_utf8: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reply:
+    """What the server said to one thing."""
+
+    code: int
+    words: str
+
+    @property
+    def is_permanent(self) -> bool:
+        return self.code >= 500
+
+    @property
+    def text(self) -> str:
+        return f"{self.code} {self.words}".strip()
+
+
+class Connection:
+    """An open connection; mails go one after the other."""
+
+    def __init__(self, smtp: aiosmtplib.SMTP, account: Account) -> None:
+        self._smtp = smtp
+        self._account = account
+        self.is_doubtful = False  # a whole mail was handed over and the server has not answered
+
+    @property
+    def is_open(self) -> bool:
+        return self._smtp.is_connected
+
+    @property
+    def largest_bytes(self) -> int | None:
+        """The largest mail the server takes, as it says (RFC 1870); None: it does not say."""
+        told = self._smtp.esmtp_extensions.get("size", "")
+        return int(told) if told.isdigit() and int(told) > 0 else None
+
+    async def hand_over(self, mail: Envelope, told: Callable[[int], None]) -> tuple[dict[str, Reply], Reply | None]:
+        """The server's answer to each recipient, and to the mail; None where no recipient was taken.
+
+        `told` is called with the bytes that are on their way. Raises Trouble: then nothing is settled, and where
+        `is_doubtful` is true the mail may have arrived.
+        """
+        self.is_doubtful = False
+        with self._in_words("while the mail was handed over"):
+            await self._sender(mail)
+            answers = {one: await self._recipient(one, mail.needs_utf8) for one in mail.to}
+            if any(answer.code in (421, 0) for answer in answers.values()) and not self._smtp.is_connected:
+                raise Trouble(next(answer.text for answer in answers.values() if answer.code in (421, 0)))
+            if not any(answer.code < 300 for answer in answers.values()):
+                await self._smtp.rset()
+                return answers, None
+            start = await self._smtp.execute_command(b"DATA", timeout=REPLY_S)
+            if start.code != 354:
+                return answers, self._reply(start.code, start.message)
+            return answers, await self._text(mail, told)
+
+    async def _sender(self, mail: Envelope) -> None:
+        options = []
+        largest = self.largest_bytes
+        if largest is not None and mail.size_bytes > largest:
+            raise Trouble(
+                f"{self._account.shown} takes mails of at most {largest / 1e6:.1f} MB, and this one has "
+                f"{mail.size_bytes / 1e6:.1f} MB: lower the size limit in Settings, E-mail, and send it again.",
+                is_permanent=True,
+            )
+        if self._smtp.supports_extension("size"):
+            options.append(f"SIZE={mail.size_bytes}")
+        if mail.needs_utf8:
+            if not self._smtp.supports_extension("smtputf8"):
+                raise Trouble(
+                    f"{self._account.shown} takes no address with letters beyond ASCII before the @.", is_permanent=True
+                )
+            options.append("SMTPUTF8")
+        try:
+            await self._smtp.mail(mail.sender, options=options, encoding=_encoding(mail.needs_utf8), timeout=REPLY_S)
+        except aiosmtplib.SMTPSenderRefused as refused:
+            answer = self._reply(refused.code, refused.message)
+            raise Trouble(
+                f"The sender {mail.sender} is refused: {answer.text}", is_permanent=answer.is_permanent
+            ) from None
+
+    async def _recipient(self, one: str, needs_utf8: bool) -> Reply:
+        try:
+            answer = await self._smtp.rcpt(one, encoding=_encoding(needs_utf8), timeout=REPLY_S)
+        except aiosmtplib.SMTPRecipientRefused as refused:
+            return self._reply(refused.code, refused.message)
+        return self._reply(answer.code, answer.message)
+
+    async def _text(self, mail: Envelope, told: Callable[[int], None]) -> Reply:
+        protocol = self._smtp.protocol
+        if protocol is None:
+            raise Trouble("The connection was lost.")
+        # A server may refuse in the midst of it: its answer is listened for from the start.
+        answer = asyncio.ensure_future(protocol.read_response(timeout=None))
+        try:
+            with contextlib.closing(await asyncio.to_thread(open, mail.file, "rb")) as file:
+                sent = 0
+                is_line_start = True
+                while not answer.done():
+                    piece, is_line_start, length = await asyncio.to_thread(_next_piece, file, is_line_start)
+                    if not piece:
+                        break
+                    await _write(protocol, piece, answer)
+                    sent += length
+                    told(sent)
+            if not answer.done():
+                self.is_doubtful = True
+                protocol.write(b".\r\n")
+            async with asyncio.timeout(END_S):
+                said = await answer
+        finally:
+            if not answer.done():
+                answer.cancel()
+            elif not answer.cancelled():
+                answer.exception()
+        self.is_doubtful = False
+        return self._reply(said.code, said.message)
+
+    async def close(self) -> None:
+        """Says goodbye where anybody listens."""
+        with contextlib.suppress(aiosmtplib.SMTPException, OSError, TimeoutError):
+            await self._smtp.quit(timeout=2.0)
+        self._smtp.close()
+
+    def drop(self) -> None:
+        """Breaks off at once: a mail that is not whole is not taken."""
+        transport = self._smtp.transport
+        if isinstance(transport, asyncio.Transport) or hasattr(transport, "abort"):
+            transport.abort()  # type: ignore[union-attr]
+        self._smtp.close()
+
+    @contextmanager
+    def _in_words(self, when: str) -> Iterator[None]:
+        with in_words(self._account, when):
+            yield
+
+    def _reply(self, code: int, message: str) -> Reply:
+        return Reply(code=code, words=clean(message, self._account.password))
+
+
+@asynccontextmanager
+async def connected(account: Account) -> AsyncIterator[Connection]:
+    """A connection that is logged in, closed at the end. Raises Trouble of the account."""
+    connection = await connect(account)
+    try:
+        yield connection
+    finally:
+        await connection.close()
+
+
+async def connect(account: Account) -> Connection:
+    """Dials, encrypts, logs in. Raises Trouble of the account."""
+    context = await asyncio.to_thread(_context, account.ca) if account.security != "none" else None
+    with in_words(account, ""):
+        dialled = await _dial(account)
+        smtp = aiosmtplib.SMTP(
+            hostname=account.host,
+            sock=dialled,
+            local_hostname=_own_name(dialled),
+            timeout=REPLY_S,
+            use_tls=account.security == "tls",
+            start_tls=False,
+            tls_context=context,
+        )
+        connection = Connection(smtp, account)
+        try:
+            await smtp.connect(timeout=DIAL_S)
+            await smtp.ehlo(timeout=REPLY_S)
+            if account.security == "starttls":
+                if not smtp.supports_extension("starttls"):
+                    raise Trouble(
+                        f"{account.shown} offers no STARTTLS: choose TLS, or ask for its port.",
+                        is_permanent=True,
+                        is_of_account=True,
+                    )
+                await smtp.starttls(tls_context=context, timeout=REPLY_S)
+                await smtp.ehlo(timeout=REPLY_S)
+            if account.user:
+                await _log_in(smtp, account)
+        except BaseException:
+            smtp.close()  # and with it the socket, which is its transport's now
+            raise
+    return connection
+
+
+async def _log_in(smtp: aiosmtplib.SMTP, account: Account) -> None:
+    try:
+        await smtp.login(account.user, account.password, timeout=REPLY_S)
+    except aiosmtplib.SMTPAuthenticationError as refused:
+        words = f"{refused.code} {clean(refused.message, account.password)}"
+        raise Trouble(
+            f"{account.shown} refuses the login of {account.user}: {words}",
+            is_permanent=refused.code >= 500,
+            is_of_account=True,
+        ) from None
+    except aiosmtplib.SMTPException as error:
+        if isinstance(error, (aiosmtplib.SMTPServerDisconnected, aiosmtplib.SMTPTimeoutError)):
+            raise
+        raise Trouble(
+            f"{account.shown} offers no login that is known here.", is_permanent=True, is_of_account=True
+        ) from None
+
+
+async def _dial(account: Account) -> socket.socket:
+    """A socket connected to the first address of the host that answers and may be dialled."""
+    loop = asyncio.get_running_loop()
+    async with asyncio.timeout(DIAL_S):
+        try:
+            found = await loop.getaddrinfo(account.host, account.port, type=socket.SOCK_STREAM)
+        except socket.gaierror:
+            raise Trouble(f"No host named {account.host} is known here.", is_of_account=True) from None
+        last: OSError | None = None
+        for family, _, protocol, _, where in found:
+            try:
+                refuse_forbidden(str(where[0]))
+            except BadAddress as why:
+                raise Trouble(str(why), is_permanent=True, is_of_account=True) from None
+            one = socket.socket(family, socket.SOCK_STREAM, protocol)
+            try:
+                one.setblocking(False)
+                await loop.sock_connect(one, where)
+                return one
+            except OSError as error:
+                one.close()
+                last = error
+            except BaseException:
+                one.close()
+                raise
+    raise last or OSError("no address")
+
+
+def _own_name(dialled: socket.socket) -> str:
+    """How this machine calls itself: its full name, else its address (RFC 5321 4.1.3). No name is looked up."""
+    name = socket.gethostname()
+    if "." in name and name.isascii() and name.isprintable() and " " not in name:
+        return name
+    own = ipaddress.ip_address(str(dialled.getsockname()[0]).partition("%")[0])
+    return f"[IPv6:{own}]" if own.version == 6 else f"[{own}]"
+
+
+def _context(ca: str) -> ssl.SSLContext:
+    """The system's own authorities, or only those given."""
+    return ssl.create_default_context(cadata=ca or None)
+
+
+def _encoding(needs_utf8: bool) -> str:
+    return "utf-8" if needs_utf8 else "ascii"
+
+
+def _next_piece(file: BinaryIO, is_line_start: bool) -> tuple[bytes, bool, int]:
+    """The next piece with its dots doubled (RFC 5321 4.5.2), whether it ends a line, and how long it was."""
+    piece = file.read(_PIECE)
+    told = piece.replace(b"\n.", b"\n..")
+    if is_line_start and piece.startswith(b"."):
+        told = b"." + told
+    return told, piece.endswith(b"\n"), len(piece)
+
+
+async def _write(protocol: SMTPProtocol, piece: bytes, answer: asyncio.Future[Any]) -> None:
+    """Writes, and waits until the line has taken most of it, the server answers, or nothing moves any more."""
+    protocol.write(piece)
+    drained: asyncio.Future[Any] = asyncio.ensure_future(protocol._drain_helper())
+    try:
+        done, _ = await asyncio.wait({drained, answer}, timeout=REPLY_S, return_when=asyncio.FIRST_COMPLETED)
+        if not done:
+            raise TimeoutError
+        if drained in done:
+            drained.result()
+    finally:
+        drained.cancel()
+        with contextlib.suppress(asyncio.CancelledError, OSError):
+            await drained
+
+
+@contextmanager
+def in_words(account: Account, when: str) -> Iterator[None]:
+    """Whatever a connection may fail with, as a Trouble with a sentence."""
+    is_dialling = not when
+    try:
+        yield
+    except Trouble:
+        raise
+    except aiosmtplib.SMTPResponseException as answer:
+        words = f"{answer.code} {clean(answer.message, account.password)}"
+        raise Trouble(
+            f"{account.shown} says{'' if is_dialling else f' {when}'}: {words}",
+            is_permanent=answer.code >= 500,
+            is_of_account=is_dialling,
+        ) from None
+    except (aiosmtplib.SMTPException, OSError, TimeoutError) as error:
+        trusted = _of_trust(error)
+        if trusted is not None:
+            raise Trouble(
+                f"{account.shown} does not prove who it is: {trusted}.", is_permanent=True, is_of_account=True
+            ) from None
+        raise Trouble(
+            f"{account.shown} {_how(error)}{'' if is_dialling else f' {when}'}.", is_of_account=is_dialling
+        ) from None
+
+
+def _of_trust(error: BaseException) -> str | None:
+    """Why a certificate is not believed, where that is what it was."""
+    one: BaseException | None = error
+    while one is not None:
+        if isinstance(one, ssl.SSLCertVerificationError):
+            return clean(one.verify_message or "its certificate is not trusted", "")
+        one = one.__cause__ or one.__context__
+    return None
+
+
+def _how(error: BaseException) -> str:
+    one: BaseException | None = error
+    while one is not None:
+        if isinstance(one, ConnectionRefusedError):
+            return "refuses the connection"
+        if isinstance(one, ssl.SSLError):
+            return "does not speak TLS as it should"
+        one = one.__cause__ or one.__context__
+    if isinstance(error, TimeoutError):
+        return "gave no answer in time"
+    if isinstance(error, (ConnectionError, aiosmtplib.SMTPServerDisconnected)):
+        return "closed the connection"
+    if isinstance(error, OSError) and error.strerror:
+        return f"cannot be reached ({error.strerror.lower()})"
+    return "did not answer as a mail server does"

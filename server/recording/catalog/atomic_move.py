@@ -1,0 +1,38 @@
+"""Moves a recording with what people said of it, so that a kill at any moment parts them not."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from pathlib import Path
+
+from server.recording.catalog import annotations as remarks
+
+
+def move(source: Path, target: Path) -> None:
+    """Copies the remarks, renames the file, and only then forgets the copy: whenever the server is killed meanwhile,
+    the recording has its remarks beside it. Raises OSError, and then nothing was moved."""
+    said, there = remarks.beside(source), remarks.beside(target)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        there.unlink(missing_ok=True)  # what an earlier kill left there is not of this one
+        with contextlib.suppress(FileNotFoundError):
+            shutil.copyfile(said, there)
+        with contextlib.suppress(FileNotFoundError):
+            os.rename(source, target)
+    except OSError:
+        with contextlib.suppress(OSError):
+            there.unlink()
+        raise
+    with contextlib.suppress(OSError):
+        said.unlink()
+
+
+def tidy(path: Path, up_to: Path) -> None:
+    """Empty folders that a file left behind."""
+    with contextlib.suppress(OSError):
+        for folder in path.parents:
+            if folder == up_to or not folder.is_relative_to(up_to):
+                break
+            folder.rmdir()

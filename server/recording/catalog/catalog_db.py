@@ -1,0 +1,162 @@
+"""The catalog's database: one row a file, and how rows are found. All of it can be made anew from the files."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sqlite3
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from server.recording.catalog.annotations import NONE, Remarks
+
+log = logging.getLogger("catgraph.catalog")
+
+_SCHEMA = f"""
+CREATE TABLE IF NOT EXISTS recording (
+    path BLOB PRIMARY KEY,
+    id TEXT NOT NULL,
+    trashed_ms INTEGER,
+    vehicle TEXT NOT NULL,
+    started_ms INTEGER NOT NULL,
+    size INTEGER NOT NULL,
+    changed_ns INTEGER NOT NULL,
+    found TEXT,
+    title TEXT NOT NULL DEFAULT '',
+    note TEXT NOT NULL DEFAULT '',
+    tags TEXT NOT NULL DEFAULT '[]',
+    words TEXT NOT NULL DEFAULT ''
+) WITHOUT ROWID;
+CREATE INDEX IF NOT EXISTS recording_kept ON recording (trashed_ms, started_ms DESC, id DESC);
+CREATE INDEX IF NOT EXISTS recording_id ON recording (id);
+PRAGMA user_version = {(VERSION := 1)};
+"""
+COLUMNS = "path, id, trashed_ms, vehicle, started_ms, size, changed_ns, found, title, note, tags"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """One file."""
+
+    path: str  # below the folder of recordings, as the system spells it
+    id: str
+    trashed_ms: int | None  # when it was deleted; None: it was not
+    vehicle: str
+    started_ms: int
+    size: int  # bytes
+    changed_ns: int
+    found: dict[str, Any] | None = None  # by the survey; None: it has not been read yet
+    remarks: Remarks = NONE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Which:
+    """Which recordings are wanted; None: all."""
+
+    vehicle: str | None = None
+    tag: str | None = None
+    text: str | None = None  # in title, note, tags, vehicle or name
+    since_ms: int | None = None  # begun then or later
+    until_ms: int | None = None  # begun before
+    is_trashed: bool = False
+
+
+def open_at(path: Path | None) -> sqlite3.Connection:
+    """The database at `path`, in memory where it is None or cannot be written. A damaged one is made anew."""
+    if path is not None:
+        for _ in range(2):
+            try:
+                return _open(str(path))
+            except sqlite3.DatabaseError as why:
+                if isinstance(why, sqlite3.OperationalError):
+                    log.warning("the catalog of recordings is kept in memory only: %s", why)
+                    break
+                log.warning("the catalog of recordings is made anew: %s", why)
+                with contextlib.suppress(OSError):
+                    for suffix in ("", "-wal", "-shm"):
+                        path.with_name(path.name + suffix).unlink(missing_ok=True)
+    return _open(":memory:")
+
+
+def _open(name: str) -> sqlite3.Connection:
+    database = sqlite3.connect(name, isolation_level=None, check_same_thread=False, timeout=5.0)
+    try:
+        (version,) = database.execute("PRAGMA user_version").fetchone()
+        if version not in (0, VERSION):
+            database.execute("DROP TABLE IF EXISTS recording")
+        database.execute("PRAGMA journal_mode=WAL")
+        database.execute("PRAGMA synchronous=OFF")  # what a loss of power takes from it is made anew from the files
+        database.executescript(_SCHEMA)
+        database.execute("PRAGMA quick_check").fetchone()
+        return database
+    except BaseException:
+        database.close()
+        raise
+
+
+def entry(row: Sequence[Any]) -> Entry:
+    """Of a row with COLUMNS."""
+    path, id, trashed_ms, vehicle, started_ms, size, changed_ns, found, title, note, tags = row
+    return Entry(
+        path=os.fsdecode(path),
+        id=id,
+        trashed_ms=trashed_ms,
+        vehicle=vehicle,
+        started_ms=started_ms,
+        size=size,
+        changed_ns=changed_ns,
+        found=orjson.loads(found) if found is not None else None,
+        remarks=Remarks(title=title, note=note, tags=tuple(orjson.loads(tags))),
+    )
+
+
+def put(database: sqlite3.Connection, entries: Iterable[Entry]) -> None:
+    """Keeps them, in place of what there was of the same files."""
+    rows = [
+        (
+            *(os.fsencode(e.path), e.id, e.trashed_ms, e.vehicle, e.started_ms, e.size, e.changed_ns),
+            None if e.found is None else orjson.dumps(e.found).decode(),
+            *(e.remarks.title, e.remarks.note, orjson.dumps(e.remarks.tags).decode(), _words(e)),
+        )
+        for e in entries
+    ]
+    database.execute("BEGIN IMMEDIATE")
+    try:
+        database.executemany(f"INSERT OR REPLACE INTO recording ({COLUMNS}, words) VALUES (?{', ?' * 11})", rows)
+        database.execute("COMMIT")
+    except BaseException:
+        database.execute("ROLLBACK")
+        raise
+
+
+def forget(database: sqlite3.Connection, paths: Iterable[str]) -> None:
+    """Takes files out of it."""
+    database.executemany("DELETE FROM recording WHERE path = ?", [(os.fsencode(path),) for path in paths])
+
+
+def _words(e: Entry) -> str:
+    """What a search looks through; each tag stands between lines of its own, so that whole ones can be asked for."""
+    tags = "".join(f"\n#{tag}\n" for tag in e.remarks.tags)
+    return f"{e.remarks.title}\n{e.remarks.note}\n{e.vehicle}\n{e.id}{tags}".casefold()
+
+
+def condition(which: Which) -> tuple[str, list[Any]]:
+    """SQL and its values."""
+    parts = ["trashed_ms IS NOT NULL" if which.is_trashed else "trashed_ms IS NULL"]
+    values: list[Any] = []
+    for part, value in (
+        ("vehicle = ?", which.vehicle),
+        ("instr(words, ?) > 0", which.text.casefold() if which.text else None),
+        ("instr(words, ?) > 0", f"\n#{which.tag.casefold()}\n" if which.tag else None),
+        ("started_ms >= ?", which.since_ms),
+        ("started_ms < ?", which.until_ms),
+    ):
+        if value is not None:
+            parts.append(part)
+            values.append(value)
+    return " AND ".join(parts), values

@@ -1,0 +1,83 @@
+"""Which files below a folder are recordings, and what their place alone says of them."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import re
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from server.recording.catalog import annotations as remarks
+from server.recording.folder import DAMAGED, FINISHED, is_id
+
+TRASH = ".trash"
+_ENDINGS = (FINISHED, ".bag", ".db3", DAMAGED)
+_DEEP = 3  # folders below the root that are looked into
+_STAMP = re.compile(r"(\d{8}T\d{6})Z")
+
+
+def id_of(inside: str) -> str:
+    """The id of a file by its place below the folder: its own name where the recorder gave it, else one made of it.
+
+    A recording that was copied in may be called anything, and as one in another folder is called too.
+    """
+    path = Path(inside)
+    stem = path.name.partition(".")[0]
+    if path.suffix == FINISHED and len(path.parts) == 2 and is_id(stem) and stem.startswith(f"{path.parts[0]}_"):
+        return stem
+    plain = re.sub(r"[^A-Za-z0-9_-]+", "-", stem).strip("-_")[:60] or "recording"
+    return f"{plain}-{hashlib.sha256(os.fsencode(inside)).hexdigest()[:10]}"
+
+
+def vehicle_of(found: dict[str, Any] | None, origin: str) -> str:
+    told = (found or {}).get("vehicle")
+    folder = Path(origin).parts[0] if len(Path(origin).parts) > 1 else ""
+    return remarks.line(told or folder)[:40]
+
+
+def started_ms_of(found: dict[str, Any] | None, name: str, changed_ns: int) -> int:
+    """By what was recorded; until it is read by the name, else by the file's own time."""
+    told = (found or {}).get("started_ms")
+    if isinstance(told, int):
+        return told
+    stamp = _STAMP.search(name)
+    if stamp is not None:
+        with contextlib.suppress(ValueError):
+            return round(datetime.strptime(stamp[1], "%Y%m%dT%H%M%S").replace(tzinfo=UTC).timestamp() * 1000)
+    return changed_ns // 1_000_000
+
+
+def files_below(folder: Path) -> Iterator[Path]:
+    """The recordings below a folder, and those in its trash; no link is followed."""
+    for at, folders, names in os.walk(folder):
+        inside = Path(at).relative_to(folder).parts
+        is_trash = inside[:1] == (TRASH,)
+        if is_trash and len(inside) > 1 and not (inside[1].isascii() and inside[1].isdigit() and len(inside[1]) < 16):
+            folders.clear()
+            continue
+        deep = _DEEP + 2 if is_trash else _DEEP
+        folders[:] = [
+            name
+            for name in folders
+            if len(inside) < deep and (not name.startswith(".") or (name == TRASH and not inside))
+        ]
+        if is_trash and len(inside) < 2:
+            continue
+        for name in names:
+            path = Path(at, name)
+            if name.endswith(_ENDINGS) and not name.startswith(".") and path.is_file() and not path.is_symlink():
+                yield path
+
+
+def shape_of(folder: Path) -> list[tuple[str, int]]:
+    """What changes when a file below a folder comes, goes, or is called otherwise."""
+    found = []
+    for at, folders, _ in os.walk(folder):
+        folders.sort()
+        with contextlib.suppress(OSError):
+            found.append((at, os.stat(at).st_mtime_ns))
+    return found

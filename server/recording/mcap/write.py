@@ -1,0 +1,194 @@
+"""Writes one MCAP file that survives whatever happens to its writer.
+
+Chunks are small and handed to the system at every `flush`, so a killed process loses what came since the last one, and
+a loss of power what came since the last `sync`. While it is written the file has another name; its own it gets when it
+is closed, whole and on the disk. A disk that refuses leaves it cut behind the last whole chunk, never in the middle.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+from mcap.writer import CompressionType, Writer
+
+from server.recording.folder import writing_path
+from server.recording.mcap.chunk_index import ChunkIndexes
+from server.recording.own import LIBRARY, METADATA
+from server.recording.read.schemas import Schema
+from server.version import catgraph_version
+
+CHUNK_BYTES = 32 * 1024
+
+
+class PartFile:
+    """One file from its beginning to its end; for one thread. Every method but `add` may raise OSError, and then only
+    `close` and `abandon` are of use."""
+
+    def __init__(self, path: Path, *, profile: str, metadata: Mapping[str, str]) -> None:
+        """`path`: what it is called when it is closed. Raises FileExistsError where anything has that name."""
+        self.path = path
+        self._metadata = dict(metadata)
+        self._channels: dict[tuple[str, str, str], int] = {}  # topic, encoding, type → number
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._sequence: dict[int, int] = {}
+        self.failed: OSError | None = None  # what the disk said of keeping it; the next flush raises it
+        self._closing = threading.Lock()
+        self._is_named = False  # the disk knows that the file is there
+        make_folder(path.parent)
+        self._writing = writing_path(path)
+        if path.exists():
+            raise FileExistsError(f"{path.name} is there already")
+        self._fd = os.open(self._writing, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)  # no other server takes it for left behind
+        self._stream = _Stream(self._fd)
+        try:
+            self._writer: Any = Writer(  # the library types only a part of itself
+                cast("Any", self._stream),
+                chunk_size=CHUNK_BYTES,
+                compression=CompressionType.ZSTD,
+                enable_crcs=True,
+                enable_data_crcs=True,
+            )
+            vars(self._writer)["_Writer__chunk_indices"] = ChunkIndexes(self._writing)  # there is no public name for it
+            self._writer.start(profile=profile, library=f"{LIBRARY} {catgraph_version()}")
+            self._writer.add_metadata(METADATA, self._metadata)
+            self._stream.drain()  # what came meanwhile waits: the disk is waited for by `sync`
+        except BaseException:
+            os.close(self._fd)
+            with contextlib.suppress(OSError):
+                self._writing.unlink()  # it holds no message
+            raise
+
+    @property
+    def size(self) -> int:
+        """Bytes of it that the system has taken."""
+        return self._stream.drained
+
+    def channel(self, topic: str, schema: Schema, metadata: Mapping[str, str] | None = None) -> int:
+        """The number of a topic's channel; the same for the same schema."""
+        key = (topic, schema.message_encoding, schema.name)
+        number = self._channels.get(key)
+        if number is None:
+            declared = (schema.name, schema.encoding, schema.data)
+            if declared not in self._schemas:
+                self._schemas[declared] = self._writer.register_schema(*declared)
+            number = self._channels[key] = self._writer.register_channel(
+                topic, schema.message_encoding, self._schemas[declared], dict(metadata or {})
+            )
+        return number
+
+    def add(self, channel: int, at_ns: int, data: bytes) -> None:
+        """One message; `at_ns` is the time of day when it came."""
+        sequence = self._sequence[channel] = self._sequence.get(channel, 0) + 1
+        self._writer.add_message(channel, at_ns, data, publish_time=at_ns, sequence=sequence)
+
+    def flush(self) -> None:
+        """Hands all that was added to the system: a kill does not lose it any more."""
+        if self.failed is not None:
+            raise self.failed
+        self._writer.flush()
+        self._stream.drain()
+
+    def sync(self) -> None:
+        """Waits until the disk has what was flushed: a loss of power does not lose it any more. For any thread."""
+        with self._closing:
+            if self._fd >= 0:
+                os.fdatasync(self._fd)
+                if not self._is_named:
+                    sync_folder(self.path.parent)
+                    self._is_named = True
+
+    def demand_place(self) -> None:
+        """Raises OSError where the file has been taken away, or replaced, while it is written."""
+        here, there = os.fstat(self._fd), os.stat(self._writing)
+        if (here.st_dev, here.st_ino) != (there.st_dev, there.st_ino):
+            raise FileNotFoundError(errno.ENOENT, "replaced", str(self._writing))
+
+    def close(self, **ended: str) -> Path:
+        """Completes the file, and only when the disk has all of it, gives it its name. Raises OSError: then it is left
+        as `abandon` leaves it."""
+        try:
+            self._writer.flush()
+            self._writer.add_metadata(METADATA, self._metadata | ended)
+            self._stream.drain()  # `finish` reads the chunks' index from the file
+            self._writer.finish()
+            self._stream.drain()
+            os.fsync(self._fd)
+        except BaseException:
+            self.abandon()
+            raise
+        self._shut()
+        os.rename(self._writing, self.path)
+        sync_folder(self.path.parent)
+        return self.path
+
+    def abandon(self) -> None:
+        """Leaves what the disk took, to be recovered when the server starts again."""
+        with contextlib.suppress(OSError):
+            self._shut()
+
+    def _shut(self) -> None:
+        with self._closing:
+            fd, self._fd = self._fd, -1
+            if fd >= 0:
+                os.close(fd)
+
+
+class _Stream:
+    """What the writer of the library writes into: memory, until it is drained into the file at the end of a record."""
+
+    def __init__(self, fd: int) -> None:
+        self._fd = fd
+        self._waiting: list[bytes] = []
+        self._size = 0
+        self.drained = 0
+
+    def write(self, data: bytes) -> int:
+        if data:
+            self._waiting.append(data)
+            self._size += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        return self._size
+
+    def flush(self) -> None:
+        """Not yet: the library asks for it in the middle of things."""
+
+    def drain(self) -> None:
+        """Writes all that waits, or none of it."""
+        data = memoryview(b"".join(self._waiting))
+        at = self.drained
+        try:
+            while at - self.drained < len(data):
+                at += os.pwrite(self._fd, data[at - self.drained :], at)
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._fd, self.drained)
+            raise
+        self._waiting.clear()
+        self.drained = at
+
+
+def make_folder(folder: Path) -> None:
+    """Makes it and what it stands in, and has the disk know each. Raises OSError."""
+    missing = [each for each in (folder, *folder.parents) if not each.exists()]
+    for each in reversed(missing):
+        each.mkdir(exist_ok=True)
+        sync_folder(each.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Waits until the disk knows the names in a folder. Raises OSError."""
+    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)

@@ -1,0 +1,284 @@
+"""Reads recorded drives of every kind as one stream of messages in rosbridge's shape."""
+
+from __future__ import annotations
+
+import heapq
+import operator
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import orjson
+
+from server.judge.message import Json, Message, RosVersion, message_of
+from server.recording.mcap.mcap_file import McapFile, is_bag2
+from server.recording.mcap.truncated import CutMcapFile, is_cut
+from server.recording.own import PREFIX
+from server.recording.read.decode import Decode, compile_decoder
+from server.recording.read.definitions import definitions_of
+from server.recording.read.errors import RecordingUnreadable, Undecodable
+from server.recording.read.recognise import Kind, recognise
+from server.recording.read.rosbag1 import Bag1
+from server.recording.read.rosbag2 import Bag2
+from server.recording.read.source import Channel, FileSource
+
+__all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopicInfo:
+    """What a recording holds of one topic."""
+
+    type: str  # "geometry_msgs/Twist" in ROS 1, "geometry_msgs/msg/Twist" in ROS 2
+    count: int
+    definition: str | None  # the message definition that the recording carries
+    is_latched: bool = False  # newcomers were given the last message
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Road:
+    """How messages of one channel become ours."""
+
+    topic: str
+    type: str
+    decode: Decode
+
+
+Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, what it says
+
+
+def open_recording(paths: Sequence[Path]) -> Recording:
+    """Opens one drive that lies in one or several files, of ROS 1 or of ROS 2.
+
+    A path is a ROS 1 bag, a ROS 2 bag directory, a single .mcap or .db3 file, or a directory with such files in it.
+    Raises RecordingUnreadable with one sentence that names the file.
+    """
+    if not paths:
+        raise RecordingUnreadable("no recording was named")
+    sources: list[FileSource] = []
+    try:
+        for path in paths:
+            for file, kind in recognise(Path(path)):
+                sources.append(_open(file, kind))
+        if len({source.ros_version for source in sources}) > 1:
+            raise RecordingUnreadable("recordings of ROS 1 and ROS 2 cannot be read as one")
+        return Recording(sources)
+    except BaseException:
+        for source in sources:
+            source.close()
+        raise
+
+
+class Recording:
+    """A drive on disk. Use it as a context manager, or close it."""
+
+    def __init__(self, sources: Sequence[FileSource]) -> None:
+        self._sources = sources
+        self.ros_version: RosVersion = sources[0].ros_version
+        self.topics: dict[str, TopicInfo] = {}
+        self.notes: list[str] = []  # topics left out, each with the reason, for a person
+        self.metadata: dict[str, str] = next(
+            (s.metadata for s in sources if isinstance(s, McapFile) and s.metadata), {}
+        )
+        self.rejected: dict[str, int] = {}  # messages by topic that could not be decoded while reading
+        self.why_rejected: dict[str, str] = {}
+        self._roads: list[dict[int, _Road]] = []
+        decoders: dict[tuple[str, str, str], Decode] = {}
+        for source in sources:
+            self._roads.append(self._roads_of(source, decoders))
+        filled = [source for source in sources if any(channel.count for channel in source.channels)]
+        self._start_ns = min((source.start_ns for source in filled), default=0)
+        end_ns = max((source.end_ns for source in filled), default=self._start_ns)
+        self.start_s = self._start_ns / 1e9  # since 1970, of the first message
+        self.duration_s = (end_ns - self._start_ns) / 1e9  # from the first message to the last
+
+    @property
+    def damage(self) -> list[str]:
+        """What the newest reading had to leave out because it is damaged or was never written, in sentences."""
+        return [
+            sentence
+            for source in self._sources
+            for sentence in source.damage.sentences(source.path.name, self._start_ns, source.end_ns)
+        ]
+
+    @property
+    def files(self) -> Sequence[FileSource]:
+        """What it lies in, for whoever copies messages as they are."""
+        return self._sources
+
+    @property
+    def count(self) -> int:
+        """Messages of all topics that can be read."""
+        return sum(topic.count for topic in self.topics.values())
+
+    def messages(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Message]:
+        """All messages in time order, from `start_s` after the beginning on, read as they are asked for; see `rows`."""
+        return (
+            message_of(at_s=at_s, topic=topic, type=type, message=message)
+            for at_s, topic, type, message in self.rows(start_s, topics)
+        )
+
+    def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
+        """As `messages`, for whoever takes them apart at once: time, topic, type, and what it says.
+
+        Where `topics` are given, those of other topics come too, but empty: unpacking is most of the work. What cannot
+        be decoded is left out and counted in `rejected`, what is damaged is left out where the rest can be told from
+        it, and named in `damage`. Raises RecordingUnreadable where it cannot, or nothing is whole.
+        """
+        start_ns = self._start_ns + round(start_s * 1e9)
+        streams = [
+            self._read(source, roads, start_ns, topics)
+            for source, roads in zip(self._sources, self._roads, strict=True)
+            if roads
+        ]
+        return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=operator.itemgetter(0))
+
+    def own(self, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
+        """What catgraph itself wrote on one of its channels ("/catgraph/alarms"), in time order: seconds since 1970,
+        and what it says. None of it is among `topics` and `messages()`."""
+        for source in self._sources:
+            numbers = {channel.number for channel in source.channels if channel.topic == topic}
+            if numbers and topic.startswith(PREFIX):
+                for time_ns, _, raw in source.messages(numbers, 0):
+                    try:
+                        yield time_ns / 1e9, _decode_json(raw)
+                    except Undecodable:
+                        self.rejected[topic] = self.rejected.get(topic, 0) + 1
+
+    def close(self) -> None:
+        for source in self._sources:
+            source.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _roads_of(self, source: FileSource, decoders: dict[tuple[str, str, str], Decode]) -> dict[int, _Road]:
+        roads: dict[int, _Road] = {}
+        for channel in source.channels:
+            if channel.topic.startswith(PREFIX) and channel.encoding == "json":
+                continue
+            type = _spelled(channel.type, self.ros_version)
+            key = (channel.type, channel.definition, channel.encoding)
+            try:
+                known = self.topics.get(channel.topic)
+                if known is not None and known.type != type:
+                    raise Undecodable(f"it has the type {type} and also {known.type}")
+                if key not in decoders:
+                    decoders[key] = _decoder(channel, source)
+            except Undecodable as why:
+                if channel.count:
+                    self.notes.append(f"{channel.topic} ({channel.count} messages) is left out: {why}")
+                continue
+            roads[channel.number] = _Road(topic=channel.topic, type=type, decode=decoders[key])
+            self.topics[channel.topic] = TopicInfo(
+                type=type,
+                count=channel.count + (known.count if known else 0),
+                definition=_definition_of(channel) or (known.definition if known else None),
+                is_latched=channel.is_latched or (known is not None and known.is_latched),
+            )
+        return roads
+
+    def _read(
+        self, source: FileSource, roads: dict[int, _Road], start_ns: int, topics: Collection[str] | None
+    ) -> Iterator[Row]:
+        ways = {
+            number: (road.topic, road.type, road.decode if topics is None or road.topic in topics else _nothing)
+            for number, road in roads.items()
+        }
+        try:
+            for time_ns, number, raw in source.messages(set(roads), start_ns):
+                topic, type, decode = ways[number]
+                try:
+                    message = decode(raw)
+                except Undecodable as why:
+                    self.rejected[topic] = self.rejected.get(topic, 0) + 1
+                    self.why_rejected.setdefault(topic, str(why))
+                    continue
+                yield time_ns / 1e9, topic, type, message
+            if source.damage.is_total:
+                raise RecordingUnreadable(f"{source.path} is damaged: none of its {source.damage.parts} parts is whole")
+        except RecordingUnreadable:
+            raise
+        except Exception as error:  # a damaged file makes the readers fail in every way there is
+            raise RecordingUnreadable(_what_is_wrong(source.path, error)) from None
+
+
+def _definition_of(channel: Channel) -> str | None:
+    """In .msg or .idl text; a channel of JSON has none, even where a ROS type is named."""
+    return channel.definition or None if channel.encoding != "json" else None
+
+
+def _nothing(raw: bytes) -> dict[str, Any]:
+    return {}
+
+
+def _open(path: Path, kind: Kind) -> FileSource:
+    try:
+        if kind == "bag":
+            return Bag1(path)
+        if kind == "mcap" and is_cut(path):
+            return CutMcapFile(path)
+        if kind == "mcap" and not is_bag2(path):
+            return McapFile(path)
+        return Bag2(path, kind)
+    except RecordingUnreadable:
+        raise
+    except Exception as error:  # as above
+        raise RecordingUnreadable(_what_is_wrong(path, error)) from None
+
+
+# How the readers of others say that the end of a file, and so its index, is missing.
+_ENDS_EARLY = (
+    "File end magic is invalid",
+    "Header could not be read from file",
+    "Truncated record",
+    "Invalid MCAP footer",
+)
+
+
+def _what_is_wrong(path: Path, error: Exception) -> str:
+    if isinstance(error, PermissionError) or isinstance(error.__cause__, PermissionError):
+        return f"{path} may not be read by this user: permission denied"
+    said = " ".join(str(error).split()).rstrip(".")
+    if "not indexed" in said:
+        return f"{path} was not closed properly and has no index: repair it with `rosbag reindex`"
+    if any(words in said for words in _ENDS_EARLY):
+        return f"{path} is not complete: it ends too early"
+    if not said or len(said) > 200 or isinstance(error, KeyError | AssertionError | TypeError | IndexError):
+        return f"{path} is damaged or not complete"
+    return f"{path} is damaged or not complete: {said}"
+
+
+def _spelled(type: str, version: RosVersion) -> str:
+    return type.replace("/msg/", "/") if version == 1 else type
+
+
+def _decoder(channel: Channel, source: FileSource) -> Decode:
+    version = source.ros_version
+    match channel.encoding:
+        case "json":
+            return _decode_json
+        case "ros1" if version == 1:
+            pass
+        case "cdr" if version == 2:
+            pass
+        case other:
+            raise Undecodable(f"messages encoded as {other!r} are not supported")
+    return compile_decoder(channel.type, definitions_of(channel, version, source.distro), version)
+
+
+def _decode_json(raw: bytes) -> dict[str, Any]:
+    try:
+        message = orjson.loads(raw)
+    except orjson.JSONDecodeError:
+        raise Undecodable("it is not JSON") from None
+    if not isinstance(message, dict):
+        raise Undecodable("it is not a JSON object")
+    return message

@@ -1,0 +1,195 @@
+"""Reads ROS 1 bags (format 2.0): the index by rosbags, the messages straight out of their chunks."""
+
+from __future__ import annotations
+
+import struct
+from bisect import bisect_left
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+from rosbags.interfaces import MessageDefinitionFormat
+from rosbags.rosbag1 import Reader, ReaderError
+
+from server.judge.message import RosVersion
+from server.recording.read.errors import RecordingUnreadable
+from server.recording.read.source import Channel, Damage
+
+CACHE_BYTES = 64_000_000  # unpacked chunks kept: chunks may overlap in time
+_CONNECTION = 7  # the op of a record that may stand before a message in its chunk
+_OP = b"\x04\x00\x00\x00op="
+_OP_BYTES = len(_OP)
+
+_INDEX, _INDEX_1 = b"\x04", b"\x01\x00\x00\x00"  # the op of an index record, and the only version there is
+_ENTRY = struct.Struct("<III")  # seconds, nanoseconds, place in the chunk
+_length = struct.Struct("<I").unpack_from
+
+
+_Entry = tuple[int, int, int, int]  # of an index: ns, chunk, place in it, connection
+
+
+class _Reader(Reader):
+    """The library's, but for the entries of the index: made one by one they take longer than all else of opening."""
+
+    indexes: dict[int, list[_Entry]]  # type: ignore[assignment]  # by connection, in order
+
+    def __init__(self, path: Path, on_first_chunk: Callable[[int], None]) -> None:
+        super().__init__(path)
+        self._on_first_chunk: Callable[[int], None] | None = on_first_chunk
+
+    def read_index_data(self, pos: int, indexes: dict[int, list[Any]]) -> None:
+        """One record of a connection's messages in the chunk at `pos`. Raises ReaderError where it is none."""
+        file = cast("BinaryIO", self.bio)
+        if self._on_first_chunk is not None:
+            tell, self._on_first_chunk, place = self._on_first_chunk, None, file.tell()
+            tell(pos)
+            file.seek(place)
+        header = _fields(file.read(_length(file.read(4))[0]))
+        entries = file.read(_length(file.read(4))[0])
+        count = _length(header[b"count"])[0]
+        if header[b"op"] != _INDEX or header[b"ver"] != _INDEX_1 or len(entries) != count * _ENTRY.size:
+            raise ReaderError("An index record is damaged.")
+        number = _length(header[b"conn"])[0]
+        indexes[number] += [
+            (seconds * 10**9 + nanoseconds, pos, place, number)
+            for seconds, nanoseconds, place in _ENTRY.iter_unpack(entries)
+        ]
+
+
+def _fields(header: bytes) -> dict[bytes, bytes]:
+    """Of a record's header: each "name=value" after its length."""
+    found, at = {}, 0
+    while at < len(header):
+        end = at + 4 + _length(header, at)[0]
+        name, _, value = header[at + 4 : end].partition(b"=")
+        found[name] = value
+        at = end
+    return found
+
+
+class Bag1:
+    """A ROS 1 bag with its index in memory. Raises RecordingUnreadable on opening and while reading."""
+
+    ros_version: RosVersion = 1
+    distro: str | None = None
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.damage = Damage()  # none that is left out: the format has no checksums
+        self._chunks: OrderedDict[int, bytes] = OrderedDict()
+        self._chunk_bytes = 0
+        self._ahead = ThreadPoolExecutor(1, "bag")
+        self._coming: dict[int, Future[bytes]] = {}  # at most one
+        self._reader = _Reader(path, self._begin_unpacking)  # whoever opens a bag reads it, as a rule from there
+        try:
+            self._reader.open()
+        except BaseException:
+            self._ahead.shutdown(cancel_futures=True)
+            raise
+        self.channels: Sequence[Channel] = [_channel(connection) for connection in self._reader.connections]
+        self.start_ns = self._reader.start_time
+        self.end_ns = self._reader.end_time - 1
+
+    def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
+        entries: list[_Entry] = []
+        for number in numbers:
+            entries += _since(start_ns, self._reader.indexes.get(number, ()))
+        entries.sort()  # by time, then by place in the file
+        wanted = dict.fromkeys(map(itemgetter(1), entries))
+        self._coming = {at: future for at, future in self._coming.items() if at in wanted}
+        order = iter(wanted)
+        position, chunk = -1, b""
+        for time_ns, at, offset, number in entries:
+            if at != position:
+                position, chunk = at, self._chunk(at)
+                following = None if self._coming else next((one for one in order if one not in self._chunks), None)
+                if following is not None:
+                    self._begin_unpacking(following)
+            try:
+                raw = _message(chunk, offset)
+            except (struct.error, IndexError):
+                raise RecordingUnreadable(f"{self.path.name} is damaged: a message lies outside its chunk") from None
+            yield time_ns, number, raw
+
+    def close(self) -> None:
+        self._ahead.shutdown(cancel_futures=True)
+        self._coming.clear()
+        self._chunks.clear()
+        self._reader.close()
+
+    def _begin_unpacking(self, position: int) -> None:
+        """A chunk is unpacked beside the reader: that takes as long as judging what is in it."""
+        header, file = self._reader.chunks[position], cast("BinaryIO", self._reader.bio)
+        try:
+            file.seek(header.datapos)
+            packed = file.read(header.datasize)
+        except (OSError, MemoryError) as error:
+            failed: Future[bytes] = Future()
+            failed.set_exception(error)
+            self._coming[position] = failed
+        else:
+            self._coming[position] = self._ahead.submit(_unpacked, header, packed)
+
+    def _chunk(self, position: int) -> bytes:
+        cached = self._chunks.get(position)
+        if cached is not None:
+            self._chunks.move_to_end(position)
+            return cached
+        if position not in self._coming:
+            self._begin_unpacking(position)
+        future = self._coming.pop(position)
+        try:
+            chunk = future.result()
+        except (OSError, EOFError, ValueError, RuntimeError, MemoryError):  # what bz2, lz4 and the disk may say
+            raise RecordingUnreadable(f"{self.path.name} is damaged: a part of it cannot be unpacked") from None
+        self._chunks[position] = chunk
+        self._chunk_bytes += len(chunk)
+        while self._chunk_bytes > CACHE_BYTES and len(self._chunks) > 1:
+            _, old = self._chunks.popitem(last=False)
+            self._chunk_bytes -= len(old)
+        return chunk
+
+
+def _since(start_ns: int, index: Sequence[_Entry]) -> Sequence[_Entry]:
+    """The entries of one connection from a moment on."""
+    first = bisect_left(index, start_ns, key=itemgetter(0))
+    return index[first:] if first else index
+
+
+def _unpacked(header: Any, packed: bytes) -> bytes:
+    if len(packed) < header.datasize:
+        raise EOFError
+    return bytes(header.decompressor(packed))
+
+
+def _message(chunk: bytes, offset: int) -> bytes:
+    """The data of the message record at `offset`. Raises struct.error or IndexError where there is none."""
+    while True:
+        head = offset + 4
+        data = head + _length(chunk, offset)[0]
+        begin = data + 4
+        end = begin + _length(chunk, data)[0]
+        if end > len(chunk):
+            raise IndexError
+        op = chunk.find(_OP, head, data)
+        if op >= 0 and chunk[op + _OP_BYTES] == _CONNECTION:
+            offset = end
+            continue
+        return chunk[begin:end]
+
+
+def _channel(connection: Any) -> Channel:
+    is_text = connection.msgdef.format == MessageDefinitionFormat.MSG
+    return Channel(
+        number=connection.id,
+        topic=connection.topic,
+        type=connection.msgtype,
+        definition=connection.msgdef.data,
+        format="msg" if is_text else "none",
+        encoding="ros1",
+        count=connection.msgcount,
+        is_latched=bool(connection.ext.latching),
+    )

@@ -1,0 +1,81 @@
+"""What every kind of recording file offers its reader."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, Protocol
+
+from server.judge.message import RosVersion
+
+DefinitionFormat = Literal["none", "msg", "idl"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """Messages of one topic and type in one file."""
+
+    number: int  # unique in its file
+    topic: str
+    type: str  # as rosbags spells it, "pkg/msg/Type" in both versions
+    definition: str
+    format: DefinitionFormat
+    encoding: Literal["ros1", "cdr", "json"]
+    count: int
+    is_latched: bool
+
+
+@dataclass(slots=True)
+class Damage:
+    """What of a file turned out to be damaged while it was read, in parts that each carry a checksum of their own."""
+
+    parts: int = 0  # that were to be read
+    lost: list[tuple[int, int]] = field(default_factory=list)  # first and last ns of each damaged one, by its index
+
+    is_cut: bool = False  # its end is missing besides, nobody knows how much
+
+    @property
+    def is_total(self) -> bool:
+        return bool(self.parts) and len(self.lost) == self.parts
+
+    def sentences(self, name: str, origin_ns: int, end_ns: int) -> list[str]:
+        """What is missing and when, for a person."""
+        said = []
+        if self.lost:
+            first_s = (min(start_ns for start_ns, _ in self.lost) - origin_ns) / 1e9
+            last_s = (max(end_ns for _, end_ns in self.lost) - origin_ns) / 1e9
+            which = "1 part" if len(self.lost) == 1 else f"{len(self.lost)} parts"
+            said.append(
+                f"{name} is damaged: {which} of {self.parts}, between {first_s:.1f} s and {last_s:.1f} s, "
+                f"{'is' if len(self.lost) == 1 else 'are'} left out"
+            )
+        if self.is_cut:
+            said.append(
+                f"{name} was never closed: it is read to its last whole part, {(end_ns - origin_ns) / 1e9:.1f} s"
+            )
+        return said
+
+
+class FileSource(Protocol):
+    """One open recording: a file, or a directory that is one ROS 2 bag."""
+
+    path: Path
+    ros_version: RosVersion
+    distro: str | None
+    channels: Sequence[Channel]
+    start_ns: int  # since 1970; of no meaning where there are no messages
+    end_ns: int
+
+    @property
+    def damage(self) -> Damage:
+        """Of the newest reading."""
+        ...
+
+    def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
+        """(time in ns, number of the channel, raw message) in time order, from `start_ns` on.
+
+        Where the file has checksums of its parts, damaged ones are left out and noted in `damage`."""
+        ...
+
+    def close(self) -> None: ...

@@ -1,0 +1,47 @@
+"""Keeps what a run knew at a moment as bytes, so that it can go on from there as often as somebody wants."""
+
+from __future__ import annotations
+
+import io
+import pickle
+import zlib
+from types import MappingProxyType
+from typing import Any, cast
+
+from monitor.catalog import CHECKS
+from server.replay.run import Known
+
+_BY_ID = {check.id: check for check in CHECKS}
+_IDS = {id(check): check.id for check in CHECKS}
+
+
+def freeze(known: Known) -> bytes:
+    """A copy that later steps do not change; some 20 kB."""
+    out = io.BytesIO()
+    _Packer(out, protocol=5).dump(known)
+    return zlib.compress(out.getvalue(), 1)
+
+
+def thaw(frozen: bytes) -> Known:
+    """What was known, anew each time. Only for bytes that this very process has frozen."""
+    return cast(Known, _Unpacker(io.BytesIO(zlib.decompress(frozen))).load())
+
+
+class _Packer(pickle.Pickler):
+    def persistent_id(self, obj: Any) -> str | None:
+        """Checks are no part of what is known: there is one of each."""
+        return _IDS.get(id(obj))
+
+    def reducer_override(self, obj: Any) -> Any:
+        if type(obj) is MappingProxyType:
+            return (_view, (dict(obj),))
+        return NotImplemented
+
+
+class _Unpacker(pickle.Unpickler):
+    def persistent_load(self, pid: Any) -> Any:
+        return _BY_ID[pid]
+
+
+def _view(mapping: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    return MappingProxyType(mapping)

@@ -1,0 +1,246 @@
+"""The replays of one server: a process for each page that looks at a recording, so many and no more."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import logging
+import os
+import secrets
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from server.replay.protocol import HEAD, KINDS, MOST_BYTES
+
+log = logging.getLogger("catgraph.playback")
+
+MOST_REPLAYS = 8  # each is a process of some 100 MB
+OPENS_WITHIN_S = 20.0  # a long file that was never closed is read through first
+ANSWERS_WITHIN_S = 3.0
+HUNG_S = 2.0  # a process that tells nothing for so long is said to hang
+LIVE_ALARMS = 8
+ROOT = str(Path(__file__).resolve().parent.parent.parent)  # where `server` is found
+ENDED = "The replay ended by itself: the server's log says why."
+
+
+class NoReplay(Exception):
+    """It cannot be replayed; `str()` is one sentence for a person."""
+
+
+class Look:
+    """One page's replay: what its process last told, and the way to tell it something."""
+
+    def __init__(self, recording: str, *, now: Callable[[], float], on_new: Callable[[str], None]) -> None:
+        self.recording = recording
+        self.token = secrets.token_hex(8)
+        self.failed: str | None = None  # why there is no more to come, as a sentence
+        self.numbers = {"state": 0, "scan": 0, "timeline": 0}
+        self.scan: bytes = b""
+        self.timeline: bytes = b""
+        self._state: bytes = b""
+        self._position: dict[str, Any] = {}
+        self._now = now
+        self._on_new = on_new
+        self._heard_s = now()
+        self._asked = itertools.count(1)
+        self._waiting: dict[int, asyncio.Future[dict[str, Any]]] = {}
+        self._ready = asyncio.Event()
+        self._process: asyncio.subprocess.Process | None = None
+        self._reader: asyncio.Task[None] | None = None
+
+    async def open(self, path: Path, opening: Mapping[str, Any]) -> None:
+        """Starts the process and waits for its first state. Raises NoReplay."""
+        paths = os.pathsep.join(filter(None, (ROOT, os.environ.get("PYTHONPATH"))))
+        self._process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "server.replay.process"),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": paths},
+        )
+        self._reader = asyncio.create_task(self._read(self._process), name=f"replay of {self.recording}")
+        self._order({"path": str(path), "name": self.recording, **opening})
+        try:
+            async with asyncio.timeout(OPENS_WITHIN_S):
+                await self._ready.wait()
+        except TimeoutError:
+            self.failed = f"{self.recording} could not be opened within {OPENS_WITHIN_S:g} s."
+        if self.failed is not None:
+            raise NoReplay(self.failed)
+
+    async def close(self) -> None:
+        """Its process ends with its input, or is ended."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        if process.stdin is not None:
+            process.stdin.close()
+        try:
+            async with asyncio.timeout(0.5):
+                await process.wait()
+        except TimeoutError:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
+        if self._reader is not None:
+            self._reader.cancel()
+            await asyncio.gather(self._reader, return_exceptions=True)
+        self._let_go()
+
+    async def ask(self, order: Mapping[str, Any]) -> dict[str, Any]:
+        """What its process answers. Raises NoReplay."""
+        if self.failed is not None or self._process is None:
+            raise NoReplay(self.failed or "This replay is over.")
+        n = next(self._asked)
+        answer: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
+        self._waiting[n] = answer
+        self._order({**order, "n": n})
+        try:
+            async with asyncio.timeout(ANSWERS_WITHIN_S):
+                return await answer
+        except TimeoutError:
+            raise NoReplay("The replay did not answer in time.") from None
+        finally:
+            self._waiting.pop(n, None)
+
+    def watch_scan(self, is_wanted: bool) -> None:
+        if self.failed is None:
+            self._order({"kind": "scan", "wanted": is_wanted})
+
+    def compose(self, server: Mapping[str, Any], live: Mapping[str, Any] | None) -> str:
+        """The state a page gets: what was recorded, beside what is live now."""
+        silent_s = self._now() - self._heard_s
+        replay = {
+            "id": self.recording,
+            "token": self.token,
+            **self._position,
+            "hangs_s": round(silent_s, 1) if silent_s > HUNG_S else None,
+        }
+        head = orjson.dumps({"server": dict(server), "replay": replay, "live": live})
+        return (head[:-1] + b"," + self._state[1:]).decode()
+
+    def _order(self, order: Mapping[str, Any]) -> None:
+        process = self._process
+        if process is not None and process.stdin is not None and not process.stdin.is_closing():
+            process.stdin.write(orjson.dumps(order) + b"\n")
+
+    async def _read(self, process: asyncio.subprocess.Process) -> None:
+        assert process.stdout is not None
+        try:
+            while True:
+                number, length = HEAD.unpack(await process.stdout.readexactly(HEAD.size))
+                if length > MOST_BYTES:
+                    raise ValueError(f"a record of {length} bytes")
+                self._take(KINDS[number], await process.stdout.readexactly(length))
+        except (asyncio.IncompleteReadError, ConnectionError, ValueError, IndexError) as error:
+            if self._process is not None and self.failed is None:
+                log.warning("the replay of %s ended: %r", self.recording, error)
+                self._fail(ENDED)
+
+    def _take(self, kind: str, payload: bytes) -> None:
+        self._heard_s = self._now()
+        match kind:
+            case "state":
+                self._state = payload
+                return  # its position follows
+            case "position":
+                self._position = orjson.loads(payload)
+                self.numbers["state"] += 1
+                if self._state:
+                    self._ready.set()
+                self._on_new("state")
+            case "scan":
+                self.scan = payload
+                self.numbers["scan"] += 1
+                self._on_new("scan")
+            case "timeline":
+                self.timeline = payload
+                self.numbers["timeline"] += 1
+                self._on_new("timeline")
+            case "reply":
+                body = orjson.loads(payload)
+                waiting = self._waiting.get(body["n"])
+                if waiting is not None and not waiting.done():
+                    waiting.set_result(body["answer"])
+            case "failed":
+                self._fail(str(orjson.loads(payload)["reason"]))
+
+    def _fail(self, why: str) -> None:
+        self.failed = why
+        self._ready.set()
+        self._let_go()
+        self._on_new("failed")
+
+    def _let_go(self) -> None:
+        for waiting in self._waiting.values():
+            if not waiting.done():
+                waiting.set_exception(NoReplay(self.failed or "This replay is over."))
+
+
+class Desk:
+    """Opens replays and knows them by their tokens. `path_of` may look at the disk."""
+
+    def __init__(self, path_of: Callable[[str], Path | None], *, now: Callable[[], float]) -> None:
+        self._path_of = path_of
+        self._now = now
+        self._looks: dict[str, Look] = {}
+
+    @property
+    def count(self) -> int:
+        return len(self._looks)
+
+    async def open(self, recording: str, opening: Mapping[str, Any], *, on_new: Callable[[str], None]) -> Look:
+        """A replay that is ready to be shown. Raises NoReplay."""
+        if len(self._looks) >= MOST_REPLAYS:
+            raise NoReplay(f"{MOST_REPLAYS} replays run already: somebody has to leave one first.")
+        look = Look(recording, now=self._now, on_new=on_new)
+        self._looks[look.token] = look
+        try:
+            path = await asyncio.to_thread(self._path_of, recording)
+            if path is None:
+                raise NoReplay(f"There is no recording named {_seen(recording)}.")
+            await look.open(path, opening)
+        except BaseException:
+            await self.close(look)
+            raise
+        return look
+
+    async def close(self, look: Look) -> None:
+        self._looks.pop(look.token, None)
+        await look.close()
+
+    async def close_all(self) -> None:
+        await asyncio.gather(*(self.close(look) for look in list(self._looks.values())))
+
+    def by_token(self, token: str) -> Look:
+        """Raises NoReplay."""
+        look = self._looks.get(token)
+        if look is None:
+            raise NoReplay("This replay is over.")
+        return look
+
+
+def summary(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Of the live state, what somebody must know who looks at a recording."""
+    session, link = state["session"], state["link"]
+    return {
+        "phase": session["phase"],
+        "name": session["name"],
+        "paused": session["paused"],
+        "cut": link["cut"],
+        "problem": link["problem"]["title"] if link["problem"] else None,
+        "recording": state["recording"],
+        "control": state["control"],
+        "reach": state["reach"],
+        "decelerate": state["decelerate"],
+        "alarms": state["alarms"][:LIVE_ALARMS],
+        "alarms_in_all": len(state["alarms"]),
+    }
+
+
+def _seen(name: str) -> str:
+    return "".join(letter if letter.isprintable() else "?" for letter in name[:60])

@@ -1,0 +1,230 @@
+"""One person's look at a recording: where it stands, whether it runs and how fast, and how it gets to another moment.
+
+Where the time line is already made, a seek goes on from what was kept there and comes to the very state that playing
+would have come to. Ahead of it, the checks get some time to warm up before the moment; the replay says so, and puts it
+right once the time line has come so far.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from server.protocol import serialize
+from server.recording.read.read import Recording, RecordingUnreadable
+from server.replay.recorded_events import read_told
+from server.replay.run import Drive, Run
+from server.replay.timeline import Index
+from server.vehicle import queries
+
+RATES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+WARM_UP_S = 25.0  # of the recording, before a moment that the time line has not come to: less than a second of work
+REACH_S = 30.0  # a moment so little ahead is played to
+BEHIND_S = 0.3  # of our own time: further behind, it does not keep the pace that was asked for
+
+
+class Playback:
+    """Times without a suffix are seconds since the beginning of the recording; `now_s` is the clock of whoever looks.
+
+    `open_again` gives the recording a second time, for the time line. Raises RecordingUnreadable.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        open_again: Callable[[], Recording],
+        *,
+        settings: str,
+        now_s: float,
+        at_s: float = 0.0,
+    ) -> None:
+        self._recording = recording
+        self.drive = Drive(recording, read_told(recording), settings)
+        self._index_recording = open_again()
+        self.index = Index(self._index_recording, self.drive)
+        self._run = Run(recording, self.drive)
+        self.is_playing = False
+        self.rate = 1.0
+        self.reached_rate: float | None = None  # where it does not keep the pace; None: it does
+        self.is_settled = True  # False: the checks were only warmed up
+        self.seeks = 0
+        self._target_s: float | None = None  # a seek under way
+        self._from_s, self._from_now_s = 0.0, now_s  # the pace is kept from here
+        self._paced: tuple[float, float] = (now_s, 0.0)
+        self.broke_off: str | None = None
+        self.seek(at_s, now_s)
+
+    def close(self) -> None:
+        self._recording.close()
+        self._index_recording.close()
+
+    @property
+    def length_s(self) -> float:
+        return self.drive.length_s
+
+    @property
+    def at_s(self) -> float:
+        """The moment that is shown, or sought."""
+        return self._target_s if self._target_s is not None else self._run.at_s
+
+    @property
+    def is_seeking(self) -> bool:
+        return self._target_s is not None
+
+    # -- what the person does ----------------------------------------------------------------------------------------
+
+    def play(self, now_s: float) -> None:
+        """From the beginning again where it stood at the end."""
+        if self.at_s >= self.length_s and self.length_s > 0:
+            self.seek(0.0, now_s)
+        self.is_playing = True
+        self._keep_pace_from(self.at_s, now_s)
+
+    def pause(self, now_s: float) -> None:
+        self.is_playing = False
+        self.reached_rate = None
+
+    def set_rate(self, rate: float, now_s: float) -> None:
+        """Raises ValueError where there is no such rate."""
+        if rate not in RATES:
+            raise ValueError(f"A replay runs at {', '.join(f'{one:g}' for one in RATES)} times the pace.")
+        self.rate = rate
+        self._keep_pace_from(self.at_s, now_s)
+
+    def seek(self, at_s: float, now_s: float) -> None:
+        """To another moment; beyond the ends, to the end. Raises ValueError for what is no number."""
+        if not math.isfinite(at_s):
+            raise ValueError("That is no moment of the recording.")
+        self.seeks += 1
+        self._go_to(min(max(at_s, 0.0), self.length_s), now_s)
+
+    def step_alarm(self, direction: int, now_s: float) -> bool:
+        """To the alarm before or after; False where there is none."""
+        moments = [mark["at_s"] for mark in self.index.as_json()["marks"]]
+        here_s = self.at_s
+        if direction > 0:
+            found = min((at_s for at_s in moments if at_s > here_s + 0.05), default=None)
+        else:
+            found = max((at_s for at_s in moments if at_s < here_s - 1.0), default=None)
+        if found is None:
+            return False
+        self.seek(found, now_s)
+        return True
+
+    # -- work --------------------------------------------------------------------------------------------------------
+
+    def work(self, now_s: float, is_over: Callable[[], bool]) -> None:
+        """Comes as far as it should be at `now_s`, or as the time given lets it; the rest goes into the time line."""
+        try:
+            self._work(now_s, is_over)
+        except RecordingUnreadable as error:
+            self._break_off(str(error), now_s)
+        if not self.index.is_done and not is_over():
+            try:
+                self.index.work(is_over)
+            except RecordingUnreadable as error:
+                self.index.broke_off = str(error)
+                self.index.finish()
+            self._put_right(now_s)
+
+    def _work(self, now_s: float, is_over: Callable[[], bool]) -> None:
+        if self._target_s is not None:
+            if not self._run.advance(self._target_s, is_over):
+                return
+            self._target_s = None
+            self._keep_pace_from(self._run.at_s, now_s)
+        if not self.is_playing:
+            return
+        due_s = min(self.length_s, self._from_s + (now_s - self._from_now_s) * self.rate)
+        if not self._run.advance(due_s, is_over) and due_s - self._run.at_s > BEHIND_S * self.rate:
+            since_s, from_s = self._paced
+            self.reached_rate = (self._run.at_s - from_s) / max(now_s - since_s, 0.05)
+            self._from_s, self._from_now_s = self._run.at_s, now_s
+        elif now_s - self._paced[0] > 2.0:
+            reached = (self._run.at_s - self._paced[1]) / (now_s - self._paced[0])
+            self.reached_rate = reached if reached < 0.9 * self.rate else None
+            self._paced = (now_s, self._run.at_s)
+        if self._run.at_s >= self.length_s:
+            self.pause(now_s)
+
+    def _keep_pace_from(self, at_s: float, now_s: float) -> None:
+        self._from_s, self._from_now_s = at_s, now_s
+        self._paced = (now_s, at_s)
+        self.reached_rate = None
+
+    def _go_to(self, target_s: float, now_s: float) -> None:
+        kept = self.index.before(target_s)
+        here_s = self._run.at_s
+        is_ahead = self.is_settled and here_s <= target_s
+        if is_ahead and (kept is None or kept[0] <= here_s) and target_s - here_s <= REACH_S:
+            pass  # what is known already leads there soonest
+        elif kept is not None and target_s - kept[0] <= max(WARM_UP_S, 2 * self.index.every_s):
+            self._run = Run(self._recording, self.drive, known=kept[1]())
+            self.is_settled = True
+        else:
+            from_s = max(0.0, target_s - WARM_UP_S)
+            self._run = Run(self._recording, self.drive, from_s=from_s)
+            self.is_settled = from_s == 0.0
+        self._target_s = target_s
+        self._keep_pace_from(target_s, now_s)
+
+    def _put_right(self, now_s: float) -> None:
+        """What was only warmed up becomes what playing would have come to, once the time line has come there."""
+        if not self.is_settled and self._target_s is None and self.index.at_s >= self._run.at_s:
+            self._go_to(self._run.at_s, now_s)
+
+    def _break_off(self, why: str, now_s: float) -> None:
+        self.broke_off = why
+        self._target_s = None
+        self.pause(now_s)
+
+    # -- what is shown -----------------------------------------------------------------------------------------------
+
+    def frame(self, **names: Any) -> dict[str, Any]:
+        """The state at the moment that has been reached, without `server`, `replay` and `live`."""
+        return self._run.frame(track_number=self.seeks, **names)
+
+    def position(self) -> dict[str, Any]:
+        """Where the replay stands, as docs/protocol.md has it."""
+        known = self._run.known
+        silent_s = None if known.last_message_s is None else max(0.0, known.at_s - known.last_message_s)
+        return {
+            "at_s": round(self.at_s, 3),
+            "at_ms": round((self.drive.start_s + self.at_s) * 1000),
+            "start_ms": round(self.drive.start_s * 1000),
+            "end_ms": round((self.drive.start_s + self.length_s) * 1000),
+            "length_s": round(self.length_s, 3),
+            "is_playing": self.is_playing,
+            "rate": self.rate,
+            "reached_rate": round(self.reached_rate, 2) if self.reached_rate is not None else None,
+            "is_seeking": self.is_seeking,
+            "is_settled": self.is_settled,
+            "silent_s": round(silent_s, 2) if silent_s is not None else None,
+            "seek": self.seeks,
+            "alarms_from": "recording" if self.drive.told.has_alarms else "judged",
+            "settings_from": "recording" if self.drive.settings_from_recording else "now",
+        }
+
+    def timeline(self) -> dict[str, Any]:
+        """The time line as far as it is made, and what there is to say of the recording."""
+        said = [*self.drive.notes]
+        if self.index.is_done:
+            said += [f"{sentence}." for sentence in self._index_recording.damage]
+        for why in (self.index.broke_off, self.broke_off):
+            if why is not None:
+                said.append(f"Not all of it can be read: {why}.")
+        return {"kind": "timeline"} | self.index.as_json() | {"notes": list(dict.fromkeys(said))[:20]}
+
+    def scan_bytes(self) -> bytes | None:
+        return self._run.scan_bytes()
+
+    def answer(self, message: dict[str, Any]) -> dict[str, Any]:
+        """What a page asks beside the state: `track_points` and `trends`, as the session answers them."""
+        known = self._run.known
+        after = message.get("after")
+        if message.get("kind") == "trends":
+            return serialize.trends(known.trends.piece(known.at_s, after=after))
+        return queries.track_points(
+            known.state.glance(known.at_s), number=self.seeks, after=after if isinstance(after, int) else 0
+        )

@@ -1,0 +1,116 @@
+"""What a recording of our own tells beside the car's messages: alarms as they were told, pauses, settings, phones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any
+
+from pydantic import ValidationError
+
+from monitor.alarm import Transition
+from monitor.phones import PhoneWord
+from server.protocol.commands import Position
+from server.recording.read.read import Recording
+from server.recording.standing import read_standing
+from server.replay import recorded_slowdown
+from server.replay.recorded_slowdown import SlowDownTold
+from server.vehicle import phone
+from server.vehicle.restore import transition_of
+
+ALARMS, PHONE, SETTINGS = "/catgraph/alarms", "/catgraph/phone", "/catgraph/settings"
+MOST_SETTINGS = 200  # changes of the settings: each is a file to read
+MOST = 50_000  # rows of one channel: a day of a phone; a file that holds more is not of our making
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pause:
+    """Monitoring was paused or went on."""
+
+    is_paused: bool
+    by: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewSettings:
+    """The settings from here on, as the file of all of them."""
+
+    toml: str
+
+
+Word = Transition | Pause | NewSettings | PhoneWord | SlowDownTold
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """Everything of one recording, in the order of time. Times are seconds since its beginning."""
+
+    words: tuple[tuple[float, Word], ...] = ()
+    has_alarms: bool = False  # its own alarm channel: what the operator was told
+    settings: str | None = None  # that were in force at its beginning; None: it does not say
+    notes: tuple[str, ...] = field(default=())
+
+
+def read_told(recording: Recording) -> Told:
+    """Reads the recording's own channels. What makes no sense in them is left out, and said."""
+    words: list[tuple[float, Word]] = []
+    left_out = changes = 0
+    metadata: Mapping[str, str] = getattr(recording, "metadata", {})
+    at_first: str | None = metadata.get("settings") or None
+    newest = at_first
+    events = [(0.0, event) for event in read_standing(metadata)] + list(_rows(recording, ALARMS))
+    for at_s, row in events:
+        word = _of_event(row, at_s, recording.start_s)
+        if word is not None:
+            words.append((at_s, word))
+    for at_s, row in _rows(recording, PHONE):
+        try:
+            words.append((at_s, _of_phone(at_s, row)))
+        except (ValidationError, TypeError, ValueError, KeyError):
+            left_out += 1
+    for at_s, row in _rows(recording, SETTINGS):
+        toml = row.get("toml")
+        if not isinstance(toml, str):
+            left_out += 1
+        elif at_first is None:
+            at_first = newest = toml
+        elif toml != newest and changes < MOST_SETTINGS:
+            words.append((at_s, NewSettings(toml=toml)))
+            newest, changes = toml, changes + 1
+        elif toml != newest:
+            left_out += 1
+    words.sort(key=lambda word: word[0])  # stable: of one moment, each channel keeps its order
+    notes = (f"{left_out} entries of catgraph's own make no sense and are left out.",) if left_out else ()
+    has_alarms = bool(events) or "session" in metadata
+    return Told(words=tuple(words), has_alarms=has_alarms, settings=at_first, notes=notes)
+
+
+def _rows(recording: Recording, topic: str) -> Iterator[tuple[float, Mapping[str, Any]]]:
+    """A channel's rows with their time since the beginning."""
+    own = getattr(recording, "own", None)
+    if own is not None:
+        yield from ((at_s - recording.start_s, row) for at_s, row in islice(own(topic), MOST))
+
+
+def _of_event(event: Mapping[str, Any], at_s: float, start_s: float) -> Word | None:
+    change = event.get("change")
+    if change in ("paused", "resumed"):
+        by = event.get("by")
+        return Pause(is_paused=change == "paused", by=by if isinstance(by, str) else None)
+    if (told := recorded_slowdown.read(event)) is not None:
+        return told
+    if not isinstance(event.get("alarm"), str):
+        return None
+    return transition_of(event, lambda at_ms: at_ms / 1000 - start_s, lambda until_ms: until_ms / 1000 - start_s)
+
+
+def _of_phone(at_s: float, row: Mapping[str, Any]) -> PhoneWord:
+    """As the session heard it. `wall_ms` is when the server did."""
+    command = Position.model_validate({**row, "kind": "position"})
+    wall_ms = float(row["time_ms"]) if isinstance(row.get("time_ms"), (int, float)) else None
+    if wall_ms is None:  # the way there and back is not recorded: the fix is as old as the page said
+        fix = command.fix
+        wall_ms = fix.heard_ms + fix.held_s * 1000 if fix is not None else 0.0
+    by = row.get("by")
+    return phone.word(command, at_s, wall_ms, by if isinstance(by, str) else "")

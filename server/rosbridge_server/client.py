@@ -1,0 +1,272 @@
+"""One client of the bridge: understands its operations, keeps its subscriptions, answers it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from websockets.exceptions import ConnectionClosed
+
+from server.judge.ros_names import BadName
+from server.rosbridge_server import fields
+from server.rosbridge_server.calls import Calls
+from server.rosbridge_server.completion import Misfit
+from server.rosbridge_server.connection import Connection
+from server.rosbridge_server.encoding import Encoding, Outgoing, Unencodable, json_frame
+from server.rosbridge_server.fields import Refused
+from server.rosbridge_server.fragments import Fragments
+from server.rosbridge_server.graph import Topic
+from server.rosbridge_server.outbox import Outbox
+from server.rosbridge_server.subscription import Subscription, Wish
+
+if TYPE_CHECKING:
+    from server.rosbridge_server.server import RosBridge
+
+_log = logging.getLogger("catgraph.bridge")
+
+LEVELS = ("info", "warning", "error", "none")
+MOST_SUBSCRIPTIONS = 1_000
+MOST_WISHES = 100  # subscribe operations for one topic under different ids
+MOST_ADVERTISED = 1_000
+BACKLOG_BYTES = 16_000_000  # messages that may wait for one client
+REPLY_BYTES = 1_000_000  # answers that may wait before we stop listening to the client
+TURN_S = 0.005  # one client's flood holds the loop no longer than this
+NOT_OURS = {
+    "advertise_service", "unadvertise_service", "service_response",
+    "advertise_action", "unadvertise_action", "send_action_goal", "cancel_action_goal",
+    "action_feedback", "action_result", "auth", "png",
+}  # fmt: skip
+
+
+class Client:
+    """Lives as long as its connection; `RosBridge` keeps the topics, the client what it asked of them."""
+
+    def __init__(self, bridge: RosBridge, connection: Connection) -> None:
+        self._bridge = bridge
+        self._connection = connection
+        self._outbox = Outbox(connection, bridge.counters, limit_bytes=BACKLOG_BYTES)
+        self._fragments = Fragments(limit_bytes=bridge.max_message_bytes)
+        self._level = "error"
+        self._subscriptions: dict[str, Subscription] = {}
+        self._advertised: dict[str, set[object]] = {}  # topic → ids under which it was advertised
+        self._calls = Calls(bridge.services, self._outbox.reply)
+        self._may_listen = asyncio.Event()
+        self._may_listen.set()
+        self._operations: dict[str, Callable[[dict[str, Any], object], None]] = {
+            "subscribe": self._subscribe,
+            "unsubscribe": self._unsubscribe,
+            "advertise": self._advertise,
+            "unadvertise": self._unadvertise,
+            "publish": self._publish,
+            "call_service": self._calls.call,
+            "set_level": self._set_level,
+            "status_level": self._set_level,
+            "fragment": self._fragment,
+        }
+        connection.on_ready = self._outbox.flush
+        connection.on_lost = self._outbox.close  # also ends our waiting for a client that does not read
+        self._outbox.on_replies_gone = self._may_listen.set
+
+    async def run(self) -> None:
+        """Serves the client until it goes."""
+        turn_ends = time.monotonic() + TURN_S
+        try:
+            while True:
+                raw = await self._connection.recv(decode=False)
+                await self._connection.awake.wait()
+                self.handle(raw)
+                if self._outbox.reply_bytes > REPLY_BYTES:
+                    self._may_listen.clear()
+                    await self._may_listen.wait()
+                if time.monotonic() > turn_ends:
+                    await asyncio.sleep(0)
+                    turn_ends = time.monotonic() + TURN_S
+        except ConnectionClosed:
+            pass
+        finally:
+            self._leave()
+
+    @property
+    def is_drained(self) -> bool:
+        """All that was meant for this client has left us."""
+        return self._outbox.is_empty and self._connection.is_drained
+
+    def handle(self, raw: bytes, *, whole: bool = False) -> None:
+        """Does what one frame asks for, or says why not. Nothing a client sends can raise."""
+        id: object = None
+        op = ""
+        try:
+            operation = fields.parse(raw)
+            id = fields.id_of(operation)
+            op = fields.text(operation, "op")
+            if op == "fragment" and whole:
+                raise Refused("a fragment cannot hold fragments")
+            handler = self._operations.get(op)
+            if handler is None:
+                raise Refused(_unknown(op, self._operations))
+            handler(operation, id)
+        except (Refused, BadName, Misfit, Unencodable) as error:
+            self.say("error", f"{op[:40]}: {error}" if op else str(error), id)
+        except Exception:  # our own mistake must not cost the client its connection
+            _log.exception("operation %r failed", op[:40])
+            self.say("error", f"{op[:40]}: this failed inside the bridge", id)
+
+    def say(self, level: str, text: str, id: object = None) -> None:
+        """Sends a status message, if the client wants those of this level."""
+        if LEVELS.index(level) < LEVELS.index(self._level):
+            return
+        status: dict[str, Any] = {"op": "status", "level": level, "msg": text}
+        if id is not None:
+            status["id"] = id
+        self._outbox.reply(json_frame(status))
+
+    def _subscribe(self, operation: dict[str, Any], id: object) -> None:
+        spelling = fields.text(operation, "topic")
+        wanted = fields.optional_text(operation, "type")
+        wish = Wish(
+            type=None if wanted is None else self._bridge.message_type(wanted),
+            throttle_s=fields.whole_number(operation, "throttle_rate", 0) / 1000.0,
+            queue_length=fields.whole_number(operation, "queue_length", 0),
+            encoding=_encoding(fields.text(operation, "compression", "none")),
+        )
+        subscription = self._subscriptions.get(spelling)
+        if subscription is None and len(self._subscriptions) >= MOST_SUBSCRIPTIONS:
+            raise Refused(f"a client may subscribe to {MOST_SUBSCRIPTIONS} topics")
+        known = self._bridge.graph.find(spelling)
+        if known is not None and known.type is not None and wish.type not in (None, known.type):
+            raise Refused(f"{known.name} has the type {known.type}, not {wish.type}")
+        if subscription is None:
+            subscription = Subscription(spelling, self._outbox, self._bridge.counters, asyncio.get_running_loop())
+            self._subscriptions[spelling] = subscription
+        elif id not in subscription.wishes and len(subscription.wishes) >= MOST_WISHES:
+            raise Refused(f"a client may subscribe {MOST_WISHES} times to one topic")
+        subscription.wishes[id] = wish
+        topic = self._bridge.graph.find_or_make(spelling, wish.type)
+        subscription.settle(topic.type)
+        if subscription not in topic.subscribers:
+            topic.subscribers[subscription] = self
+            if topic.latched is not None:
+                subscription.offer(topic.latched)
+        self._bridge.subscribed(topic.name)
+        if topic.type is None:
+            self.say("warning", f"subscribe: {topic.name} does not exist yet, and no type was given", id)
+        self.say("info", f"subscribed to {topic.name}", id)
+
+    def _unsubscribe(self, operation: dict[str, Any], id: object) -> None:
+        spelling = fields.text(operation, "topic")
+        subscription = self._subscriptions.get(spelling)
+        if subscription is None:
+            self.say("warning", f"unsubscribe: not subscribed to {spelling[:100]}", id)
+            return
+        if id is None:
+            subscription.wishes.clear()
+        else:
+            subscription.wishes.pop(id, None)
+        if subscription.wishes:
+            topic = self._bridge.graph.find(spelling)
+            subscription.settle(topic.type if topic else None)
+        else:
+            self._end(spelling)
+        self.say("info", f"unsubscribed from {spelling[:100]}", id)
+
+    def _advertise(self, operation: dict[str, Any], id: object) -> None:
+        name = fields.text(operation, "topic")
+        type = self._bridge.message_type(fields.text(operation, "type"))
+        topic = self._bridge.graph.find(name)
+        if topic is not None and topic.type not in (None, type):
+            raise Refused(f"{topic.name} has the type {topic.type}, not {type}")
+        if len(self._advertised) >= MOST_ADVERTISED:
+            raise Refused(f"a client may advertise {MOST_ADVERTISED} topics")
+        topic = self._bridge.graph.find_or_make(name, type)
+        topic.publishers.add(self)
+        topic.latches |= operation.get("latch") is True
+        ids = self._advertised.setdefault(topic.name, set())
+        if len(ids) < MOST_WISHES:
+            ids.add(id)
+        self.say("info", f"advertised {topic.name}", id)
+
+    def _unadvertise(self, operation: dict[str, Any], id: object) -> None:
+        topic = self._bridge.graph.find(fields.text(operation, "topic"))
+        ids = None if topic is None else self._advertised.get(topic.name)
+        if topic is None or ids is None:
+            self.say("warning", "unadvertise: this topic was not advertised by this client", id)
+            return
+        ids.discard(id)
+        if id is None or not ids:
+            del self._advertised[topic.name]
+            topic.publishers.discard(self)
+            self._bridge.graph.tidy(topic)
+
+    def _publish(self, operation: dict[str, Any], id: object) -> None:
+        topic = self._bridge.graph.find(fields.text(operation, "topic"))
+        if topic is None or topic.type is None:
+            raise Refused("this topic has no type yet: advertise it first")
+        message = operation.get("msg", {})
+        if not isinstance(message, dict):
+            raise Refused("msg must be an object")
+        if topic.name not in self._advertised:
+            if len(self._advertised) >= MOST_ADVERTISED:
+                raise Refused(f"a client may publish to {MOST_ADVERTISED} topics")
+            self._advertised[topic.name] = {None}  # publishing makes a publisher, as in rosbridge
+            topic.publishers.add(self)
+        message = self._bridge.types.complete(topic.type, message, self._bridge.now())
+        topic.distribute(Outgoing(message))
+        for callback in self._bridge.on_publish:
+            callback(topic.name, topic.type, message)
+
+    def _set_level(self, operation: dict[str, Any], id: object) -> None:
+        level = fields.text(operation, "level")
+        if level not in LEVELS:
+            raise Refused(f"the level must be one of {', '.join(LEVELS)}")
+        self._level = level
+
+    def _fragment(self, operation: dict[str, Any], id: object) -> None:
+        whole = self._fragments.add(operation)
+        if whole is not None:
+            self.handle(whole, whole=True)
+
+    def type_became(self, topic: Topic, subscription: Subscription) -> None:
+        """The topic exists now: those who asked for another type get an error and no data."""
+        subscription.settle(topic.type)
+        for id, wish in subscription.wishes.items():
+            if wish.type not in (None, topic.type):
+                self.say("error", f"subscribe: {topic.name} has the type {topic.type}, not {wish.type}", id)
+
+    def _end(self, spelling: str) -> None:
+        subscription = self._subscriptions.pop(spelling)
+        subscription.close()
+        topic = self._bridge.graph.find(spelling)
+        if topic is not None:
+            topic.subscribers.pop(subscription, None)
+            self._bridge.graph.tidy(topic)
+
+    def _leave(self) -> None:
+        self._connection.on_ready = self._connection.on_lost = None
+        self._calls.close()
+        self._outbox.close()
+        for spelling in list(self._subscriptions):
+            self._end(spelling)
+        for name in self._advertised:
+            topic = self._bridge.graph.find(name)
+            if topic is not None:
+                topic.publishers.discard(self)
+                self._bridge.graph.tidy(topic)
+
+
+def _encoding(compression: str) -> Encoding:
+    match compression:
+        case "none":
+            return "json"
+        case "cbor":
+            return "cbor"
+        case _:
+            raise Refused(f"compression {compression[:40]!r} is not offered here: none or cbor")
+
+
+def _unknown(op: str, known: dict[str, Any]) -> str:
+    if op in NOT_OURS:
+        return "this bridge does not do that"
+    return f"unknown operation: there are {', '.join(known)}"

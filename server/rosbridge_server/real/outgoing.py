@@ -1,0 +1,76 @@
+"""One message on its way to a real bridge's clients, turned into each form at most once."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from server.judge.message import Json
+from server.rosbridge_server.encoding import Outgoing, json_bytes
+from server.rosbridge_server.real import cbor, text
+from server.rosbridge_server.real.raw import raw_bytes
+from server.rosbridge_server.real.shape import Lost
+from server.rosbridge_server.real.values import Values
+
+if TYPE_CHECKING:
+    from server.rosbridge_server.server import RosBridge
+
+
+class RealOutgoing(Outgoing):
+    """`type` is the publisher's; a type that nobody defined is written as it stands."""
+
+    __slots__ = ("_bridge", "_forms", "type")
+
+    def __init__(self, bridge: RosBridge, type: str, message: Json) -> None:
+        super().__init__(message)
+        self._bridge = bridge
+        self.type = type
+        self._forms: dict[str, Any] = {}
+
+    def json_values(self) -> Any:
+        """What goes into `msg` of a JSON frame. Raises Lost."""
+        return self._form("json")
+
+    def cbor_frame(self, topic: str) -> bytes:
+        """A whole CBOR object. Raises Lost."""
+        return cbor.dumps({"op": "publish", "topic": topic, "msg": self._form("cbor")}, self._bridge.ros_version)
+
+    def raw_frame(self, topic: str) -> bytes:
+        """A whole CBOR object with the bytes of the ROS message. Raises Lost."""
+        now_s = self._bridge.now()
+        message = {
+            "secs": math.floor(now_s),
+            "nsecs": min(999_999_999, round((now_s - math.floor(now_s)) * 1e9)),
+            "bytes": self._form("raw"),
+        }
+        return cbor.dumps({"op": "publish", "topic": topic, "msg": message}, self._bridge.ros_version)
+
+    def png_text(self, topic: str) -> str:
+        """The picture of the JSON frame. Raises Lost."""
+        version = self._bridge.ros_version
+        frame = text.dumps({"op": "publish", "topic": topic, "msg": self.json_values()}, version)
+        return text.png(frame)
+
+    def _form(self, name: str) -> Any:
+        if name not in self._forms:
+            try:
+                self._forms[name] = self._written(name)
+            except Lost as lost:
+                self._forms[name] = lost
+        found = self._forms[name]
+        if isinstance(found, Lost):
+            raise found
+        return found
+
+    def _written(self, name: str) -> Any:
+        definitions = self._bridge.types.definitions(self.type)
+        if definitions is None and name == "json":
+            return json.loads(json_bytes(self._message))
+        if definitions is None:
+            raise Lost(f"the type {self.type} is not known")
+        long, version = self._bridge.types.long_name(self.type), self._bridge.ros_version
+        if name == "raw":
+            return raw_bytes(long, definitions, version, self._message)
+        values = Values(version, definitions)
+        return values.json(long, self._message) if name == "json" else values.cbor(long, self._message)

@@ -1,0 +1,98 @@
+"""The fields of a message type, as the real bridge of each ROS version names and distinguishes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from rosbags.interfaces import Nodetype
+
+from server.judge.message import RosVersion
+from server.rosbridge_server.completion import PLACEHOLDER, TIMES
+
+Array = Literal["", "fixed", "sequence"]
+
+FLOATS = {"float32": "f4", "float64": "f8"}
+INTEGERS = {
+    "byte": "i1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8",
+}  # fmt: skip
+_ROS2_NAMES = {"bool": "boolean", "float32": "float", "float64": "double", "byte": "octet", "char": "uint8"}
+
+# what a field holds in a new message where that is not zero
+DEFAULTS: dict[int, dict[tuple[str, str], float]] = {
+    1: {},
+    2: {("geometry_msgs/msg/Quaternion", name): float(name == "w") for name in "xyzw"},
+}
+
+
+class Lost(Exception):
+    """The real bridge fails here and sends nothing. The text is what it writes to its own log."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Field:
+    """One field of a message. `type` is a primitive's name in .msg text, or a message's as rosbags spells it."""
+
+    name: str
+    type: str
+    is_message: bool
+    array: Array = ""
+    length: int = 0  # of a fixed array; the bound of a sequence, 0 for none
+    text_bound: int = 0  # of string<=N
+
+    @property
+    def is_bytes(self) -> bool:
+        return self.array != "" and self.type in ("uint8", "char")
+
+    @property
+    def is_float(self) -> bool:
+        return self.type in FLOATS
+
+    @property
+    def is_number(self) -> bool:
+        return self.type in FLOATS or self.type in INTEGERS
+
+    def is_time(self, version: RosVersion) -> bool:
+        """Time and duration: primitives in ROS 1, messages in ROS 2."""
+        return self.type in TIMES
+
+    def item(self) -> Field:
+        """One element of the array, as a field of its own."""
+        return Field(name=self.name, type=self.type, is_message=self.is_message, text_bound=self.text_bound)
+
+    def shown(self, version: RosVersion) -> str:
+        """The type of one element, as error texts and message_details write it."""
+        if self.is_message:
+            return shown(self.type, version)
+        if version == 1:
+            return self.type
+        name = _ROS2_NAMES.get(self.type, self.type)
+        return f"{name}<{self.text_bound}>" if self.text_bound else name
+
+
+def shown(type: str, version: RosVersion) -> str:
+    """A message's type in two parts, as the real bridge writes it; time and duration are primitives of ROS 1."""
+    return TIMES[type] if version == 1 and type in TIMES else type.replace("/msg/", "/")
+
+
+def fields(type: str, definitions: dict[str, Any]) -> tuple[Field, ...]:
+    """The fields of a message whose type is spelled as rosbags does. Raises KeyError where it is not known."""
+    return tuple(_field(name, kind, what) for name, (kind, what) in definitions[type][1] if name != PLACEHOLDER)
+
+
+def _field(name: str, kind: Nodetype, what: Any) -> Field:
+    if kind == Nodetype.NAME:
+        return Field(name=name, type=what, is_message=True)
+    if kind == Nodetype.BASE:
+        return Field(name=name, type=what[0], is_message=False, text_bound=what[1] if what[0] == "string" else 0)
+    (item_kind, item), length = what
+    element = _field(name, item_kind, item)
+    return Field(
+        name=name,
+        type=element.type,
+        is_message=element.is_message,
+        array="fixed" if kind == Nodetype.ARRAY else "sequence",
+        length=length,
+        text_bound=element.text_bound,
+    )

@@ -1,0 +1,265 @@
+"""A rosbridge server (protocol v2) in front of a recording or a simulated car."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Literal
+
+from server.judge.message import Json, RosVersion
+from server.judge.ros_names import canonical_name, canonical_type
+from server.rosbridge_server.client import Client
+from server.rosbridge_server.connection import Connection
+from server.rosbridge_server.encoding import Outgoing
+from server.rosbridge_server.graph import SOURCE, Graph, Topic
+from server.rosbridge_server.listener import CannotListen, Listener
+from server.rosbridge_server.outbox import Counters
+from server.rosbridge_server.real.client import RealClient
+from server.rosbridge_server.real.fragments import RealFragments
+from server.rosbridge_server.real.options import BOUND_BYTES, RealOptions
+from server.rosbridge_server.real.outgoing import RealOutgoing
+from server.rosbridge_server.real.publishers import Publishers
+from server.rosbridge_server.real.subscribers import Subscribers
+from server.rosbridge_server.rosapi import ROSAPI_NODE, add_rosapi
+from server.rosbridge_server.services import Handler, Service, ServiceFailed, Services
+from server.rosbridge_server.types import MessageTypes
+
+__all__ = ["CannotListen", "Like", "RealOptions", "RosBridge", "ServiceFailed"]
+
+Like = Literal["helpful", "real"]
+_CLOSE_ANSWERS: dict[int, Callable[[bytes], bytes]] = {1: lambda _: b"\x03\xe8", 2: lambda data: data[:2]}
+_SERVERS = {1: "AutobahnPython/22.7.1", 2: "TornadoServer/6.6.1"}
+
+
+class RosBridge:
+    """Speaks as the rosbridge of `ros_version` does; `now` is the ROS time that rosapi tells [s since 1970].
+
+    `like` "helpful" says in `status` messages what is wrong, and sends and survives what the real server loses or dies
+    of; "real" is that server, with its silences, `real` being how it was started.
+
+    Everything but start, stop, kill and revive is synchronous and belongs on the loop on which the bridge was started.
+    """
+
+    def __init__(
+        self,
+        *,
+        ros_version: RosVersion = 1,
+        now: Callable[[], float] = time.time,
+        node: str = "/car",
+        max_clients: int = 256,
+        max_message_bytes: int = 10_000_000,
+        like: Like = "helpful",
+        real: RealOptions | None = None,
+    ) -> None:
+        self.ros_version: RosVersion = ros_version
+        self.now = now
+        self.node = node  # name under which rosapi shows what we publish ourselves
+        self.max_message_bytes = max_message_bytes
+        self.counters = Counters()
+        self.graph = Graph()
+        self.services = Services()
+        self.types = MessageTypes(ros_version)
+        self.on_publish: list[Callable[[str, str, Json], None]] = []  # (topic, type, message) of what clients publish
+        self.on_subscribe: list[Callable[[str], None]] = []  # (topic) each time a client subscribes
+        self.like: Like = like
+        self.real = real or RealOptions()
+        self.subscribers = Subscribers(self)
+        self.publishers = Publishers(self)
+        self.fragments = RealFragments()
+        self.dead_nodes: set[str] = set()  # their services are still listed and never answer
+        self.down: str | None = None  # what every service call is answered while ROS itself is gone
+        self.parameters: dict[str, object] = {}
+        self._types_seen: dict[str, str] = {}  # ROS 1's master remembers the type of every topic there ever was
+        self._listener = Listener(
+            self._serve_client,
+            max_clients=max_clients,
+            max_message_bytes=max_message_bytes if like == "helpful" else BOUND_BYTES,
+            server_header=None if like == "helpful" else _SERVERS[ros_version],
+            close_answer=None if like == "helpful" else _CLOSE_ANSWERS[ros_version],
+        )
+        self._clients: set[Client | RealClient] = set()
+        self._address: tuple[str, int] | None = None
+        self.add_rosapi()
+
+    @property
+    def sent(self) -> int:
+        """Messages handed to clients' sockets; one message to three clients counts three."""
+        return self.counters.sent
+
+    @property
+    def dropped(self) -> int:
+        """Messages lost because a client did not keep up, or went while they waited."""
+        return self.counters.dropped
+
+    @property
+    def bytes_sent(self) -> int:
+        return self.counters.bytes_sent
+
+    @property
+    def clients(self) -> int:
+        """Clients connected now."""
+        return self._listener.clients
+
+    async def start(self, host: str = "127.0.0.1", port: int = 0) -> int:
+        """Listens and answers the port, a free one for 0. Raises CannotListen with one sentence for a person."""
+        self.types.load()
+        port = await self._listener.open(host, port)
+        self._address = (host, port)
+        return port
+
+    async def stop(self) -> None:
+        """Says goodbye to every client and stops listening."""
+        self._address = None
+        self.publishers.close()
+        await self._listener.close(abruptly=False)
+
+    async def kill(self) -> None:
+        """Drops every connection as a killed process would, and refuses new ones until `revive()`."""
+        await self._listener.close(abruptly=True)
+
+    async def revive(self) -> None:
+        """Listens again on the same port. Raises CannotListen."""
+        if self._address is None:
+            raise RuntimeError("the bridge was never started")
+        await self._listener.open(*self._address)
+
+    def freeze(self) -> None:
+        """Keeps every connection but answers nothing, not even pings, as a stopped process would."""
+        self._listener.freeze()
+
+    def thaw(self) -> None:
+        """Goes on where it was frozen: what waited is read and sent."""
+        self._listener.thaw()
+
+    def message_type(self, name: str) -> str:
+        """A message type's name as this ROS version spells it. Raises BadName."""
+        return canonical_type(name, self.ros_version)
+
+    def advertise(self, topic: str, type: str, definition: str | None = None, *, latch: bool = False) -> None:
+        """Makes a topic exist. `latch`: newcomers get the last message at once. Raises BadName.
+
+        `definition` is the type's .msg text with all it contains; standard types need none.
+        """
+        type = self.message_type(type)
+        found = self.graph.find_or_make(topic, type)
+        found.type, found.latches = type, latch
+        if definition:
+            self.types.learn(type, definition)
+        found.publishers.add(SOURCE)
+        self.note_type(found.name, type)
+        for subscription, client in list(found.subscribers.items()):
+            client.type_became(found, subscription)
+
+    def unadvertise(self, topic: str) -> None:
+        """The topic's source is gone; those who listen go on listening."""
+        found = self.graph.find(topic)
+        if found is not None:
+            found.publishers.discard(SOURCE)
+            self.graph.tidy(found)
+
+    def publish(self, topic: str, message: Json) -> None:
+        """Sends a message to all who listen, without ever waiting. The message must not change afterwards.
+
+        Raises LookupError where the topic was not advertised, Unencodable where it cannot be sent.
+        """
+        found = self.graph.find(topic)
+        if found is None or SOURCE not in found.publishers:
+            raise LookupError(f"{topic} was not advertised")
+        assert found.type is not None
+        found.distribute(self._outgoing(found.type, message))
+
+    def deliver(self, topic: Topic, type: str, message: Json, *, latches: bool = False) -> None:
+        """Takes a message that a client of a bridge like the real one published."""
+        topic.latches |= latches
+        topic.distribute(self._outgoing(type, message))
+        for callback in self.on_publish:
+            callback(topic.name, type, message)
+
+    def add_service(
+        self,
+        name: str,
+        type: str,
+        handler: Handler,
+        arguments: tuple[str, ...] = (),
+        *,
+        request: str | None = None,
+        response: str | None = None,
+        node: str | None = None,
+    ) -> None:
+        """Offers a service. `handler(args)` answers the values, now or as an awaitable; what it raises is passed on.
+
+        `arguments` are their names in order, for the callers that send a list; `request` and `response` the .msg text
+        of both.
+        """
+        self.services.add(
+            Service(
+                name=canonical_name(name),
+                type=canonical_type(type, self.ros_version, "srv"),
+                handler=handler,
+                arguments=arguments,
+                request=request,
+                response=response,
+                node=self.node if node is None else node,
+            )
+        )
+
+    def end_node(self, node: str) -> None:
+        """A node ends and takes its services with it."""
+        for service in self.services.all():
+            if service.node == node:
+                self.services.remove(service.name)
+
+    def add_rosapi(self) -> None:
+        """Offers the services of rosapi, at the beginning and again after its end."""
+        self.dead_nodes.discard(ROSAPI_NODE)
+        add_rosapi(self)
+
+    def note_type(self, topic: str, type: str | None) -> None:
+        """Remembers the type of a topic."""
+        if type is not None:
+            self._types_seen[topic] = type
+
+    def known_type(self, topic: str) -> str | None:
+        """The type of a topic, in ROS 1 of any that ever was."""
+        found = self.graph.find(topic)
+        if self.ros_version == 1:
+            return self._types_seen.get(topic)
+        return found.type if found is not None else None
+
+    def advertised_types(self) -> set[str]:
+        """The types of what the source publishes: they are known to it, even where no definition came with them."""
+        return {topic.type for topic in self.graph.topics() if topic.type and SOURCE in topic.publishers}
+
+    def types_seen(self) -> dict[str, str]:
+        """Every topic there ever was, with its newest type."""
+        return dict(self._types_seen)
+
+    def _outgoing(self, type: str, message: Json) -> Outgoing:
+        return RealOutgoing(self, type, message) if self.like == "real" else Outgoing(message)
+
+    def subscribed(self, topic: str) -> None:
+        """Called by a client when it has subscribed."""
+        for callback in self.on_subscribe:
+            callback(topic)
+
+    async def drain(self, within_s: float) -> bool:
+        """Waits until every client has been sent all that waits for it; False when that took too long."""
+        deadline = time.monotonic() + within_s
+        while not all(client.is_drained for client in self._clients):
+            if time.monotonic() > deadline:
+                return False
+            await asyncio.sleep(0.01)
+        return True
+
+    def client(self, connection: Connection) -> Client | RealClient:
+        """Whoever serves one connection."""
+        return RealClient(self, connection) if self.like == "real" else Client(self, connection)
+
+    async def _serve_client(self, connection: Connection) -> None:
+        client = self.client(connection)
+        self._clients.add(client)
+        try:
+            await client.run()
+        finally:
+            self._clients.discard(client)

@@ -1,0 +1,94 @@
+"""The message types a bridge knows: the standard ones, and those whose definitions came with the topics."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+
+from server.judge.message import Json, RosVersion
+from server.rosbridge_server.completion import complete
+from server.rosbridge_server.typedefs import describe
+
+Definitions = dict[str, Any]  # type as rosbags spells it → (constants, fields)
+
+
+class MessageTypes:
+    """Types of noetic or humble, and of the topics' own definitions, which come first."""
+
+    def __init__(self, version: RosVersion) -> None:
+        self._version: RosVersion = version
+        self._texts: dict[str, str] = {}
+        self._parsed: dict[str, Definitions] = {}
+
+    def load(self) -> None:
+        """Gets the standard messages ready: a tenth of a second, the first time in a process."""
+        _standard(self._version)
+
+    def learn(self, type: str, definition: str) -> None:
+        """Notes a definition in .msg text; it is parsed when it is needed."""
+        if self._texts.get(type) != definition:
+            self._texts[type] = definition
+            self._parsed.pop(type, None)
+
+    def text(self, type: str) -> str:
+        """The definition in full, as `gendeps --cat` writes it; empty where it is not known."""
+        if type in self._texts:
+            return self._texts[type]
+        try:
+            return str(_standard(self._version).generate_msgdef(_long(type), ros_version=self._version)[0])
+        except (TypesysError, KeyError):
+            return ""
+
+    def complete(self, type: str, message: Json, now_s: float) -> Json:
+        """The message with every field that was left out, header stamps being now. Unknown types pass as they are.
+
+        Raises Misfit where a field does not exist or has a value of the wrong kind.
+        """
+        definitions = self.definitions(type)
+        return message if definitions is None else complete(_long(type), definitions, self._version, message, now_s)
+
+    def describe(self, type: str) -> list[Json]:
+        """The type and all it contains, as rosapi describes them. Raises LookupError where it is not known."""
+        definitions = self.definitions(type)
+        if definitions is None:
+            raise LookupError(f"the type {type} is not known here")
+        return describe(_long(type), definitions, self._version)
+
+    def has_package(self, package: str) -> bool:
+        """Is any type of this package known?"""
+        names = (*self._texts, *_standard(self._version).fielddefs)
+        return any(name.startswith(f"{package}/") for name in names)
+
+    def long_name(self, type: str) -> str:
+        """The type as rosbags spells it, in both versions."""
+        return _long(type)
+
+    def definitions(self, type: str) -> Definitions | None:
+        """The definitions of a type and of all it contains; None where it is not known."""
+        long = _long(type)
+        for definitions in (self._learnt(type), _standard(self._version).fielddefs):
+            if long in definitions:
+                return definitions
+        return next((found for found in map(self._learnt, list(self._texts)) if long in found), None)
+
+    def _learnt(self, type: str) -> Definitions:
+        if type not in self._texts:
+            return {}
+        if type not in self._parsed:
+            try:
+                self._parsed[type] = dict(get_types_from_msg(self._texts[type], _long(type)))
+            except Exception:  # the parser says what is wrong in many ways; the standard messages may still know it
+                self._parsed[type] = {}
+        return self._parsed[type]
+
+
+@cache
+def _standard(version: RosVersion) -> Any:
+    return get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
+
+
+def _long(type: str) -> str:
+    package, _, name = type.partition("/")
+    return type if name.startswith("msg/") else f"{package}/msg/{name}"

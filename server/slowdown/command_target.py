@@ -1,0 +1,46 @@
+"""The way to the car: on which topic it is commanded, and what speaks against it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from server.judge.topics import Source
+from server.rosbridge.outgoing import is_topic
+from server.slowdown.twist import Kind, kind_of
+
+GUARD_CMD = "/ocu_guard/cmd_vel"  # a guard on the car: commanded here, it goes before the controllers
+GUARD_STATE = "/ocu_guard/state"
+GUARD_HEARTBEAT = "/ocu_guard/heartbeat"
+GUARD_RELEASE = "/ocu_guard/release"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Way:
+    """`problem`: why nothing can be ordered, as a sentence; None: it can."""
+
+    topic: str = ""
+    type: str | None = None  # as the bridge spells it
+    kind: Kind | None = None
+    has_guard: bool = False
+    problem: str | None = None
+
+
+def way_of(*, phase: str, sources: Mapping[str, Source], offered: Mapping[str, str] | None) -> Way:
+    """`sources` by signal; `offered` topic → type of all that the car has, None while its bridge does not say."""
+    if phase not in ("monitoring", "lost"):
+        return Way(problem="No car is connected.")
+    if offered is None:
+        return Way(problem="The bridge does not say which topics the car has, so the type is not confirmed.")
+    has_guard = GUARD_STATE in offered and kind_of(offered.get(GUARD_CMD, "")) is not None
+    source = sources.get("command")
+    if not has_guard and source is None:
+        return Way(problem="The car has no command topic: pick one for Command in Settings.")
+    topic = GUARD_CMD if has_guard or source is None else source.topic
+    type = offered.get(topic) or (None if source is None else source.type)
+    kind = kind_of(type or "")
+    if kind is None:
+        return Way(topic=topic, type=type, problem=f"{topic} is {type or 'of unknown type'}, no Twist.")
+    if not is_topic(topic):
+        return Way(topic=topic, type=type, problem=f"{topic} is not a topic name that ROS accepts.")
+    return Way(topic=topic, type=type, kind=kind, has_guard=has_guard)

@@ -1,0 +1,73 @@
+"""The rules that slow the car by themselves: a count-down before each, in which any operator may say no."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from monitor.alarm import Alarm, Refused
+from monitor.checks.slow_down import SlowDownLimits
+from monitor.triggers import COUNTDOWN_S, Due, Triggers
+from server.protocol import serialize
+from server.slowdown.note import Note
+
+
+class Countdown:
+    """At most one runs. Time is an argument."""
+
+    def __init__(self, note: Note) -> None:
+        self._note = note
+        self._triggers = Triggers()
+        self._running: tuple[Due, float] | None = None  # and since when
+
+    def look(self, alarms: Mapping[str, Alarm], limits: SlowDownLimits, now_s: float, *, can_begin: bool) -> Due | None:
+        """The rule whose count-down is over: the car is to be slowed now. `can_begin`: slow-down is armed, and nothing
+        is ordered."""
+        due = self._triggers.look(alarms, limits, now_s)
+        if not can_begin:
+            self._running = None
+            return None
+        if self._running is None:
+            if due is not None:
+                self._running = (due, now_s)
+                text = (
+                    f"The car is slowed in {COUNTDOWN_S:.0f} s unless somebody vetoes: {due.trigger.title}. {due.text}"
+                )
+                self._note("slow_down", text, step="countdown", trigger=due.trigger.id)
+            return None
+        counting, began_s = self._running
+        if due is None or due.trigger.id != counting.trigger.id:
+            self._running = None
+            self._note("slow_down", f"Count-down ended: {counting.trigger.title} is over.", step="over")
+            return None
+        return counting if now_s - began_s >= COUNTDOWN_S else None
+
+    def veto(self, trigger: str, *, by: str) -> None:
+        """Not this time: the rule is not due again before its fault has gone. Raises Refused."""
+        if self._running is None or self._running[0].trigger.id != trigger:
+            raise Refused("No count-down runs for this any more.")
+        due, _ = self._running
+        self._running = None
+        self._triggers.veto(trigger)
+        self._note("slow_down", f"Vetoed: {due.trigger.title}.", by=by, step="vetoed", trigger=trigger)
+
+    def stop(self) -> None:
+        """What counts down is of no interest any more."""
+        self._running = None
+
+    def forget(self) -> None:
+        """Another car."""
+        self._running = None
+        self._triggers.forget()
+
+    def frame(self, now_s: float) -> dict[str, Any] | None:
+        """The `countdown` of `decelerate`."""
+        if self._running is None:
+            return None
+        due, began_s = self._running
+        return {
+            "trigger": due.trigger.id,
+            "title": due.trigger.title,
+            "text": due.text,
+            "left_s": serialize.plain(max(0.0, COUNTDOWN_S - (now_s - began_s)), 1),
+        }

@@ -1,0 +1,196 @@
+"""The life of an order to slow the car: armed, ordered, held, released. Pure: time is an argument.
+
+Between two commands the car may have done anything, so a ramp that was interrupted begins anew at the measured speed.
+What was never sent is never sent later: a command is made when it goes out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from monitor.alarm import Refused
+from server.slowdown.command_target import Way
+from server.slowdown.ramp import Ramp
+
+LATE_S = 0.3  # what was pressed longer ago is not obeyed any more
+DESERTED_S = 10.0  # after the last operator's page has gone, slow-down is not armed any more
+BY_HAND = "by hand"
+State = Literal["not_available", "safe", "armed", "ordered", "holding"]
+Ended = Literal["released", "longest", "disconnected"]
+Stands = Literal["before", "unproven"]  # it stood when it was ordered; what stopped it is not shown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """What the car is told now: m/s along the car, tyre angle in rad."""
+
+    speed_mps: float
+    tyre_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Car:
+    """What is measured now; None: not known."""
+
+    speed_mps: float | None
+    tyre_rad: float | None
+
+
+@dataclass(slots=True, kw_only=True)
+class Order:
+    """One order. Moments are on the session's monotonic clock."""
+
+    number: int  # never given twice
+    by: str
+    why: str
+    ordered_s: float
+    pressed_s: float | None  # when the finger let go, as near as can be told
+    deceleration_mps2: float
+    ramp: Ramp | None = None  # None: no command has gone out since it began, or since the link came back
+    from_mps: float | None = None  # where the first ramp began
+    first_sent_s: float | None = None
+    sending_s: float | None = None  # since when commands go out without a gap
+    slows_s: float | None = None  # when the car's own speed showed it
+    stands: Stands | None = None  # the car stands, and its speed does not show that the order stopped it
+    last: Command | None = None
+
+
+class SlowDown:
+    """One vehicle's. Whoever calls has made sure that the caller may."""
+
+    def __init__(self, number: int = 0) -> None:
+        """`number`: no order up to this one is given again."""
+        self._number = number
+        self.armed_by: str | None = None
+        self.order: Order | None = None
+        self.ended_at_longest_s: float | None = None
+        self._operators_s: float | None = None  # a page of an operator was last heard; None: none since it was armed
+
+    def state(self, way: Way, now_s: float) -> State:
+        if self.order is not None:
+            at_zero = self.order.last is not None and self.order.last.speed_mps == 0.0
+            return "holding" if at_zero and self.order.ramp is not None else "ordered"
+        if way.problem is not None:
+            return "not_available"
+        return "safe" if self.armed_by is None else "armed"
+
+    def arm(self, way: Way, by: str) -> bool:
+        """Whether it was not armed before. Raises Refused."""
+        if way.problem is not None:
+            raise Refused(f"Slow-down is not available: {way.problem}")
+        was = self.armed_by
+        self.armed_by = was or by
+        return was is None
+
+    def is_deserted(self, heard_s: float | None, now_s: float, *, keeps: bool) -> bool:
+        """Whether it is armed without an order, and the last operator's page has gone. `heard_s`: when one was heard
+        last; None: none is here. `keeps`: it stays armed all the same. Armed by a program with no page about, it stays
+        armed."""
+        if self.armed_by is None:
+            self._operators_s = None
+            return False
+        if heard_s is not None:
+            self._operators_s = max(heard_s, self._operators_s or heard_s)
+        gone_s = self._operators_s
+        return gone_s is not None and self.order is None and not keeps and now_s - gone_s >= DESERTED_S
+
+    def disarm(self) -> bool:
+        """Whether it was armed. Raises Refused while the car is being slowed."""
+        if self.order is not None:
+            raise Refused("The car is being slowed: release it first.")
+        was, self.armed_by = self.armed_by, None
+        return was is not None
+
+    def begin(
+        self, way: Way, *, by: str, why: str, deceleration_mps2: float, now_s: float, pressed_s: float | None
+    ) -> Order | None:
+        """A new order; None: one stands already, and goes on. Raises Refused."""
+        if self.order is not None:
+            return None
+        if self.armed_by is None:
+            raise Refused("Slow-down is not armed.")
+        if way.problem is not None:
+            raise Refused(f"Slow-down is not available: {way.problem}")
+        self._number += 1
+        self.ended_at_longest_s = None
+        self.order = Order(
+            number=self._number,
+            by=by,
+            why=why,
+            ordered_s=now_s,
+            pressed_s=pressed_s,
+            deceleration_mps2=deceleration_mps2,
+        )
+        return self.order
+
+    def next(self, car: Car, now_s: float) -> Command | None:
+        """What the car is to be told now; None: nothing is ordered, or no tyre angle is known that could be held: 0
+        would turn the tyres. Without a known speed the ramp begins at the last
+        command, or at zero: the car itself limits how hard it brakes."""
+        order = self.order
+        if order is None:
+            return None
+        if order.ramp is None:
+            last = order.last
+            known = car.speed_mps if car.speed_mps is not None else (last.speed_mps if last is not None else 0.0)
+            tyre_rad = car.tyre_rad if car.tyre_rad is not None else (last.tyre_rad if last is not None else None)
+            if tyre_rad is None:
+                return None
+            order.ramp = Ramp(
+                from_mps=known, tyre_rad=tyre_rad, deceleration_mps2=order.deceleration_mps2, began_s=now_s
+            )
+            if order.from_mps is None:
+                order.from_mps = known
+        return Command(speed_mps=order.ramp.speed_mps(now_s), tyre_rad=order.ramp.tyre_rad)
+
+    def sent(self, command: Command, now_s: float) -> bool:
+        """The command has gone out to the bridge; whether it is the first of the order."""
+        order = self.order
+        assert order is not None
+        order.last = command
+        if order.sending_s is None:
+            order.sending_s = now_s
+        if order.first_sent_s is None:
+            order.first_sent_s = now_s
+            return True
+        return False
+
+    def cut(self) -> bool:
+        """Commands do not go out any more; whether they did."""
+        order = self.order
+        if order is None or order.sending_s is None:
+            if order is not None:
+                order.ramp = None
+            return False
+        order.ramp, order.sending_s = None, None
+        return True
+
+    def confirm(self, now_s: float) -> bool:
+        """The car's own speed shows that it slows; whether that is new."""
+        if self.order is None or self.order.slows_s is not None:
+            return False
+        self.order.slows_s = now_s
+        return True
+
+    def is_too_long(self, longest_s: float, now_s: float) -> bool:
+        return self.order is not None and now_s - self.order.ordered_s >= longest_s
+
+    def release(self, number: int) -> Order:
+        """Ends the very order that is named. Raises Refused."""
+        order = self.order
+        if order is None:
+            raise Refused("The car is not being slowed.")
+        if order.number != number:
+            raise Refused("The car was ordered to slow down anew meanwhile: look again.")
+        self.order = None
+        return order
+
+    def end(self, why: Ended, now_s: float) -> Order | None:
+        """Ends whatever stands; slow-down is not armed any more where the car is another."""
+        order, self.order = self.order, None
+        if why == "longest":
+            self.ended_at_longest_s = now_s
+        if why == "disconnected":
+            self.armed_by, self.ended_at_longest_s = None, None
+        return order

@@ -1,0 +1,149 @@
+"""Keeps the certificate that is shown the right one while the server runs: renewed, or read again from its files."""
+
+from __future__ import annotations
+
+import asyncio
+import datetime as dt
+import logging
+import ssl
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+from server.tls import provided_certificate, server_certificate
+from server.tls.authority import Authority, TlsRefused, load_or_make
+from server.tls.context import LiveContext
+from server.tls.names import Names
+
+log = logging.getLogger("catgraph.tls")
+
+LOOK_EVERY_S = 5.0  # a phone that waits for the laptop to join its network waits no longer than this
+
+
+class Certificate(Protocol):
+    """Something that shows a certificate and can look whether another is due."""
+
+    context: LiveContext
+
+    def refresh(self, now: dt.datetime) -> str | None:
+        """Exchanges it where needed, and says so in words. Never raises for what is wrong with files."""
+
+
+class OwnCertificate:
+    """Signed by our own authority, for the names this machine has."""
+
+    def __init__(self, folder: Path, names: Callable[[], Names], *, host: str, now: dt.datetime) -> None:
+        """Raises TlsRefused."""
+        self.authority: Authority = load_or_make(folder, host=host, now=now)
+        if now > self.authority.cert.not_valid_after_utc:
+            raise TlsRefused(
+                f"The server's own authority in {folder} ended on {self.authority.cert.not_valid_after_utc:%Y-%m-%d}: "
+                "delete the folder for a new one, then set up every phone anew (or set this machine's clock)."
+            )
+        self._folder = folder
+        self._names_now = names
+        self._failing = ""
+        try:
+            self.names = names()
+            kept = server_certificate.load(folder)
+            if kept is None or server_certificate.why_renew(kept, self.authority, self.names, now=now):
+                kept = server_certificate.make(self.authority, self.names, now=now)
+            self.leaf = kept
+            self.context = LiveContext(server_certificate.keep(folder, kept))
+        except (OSError, ssl.SSLError) as why:
+            raise TlsRefused(f"The server's certificate in {folder} cannot be used: {why.strerror or why}.") from None
+
+    def refresh(self, now: dt.datetime) -> str | None:
+        """Renews it when the addresses changed or its end comes near."""
+        try:
+            names = self._names_now()
+            why = server_certificate.why_renew(self.leaf, self.authority, names, now=now)
+            if why is None:
+                return None
+            fresh = server_certificate.make(self.authority, names, now=now)
+            self.context.use(server_certificate.keep(self._folder, fresh))
+        except (OSError, ssl.SSLError) as failed:
+            return self._once(f"the certificate cannot be renewed, the one before stays: {failed}")
+        self.leaf, self.names, self._failing = fresh, names, ""
+        addresses = ", ".join(str(ip) for ip in names.reachable) or "no network"
+        return f"a new certificate, because {why}: {', '.join(names.dns)}, {addresses}"
+
+    def _once(self, failing: str) -> str | None:
+        if failing == self._failing:
+            return None
+        self._failing = failing
+        return failing
+
+
+class GivenCertificate:
+    """The one of `--tls CERT KEY`."""
+
+    def __init__(self, cert: Path, key: Path, *, now: dt.datetime) -> None:
+        """Raises TlsRefused."""
+        self._cert, self._key = cert, key
+        self.given = provided_certificate.look(cert, key, now=now)
+        self._seen = self._stamps()
+        self._told = self.given.warning
+        try:
+            self.context = LiveContext(cert, key)
+        except (OSError, ssl.SSLError, ValueError) as why:
+            raise TlsRefused(f"The certificate {cert} cannot be served: {why}.") from None
+
+    def refresh(self, now: dt.datetime) -> str | None:
+        """Shows what the files hold now, if they changed and it is good; else the one before stays."""
+        stamps = self._stamps()
+        if stamps == self._seen:
+            return self._grown_old(now)
+        if stamps is not None:
+            self._seen = stamps
+        try:
+            fresh = provided_certificate.look(self._cert, self._key, now=now)
+            self.context.use(self._cert, self._key)
+        except (TlsRefused, OSError, ssl.SSLError, ValueError) as why:
+            return self._once(f"the certificate of before stays, for the changed one cannot be served: {why}")
+        self.given, self._told = fresh, fresh.warning
+        ends = f"{fresh.cert.not_valid_after_utc:%Y-%m-%d}"
+        return f"the certificate {self._cert} was read again, it ends on {ends}"
+
+    def _grown_old(self, now: dt.datetime) -> str | None:
+        left = self.given.cert.not_valid_after_utc - now
+        if left < dt.timedelta(0):
+            return self._once(f"the certificate {self._cert} expired: no browser takes it any more")
+        if left < provided_certificate.SOON:
+            return self._once(f"the certificate {self._cert} expires on {self.given.cert.not_valid_after_utc:%Y-%m-%d}")
+        return None
+
+    def _once(self, said: str) -> str | None:
+        if said == self._told:
+            return None
+        self._told = said
+        return said
+
+    def _stamps(self) -> tuple[tuple[int, int, int], ...] | None:
+        """What changes when the files do, also when a link is led to others, as certbot does; None: not there now."""
+        try:
+            return tuple((s.st_mtime_ns, s.st_size, s.st_ino) for s in (self._cert.stat(), self._key.stat()))
+        except OSError:
+            return None
+
+
+async def keep(
+    certificate: Certificate,
+    *,
+    now: Callable[[], dt.datetime],
+    told: Callable[[], None] = lambda: None,
+    every_s: float = LOOK_EVERY_S,
+) -> None:
+    """Looks after it until cancelled; `told` is called after each exchange. A look that fails is no end of looking."""
+    last = ""
+    while True:
+        await asyncio.sleep(every_s)
+        try:
+            said = certificate.refresh(now())
+            if said is not None:
+                log.warning("%s", said)
+                told()
+        except Exception as bug:
+            if repr(bug) != last:
+                log.exception("the certificate could not be looked after, it goes on being tried")
+            last = repr(bug)

@@ -1,0 +1,1 @@
+"""One car: its session, subscriptions, settings and event log."""

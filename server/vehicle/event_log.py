@@ -1,0 +1,107 @@
+"""What one vehicle's session writes into the log: transitions of alarms, its own doings, settings from → to."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
+
+from monitor.alarm import Alarm, Transition
+from server.bus.bus import LocalBus
+from server.judge.active_settings import Tuning
+from server.protocol import serialize
+from server.system.clean_text import cleaned
+
+log = logging.getLogger("catgraph.logbook")
+
+MAX_WAITING = 1000  # events that the log refused and that are tried again
+
+
+class Logbook:
+    """Every event carries the version of the settings in force. `wall_ms` is the time of day in ms since 1970;
+    `also` is called with each event and its number.
+
+    No method raises for what the log does: what an event reports has happened already. Events that cannot be appended
+    wait for `retry`, in order, and `trouble` says so.
+    """
+
+    def __init__(
+        self,
+        vehicle: str,
+        bus: LocalBus,
+        tuning: Tuning,
+        *,
+        wall_ms: Callable[[], int],
+        also: Callable[[list[dict[str, Any]]], None] = lambda _: None,
+    ) -> None:
+        self._vehicle = vehicle
+        self._bus = bus
+        self._tuning = tuning
+        self._wall_ms = wall_ms
+        self._also = also
+        self._waiting: deque[dict[str, Any]] = deque()
+        self._lost = 0
+        self._why: str | None = None
+
+    @property
+    def trouble(self) -> str | None:
+        """Why events are not appended, as a sentence; None: they are."""
+        if self._why is None:
+            return None
+        lost = f", {self._lost} lost" if self._lost else ""
+        return f"The event log fails: {self._why}. Events that wait: {len(self._waiting)}{lost}."
+
+    def retry(self) -> None:
+        """Tries to append what waits; to be called now and then."""
+        if self._waiting:
+            self._write([])
+
+    def tell(self, transitions: Collection[Transition], alarms: Mapping[str, Alarm], now_s: float) -> None:
+        """What happened to alarms, at `now_s` of the monitor's clock."""
+        at_ms = self._wall_ms()
+        self._write(
+            [
+                serialize.event(t, alarms[t.alarm_id].spec, at_ms, now_s=now_s, settings_version=self._version)
+                for t in transitions
+            ]
+        )
+
+    def note(self, change: str, text: str, *, by: str | None = None, **more: Any) -> None:
+        """Something of no alarm."""
+        event = {"at_ms": self._wall_ms(), "alarm": None, "change": change, "text": text, "by": by}
+        self._write([event | {"settings_version": self._version} | more])
+
+    def started(self, address: str, shown: str, *, by: str | None) -> None:
+        """Monitoring of a car begins; with all settings in force, so that the log alone says what was judged by."""
+        self.note("started", f"Monitoring of {shown} begins.", by=by, address=address, settings=self._tuning.in_force())
+        self._tuning.changes()  # told herewith
+
+    def settings(self, text: str, *, by: str | None) -> None:
+        """Settings changed: `text` for people, each value from → to for whoever reconstructs them."""
+        self.note("settings", text, by=by, changes=self._tuning.changes())
+
+    def _write(self, events: list[dict[str, Any]]) -> None:
+        due = [*self._waiting, *(events := [cleaned(event) for event in events])]
+        try:
+            numbered = self._bus.append(self._vehicle, due)
+        except Exception as error:
+            self._why = f"{type(error).__name__}: {error}"[:200]
+            log.exception("%d events of %s could not be logged", len(due), self._vehicle)
+            self._waiting.extend(events)
+            while len(self._waiting) > MAX_WAITING:
+                self._waiting.popleft()
+                self._lost += 1
+            return
+        self._waiting.clear()
+        self._why = None
+        try:
+            if numbered:
+                self._also(numbered)
+        except Exception as error:  # the recording of events; the log has them
+            self._why = f"{type(error).__name__}: {error}"[:200]
+            log.exception("%d events of %s could not be recorded", len(numbered), self._vehicle)
+
+    @property
+    def _version(self) -> int:
+        return self._tuning.settings.version

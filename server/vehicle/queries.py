@@ -1,0 +1,91 @@
+"""What a session answers beyond its state: where the car went, what it publishes besides, why a wish was refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from monitor.runner import Refused
+from monitor.signals import SIGNALS
+from monitor.state import Snapshot, TrackPoint
+from server.control.lease import NotInControl
+from server.judge.reception_stats import Reception
+from server.judge.settings import BadSetting, Conflict
+from server.judge.topics import candidates
+from server.protocol import commands, serialize
+from server.rosbridge import connection_errors
+from server.rosbridge.address import BadAddress
+
+REFUSALS = (commands.NotUnderstood, BadAddress, Refused, BadSetting, Conflict, OSError)  # what `refusal` has words for
+
+
+def refusal(why: Exception) -> dict[str, Any]:
+    """The answer to a wish that cannot be met, one of REFUSALS."""
+    match why:
+        case BadAddress():
+            problem = connection_errors.of_bad_address(why)
+            return {
+                "ok": False,
+                "reason": f"{problem.title} {problem.hint}".strip(),
+                "problem": problem.as_json() | {"suggestion": why.suggestion},
+            }
+        case NotInControl():
+            return {"ok": False, "reason": why.reason, "held_by": why.holder.name if why.holder else None}
+        case Refused():
+            return {"ok": False, "reason": why.reason}
+        case BadSetting():
+            return {"ok": False, "reason": str(why), "field": why.field}
+        case Conflict():
+            return {"ok": False, "reason": str(why), "conflict": True}
+        case OSError():
+            return {"ok": False, "reason": f"The settings cannot be kept: {why.strerror or why}."}
+    return {"ok": False, "reason": str(why)}
+
+
+def track(snapshot: Snapshot) -> dict[str, Any]:
+    """The positions since connecting, thinned, as a GeoJSON MultiLineString (longitude, latitude; WGS84).
+
+    A line ends where the way to the next point is not known: the position leapt, or none came for a while. A line has
+    two points at least (RFC 7946, 3.1.4), so a point alone is left out.
+    """
+    lines: list[list[list[float]]] = []
+    for point in snapshot.track:
+        if not lines or point.is_jump or point.is_after_gap:
+            lines.append([])
+        lines[-1].append([round(point.lon_deg, 7), round(point.lat_deg, 7)])
+    return {
+        "type": "Feature",
+        "geometry": {"type": "MultiLineString", "coordinates": [line for line in lines if len(line) > 1]},
+        "properties": {"length_m": serialize.plain(snapshot.track_m, 1)},
+    }
+
+
+def track_points(snapshot: Snapshot, *, number: int, after: int) -> dict[str, Any]:
+    """The points of track `number` beyond point `after`, oldest first, as docs/protocol.md has them."""
+    rows = [
+        [p.number, round(p.lat_deg, 7), round(p.lon_deg, 7), round(p.at_s, 1), _joins(p)]
+        for p in snapshot.track
+        if p.number > after
+    ]
+    return {"number": number, "points": rows}
+
+
+def _joins(point: TrackPoint) -> int:
+    """How a point joins the one before it: 0 driven, 1 after a time without positions, 2 the position leapt."""
+    return 2 if point.is_jump else 1 if point.is_after_gap else 0
+
+
+def signals(
+    unmapped: Mapping[str, str], reception: Reception, offered: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Topics beyond the signals, what came that was no message, and which topics could carry each signal; `offered`
+    None: the bridge does not say what there is."""
+    return {
+        "candidates": None if offered is None else candidates(offered),
+        "topics": [{"topic": name, "type": kind} for name, kind in sorted(unmapped.items())],
+        "rejected": {
+            SIGNALS[name].label: dict(tally.reasons) for name, tally in reception.by_signal.items() if tally.rejected
+        },
+        "unreadable_frames": dict(reception.frames.reasons),
+        "unasked": reception.unasked,
+    }

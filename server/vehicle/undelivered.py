@@ -1,0 +1,86 @@
+"""Which topics a bridge does not pass on although they have a publisher, and why: by what rosapi says of subscribers.
+
+A topics_glob keeps the bridge from subscribing at all. A client that subscribed with cbor-raw before us leaves the
+bridge subscribed, and us without messages. Neither is ever reported. Pure: time is an argument.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from typing import Any
+
+from server.rosbridge import connection_errors
+from server.rosbridge.connection_errors import Problem
+
+CLIENT_COUNT = "/client_count"  # each rosbridge publishes there how many clients it has
+OWN_CLIENTS = 2  # the link and the connection for questions
+AGAIN_S = 5.0
+BLOCKED_AFTER_S = 4.0  # a publisher may begin a little later
+AT_ONCE = 8
+
+
+@dataclass(slots=True)
+class Passing:
+    """Of one connection to a bridge."""
+
+    bridges: frozenset[str] = frozenset()  # nodes that are rosbridges; none: not known
+    clients: int | None = None  # others that are connected to the bridge
+    _since_s: dict[str, float] = field(default_factory=dict)  # silent topics with a publisher
+    _asked_s: dict[str, float] = field(default_factory=dict)
+    _is_subscribed: dict[str, bool] = field(default_factory=dict)  # by the bridge
+
+    def opened(self) -> None:
+        """Another connection: another bridge may answer it."""
+        self.bridges, self.clients = frozenset(), None
+        self._since_s.clear()
+        self._asked_s.clear()
+        self._is_subscribed.clear()
+
+    def follow(self, silent: Collection[str], now_s: float) -> None:
+        """Judged topics with a publisher of which nothing came yet, on this connection."""
+        for known in (self._since_s, self._asked_s, self._is_subscribed):
+            for topic in [topic for topic in known if topic not in silent]:
+                del known[topic]
+        for topic in silent:
+            self._since_s.setdefault(topic, now_s)
+
+    def to_ask(self, now_s: float) -> list[str]:
+        """Topics whose subscribers are to be asked for now; none while it is not known which node is the bridge."""
+        if not self.bridges:
+            return []
+        due = [topic for topic in self._since_s if now_s - self._asked_s.get(topic, -math.inf) >= AGAIN_S]
+        return sorted(due, key=lambda topic: self._asked_s.get(topic, -math.inf))[:AT_ONCE]
+
+    def answered(self, topic: str, subscribers: tuple[str, ...] | None, now_s: float) -> None:
+        """Which nodes subscribe to a topic; None: rosapi does not say."""
+        self._asked_s[topic] = now_s
+        if subscribers is None:
+            self._is_subscribed.pop(topic, None)
+        else:
+            self._is_subscribed[topic] = not self.bridges.isdisjoint(subscribers)
+
+    @property
+    def needs_clients(self) -> bool:
+        """Whether it matters how many clients the bridge has."""
+        return bool(self._since_s)
+
+    def counted(self, message: Any) -> None:
+        """A message of CLIENT_COUNT."""
+        count = message.get("data") if isinstance(message, dict) else None
+        self.clients = max(0, count - OWN_CLIENTS) if type(count) is int and 0 <= count < 10_000 else None
+
+    def problem(self, now_s: float) -> Problem | None:
+        """What keeps the topics from us; None: nothing is known to."""
+        hidden = sorted(topic for topic, is_subscribed in self._is_subscribed.items() if not is_subscribed)
+        if hidden:
+            return connection_errors.hidden_topics(hidden)
+        blocked = sorted(
+            topic
+            for topic, since_s in self._since_s.items()
+            if self._is_subscribed.get(topic) and now_s - since_s >= BLOCKED_AFTER_S
+        )
+        if blocked and self.clients:
+            return connection_errors.blocked_topics(blocked, self.clients)
+        return None

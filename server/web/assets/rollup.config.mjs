@@ -1,0 +1,39 @@
+// How the page's modules are joined; server/web/assets/bundle.py runs this and says what and where to.
+//
+// What several parts share goes to what is loaded already when they are needed, so that a page begins with one script.
+
+import { env } from 'node:process';
+
+/** Into `joined.json`: the script that begins the page, and what it asks for at once. */
+const list = {
+  name: 'list',
+  generateBundle(_, bundle) {
+    const script = Object.keys(bundle).find((name) => bundle[name].isEntry);
+    const found = new Set([script]);
+    for (const name of found) for (const one of bundle[name].imports) if (one in bundle) found.add(one);
+    const [, ...needed] = found;
+    this.emitFile({ type: 'asset', fileName: 'joined.json', source: JSON.stringify({ script, needed }) });
+  },
+};
+
+/** The address of a script for a thread of its own, which is joined before: it holds the hash of what is in it. */
+const threads = {
+  name: 'threads',
+  transform(code) {
+    for (const [plain, hashed] of Object.entries(JSON.parse(env.CATGRAPH_THREADS))) code = code.replaceAll(`'./${plain}'`, `'./${hashed}'`);
+    return { code, map: null };
+  },
+};
+
+export default {
+  input: env.CATGRAPH_ENTRY,
+  external: /\.\.\/vendor\//,
+  makeAbsoluteExternalsRelative: false,
+  plugins: [threads, list],
+  output: {
+    dir: env.CATGRAPH_INTO,
+    format: 'es',
+    entryFileNames: '[name]-[hash].js',
+    chunkFileNames: '[name]-[hash].js',
+  },
+};

@@ -1,0 +1,73 @@
+"""The page's shell as a phone keeps it: which files, under which name, and the worker that keeps them.
+
+Kept are only files whose address holds the hash of their content, the page that says that the server does not answer,
+and its fonts. Nothing that is live is ever among them. With single modules, as during development, there is no worker,
+and one that a phone still has takes itself away.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.version import catgraph_version
+from server.web.assets.bundle import FOLDER, Built
+
+WORKER, OFFLINE = "/worker.js", "/offline"
+FONTS = tuple(f"/static/fonts/catgraph-numerals-{weight}.woff2" for weight in (500, 700))
+_MARKS = ("", "-critical", "-warning", "-lost", "-replay")
+OF_OFFLINE = ("js/offline.js",)
+_SOURCES = "worker"  # in static/
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shell:
+    """What one build of the page leaves on a phone."""
+
+    version: str  # another content has another version
+    build: str  # of the page it belongs to
+    named: tuple[str, ...]  # addresses that hold the hash of what is behind them
+    plain: tuple[str, ...]  # fonts: no code, and counted in the version
+
+    def worker(self, static: Path) -> str:
+        """The script of the worker."""
+        told = {
+            "version": self.version,
+            "build": self.build,
+            "named": self.named,
+            "plain": self.plain,
+            "offline": f"{OFFLINE}?v={self.version}",
+        }
+        return f"self.SHELL = {json.dumps(told)};\n{_script(static, 'worker')}"
+
+
+def build_of(built: Built | None) -> str:
+    """The name of the page as it is joined now; "" for single modules, of which no page can say that it is old."""
+    return "" if built is None else f"{catgraph_version()}-{built.name}"
+
+
+def shell_of(static: Path, built: Built, asset: Callable[[str], str], offline: bytes) -> Shell:
+    """What to keep of the page `built`; `offline` is the page for when the server does not answer, as it is sent."""
+    joined = sorted(path for path in (static / FOLDER).iterdir() if path.suffix in (".js", ".css"))
+    named = (
+        *(f"/static/{FOLDER}/{path.name}" for path in joined),
+        *(asset(name) for name in OF_OFFLINE),
+        *(asset(f"icons/catgraph{mark}.svg") for mark in _MARKS),
+    )
+    digest = hashlib.sha256(repr((named, FONTS, build_of(built))).encode() + offline)
+    digest.update(_script(static, "worker").encode())
+    for address in FONTS:
+        digest.update((static / address.removeprefix("/static/")).read_bytes())
+    return Shell(version=digest.hexdigest()[:12], build=build_of(built), named=named, plain=FONTS)
+
+
+def withdrawn(static: Path) -> str:
+    """The script that takes away what an earlier worker left, and then itself."""
+    return _script(static, "withdrawn")
+
+
+def _script(static: Path, name: str) -> str:
+    return (static / _SOURCES / f"{name}.js").read_text(encoding="utf-8")

@@ -1,0 +1,83 @@
+"""The page's files as they go out: compressed once and kept.
+
+What a browser must never do is run yesterday's script: a file with the hash of its content in its address may be kept
+for ever, every other one is asked about each time, and answered 304 while it is the same.
+"""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import os
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from stat import S_ISREG
+
+from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from server.web.assets.bundle import FOLDER
+
+_LONGEST_NAME = 120
+_YEAR = "public, max-age=31536000, immutable"
+_TYPES = {
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".txt": "text/plain; charset=utf-8",
+    ".webmanifest": "application/manifest+json",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Packed:
+    """One file as it goes out."""
+
+    plain: bytes
+    small: bytes  # gzip
+    etag: str
+
+
+def packed(body: bytes) -> Packed:
+    """Any text, compressed as far as gzip can, and without a date, so that the same text is the same bytes."""
+    digest = hashlib.sha256(body).hexdigest()[:20]
+    return Packed(plain=body, small=gzip.compress(body, 9, mtime=0), etag=digest)
+
+
+def answer(file: Packed, headers: Headers, media_type: str, keep: str) -> Response:
+    """The whole, or 304 where the browser has it."""
+    is_small = "gzip" in headers.get("accept-encoding", "")
+    etag = f'"{file.etag}{"-gz" if is_small else ""}"'
+    told = {"ETag": etag, "Cache-Control": keep, "Vary": "Accept-Encoding"}
+    if etag in headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=told)
+    if is_small:
+        return Response(file.small, media_type=media_type, headers=told | {"Content-Encoding": "gzip"})
+    return Response(file.plain, media_type=media_type, headers=told)
+
+
+class StaticText(StaticFiles):
+    """Static files; texts among them small."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        is_named = path.startswith(f"{FOLDER}/") or scope.get("query_string", b"").startswith(b"v=")
+        keep = _YEAR if is_named else "no-cache"
+        media_type = _TYPES.get(os.path.splitext(path)[1])
+        if "\0" in path or any(len(part) > _LONGEST_NAME for part in path.split(os.sep)):
+            raise HTTPException(404)  # no file is called so, and asking for it is an error of its own kind
+        if media_type is not None and scope["method"] == "GET":
+            full, stat = self.lookup_path(path)
+            if stat is not None and S_ISREG(stat.st_mode):
+                return answer(_read(Path(full), stat.st_mtime_ns), Headers(scope=scope), media_type, keep)
+        response = await super().get_response(path, scope)
+        response.headers["Cache-Control"] = keep
+        return response
+
+
+@lru_cache(maxsize=512)
+def _read(path: Path, changed_ns: int) -> Packed:
+    return packed(path.read_bytes())

@@ -1,0 +1,148 @@
+"""Fetches one tile from the configured server of tiles, and from nowhere else. Blocking: for a thread."""
+
+from __future__ import annotations
+
+import ssl
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from urllib.parse import urlsplit
+
+import urllib3
+from urllib3.exceptions import HTTPError, NameResolutionError, SSLError
+
+from server.version import catgraph_version
+from server.web.maps.http_cache import fresh_for_s, retry_after_s
+from server.web.maps.image_type import media_type
+from server.web.maps.map_options import MapUpstream
+
+CONNECTIONS = 2
+LARGEST_BYTES = 2 * 2**20  # a tile of 512 pixels at its most colourful
+ANSWERS_S, WHOLE_S = 8.0, 20.0  # its first byte, its last
+REFUSED_PAUSE_S = 600.0  # a wrong key does not become right by asking
+_PIECE = 64 * 1024
+
+
+class SourceTrouble(Exception):
+    """No tile came; `str()` is one sentence. `pause_s`: how long not to ask; None: as after any failure."""
+
+    def __init__(self, why: str, pause_s: float | None = None) -> None:
+        super().__init__(why)
+        self.pause_s = pause_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fetched:
+    """What the server of tiles said."""
+
+    is_same: bool = False  # what is kept still holds
+    data: bytes | None = None  # None and not the same: there is no tile
+    fresh_s: float | None  # None: must not be kept
+    etag: str | None = None
+    modified: str | None = None
+
+
+class TileSource:
+    """One host. No redirect is followed, no proxy or password is taken from the environment, no cookie is kept."""
+
+    def __init__(self, upstream: MapUpstream) -> None:
+        self.host = upstream.host
+        self._template = upstream.template
+        parts = urlsplit(upstream.template)
+        pool: Callable[..., urllib3.HTTPConnectionPool] = urllib3.HTTPConnectionPool
+        if parts.scheme == "https":
+            pool = partial(urllib3.HTTPSConnectionPool, ssl_context=ssl.create_default_context())
+        self._pool = pool(
+            parts.hostname,
+            port=parts.port,
+            maxsize=CONNECTIONS,
+            block=True,
+            timeout=urllib3.Timeout(connect=5.0, read=ANSWERS_S),
+            retries=False,
+            headers={"User-Agent": f"catgraph/{catgraph_version()}", "Accept": "image/webp,image/png,image/jpeg"},
+        )
+
+    def close(self) -> None:
+        self._pool.close()
+
+    def fetch(
+        self, z: int, x: int, y: int, *, wall_s: float, etag: str | None = None, modified: str | None = None
+    ) -> Fetched:
+        """The tile of column x, row y from the north. Raises SourceTrouble."""
+        asked = {"Accept-Encoding": "identity"}
+        if etag is not None:
+            asked["If-None-Match"] = etag
+        if modified is not None:
+            asked["If-Modified-Since"] = modified
+        try:
+            answer = self._pool.request(
+                "GET",
+                self._path(z, x, y),
+                headers={**self._pool.headers, **asked},
+                redirect=False,
+                preload_content=False,
+                decode_content=False,
+            )
+            try:
+                return self._read(answer, wall_s, was_kept=etag is not None or modified is not None)
+            finally:
+                _leave(answer)
+        except NameResolutionError:
+            raise SourceTrouble(f"The map's server {self.host} is not found: is there internet?") from None
+        except SSLError:
+            raise SourceTrouble(f"The certificate of the map's server {self.host} is not trusted.") from None
+        except (HTTPError, OSError):  # its words hold the address, and that may hold a key
+            raise SourceTrouble(f"The map's server {self.host} does not answer.") from None
+
+    def _path(self, z: int, x: int, y: int) -> str:
+        filled = self._template.replace("{z}", str(z)).replace("{x}", str(x))
+        parts = urlsplit(filled.replace("{y}", str(y)).replace("{-y}", str((1 << z) - 1 - y)))
+        return f"{parts.path or '/'}{'?' + parts.query if parts.query else ''}"
+
+    def _read(self, answer: urllib3.BaseHTTPResponse, wall_s: float, *, was_kept: bool) -> Fetched:
+        fresh_s = fresh_for_s(answer.headers, wall_s)
+        match answer.status:
+            case 304 if was_kept:
+                etag, modified = answer.headers.get("ETag"), answer.headers.get("Last-Modified")
+                return Fetched(is_same=True, fresh_s=fresh_s, etag=etag, modified=modified)
+            case 204 | 404 | 410:
+                return Fetched(fresh_s=fresh_s)
+            case 429 | 503:
+                pause_s = retry_after_s(answer.headers.get("Retry-After"), wall_s)
+                raise SourceTrouble(f"The map's server {self.host} asks for a pause.", pause_s)
+            case 401 | 403:
+                why = f"The map's server {self.host} refuses ({answer.status}): is the key right?"
+                raise SourceTrouble(why, REFUSED_PAUSE_S)
+            case 200:
+                pass
+            case 301 | 302 | 303 | 307 | 308:
+                raise SourceTrouble(f"The map's server {self.host} points elsewhere, which is not followed.")
+            case status:
+                raise SourceTrouble(f"The map's server {self.host} answers with status {status}.")
+        data = self._body(answer)
+        if media_type(data) is None:
+            raise SourceTrouble(f"The map's server {self.host} answers with something that is no picture.")
+        etag, modified = answer.headers.get("ETag"), answer.headers.get("Last-Modified")
+        return Fetched(data=data, fresh_s=fresh_s, etag=etag, modified=modified)
+
+    def _body(self, answer: urllib3.BaseHTTPResponse) -> bytes:
+        until_s = time.monotonic() + WHOLE_S
+        pieces = bytearray()
+        for piece in answer.stream(_PIECE, decode_content=False):
+            pieces += piece
+            if len(pieces) > LARGEST_BYTES:
+                raise SourceTrouble(f"A tile of the map's server {self.host} is larger than {LARGEST_BYTES >> 20} MB.")
+            if time.monotonic() > until_s:
+                raise SourceTrouble(f"The map's server {self.host} is too slow.")
+        return bytes(pieces)
+
+
+def _leave(answer: urllib3.BaseHTTPResponse) -> None:
+    """The connection is used again where little is left to read, or nothing; else it is closed."""
+    left = answer.length_remaining
+    if left is not None and left <= _PIECE:
+        answer.drain_conn()
+        answer.release_conn()
+    else:
+        answer.close()

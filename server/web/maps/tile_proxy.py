@@ -1,0 +1,196 @@
+"""A layer of tiles that are fetched when a page shows them, kept, and shown from there when there is no internet.
+
+Two fetches at a time, the newest wish first. A tile that is kept is shown at once, also an old one, which is then
+asked for anew behind it. Nothing waits on the loop: files and sockets are the business of threads.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import logging
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from server.web.maps.daemon_threads import Hands
+from server.web.maps.http_cache import Pace
+from server.web.maps.image_type import media_type, plain_text
+from server.web.maps.map_options import MapUpstream
+from server.web.maps.mbtiles import Layer, MapRefused
+from server.web.maps.tile_cache import Kept, Place, TileCache
+from server.web.maps.tile_fetcher import CONNECTIONS, SourceTrouble, TileSource
+
+log = logging.getLogger("catgraph.map")
+
+WAITS_S = 12.0  # a page for a tile; then the place stays empty, and the tile is kept for the next time
+LONGEST_QUEUE = 96  # three screens of tiles: older wishes are of what was in sight before
+ABSENT_S = 86_400.0  # at most so long is believed that a tile does not exist
+_BOUNDS = (-180.0, -85.06, 180.0, 85.06)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tile:
+    """A picture on its way to a page; `fresh_s` is how long it may keep it."""
+
+    data: bytes
+    kind: str
+    fresh_s: float
+
+
+@dataclass(slots=True)
+class _Wish:
+    place: Place
+    kept: Kept | None
+    answer: asyncio.Future[Kept | None]
+
+
+@dataclass(slots=True)
+class _Queue:
+    """What is wished for and not yet there; only the loop touches it."""
+
+    wishes: dict[Place, _Wish] = field(default_factory=dict)
+    waiting: list[_Wish] = field(default_factory=list)
+    at_work: set[asyncio.Task[None]] = field(default_factory=set)
+    dropped: int = 0
+
+
+class Upstream:
+    """One configured server of tiles, and what is kept of it."""
+
+    def __init__(
+        self, upstream: MapUpstream, folder: Path | None, *, now: Callable[[], float], wall_s: Callable[[], float]
+    ) -> None:
+        """Raises MapRefused."""
+        if folder is None:
+            raise MapRefused("--map-upstream needs a data folder: what is fetched is kept there.")
+        digest = hashlib.sha256(upstream.template.encode()).hexdigest()
+        attribution = plain_text(upstream.attribution)
+        path = folder / "maps" / f"{_slug(upstream.host)}-{digest[:8]}.mbtiles"
+        try:
+            self._cache = TileCache(
+                path, title=upstream.host, attribution=attribution, limit_bytes=upstream.limit_mb * 1_000_000
+            )
+        except Exception as why:
+            raise MapRefused(f"The tiles of --map-upstream cannot be kept in {path}: {why}.") from None
+        self.layer = Layer(
+            name=digest[8:20], title=upstream.host, attribution=attribution, zoom=upstream.zoom, bounds=_BOUNDS
+        )
+        self._source = TileSource(upstream)
+        self._now, self._wall_s = now, wall_s
+        self._pace = Pace()
+        self._queue = _Queue()
+        self._hands = Hands(CONNECTIONS)
+        self._is_closed = False
+
+    def close(self) -> None:
+        self._is_closed = True
+        self._hands.close()
+        self._source.close()
+        self._cache.close()
+
+    def told(self) -> dict[str, Any]:
+        """What a page is told; the address is not, for it may hold a key."""
+        return {
+            "host": self._source.host,
+            "problem": self._pace.words(self._now()) or self._cache.problem,
+            "kept_bytes": self._cache.size_bytes,
+            "limit_bytes": self._cache.limit_bytes,
+            "evicted": self._cache.evicted,
+        }
+
+    async def tile(self, z: int, x: int, y: int) -> Tile | None:
+        """The picture of column x, row y from the north; None: there is none, or none now."""
+        least, deepest = self.layer.zoom
+        if self._is_closed or not (least <= z <= deepest and 0 <= x < 1 << z and 0 <= y < 1 << z):
+            return None
+        place = (z, x, y)
+        loop = asyncio.get_running_loop()
+        kept = await loop.run_in_executor(None, self._cache.get, place, self._wall_s())
+        if kept is None or kept.until_s <= self._wall_s():
+            wish = self._wish(place, kept)
+            if kept is None and wish is not None:
+                try:
+                    kept = await asyncio.wait_for(asyncio.shield(wish.answer), WAITS_S)
+                except TimeoutError:
+                    return None
+        if kept is None or kept.data is None:
+            return None
+        kind = media_type(kept.data)
+        if kind is None:
+            return None
+        return Tile(data=kept.data, kind=kind, fresh_s=max(0.0, kept.until_s - self._wall_s()))
+
+    def _wish(self, place: Place, kept: Kept | None) -> _Wish | None:
+        """Has a tile fetched; None where the server of tiles is not to be asked now."""
+        queue = self._queue
+        if place in queue.wishes:
+            return queue.wishes[place]
+        if not self._pace.may_ask(self._now()):
+            return None
+        wish = _Wish(place, kept, asyncio.get_running_loop().create_future())
+        queue.wishes[place] = wish
+        queue.waiting.append(wish)
+        if len(queue.waiting) > LONGEST_QUEUE:
+            queue.dropped += 1
+            self._done(queue.waiting.pop(0), None)
+        self._go_on()
+        return wish
+
+    def _go_on(self) -> None:
+        queue = self._queue
+        while queue.waiting and len(queue.at_work) < CONNECTIONS:
+            wish = queue.waiting.pop()
+            if self._is_closed or not self._pace.may_ask(self._now()):
+                self._done(wish, wish.kept)
+                continue
+            self._pace.asked(self._now())
+            work = asyncio.get_running_loop().create_task(self._fulfil(wish))
+            queue.at_work.add(work)
+            work.add_done_callback(self._worked)
+
+    def _worked(self, work: asyncio.Task[None]) -> None:
+        self._queue.at_work.discard(work)
+        self._go_on()
+
+    async def _fulfil(self, wish: _Wish) -> None:
+        found = wish.kept
+        try:
+            found = await self._hands.do(lambda: self._fetch(wish.place, wish.kept))
+            if self._pace.problem is not None:
+                log.info("%s answers again", self._source.host)
+            self._pace.well()
+        except SourceTrouble as why:
+            if self._pace.problem is None:
+                log.warning("%s What was kept is shown.", why)
+            self._pace.failed(str(why), self._now(), why.pause_s)
+        finally:
+            self._done(wish, found)
+
+    def _done(self, wish: _Wish, found: Kept | None) -> None:
+        self._queue.wishes.pop(wish.place, None)
+        if not wish.answer.done():
+            wish.answer.set_result(found)
+
+    def _fetch(self, place: Place, kept: Kept | None) -> Kept:
+        """In a thread. Raises SourceTrouble."""
+        wall_s = self._wall_s()
+        etag, modified = (kept.etag, kept.modified) if kept is not None and kept.data is not None else (None, None)
+        got = self._source.fetch(*place, wall_s=wall_s, etag=etag, modified=modified)
+        until_s = wall_s + (got.fresh_s or 0.0)
+        if got.is_same and kept is not None:
+            same = replace(kept, until_s=until_s, etag=got.etag or kept.etag, modified=got.modified or kept.modified)
+            self._cache.renew(place, same)
+            return same
+        if got.data is None:
+            until_s = min(max(until_s, wall_s + 60.0), wall_s + ABSENT_S)
+        new = Kept(data=got.data, until_s=until_s, etag=got.etag, modified=got.modified)
+        if got.fresh_s is not None:
+            self._cache.put(place, new, wall_s)
+        return new
+
+
+def _slug(host: str) -> str:
+    return re.sub(r"[^a-z0-9.-]+", "-", host.lower()).strip(".-")[:60] or "tiles"

@@ -1,0 +1,115 @@
+"""Turns away what is too much: requests a second of one device, bodies too long or too slow, nesting without end."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+
+from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.access.identity import LOCAL, SCOPE_KEY, Who
+from server.protocol.rate_limit import Allowance, Limits, Rate
+from server.web.middleware.errors import problem
+
+SLOW_DOWN_PATH = "/api/slow-down/"
+_KEPT = 2000  # devices whose rate is known; addresses of strangers among them
+_LAST = {"Connection": "close"}  # what is still on its way is not read
+
+
+class Throttle:
+    """Pure ASGI, inside the guard, which says whose request it is; without a device it is the peer's address."""
+
+    def __init__(self, app: ASGIApp, *, limits: Limits, now: Callable[[], float]) -> None:
+        self._app = app
+        self._limits = limits
+        self._now = now
+        self._known: dict[str, Allowance] = {}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        allowance = self._allowance(scope)
+        now_s = self._now()
+        if not allowance.takes(now_s):
+            wait_s = math.ceil(allowance.wait_s(now_s))
+            answer = problem(429, f"Too many requests at once from this device: try again in {wait_s} s.")
+            answer.headers["Retry-After"] = str(wait_s)
+            await answer(scope, receive, send)  # a WebSocket is refused with the same words
+            return
+        if scope["type"] == "http":
+            length = _length(scope)
+            if length is None or length > self._limits.body_bytes:
+                await _too_long(self._limits.body_bytes)(scope, receive, send)
+                return
+            receive = self._bounded(receive)
+        await self._app(scope, receive, send)
+
+    def _bounded(self, receive: Receive) -> Receive:
+        """Ends a body that is longer or takes longer than it may."""
+        most, within_s = self._limits.body_bytes, self._limits.body_s
+        loop = asyncio.get_running_loop()
+        due_s = loop.time() + within_s
+        got = 0
+        is_whole = False
+
+        async def receive_bounded() -> Message:
+            nonlocal got, is_whole
+            if is_whole:
+                return await receive()  # that the client leaves may be waited for without end
+            try:
+                async with asyncio.timeout_at(due_s):
+                    message = await receive()
+            except TimeoutError:
+                raise HTTPException(408, f"The request did not end within {within_s:g} s.", headers=_LAST) from None
+            got += len(message.get("body", b""))
+            if got > most:
+                raise HTTPException(413, _longest(most))
+            is_whole = message["type"] != "http.request" or not message.get("more_body", False)
+            return message
+
+        return receive_bounded
+
+    def _allowance(self, scope: Scope) -> Allowance:
+        who: Who | None = scope.get(SCOPE_KEY)
+        peer = scope.get("client")
+        key = f"device {who.id}" if who is not None else f"address {peer[0] if peer else ''}"
+        is_slow_down = scope["type"] == "http" and scope["path"].startswith(SLOW_DOWN_PATH)
+        if is_slow_down:  # has an allowance of its own: whatever else a device asks for does not use it up
+            key = f"slow-down of {key}"
+        found = self._known.get(key)
+        if found is None:
+            if len(self._known) >= _KEPT:
+                self._forget()
+            found = self._known[key] = Allowance(
+                self._limits.slow_down if is_slow_down else self._rate(who), self._now()
+            )
+        return found
+
+    def _rate(self, who: Who | None) -> Rate:
+        return self._limits.local_requests if who is LOCAL else self._limits.requests
+
+    def _forget(self) -> None:
+        """Those who asked nothing for a while; where that is not enough, the half that was known first."""
+        now_s = self._now()
+        kept = {key: one for key, one in self._known.items() if not one.is_whole(now_s)}
+        self._known = dict(list(kept.items())[-_KEPT // 2 :])
+
+
+def _length(scope: Scope) -> int | None:
+    """What the head says of the body [bytes]; 0: nothing, None: no number."""
+    for name, value in scope["headers"]:
+        if name == b"content-length":
+            return int(value) if value.isdigit() and len(value) < 19 else None
+    return 0
+
+
+def _too_long(most: int) -> ASGIApp:
+    # The connection is not closed on what is still on its way, or the sender would never see why it was refused.
+    return problem(413, _longest(most))
+
+
+def _longest(most: int) -> str:
+    return f"At most {most // 1024} kB are taken."

@@ -1,0 +1,136 @@
+"""Exports and clips over HTTP: asked for, followed, cancelled, fetched."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Body, HTTPException, Request, Response
+from fastapi import Path as InPath
+from pydantic import BaseModel, ConfigDict, Field
+
+from server.recording.export.clip import AFTER_S, BEFORE_S, LONGEST_S, Window
+from server.recording.export.formats import FORMATS
+from server.recording.export.jobs import Exports, Job, NoSuchRecording, NotYet, TooMany
+from server.web.middleware.errors import Problem
+from server.web.middleware.ranges import file_answer
+from server.web.routes.api import running
+
+router = APIRouter(tags=["recordings"])
+Id = Annotated[str, InPath(max_length=100, description="The recording's `id` in the list")]
+JobId = Annotated[str, InPath(max_length=40, description="`job` of the answer that began it")]
+Format = Literal["bag", "ros2", "csv", "gpx", "geojson", "html"]
+
+
+class ExportRequest(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+    format: Format = Field(description="; ".join(f"{form.name}: {form.what}" for form in FORMATS.values()))
+
+
+class ClipRequest(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+    at_ms: float = Field(ge=0, le=2**53, description="The moment it is about, ms since 1970: an alarm's `raised_ms`")
+    before_s: float = Field(BEFORE_S, ge=0, le=LONGEST_S)
+    after_s: float = Field(AFTER_S, ge=0, le=LONGEST_S)
+
+
+def exports(request: Request) -> Exports:
+    found: Exports | None = running(request).exports
+    if found is None:
+        raise HTTPException(404, "This server keeps nothing: start it with --data FOLDER to have recordings.")
+    return found
+
+
+@router.post("/api/recordings/{id}/exports", status_code=202, summary="Begin an export")
+async def begin(request: Request, id: Id, body: Annotated[ExportRequest, Body()]) -> dict[str, Any]:
+    """Answers at once; the same export that is going on or still there is answered instead of another."""
+    return (await _begun(request, id, body.format)).as_json()
+
+
+@router.post("/api/recordings/{id}/clip", status_code=202, summary="Cut out the time around a moment, as a recording")
+async def clip(request: Request, id: Id, body: Annotated[ClipRequest, Body()]) -> dict[str, Any]:
+    """A recording that is going on may be cut too; what is not recorded yet is waited for, at most a minute. The job
+    that is done names the new recording."""
+    window = Window(at_ns=round(body.at_ms * 1_000_000), before_s=body.before_s, after_s=body.after_s)
+    try:
+        return (await exports(request).clip(id, window)).as_json()
+    except NoSuchRecording as why:
+        raise HTTPException(404, str(why)) from None
+    except NotYet as why:
+        raise Problem(422, str(why), field="at_ms") from None
+    except TooMany as why:
+        raise HTTPException(429, str(why), headers={"Retry-After": "30"}) from None
+
+
+@router.get("/api/recordings/{id}/export/{format}", summary="A recording in another format", response_class=Response)
+async def exported(request: Request, id: Id, format: Format) -> Response:
+    """Made first where it is not there, which may take a minute for an hour of driving: where a person waits, begin it
+    as a job and show how far it is."""
+    job = await _begun(request, id, format)
+    await job.finished.wait()
+    return await _file(request, job)
+
+
+@router.get("/api/exports", summary="The exports that wait, go on, or can still be fetched")
+async def listed(request: Request) -> dict[str, Any]:
+    return {"exports": [job.as_json() for job in exports(request).jobs()]}
+
+
+@router.get("/api/exports/{job}", summary="How far an export is")
+async def followed(request: Request, job: JobId) -> dict[str, Any]:
+    return _found(request, job).as_json()
+
+
+@router.delete("/api/exports/{job}", summary="Cancel an export, or remove its file")
+async def cancelled(request: Request, job: JobId) -> dict[str, Any]:
+    found = _found(request, job)
+    exports(request).cancel(job)
+    if not found.is_over:
+        await found.finished.wait()
+    return {"ok": True, "state": found.state}
+
+
+@router.head("/api/exports/{job}/file", include_in_schema=False)
+@router.get(
+    "/api/exports/{job}/file",
+    summary="The file of an export that is done, whole or in part",
+    response_class=Response,
+)
+async def fetched(request: Request, job: JobId) -> Response:
+    return await _file(request, _found(request, job))
+
+
+async def _begun(request: Request, id: str, format: str) -> Job:
+    try:
+        return await exports(request).begin(id, format)
+    except NoSuchRecording as why:
+        raise HTTPException(404, str(why)) from None
+    except TooMany as why:
+        raise HTTPException(429, str(why), headers={"Retry-After": "30"}) from None
+
+
+def _found(request: Request, id: str) -> Job:
+    job = exports(request).job(id)
+    if job is None:
+        raise HTTPException(404, "There is no such export: it is kept for an hour.")
+    return job
+
+
+async def _file(request: Request, job: Job) -> Response:
+    if not job.is_over:
+        raise Problem(409, "It is not ready yet.", **job.as_json())
+    if job.path is None:
+        raise HTTPException(422 if job.state == "failed" else 409, job.sentence)
+    return await asyncio.to_thread(_answer, request, job, job.path)
+
+
+def _answer(request: Request, job: Job, path: Path) -> Response:
+    """Named after the recording as the list has it."""
+    form, recordings = FORMATS[job.format], running(request).recordings
+    row = recordings.row(job.of) if recordings is not None else None
+    name = f"{job.of} {(row or {}).get('title') or ''}".strip()
+    answer = file_answer(request, path, name=f"{name}.{form.ending}", media_type=form.media_type)
+    if job.is_whole is False:
+        answer.headers["Catgraph-Not-Whole"] = str(len(job.notes))  # its notes are in the job
+    return answer

@@ -1,0 +1,111 @@
+"""What lies under the map: tiles that may be fetched, those of map files, and the picture of the site above them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, HTTPException, Request, Response
+from starlette.concurrency import run_in_threadpool
+
+from server.web.maps.mbtiles import Layer, MapFile
+from server.web.maps.site_image import SiteImage, site_image
+from server.web.maps.tile_proxy import Upstream
+from server.web.routes.api import running
+
+router = APIRouter()
+_YEAR = "public, max-age=31536000, immutable"  # a file with other content has another name
+_DAY_S = 86_400  # a phone keeps a fetched tile no longer: it may be another one by then
+_NUMBER = re.compile(r"[0-9]{1,9}")  # more digits are no tile's, and turning them into a number may cost or fail
+
+
+class Ground:
+    """What may be fetched, the open map files in the order in which they lie on it, and the picture above them."""
+
+    def __init__(
+        self, maps: Iterable[Path] = (), image: Path | None = None, upstream: Callable[[], Upstream] | None = None
+    ) -> None:
+        """Raises MapRefused."""
+        self.maps: dict[str, MapFile] = {}
+        self.upstream: Upstream | None = None
+        try:
+            for path in maps:
+                one = MapFile(path)
+                if one.layer.name in self.maps:
+                    one.close()
+                else:
+                    self.maps[one.layer.name] = one
+            self.image: SiteImage | None = site_image(image) if image is not None else None
+            self.upstream = upstream() if upstream is not None else None
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        for one in self.maps.values():
+            one.close()
+        if self.upstream is not None:
+            self.upstream.close()
+
+
+@router.get("/api/map", tags=["map"], summary="What lies under the map: layers of tiles, the picture of the site")
+async def ground(request: Request) -> dict[str, Any]:
+    under = running(request).ground
+    image, fetched = under.image, under.upstream
+    layers = [] if fetched is None else [_told(fetched.layer) | {"upstream": fetched.told()}]
+    return {
+        "layers": [*layers, *(_told(one.layer) for one in under.maps.values())],
+        "image": image
+        and {"source": f"/map/site/{image.name}", "corners": image.corners, "attribution": image.attribution},
+    }
+
+
+def _told(layer: Layer) -> dict[str, Any]:
+    return {
+        "title": layer.title,
+        "tiles": f"/map/{layer.name}/{{z}}/{{x}}/{{y}}",
+        "min_zoom": layer.zoom[0],
+        "max_zoom": layer.zoom[1],
+        "bounds": layer.bounds,
+        "attribution": layer.attribution,
+    }
+
+
+@router.get("/map/site/{name}", tags=["map"], summary="The picture of the site", response_class=Response)
+async def picture(request: Request, name: str) -> Response:
+    image = running(request).ground.image
+    if image is None or name != image.name:
+        raise HTTPException(404, "There is no such picture.")
+    return Response(image.data, media_type=image.media_type, headers={"Cache-Control": _YEAR})
+
+
+@router.get(
+    "/map/{name}/{z}/{x}/{y}",
+    tags=["map"],
+    summary="A tile, rows counted from the north; 204 where the map has none",
+    response_class=Response,
+)
+async def tile(request: Request, name: str, z: str, x: str, y: str) -> Response:
+    under = running(request).ground
+    found = under.maps.get(name)
+    fetched = under.upstream if under.upstream is not None and under.upstream.layer.name == name else None
+    if (found is None and fetched is None) or not all(_NUMBER.fullmatch(number) for number in (z, x, y)):
+        raise HTTPException(404, "There is no such tile.")
+    if found is None and fetched is not None:
+        return await _fetched(fetched, int(z), int(x), int(y))
+    assert found is not None
+    # In a thread: a file may lie on a slow disk, and the loop must not wait for it.
+    picture = await run_in_threadpool(found.tile, int(z), int(x), int(y))
+    if picture is None:
+        return Response(status_code=204, headers={"Cache-Control": "public, max-age=3600"})
+    return Response(picture[0], media_type=picture[1], headers={"Cache-Control": _YEAR})
+
+
+async def _fetched(layer: Upstream, z: int, x: int, y: int) -> Response:
+    one = await layer.tile(z, x, y)
+    if one is None:
+        return Response(status_code=204, headers={"Cache-Control": "no-store"})  # it may be there the next time
+    keep = f"private, max-age={min(int(one.fresh_s), _DAY_S)}" if one.fresh_s >= 1 else "no-cache"
+    return Response(one.data, media_type=one.kind, headers={"Cache-Control": keep})

@@ -1,0 +1,123 @@
+"""The page and its files."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+
+from fastapi import FastAPI, Request
+from fastapi.responses import HTMLResponse, Response
+from fastapi.templating import Jinja2Templates
+from markupsafe import Markup
+from starlette.exceptions import HTTPException
+from starlette.responses import FileResponse
+
+from server.system.page_files import check_vendor, static_dir, templates_dir
+from server.web.assets.bundle import EARLY, ENTRY, STYLES, Built, find
+from server.web.assets.icons import FOLDER as DRAWN
+from server.web.assets.icons import WITHOUT, are_drawn
+from server.web.assets.manifest import manifest as manifest_of
+from server.web.assets.service_worker import OFFLINE, WORKER, Shell, build_of, shell_of, withdrawn
+from server.web.assets.static_files import StaticText, answer, packed
+from server.web.middleware.headers import policy_of
+from server.web.routes.api import running, vehicle_of
+
+log = logging.getLogger("catgraph.page")
+
+_HTML = "text/html; charset=utf-8"
+
+
+def parts_of(built: Built | None, asset: Callable[[str], str]) -> dict[str, object]:
+    """The addresses of what the page begins with: few joined files, or all that there are."""
+    if built is None:
+        return {"styles": [asset(f"css/{name}.css") for name in STYLES], "script": asset(f"js/{ENTRY}"), "needed": []}
+    style, script, *needed = (f"/static/{name}" for name in (built.style, built.script, *built.needed))
+    return {"styles": [style], "script": script, "needed": needed}
+
+
+def early_of(built: Built | None, static: Path) -> str:
+    """The script that stands in a page itself: asked for by an address it would hold up all that comes after it."""
+    return built.early if built is not None else (static / "js" / EARLY).read_text(encoding="utf-8")
+
+
+def install(app: FastAPI) -> None:
+    """Serves `/`, `/static/…` and what installs the page on a phone.
+
+    Raises AssetsMissing when the page's files are not there.
+    """
+    check_vendor()
+    static = static_dir()
+    templates = Jinja2Templates(directory=templates_dir())
+
+    @lru_cache(maxsize=512)
+    def digest(path: Path, changed_ns: int) -> str:
+        return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+
+    def asset(name: str) -> str:
+        """The address of a static file, with the hash of its content so that no stale copy is ever used."""
+        path = static / name
+        return f"/static/{name}?v={digest(path, path.stat().st_mtime_ns)}"
+
+    templates.env.globals["asset"] = asset
+    app.mount("/static", StaticText(directory=static), name="static")
+
+    if not are_drawn(static):
+        log.warning(WITHOUT)
+
+    def page_of(template: str, request: Request, built: Built | None, **context: object) -> bytes:
+        context |= parts_of(built, asset) | {"build": build_of(built), "icons": are_drawn(static)}
+        context["early"] = Markup(early_of(built, static))
+        return bytes(templates.TemplateResponse(request, template, context).body)
+
+    def sent(body: bytes, request: Request, built: Built | None) -> Response:
+        answered = answer(packed(body), request.headers, _HTML, "no-cache")
+        answered.headers["Content-Security-Policy"] = policy_of(early_of(built, static))
+        return answered
+
+    def shell(request: Request, built: Built) -> Shell:
+        return shell_of(static, built, asset, page_of("offline.html", request, built))
+
+    @app.get("/", response_class=HTMLResponse, include_in_schema=False)
+    async def page(request: Request, vehicle: str | None = None) -> Response:
+        one, built = running(request), find(static)
+        access = "open" if one.access.is_open else "paired"
+        context = {"version": one.version, "vehicle": vehicle_of(one, vehicle), "access": access}
+        body = page_of("page.html", request, built, worker=built is not None and one.config.worker, **context)
+        return sent(body, request, built)
+
+    @app.get(OFFLINE, response_class=HTMLResponse, include_in_schema=False)
+    async def offline(request: Request, v: str | None = None) -> Response:
+        """What a phone shows while the server does not answer; `v` names the shell it is to belong to."""
+        built = find(static)
+        if v is not None and (built is None or shell(request, built).version != v):
+            raise HTTPException(404, "The page has changed since.")
+        return sent(page_of("offline.html", request, built), request, built)
+
+    @app.get(WORKER, include_in_schema=False)
+    async def worker(request: Request) -> Response:
+        """The worker that keeps the shell; with single modules, or where there shall be none, the one that goes."""
+        built = find(static)
+        is_kept = built is not None and running(request).config.worker
+        script = shell(request, built).worker(static) if built is not None and is_kept else withdrawn(static)
+        answered = answer(packed(script.encode()), request.headers, "text/javascript; charset=utf-8", "no-cache")
+        answered.headers["Service-Worker-Allowed"] = "/"
+        return answered
+
+    @app.get("/manifest.webmanifest", include_in_schema=False)
+    async def manifest(request: Request) -> Response:
+        body = json.dumps(manifest_of(asset, are_drawn=are_drawn(static)), indent=1).encode()
+        return answer(packed(body), request.headers, "application/manifest+json", "no-cache")
+
+    @app.get("/favicon.ico", include_in_schema=False)
+    @app.get("/apple-touch-icon.png", include_in_schema=False)
+    async def asked_by_name(request: Request) -> FileResponse:
+        """Pictures that browsers ask for at these addresses, whatever a page says."""
+        name = "favicon.png" if request.url.path == "/favicon.ico" else "apple-touch-icon.png"
+        path = static / DRAWN / name
+        if not path.is_file():
+            raise HTTPException(404, "This picture was not drawn when catgraph was installed.")
+        return FileResponse(path, media_type="image/png", headers={"Cache-Control": "no-cache"})

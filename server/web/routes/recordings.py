@@ -1,0 +1,185 @@
+"""The recordings over HTTP: listed a page at a time, called by names, fetched, deleted and taken back."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from typing import Annotated, Any, TypeVar
+
+import orjson
+from fastapi import APIRouter, Body, HTTPException, Query, Request, Response
+from fastapi import Path as InPath
+from pydantic import BaseModel, ConfigDict, Field
+
+from server.recording.catalog import sketch
+from server.recording.catalog.annotations import BadRemark
+from server.recording.catalog.catalog import MAX_ROWS, Catalog, NotThere, Refused
+from server.recording.catalog.catalog_db import Which
+from server.web.middleware.errors import Problem
+from server.web.middleware.ranges import file_answer
+from server.web.routes.api import running
+
+# None of these routes is `async`: they look at a disk, so they run in threads, and the event loop goes on.
+router = APIRouter(tags=["recordings"])
+Id = Annotated[str, InPath(max_length=100, description="The recording's `id` in the list")]
+Text = Annotated[str | None, Query(max_length=200)]
+Milliseconds = Annotated[int | None, Query(ge=-(2**53), le=2**53)]
+_TYPES = {"mcap": "application/x-mcap", "bag": "application/x-rosbag", "db3": "application/vnd.sqlite3"}
+T = TypeVar("T")
+
+
+class Remarks(BaseModel):
+    """What is left out stays as it is."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    title: str | None = Field(None, max_length=20_000, description="At most 120 letters; empty: called by its time")
+    note: str | None = Field(None, max_length=20_000, description="At most 4000 letters")
+    tags: list[Annotated[str, Field(max_length=20_000)]] | None = Field(
+        None, max_length=100, description="At most 20 of at most 40 letters; each once"
+    )
+
+
+def catalog(request: Request) -> Catalog:
+    found: Catalog | None = running(request).recordings
+    if found is None:
+        raise HTTPException(404, "This server keeps nothing: start it with --data FOLDER to have recordings.")
+    return found
+
+
+def _asked(what: Callable[[], T]) -> T:
+    try:
+        return what()
+    except NotThere as why:
+        raise HTTPException(404, str(why)) from None
+    except BadRemark as why:
+        raise Problem(422, str(why), field=why.field) from None
+    except Refused as why:
+        raise HTTPException(409, str(why)) from None
+
+
+def _json(request: Request, body: Any) -> Response:
+    """304 where the page has the same already: a list that is looked at is asked for again and again."""
+    raw = orjson.dumps(body)
+    headers = {"ETag": f'"{hashlib.sha256(raw).hexdigest()[:20]}"', "Cache-Control": "private, no-cache"}
+    if headers["ETag"] in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    return Response(raw, media_type="application/json", headers=headers)
+
+
+@router.get("/api/recordings", summary="The recordings, newest first, a page at a time")
+def listed(
+    request: Request,
+    cursor: Annotated[str | None, Query(max_length=120, description="`next` of the page before")] = None,
+    limit: Annotated[int, Query(ge=1, le=MAX_ROWS)] = 50,
+    vehicle: Text = None,
+    tag: Text = None,
+    text: Annotated[str | None, Query(max_length=200, description="In title, note, tags, vehicle or name")] = None,
+    since_ms: Milliseconds = None,
+    until_ms: Milliseconds = None,
+) -> Response:
+    """`next` asks for the page after this one; null: there is none. What was just recorded, and what was copied into
+    the folder by hand, is listed by its name until it has been read (`state` waiting)."""
+    recordings = catalog(request)
+    which = Which(vehicle=vehicle, tag=tag, text=text, since_ms=since_ms, until_ms=until_ms)
+    recordings.look_again()
+    page = _asked(lambda: recordings.rows(which, cursor=cursor, limit=limit))
+    free = recordings.free_bytes()
+    return _json(
+        request,
+        {
+            "recordings": page.rows,
+            "next": page.next,
+            "found": recordings.totals(which),
+            "all": recordings.totals(),
+            "trash": recordings.totals(Which(is_trashed=True)),
+            "free_bytes": None if free is None else free - free % 10_000_000,  # the same for a while: see ETag
+            "waiting": recordings.waiting,
+            **recordings.names(),
+        },
+    )
+
+
+@router.post("/api/recordings/rescan", summary="Look through the folder again, and read anew what could not be read")
+def rescan(request: Request) -> dict[str, Any]:
+    recordings = catalog(request)
+    recordings.rebuild()
+    return {"ok": True, **recordings.totals()}
+
+
+@router.get("/api/recordings/{id}", summary="One recording, with the alarms that were raised in it")
+def one(request: Request, id: Id) -> Response:
+    row = catalog(request).row(id)
+    if row is None:
+        raise HTTPException(404, "There is no such recording.")
+    return _json(request, row)
+
+
+@router.patch("/api/recordings/{id}", summary="Give it another title, note or tags")
+def remark(request: Request, id: Id, body: Annotated[Remarks, Body()]) -> Response:
+    recordings = catalog(request)
+    return _json(request, _asked(lambda: recordings.remark(id, title=body.title, note=body.note, tags=body.tags)))
+
+
+@router.delete("/api/recordings/{id}", summary="Into the trash; it stays there until the trash is emptied")
+def delete(request: Request, id: Id) -> Response:
+    recordings = catalog(request)
+    return _json(request, _asked(lambda: recordings.delete(id)))
+
+
+@router.head("/api/recordings/{id}/file.mcap", include_in_schema=False)
+@router.get(
+    "/api/recordings/{id}/file.mcap",
+    summary="Its file as it is, whole or in part",
+    response_class=Response,
+)
+def file(request: Request, id: Id) -> Response:
+    """A recording that was copied in may be a ROS 1 bag or a db3 file; its name says so."""
+    recordings = catalog(request)
+    row, path = recordings.row(id), recordings.path(id)
+    if row is None or path is None:
+        raise HTTPException(404, "There is no such recording.")
+    name = f"{id} {row['title']}".strip() + f".{row['format']}"
+    return file_answer(request, path, name=name, media_type=_TYPES.get(row["format"], "application/octet-stream"))
+
+
+@router.get("/api/recordings/{id}/track.svg", summary="The way it went, with its alarms", response_class=Response)
+def track(request: Request, id: Id) -> Response:
+    row = catalog(request).row(id)
+    if row is None:
+        raise HTTPException(404, "There is no such recording.")
+    drawn = sketch.from_json(row["sketch"])
+    marks = 0 if drawn is None else len(drawn.marks)
+    words = "No position was recorded" if drawn is None else f"The track, with {marks} alarm{'s' * (marks != 1)} on it"
+    return Response(
+        sketch.svg(drawn, words), media_type="image/svg+xml", headers={"Cache-Control": "private, max-age=60"}
+    )
+
+
+@router.get("/api/trash", summary="What was deleted and can be taken back, deleted last first")
+def trash(
+    request: Request,
+    cursor: Annotated[str | None, Query(max_length=120)] = None,
+    limit: Annotated[int, Query(ge=1, le=MAX_ROWS)] = 50,
+) -> Response:
+    recordings = catalog(request)
+    which = Which(is_trashed=True)
+    page = _asked(lambda: recordings.rows(which, cursor=cursor, limit=limit))
+    return _json(request, {"recordings": page.rows, "next": page.next, "all": recordings.totals(which)})
+
+
+@router.post("/api/trash/{id}/restore", summary="Take it back")
+def restore(request: Request, id: Id) -> Response:
+    recordings = catalog(request)
+    return _json(request, _asked(lambda: recordings.restore(id)))
+
+
+@router.delete("/api/trash/{id}", summary="Delete it for good")
+def destroy(request: Request, id: Id) -> dict[str, Any]:
+    recordings = catalog(request)
+    return {"ok": True, **_asked(lambda: recordings.destroy(id))}
+
+
+@router.delete("/api/trash", summary="Empty the trash: delete all of it for good")
+def empty(request: Request) -> dict[str, Any]:
+    recordings = catalog(request)
+    return {"ok": True, **_asked(lambda: recordings.destroy(None))}

@@ -1,0 +1,44 @@
+"""One event is one line, whoever wrote the words in it."""
+
+from __future__ import annotations
+
+import logging
+import sys
+
+import pytest
+
+from server.cli.logging import FORMAT, LONGEST, OneLine
+
+
+def written(message: str, *arguments: object, fault: BaseException | None = None) -> str:
+    told = (type(fault), fault, fault.__traceback__) if fault is not None else None
+    return OneLine(FORMAT).format(logging.LogRecord("catgraph.x", logging.ERROR, "f", 1, message, arguments, told))
+
+
+@pytest.mark.parametrize(
+    ("said", "stands"),
+    [
+        ("/scan", "/scan"),
+        ("Büro – 5 m², ü", "Büro – 5 m², ü"),
+        ("a\nERROR catgraph.app: all is well", "a\\nERROR catgraph.app: all is well"),
+        ("a\r\nb", "a\\r\\nb"),
+        ("\x1b[2Jgone", "\\x1b[2Jgone"),
+        ("a\0b\x85c\u2028d", "a\\x00b\\x85c\\u2028d"),
+        ("\u202etxt.exe", "\\u202etxt.exe"),
+        ("half \ud800", "half \\ud800"),
+        ("x" * (LONGEST + 5), "x" * (LONGEST - len("ERROR catgraph.x: ")) + f"… ({LONGEST + 23} letters)"),
+    ],
+)
+def test_a_message_is_one_line(said: str, stands: str) -> None:
+    assert written("%s", said) == f"ERROR catgraph.x: {stands}"
+
+
+def test_no_line_of_a_trace_passes_for_a_line_of_the_log() -> None:
+    try:
+        raise ValueError("a\nERROR catgraph.app: forged \x1b[2J")
+    except ValueError:
+        lines = written("it failed", fault=sys.exc_info()[1]).split("\n")
+    assert lines[0] == "ERROR catgraph.x: it failed"
+    assert len(lines) > 3
+    assert all(line.startswith("  | ") for line in lines[1:])
+    assert any("forged \\x1b[2J" in line for line in lines)

@@ -1,0 +1,114 @@
+"""Which phones can alarm right now, and how many operators that are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from monitor.reach import ReachFacts
+from server.control.alarm_reach import BLIND_S, FORGOTTEN_S, FRESH_S, MOST, MOST_SHOWN, Present, Reach, Why
+from server.control.lease import Operator
+
+READY = Present(is_visible=True, sound="ready", awake="ready", vibrates=True, battery=0.5, is_charging=False, lag_s=0.1)
+
+
+def one(name: str, page: str = "", who: str = "") -> Operator:
+    return Operator(page=page or f"page-{name}", who=who or f"device-{name}", name=name)
+
+
+def test_of_a_server_that_nobody_looks_at_nobody_hears_anything() -> None:
+    assert Reach().facts(0.0) == ReachFacts(can=0, of=0, why="")
+
+
+@pytest.mark.parametrize(
+    ("word", "age_s", "why"),
+    [
+        (READY, 0.0, None),
+        (READY, FRESH_S, None),
+        (READY, FRESH_S + 0.01, "silent"),
+        (replace(READY, is_visible=False), 0.0, "hidden"),
+        (replace(READY, lag_s=BLIND_S), 0.0, None),
+        (replace(READY, is_drawing=False), 0.0, "undrawn"),
+        (replace(READY, lag_s=BLIND_S + 0.1), 0.0, "blind"),  # it is heard, and hears nothing itself
+        (replace(READY, is_replaying=True), 0.0, "replay"),
+        (replace(READY, sound="refused"), 0.0, "sound"),
+        (replace(READY, sound="asks"), 0.0, "sound"),
+        (replace(READY, sound="missing"), 0.0, "sound"),
+        (replace(READY, sound="interrupted"), 0.0, "sound"),  # an iPhone that is called
+        (replace(READY, awake="refused"), 0.0, None),  # it may fall asleep, and is then not heard any more
+        (replace(READY, awake="missing", vibrates=False, battery=None, is_charging=None), 0.0, None),
+    ],
+)
+def test_what_keeps_a_phone_from_alarming(word: Present, age_s: float, why: Why | None) -> None:
+    reach = Reach()
+    reach.hear(one("Ann"), word, 10.0)
+    (page,) = reach.all(10.0 + age_s)
+    assert page.why_not(10.0 + age_s) == why
+    assert reach.facts(10.0 + age_s).can == (1 if why is None else 0)
+
+
+def test_two_of_three_operators() -> None:
+    reach = Reach()
+    reach.hear(one("Ann"), READY, 0.0)
+    reach.hear(one("Ben"), READY, 0.0)
+    reach.hear(one("Cem"), replace(READY, sound="refused"), 0.0)
+    assert reach.facts(1.0) == ReachFacts(can=2, of=3, why="sound off")
+    reach.hear(one("Cem"), READY, 2.0)
+    assert reach.facts(3.5) == ReachFacts(can=1, of=3, why="2 × not heard")
+
+
+def test_two_pages_of_one_device_are_one_operator_who_hears_by_either() -> None:
+    reach = Reach()
+    reach.hear(one("Ann", "page-1"), replace(READY, is_visible=False), 0.0)
+    reach.hear(one("Ann", "page-2"), READY, 0.0)
+    assert reach.facts(0.0) == ReachFacts(can=1, of=1, why="")
+    reach.hear(one("Ann", "page-3"), replace(READY, sound="refused"), 0.2)
+    assert reach.facts(0.2) == ReachFacts(can=1, of=1, why="")
+    reach.hear(one("Ann", "page-2"), replace(READY, sound="asks"), 0.5)
+    assert reach.facts(0.5).can == 0
+
+
+def test_who_sleeps_counts_for_five_minutes_and_who_leaves_does_not() -> None:
+    reach = Reach()
+    reach.hear(one("Ann"), READY, 0.0)
+    reach.hear(one("Ben"), READY, 0.0)
+    reach.leave(one("Ben"))
+    assert reach.facts(FORGOTTEN_S) == ReachFacts(can=0, of=1, why="not heard")
+    assert reach.facts(FORGOTTEN_S + 0.1).of == 0
+
+
+def test_no_more_than_so_many_pages_are_kept_and_those_heard_last_stay() -> None:
+    reach = Reach()
+    for number in range(MOST + 5):
+        reach.hear(one(f"{number:03}"), READY, number / 100)
+    assert len(reach.all(1.0)) == MOST
+    assert reach.all(1.0)[0].of.name == "005"
+
+
+def test_the_state_shows_each_page_and_says_how_many_it_leaves_out() -> None:
+    reach = Reach()
+    reach.hear(one("Ann"), replace(READY, sound="refused"), 0.0)
+    shown = reach.as_json(0.5)
+    assert shown == {
+        "can": 0, "of": 1, "why": "sound off", "left_out": 0,
+        "pages": [{
+            "page": "page-Ann", "name": "Ann", "can": False, "why": "sound", "why_text": "sound off", "here": True,
+            "awake": "ready", "vibrates": True, "battery": 0.5, "charging": False, "heard_s": 0.5,
+        }],
+    }  # fmt: skip
+    for number in range(MOST_SHOWN):
+        reach.hear(one(str(number)), READY, 0.0)
+    assert (len(reach.as_json(0.0)["pages"]), reach.as_json(0.0)["left_out"]) == (MOST_SHOWN, 1)
+
+
+def test_here_is_who_is_seen() -> None:
+    reach = Reach()
+    reach.hear(one("Ann"), READY, 0.0)
+    reach.hear(one("Ben"), replace(READY, is_visible=False), 0.0)
+    assert reach.is_here(one("Ann"), 1.0)
+    assert not reach.is_here(one("Ben"), 1.0)
+    assert not reach.is_here(one("Ann"), 3.1)
+    assert not reach.is_here(one("Ann", who="device-Ben"), 1.0)
+    assert reach.find("page-Ann", 1.0) == one("Ann")
+    assert reach.find("page-Ben", 1.0) is None

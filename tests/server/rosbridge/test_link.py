@@ -1,0 +1,568 @@
+"""The life of a link: what it subscribes to and when, what it refuses to send, how it is hurried and ended."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import gc
+import itertools
+import socket
+import statistics
+import time
+from collections.abc import AsyncIterator
+from typing import Any
+
+import psutil
+import pytest
+
+from server.rosbridge import link as link_module
+from server.rosbridge.address import parse
+from server.rosbridge.link import CallFailed, LinkDown, RosLink, Subscription
+from tests.server.ear import Ear, accept, answering, bridging, linked, until
+from tests.server.loops import on_both_loops
+
+SPEED = Subscription(topic="/vel", type="geometry_msgs/Twist", queue_length=50)
+SCAN = Subscription(topic="/scan", type="sensor_msgs/LaserScan", compression="cbor", throttle_ms=50, queue_length=1)
+ANY = Subscription(topic="/any", type=None)
+ROWS = [
+    {
+        "op": "subscribe",
+        "id": "subscribe:/vel",
+        "topic": "/vel",
+        "type": "geometry_msgs/Twist",
+        "compression": "none",
+        "throttle_rate": 1,  # a queue without a throttle deafens ROS 2's rosbridge when its client goes
+        "queue_length": 50,
+    },
+    {
+        "op": "subscribe",
+        "id": "subscribe:/scan",
+        "topic": "/scan",
+        "type": "sensor_msgs/LaserScan",
+        "compression": "cbor",
+        "throttle_rate": 50,
+        "queue_length": 1,
+    },
+    {
+        "op": "subscribe",
+        "id": "subscribe:/any",
+        "topic": "/any",
+        "compression": "none",
+        "throttle_rate": 0,
+        "queue_length": 0,
+    },
+]
+OVER = {"op": "unsubscribe", "id": "over", "topic": "/over"}
+
+
+@contextlib.asynccontextmanager
+async def leaving_nothing() -> AsyncIterator[None]:
+    """No task, timer or descriptor more after the block than before it."""
+
+    def timers() -> int:
+        scheduled = getattr(asyncio.get_running_loop(), "_scheduled", ())  # asyncio's own loop has it
+        return sum(not handle.cancelled() for handle in scheduled)
+
+    process = psutil.Process()
+    with contextlib.suppress(OSError):  # uvloop opens something of its own at its first dialling
+        await asyncio.get_running_loop().create_connection(asyncio.Protocol, "127.0.0.1", 1)
+    gc.collect()
+    before = (asyncio.all_tasks(), timers(), process.num_fds())
+    yield
+    for _ in range(5):
+        await asyncio.sleep(0)
+    gc.collect()
+    assert asyncio.all_tasks() == before[0]
+    assert timers() <= before[1]
+    assert process.num_fds() == before[2]
+
+
+@on_both_loops
+async def test_the_table_is_sent_once_an_opening_in_order_before_anything_else() -> None:
+    ear = Ear()
+    async with bridging() as bridge:
+        link = RosLink(parse(bridge.address), ear, now=time.monotonic)
+        for row in (SPEED, SCAN, ANY):
+            link.subscribe(row)
+        assert link.subscriptions == (SPEED, SCAN, ANY)
+        ear.link_opened = lambda: link.send_now(OVER)  # type: ignore[method-assign]
+        link.start()
+        await until(lambda: OVER in bridge.operations)
+        assert bridge.operations == [*ROWS, OVER]
+        assert link.heard_s == pytest.approx(time.monotonic(), abs=1.0)
+        link.stop()
+
+
+@on_both_loops
+async def test_twenty_reconnects_multiply_no_subscription() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        bridge.hangs_up = True
+        for row in (SPEED, SCAN, ANY):
+            link.subscribe(row)
+        for opening in range(1, 21):
+            await ear.hears("opened", opening)
+            await ear.hears("closed", opening)
+            if opening == 20:
+                bridge.hangs_up = False
+            await asyncio.sleep(0)
+            link.retry_now()
+        await ear.hears("opened", 21)
+        link.send_now(OVER)
+        await until(lambda: OVER in bridge.operations)
+        assert bridge.operations == [*ROWS, OVER]
+        assert len(bridge.connections) == link.attempts == 21
+        assert [name for name, _ in ear.told] == ["opened", "closed"] * 20 + ["opened"]
+
+
+@on_both_loops
+async def test_a_changed_row_takes_the_place_of_the_old_one_an_equal_one_is_left() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        await ear.hears("opened")
+        link.subscribe(SPEED)
+        link.subscribe(Subscription(topic="/vel", type="geometry_msgs/Twist", queue_length=50))
+        link.subscribe(Subscription(topic="/vel", type="geometry_msgs/Twist", queue_length=1))
+        link.subscribe(Subscription(topic="/vel", type="geometry_msgs/TwistStamped", queue_length=1))
+        link.unsubscribe("/vel")
+        link.unsubscribe("/vel")
+        link.unsubscribe("/never")
+        link.subscribe(ANY)
+        link.subscribe(SCAN)
+        link.unsubscribe_all()
+        link.send_now(OVER)
+        await until(lambda: OVER in bridge.operations)
+        brief = [(one["op"], one["topic"], one.get("id"), one.get("queue_length")) for one in bridge.operations[:-1]]
+        assert brief == [
+            ("subscribe", "/vel", "subscribe:/vel", 50),
+            ("subscribe", "/vel", "subscribe:/vel", 1),
+            ("unsubscribe", "/vel", "subscribe:/vel", None),
+            ("subscribe", "/vel", "subscribe:/vel", 1),
+            ("unsubscribe", "/vel", "subscribe:/vel", None),
+            ("subscribe", "/any", "subscribe:/any", 0),
+            ("subscribe", "/scan", "subscribe:/scan", 1),
+            ("unsubscribe", "/any", "subscribe:/any", None),
+            ("unsubscribe", "/scan", "subscribe:/scan", None),
+        ]
+        assert link.subscriptions == ()
+
+
+@on_both_loops
+async def test_what_changes_while_down_counts_at_the_next_opening() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        link.subscribe(SPEED)
+        await ear.hears("opened")
+        bridge.socket.transport.abort()
+        await ear.hears("closed")
+        link.unsubscribe("/vel")
+        link.subscribe(ANY)
+        await ear.hears("opened", 2)
+        link.send_now(OVER)
+        await until(lambda: OVER in bridge.operations)
+        assert bridge.operations == [ROWS[2], OVER]
+
+
+@on_both_loops
+async def test_nothing_is_sent_while_down_and_nothing_later() -> None:
+    """Before the first opening, between two, while the other side says goodbye, and after the end."""
+    ear = Ear()
+    async with bridging() as bridge:
+        link = RosLink(parse(bridge.address), ear, now=time.monotonic)
+        with pytest.raises(LinkDown):
+            link.send_now(OVER)
+        link.start()
+        with pytest.raises(LinkDown):
+            link.send_now(OVER)
+        await ear.hears("opened")
+        bridge.socket.transport.abort()
+        await ear.hears("closed")
+        assert not link.is_open
+        for _ in range(50):
+            with pytest.raises(LinkDown):
+                link.send_now(OVER)
+        with pytest.raises(LinkDown):
+            await link.call("/rosapi/topics")
+        await ear.hears("opened", 2)
+        link.send_now(OVER)
+        await until(lambda: bridge.operations)
+        link.stop()
+        with pytest.raises(LinkDown):
+            link.send_now(OVER)
+        await asyncio.sleep(0.05)
+        assert bridge.connections == [[], [OVER]]
+
+
+@on_both_loops
+async def test_after_the_bridges_goodbye_nothing_is_sent_and_the_link_closes_at_once() -> None:
+    """A bridge that says goodbye and then leaves the connection standing."""
+    ear = Ear()
+
+    async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await accept(reader, writer)
+        await asyncio.sleep(0.05)
+        writer.write(b"\x88\x12\x03\xe9roslaunch is over")
+        await asyncio.sleep(5)
+
+    async with answering(leave) as port, linked(f"127.0.0.1:{port}", ear) as link:
+        await ear.hears("opened")
+        problem = await ear.hears("closed", within_s=0.5)
+        assert problem.code == "closed"
+        assert "roslaunch is over" not in problem.title
+        assert "(roslaunch is ove" in problem.hint
+        assert not link.is_open
+        with pytest.raises(LinkDown):
+            link.send_now(OVER)
+
+
+@on_both_loops
+async def test_a_goodbye_that_cannot_be_answered_ends_the_link_all_the_same() -> None:
+    """The bridge reads nothing, so that our answer stays in the pipe for ever."""
+    ear = Ear()
+    told = asyncio.Event()
+
+    async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await accept(reader, writer)
+        reader._transport.pause_reading()  # type: ignore[attr-defined]
+        await told.wait()
+        writer.write(b"\x88\x00")
+        await asyncio.sleep(5)
+
+    async with answering(leave) as port, linked(f"127.0.0.1:{port}", ear) as link:
+        await ear.hears("opened")
+        link._socket.sendMessage(b"x" * 12_000_000)  # type: ignore[union-attr]
+        told.set()
+        assert (await ear.hears("closed", within_s=1.2)).code == "closed"
+
+
+@on_both_loops
+async def test_what_a_dropped_link_still_held_is_never_delivered() -> None:
+    """The bridge stops reading with commands on their way to it: once the link is dropped, they are void."""
+    ear = Ear()
+    got = bytearray()
+    may_read = asyncio.Event()
+    is_read = asyncio.Event()
+    listening = socket.socket()
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    listening.bind(("127.0.0.1", 0))
+
+    async def stop_reading(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await accept(reader, writer)
+        reader._transport.pause_reading()  # type: ignore[attr-defined]
+        await may_read.wait()
+        reader._transport.resume_reading()  # type: ignore[attr-defined]
+        with contextlib.suppress(ConnectionError):
+            while data := await reader.read(65536):
+                got.extend(data)
+        is_read.set()
+
+    async with answering(stop_reading, sock=listening) as port, linked(f"127.0.0.1:{port}", ear) as link:
+        await ear.hears("opened")
+        for _ in range(100):
+            link._socket.sendMessage(b"x" * 10_000)  # type: ignore[union-attr]
+        assert (await ear.hears("closed", within_s=2.5)).code == "bridge_silent"
+        link.stop()
+        may_read.set()
+        await asyncio.wait_for(is_read.wait(), 3)
+        assert len(got) < 300_000  # what the bridge's own machine had taken already; a million was sent
+
+
+@on_both_loops
+async def test_hurried_while_waiting_it_dials_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_module, "FIRST_RETRY_S", 60.0)
+    ear = Ear()
+    with socket.socket() as closed:
+        closed.bind(("127.0.0.1", 0))
+        async with linked(f"127.0.0.1:{closed.getsockname()[1]}", ear) as link:
+            for attempt in range(1, 6):
+                await ear.hears("failed", attempt, within_s=1.0)
+                await asyncio.sleep(0.01)
+                assert link.attempts == attempt
+                link.retry_now()
+
+
+@on_both_loops
+async def test_hurried_while_dialling_shaking_hands_or_open_there_is_never_a_second_connection() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        for _ in range(100):
+            link.retry_now()
+            await asyncio.sleep(0)
+        await ear.hears("opened")
+        for _ in range(20):
+            link.retry_now()
+            await asyncio.sleep(0.01)
+        assert len(bridge.connections) == 1
+        bridge.socket.transport.abort()
+        await ear.hears("closed")
+        for _ in range(100):
+            link.retry_now()
+            await asyncio.sleep(0)
+        await ear.hears("opened", 2)
+        await asyncio.sleep(0.5)  # longer than the first wait for another try
+        assert len(bridge.connections) == 2
+        assert len(ear.all("opened")) == 2
+
+
+@on_both_loops
+async def test_hurried_in_the_very_moment_of_closing_it_goes_on_trying() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        ear.link_closed = lambda problem: link.retry_now()  # type: ignore[method-assign]
+        for opening in range(1, 4):
+            await ear.hears("opened", opening)
+            bridge.socket.transport.abort()
+        await ear.hears("opened", 4)
+
+
+@on_both_loops
+async def test_the_wait_between_two_tries_grows_to_its_limit_and_not_beyond(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_module, "FIRST_RETRY_S", 0.02)
+    monkeypatch.setattr(link_module, "LAST_RETRY_S", 0.1)
+    ear = Ear()
+    times_s: list[float] = []
+    ear.dial_failed = lambda problem: times_s.append(time.monotonic())  # type: ignore[method-assign]
+    with socket.socket() as closed:
+        closed.bind(("127.0.0.1", 0))
+        async with linked(f"127.0.0.1:{closed.getsockname()[1]}", ear):
+            await until(lambda: len(times_s) > 9)
+    waits_s = [later - earlier for earlier, later in itertools.pairwise(times_s)]
+    assert waits_s[0] < 0.08
+    assert 0.1 <= min(waits_s[5:])
+    assert statistics.median(waits_s[5:]) < 0.2  # one of them may be held up by a busy machine
+
+
+@on_both_loops
+async def test_ended_before_it_began() -> None:
+    async with leaving_nothing():
+        link = RosLink(parse("127.0.0.1:1"), Ear(), now=time.monotonic)
+        link.stop()
+        link.start()  # too late
+        link.retry_now()
+        assert not link.is_open
+
+
+@on_both_loops
+async def test_ended_while_open() -> None:
+    ear = Ear()
+    async with bridging() as bridge:
+        async with leaving_nothing():
+            async with linked(bridge.address, ear) as link:
+                await ear.hears("opened")
+                call = asyncio.create_task(link.call("/rosapi/topics"))
+                await asyncio.sleep(0.05)
+            with pytest.raises(LinkDown):
+                await call
+            await until(lambda: bridge.socket.state == 3)
+            await bridge.socket.wait_closed()
+            bridge.sockets.clear()
+        assert [name for name, _ in ear.told] == ["opened"]
+
+
+@on_both_loops
+async def test_ended_while_shaking_hands() -> None:
+    ear = Ear()
+    arrived, left = asyncio.Event(), asyncio.Event()
+
+    async def say_nothing(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        arrived.set()
+        with contextlib.suppress(ConnectionError):
+            await reader.read()
+        writer.transport.abort()
+        left.set()
+
+    async with answering(say_nothing) as port, leaving_nothing():
+        async with linked(f"127.0.0.1:{port}", ear):
+            await asyncio.wait_for(arrived.wait(), 2)
+        await asyncio.wait_for(left.wait(), 0.5)
+    assert ear.told == []
+
+
+@on_both_loops
+async def test_ended_just_before_the_handshake_is_done() -> None:
+    ear = Ear()
+    arrived, may_answer, left = asyncio.Event(), asyncio.Event(), asyncio.Event()
+
+    async def answer_late(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        arrived.set()
+        await may_answer.wait()
+        with contextlib.suppress(ConnectionError):
+            await accept(reader, writer)
+            await reader.read()
+        left.set()
+
+    async with answering(answer_late) as port:
+        async with linked(f"127.0.0.1:{port}", ear) as link:
+            await asyncio.wait_for(arrived.wait(), 2)
+            may_answer.set()
+            link.stop()
+            await asyncio.wait_for(left.wait(), 1)
+    assert ear.told == []
+
+
+@on_both_loops
+async def test_ended_while_waiting_for_the_next_try(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_module, "FIRST_RETRY_S", 60.0)
+    ear = Ear()
+    with socket.socket() as closed:
+        closed.bind(("127.0.0.1", 0))
+        async with leaving_nothing():
+            async with linked(f"127.0.0.1:{closed.getsockname()[1]}", ear):
+                await ear.hears("failed")
+                await asyncio.sleep(0.01)
+
+
+@on_both_loops
+async def test_ended_by_the_listener_itself() -> None:
+    """A session may end its link from within what the link tells it."""
+    async with bridging() as bridge:
+        for kind in ("link_opened", "message_received", "link_closed"):
+            ear = Ear()
+            link = RosLink(parse(bridge.address), ear, now=time.monotonic)
+
+            def end(*_: Any, link: RosLink = link) -> None:
+                link.stop()
+
+            setattr(ear, kind, end)
+            link.start()
+            openings = len(bridge.connections)
+            while len(bridge.connections) == openings:
+                await asyncio.sleep(0.005)
+            with contextlib.suppress(Exception):
+                await bridge.say({"op": "publish", "topic": "/a", "msg": {}})
+                await bridge.say({"op": "publish", "topic": "/a", "msg": {}})
+                bridge.socket.transport.abort()
+            await asyncio.wait_for(bridge.socket.wait_closed(), 1)
+            while link.is_open:
+                await asyncio.sleep(0.005)
+            link.stop()
+
+
+@on_both_loops
+async def test_a_hundred_openings_leave_nothing_behind() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        bridge.hangs_up = True
+        link.subscribe(ANY)
+        await ear.hears("closed", 1)
+        before: tuple[int, int, int] = (0, 0, 0)
+        process = psutil.Process()
+        for opening in range(1, 101):
+            await ear.hears("closed", opening)
+            if opening in (10, 100):
+                for socket_ in bridge.sockets:
+                    await socket_.wait_closed()
+                bridge.sockets.clear()
+                gc.collect()
+                now = (len(asyncio.all_tasks()), process.num_fds(), process.num_threads())
+                assert opening == 10 or now == before
+                before = now
+            await asyncio.sleep(0)
+            link.retry_now()
+
+
+# -- calls -----------------------------------------------------------------------------------------------------------
+
+
+def respond(values: Any, **others: Any) -> Any:
+    def answer(operation: dict[str, Any]) -> dict[str, Any] | None:
+        if operation["op"] != "call_service":
+            return None
+        return {"op": "service_response", "id": operation["id"], "values": values, "result": True} | others
+
+    return answer
+
+
+@on_both_loops
+async def test_a_call_is_answered_with_the_values() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        await ear.hears("opened")
+        bridge.answer = respond({"topics": ["/a"]})
+        assert await link.call("/rosapi/topic_type", {"topic": "/a"}) == {"topics": ["/a"]}
+        assert bridge.operations[0] | {"id": ""} == {
+            "op": "call_service",
+            "id": "",
+            "service": "/rosapi/topic_type",
+            "args": {"topic": "/a"},
+        }
+
+
+@on_both_loops
+async def test_answers_find_their_own_calls_in_any_order() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        await ear.hears("opened")
+        calls = [asyncio.create_task(link.call("/rosapi/topic_type", {"topic": f"/s{n}"})) for n in range(5)]
+        await until(lambda: len(bridge.operations) == 5)
+        for operation in reversed(bridge.operations):
+            await bridge.say({"op": "service_response", "id": operation["id"], "values": operation["args"]["topic"]})
+        assert await asyncio.gather(*calls) == [f"/s{n}" for n in range(5)]
+
+
+FAILURES = {
+    "words": ("Service /x does not exist", "Service /x does not exist"),
+    "no words": (None, ""),
+    "an object": ({"deep": [[1]] * 9}, "(dict)"),
+    "too many words": ("x" * 100_000, "x" * 300),
+}
+
+
+@pytest.mark.parametrize(("values", "said"), FAILURES.values(), ids=FAILURES)
+@on_both_loops
+async def test_a_failed_call_says_what_the_bridge_said(values: Any, said: str) -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        await ear.hears("opened")
+        bridge.answer = respond(values, result=False)
+        with pytest.raises(CallFailed) as failure:
+            await link.call("/rosapi/get_time")
+        assert str(failure.value) == said
+
+
+@on_both_loops
+async def test_a_call_without_an_answer_fails_in_time_and_a_late_answer_harms_nothing() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        await ear.hears("opened")
+        with pytest.raises(CallFailed, match=r"/rosapi/topics did not answer within 0\.05 s"):
+            await link.call("/rosapi/topics", timeout_s=0.05)
+        identity = bridge.operations[0]["id"]
+        for wrong in (identity, None, 1, True, [1], {"a": 1}, "call:/other:9"):
+            await bridge.say({"op": "service_response", "id": wrong, "values": {}, "result": True})
+        await bridge.say({"op": "service_response"})
+        bridge.answer = respond("fine")
+        assert await link.call("/rosapi/get_time") == "fine"
+        assert ear.all("junk") == []
+
+
+@on_both_loops
+async def test_calls_end_with_the_link_that_carried_them() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        await ear.hears("opened")
+        calls = [asyncio.create_task(link.call("/rosapi/get_time", timeout_s=5)) for _ in range(3)]
+        await until(lambda: len(bridge.operations) == 3)
+        bridge.socket.transport.abort()
+        for call in calls:
+            with pytest.raises(LinkDown):
+                await call
+
+
+@on_both_loops
+async def test_unanswered_calls_are_bounded_and_a_cancelled_one_is_forgotten() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear) as link:
+        await ear.hears("opened")
+        calls = [
+            asyncio.create_task(link.call("/rosapi/get_time", timeout_s=5))
+            for _ in range(link_module.MAX_PENDING_CALLS)
+        ]
+        await until(lambda: len(bridge.operations) == len(calls))
+        with pytest.raises(CallFailed, match="too many"):
+            await link.call("/rosapi/get_time")
+        for call in calls:
+            call.cancel()
+        await asyncio.gather(*calls, return_exceptions=True)
+        bridge.answer = respond("fine")
+        assert await link.call("/rosapi/get_time") == "fine"

@@ -1,0 +1,411 @@
+"""What may answer at an address instead of a rosbridge, and what the operator is told of it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import datetime
+import ipaddress
+import socket
+import ssl
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+
+from server.rosbridge import link as link_module
+from tests.server.ear import Ear, Handler, accept, answering, bridging, linked, until
+from tests.server.loops import on_both_loops
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The product's own patience is for radio links."""
+    monkeypatch.setattr(link_module, "DIAL_TIMEOUT_S", 1.0)
+    monkeypatch.setattr(link_module, "HANDSHAKE_TIMEOUT_S", 0.4)
+    monkeypatch.setattr(link_module, "LOOKUP_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(link_module, "FIRST_RETRY_S", 0.05)
+
+
+def saying(answer: bytes, *, hang_up: bool = False, first: bool = False) -> Handler:
+    """Answers the handshake, whatever it asks; or speaks first."""
+
+    async def handle(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if not first:
+            await reader.readuntil(b"\r\n\r\n")
+        writer.write(answer)
+        await writer.drain()
+        if hang_up:
+            writer.close()
+        else:
+            await asyncio.sleep(5)
+
+    return handle
+
+
+async def say_without_end(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    while True:
+        writer.write(b"frame of a camera " * 1000)
+        await writer.drain()
+
+
+async def hang_up(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    writer.close()
+
+
+async def reset(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    await reader.readuntil(b"\r\n\r\n")
+    writer.transport.abort()
+
+
+OTHERS: dict[str, tuple[Handler, str, str]] = {
+    "web server": (
+        saying(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n", hang_up=True),
+        "not_rosbridge",
+        "404",
+    ),
+    "web server that stays": (saying(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nOK"), "not_rosbridge", "HTTP 200"),
+    "web server of old": (saying(b"HTTP/1.0 200 OK\r\n\r\n"), "not_rosbridge", "not as a WebSocket"),
+    "one that sends elsewhere": (saying(b"HTTP/1.1 302 Found\r\nLocation: /\r\n\r\n"), "not_rosbridge", "HTTP 302"),
+    "one that asks for a login": (saying(b"HTTP/1.1 401 Unauthorized\r\n\r\n"), "not_rosbridge", "login"),
+    "one that is full": (saying(b"HTTP/1.1 503 Service Unavailable\r\n\r\n"), "busy", "by itself"),
+    "a wrong key": (
+        saying(b"HTTP/1.1 101 X\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: x\r\n\r\n"),
+        "not_rosbridge",
+        "not as a WebSocket",
+    ),
+    "an upgrade to something else": (
+        saying(b"HTTP/1.1 101 X\r\nUpgrade: h2c\r\nConnection: Upgrade\r\n\r\n"),
+        "not_rosbridge",
+        "not as a WebSocket",
+    ),
+    "headers that are no text": (saying(b"HTTP/1.1 200 \xff\xfe\r\n\xff: \xfe\r\n\r\n"), "not_rosbridge", "not as a"),
+    "headers that are none": (saying(b"HTTP/1.1\r\nno colon\r\n\r\n"), "not_rosbridge", "not as a WebSocket"),
+    "an empty line": (saying(b"\r\n\r\n"), "not_rosbridge", "not as a WebSocket"),
+    "noise": (saying(bytes(range(256)) * 4), "not_rosbridge", "not as a WebSocket"),
+    "ssh": (saying(b"SSH-2.0-OpenSSH_9.6\r\n", first=True), "not_rosbridge", "not as a WebSocket"),
+    "one that talks without end": (say_without_end, "not_rosbridge", "not as a WebSocket"),
+    "one that is silent": (saying(b""), "not_rosbridge", "says nothing"),
+    "one that hangs up at once": (hang_up, "not_rosbridge", "closes the connection"),
+    "one that resets": (reset, "not_rosbridge", "closes the connection"),
+    "TLS": (saying(b"\x15\x03\x01\x00\x02\x02\x46", hang_up=True), "wants_tls", "wss://127.0.0.1"),
+}
+
+
+@pytest.mark.parametrize(("handler", "code", "words"), OTHERS.values(), ids=OTHERS)
+@on_both_loops
+async def test_something_else_answers(handler: Handler, code: str, words: str) -> None:
+    ear = Ear()
+    async with answering(handler) as port, linked(f"127.0.0.1:{port}", ear) as link:
+        problem = await ear.hears("failed")
+        assert (problem.code, words in problem.hint) == (code, True), problem
+        assert not link.is_open
+        assert link.heard_s is None
+        await ear.hears("failed", 2)  # and goes on trying
+        assert link.attempts - len(ear.all("failed")) in (0, 1)  # one word for each try
+        assert {name for name, _ in ear.told} == {"failed"}
+
+
+@on_both_loops
+async def test_one_that_talks_without_end_fills_no_memory() -> None:
+    ear = Ear()
+    before = psutil.Process().memory_info().rss
+    async with answering(say_without_end) as port, linked(f"127.0.0.1:{port}", ear):
+        await ear.hears("failed", 3)
+    assert psutil.Process().memory_info().rss - before < 30e6
+
+
+@on_both_loops
+async def test_a_handshake_that_comes_letter_by_letter_is_one() -> None:
+    ear = Ear()
+
+    async def dribble(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        write, said = writer.write, bytearray()
+        writer.write = said.extend  # type: ignore[method-assign, assignment]
+        await accept(reader, writer)
+        for letter in said + b'\x81\x0f{"op":"status"}':
+            write(bytes([letter]))
+            await asyncio.sleep(0.0002)
+        await asyncio.sleep(5)
+
+    async with answering(dribble) as port, linked(f"127.0.0.1:{port}", ear):
+        await ear.hears("status")
+        assert [name for name, _ in ear.told] == ["opened", "status"]
+
+
+@on_both_loops
+async def test_what_comes_with_the_handshake_is_read_after_it() -> None:
+    ear = Ear()
+
+    async def hasten(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        write, said = writer.write, bytearray()
+        writer.write = said.extend  # type: ignore[method-assign, assignment]
+        await accept(reader, writer)
+        write(bytes(said) + b'\x81\x0f{"op":"status"}\x88\x00')
+        await asyncio.sleep(5)
+
+    async with answering(hasten) as port, linked(f"127.0.0.1:{port}", ear):
+        await ear.hears("closed")
+        assert [name for name, _ in ear.told][:3] == ["opened", "status", "closed"]
+
+
+# -- nothing answers -------------------------------------------------------------------------------------------------
+
+
+@on_both_loops
+async def test_refused() -> None:
+    ear = Ear()
+    with socket.socket() as closed:
+        closed.bind(("127.0.0.1", 0))
+        port = closed.getsockname()[1]
+        async with linked(f"127.0.0.1:{port}", ear):
+            problem = await ear.hears("failed")
+            assert problem.code == "refused"
+            assert problem.title == f"127.0.0.1 is there, but nothing listens on port {port}."
+            await ear.hears("failed", 3)
+
+
+@on_both_loops
+async def test_the_car_comes_up_later() -> None:
+    ear = Ear()
+    with socket.socket() as closed:
+        closed.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        closed.bind(("127.0.0.1", 0))
+        port = closed.getsockname()[1]
+        async with linked(f"127.0.0.1:{port}", ear):
+            await ear.hears("failed", 2)
+            closed.close()
+            async with bridging(port):
+                await ear.hears("opened")
+
+
+@contextlib.contextmanager
+def black_hole() -> Iterator[int]:
+    """A port that takes no more connections and refuses none: its queue is full, as of a machine out of range."""
+    with contextlib.ExitStack() as held:
+        listening = held.enter_context(socket.socket())
+        listening.bind(("127.0.0.1", 0))
+        listening.listen(0)
+        for _ in range(4):
+            waiting = held.enter_context(socket.socket())
+            waiting.setblocking(False)
+            waiting.connect_ex(listening.getsockname())
+        yield listening.getsockname()[1]
+
+
+@on_both_loops
+async def test_no_answer_at_all() -> None:
+    ear = Ear()
+    with black_hole() as port:
+        async with linked(f"127.0.0.1:{port}", ear) as link:
+            for _ in range(10):
+                link.retry_now()  # while dialling: no second dial
+                await asyncio.sleep(0.01)
+            assert (await ear.hears("failed")).code == "timeout"
+            assert link.attempts == 1
+
+
+@on_both_loops
+async def test_ended_while_dialling() -> None:
+    ear = Ear()
+    with black_hole() as port:
+        before = asyncio.all_tasks()
+        fds = psutil.Process().num_fds()
+        async with linked(f"127.0.0.1:{port}", ear):
+            await asyncio.sleep(0.1)
+        await until(lambda: asyncio.all_tasks() == before, within_s=0.3)
+        await until(lambda: psutil.Process().num_fds() <= fds + 1, within_s=0.3)  # uvloop keeps one of its own
+    assert ear.told == []
+
+
+@on_both_loops
+async def test_no_such_host() -> None:
+    ear = Ear()
+    async with linked("no-such-host.invalid", ear):
+        assert (await ear.hears("failed")).code in ("no_such_host", "no_lookup")  # where no name server answers
+
+
+@pytest.mark.parametrize(
+    "typed", ["169.254.169.254", "2852039166:80", "[::ffff:169.254.169.254]", "0.0.0.0", "[ff02::1]"]
+)
+@on_both_loops
+async def test_what_is_never_dialled_is_not(typed: str) -> None:
+    ear = Ear()
+    async with linked(typed, ear):
+        problem = await ear.hears("failed")
+        assert problem.code == "forbidden"
+
+
+# -- several addresses -----------------------------------------------------------------------------------------------
+
+
+def found(*ips: str) -> list[Any]:
+    kind = {4: socket.AF_INET, 6: socket.AF_INET6}
+    return [(kind[ipaddress.ip_address(ip).version], socket.SOCK_STREAM, 6, "", (ip, 0)) for ip in ips]
+
+
+ROADS = {
+    "the first refuses": (("127.0.0.3", "127.0.0.1"), None),
+    "the first is no rosbridge": (("127.0.0.2", "127.0.0.1"), None),
+    "the first is forbidden": (("169.254.1.1", "127.0.0.1"), None),
+    "the first is no network of ours": (("2001:db8::1", "127.0.0.1"), None),
+    "the same one twice": (("127.0.0.3", "127.0.0.3", "127.0.0.3", "127.0.0.3", "127.0.0.1"), None),
+    "all refuse": (("127.0.0.3", "127.0.0.4"), "refused"),
+    "one refuses, one is no rosbridge": (("127.0.0.2", "127.0.0.3"), "not_rosbridge"),
+    "one is forbidden, one refuses": (("169.254.1.1", "127.0.0.3"), "refused"),
+    "all are forbidden": (("169.254.1.1", "fe80::1"), "forbidden"),
+    "none": ((), "failed"),
+}
+
+
+@pytest.mark.parametrize(("ips", "code"), ROADS.values(), ids=ROADS)
+async def test_every_address_of_a_host_is_tried_to_its_handshake(
+    ips: tuple[str, ...], code: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On asyncio's loop, whose resolver can be exchanged; what is dialled after it is the same on both."""
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: found(*ips))
+    ear = Ear()
+    async with bridging() as bridge:
+        async with answering(hang_up, host="127.0.0.2", port=bridge.port), linked(f"car:{bridge.port}", ear) as link:
+            if code is None:
+                await ear.hears("opened")
+                assert ear.all("failed") == []
+                assert link.attempts == 1
+            else:
+                assert (await ear.hears("failed")).code == code
+
+
+async def test_a_name_server_that_hangs_is_asked_once_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    answers = threading.Event()
+
+    def hang(host: str, *_: Any, **__: Any) -> list[Any]:
+        asked.append(host)
+        answers.wait(8)
+        return found("127.0.0.1")
+
+    monkeypatch.setattr(socket, "getaddrinfo", hang)
+    ear = Ear()
+    async with bridging() as bridge, linked(f"car:{bridge.port}", ear):
+        assert (await ear.hears("failed")).code == "no_lookup"
+        await ear.hears("failed", 3)
+        assert asked == ["car"]
+        answers.set()
+        await ear.hears("opened")
+        assert asked == ["car"]
+
+
+async def test_ended_while_a_name_is_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = threading.Event()
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: answers.wait(8) and found("127.0.0.1"))
+    ear = Ear()
+    before = asyncio.all_tasks()
+    async with linked("car", ear):
+        await asyncio.sleep(0.05)
+    await until(lambda: asyncio.all_tasks() == before, within_s=0.3)
+    answers.set()
+    await asyncio.sleep(0.05)
+    assert ear.told == []
+
+
+# -- TLS -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A certificate for 127.0.0.1 with its key, signed by itself."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "a car")])
+    now = datetime.datetime.now(datetime.UTC)
+    one = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - datetime.timedelta(days=1))
+        .not_valid_after(now + datetime.timedelta(days=1))
+        .add_extension(x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address("127.0.0.1"))]), critical=False)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=None), critical=True)
+        .sign(key, hashes.SHA256())
+    )
+    path = tmp_path_factory.mktemp("tls") / "car.pem"
+    secret = key.private_bytes(
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    )
+    path.write_bytes(secret + one.public_bytes(serialization.Encoding.PEM))
+    return path
+
+
+@pytest.fixture
+def secure(certificate: Path) -> ssl.SSLContext:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(certificate)
+    return context
+
+
+@on_both_loops
+async def test_secure(certificate: Path, secure: ssl.SSLContext, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
+    ear = Ear()
+    async with bridging(ssl=secure) as bridge, linked(f"wss://127.0.0.1:{bridge.port}", ear) as link:
+        await ear.hears("opened")
+        link.send_now({"op": "unsubscribe", "id": "a", "topic": "/a"})
+        await until(lambda: bridge.operations)
+        await bridge.say({"op": "publish", "topic": "/a", "msg": 1})
+        assert await ear.hears("message") == ("/a", 1, None)
+        link.abort()
+        await ear.hears("opened", 2)
+
+
+@on_both_loops
+async def test_secure_but_not_trusted(secure: ssl.SSLContext) -> None:
+    ear = Ear()
+    async with bridging(ssl=secure) as bridge, linked(f"wss://127.0.0.1:{bridge.port}", ear):
+        problem = await ear.hears("failed")
+        assert problem.code == "tls_untrusted"
+        assert "self" in problem.hint  # self-signed, in OpenSSL's words
+        await ear.hears("failed", 2)
+
+
+@on_both_loops
+async def test_secure_for_another_host(
+    certificate: Path, secure: ssl.SSLContext, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
+    ear = Ear()
+    async with bridging(ssl=secure) as bridge, linked(f"wss://localhost:{bridge.port}", ear):
+        assert (await ear.hears("failed")).code == "tls_untrusted"
+
+
+@on_both_loops
+async def test_a_bridge_without_tls_dialled_with_wss() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(f"wss://127.0.0.1:{bridge.port}", ear):
+        problem = await ear.hears("failed")
+        assert problem.code == "tls"
+        assert f"ws://127.0.0.1:{bridge.port}" in problem.hint
+        await ear.hears("failed", 2)
+
+
+@pytest.mark.parametrize("handler", [hang_up, saying(b"", first=True)], ids=["hangs up", "silent"])
+@on_both_loops
+async def test_something_without_words_dialled_with_wss(handler: Handler) -> None:
+    ear = Ear()
+    async with answering(handler) as port, linked(f"wss://127.0.0.1:{port}", ear):
+        assert (await ear.hears("failed")).code in ("tls", "timeout")
+
+
+@on_both_loops
+async def test_a_bridge_with_tls_dialled_with_ws(secure: ssl.SSLContext) -> None:
+    ear = Ear()
+    async with bridging(ssl=secure) as bridge, linked(f"ws://127.0.0.1:{bridge.port}", ear):
+        problem = await ear.hears("failed")
+        assert "wss://" in problem.hint
+        await ear.hears("failed", 2)

@@ -1,0 +1,337 @@
+"""What a bridge can send that is no proper operation: counted with its reason, and the link goes on."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import subprocess
+import sys
+import time
+from typing import Any
+
+import cbor2
+import orjson
+import psutil
+import pytest
+
+from server.rosbridge import link as link_module
+from server.rosbridge.link import MAX_MESSAGE_BYTES, MAX_SKIPPED_BYTES
+from tests.server.ear import Ear, accept, answering, bridging, linked, text_frame
+from tests.server.loops import on_both_loops
+from tests.tree import PROJECT
+
+GOOD = {"op": "publish", "topic": "/a", "msg": {"data": 1}}
+
+JUNK: dict[str, tuple[bytes | str, str]] = {
+    "binary noise": (b"\xff\xfe\xfd", "binary noise"),
+    "an empty binary frame": (b"", "binary noise"),
+    "a PNG": (b"\x89PNG\r\n\x1a\n", "binary noise"),
+    "text noise": ("hello", "text that is not JSON"),
+    "an empty frame": ("", "text that is not JSON"),
+    "a list": ("[]", "a frame that is not an object"),
+    "a number": ("1", "a frame that is not an object"),
+    "100 000 deep": ("[" * 100_000 + "]" * 100_000, "a message of too many parts"),
+    "1000 deep": ('{"op":' + "[" * 1000 + "]" * 1000 + "}", "a frame that nests too deep"),
+    "no operation": ("{}", "an operation that rosbridge does not have"),
+    "an unknown operation": ('{"op":"explode"}', "an operation that rosbridge does not have"),
+    "an operation that is a number": ('{"op":1}', "an operation that rosbridge does not have"),
+    "an operation that is a list": ('{"op":["publish"]}', "an operation that rosbridge does not have"),
+    "an operation that is an object": ('{"op":{}}', "an operation that rosbridge does not have"),
+    "a client's operation": ('{"op":"subscribe","topic":"/a"}', "an operation that rosbridge does not have"),
+    "a fragment": ('{"op":"fragment","id":"1","data":"{","num":0,"total":2}', "a fragment, which was not asked for"),
+    "a publish without msg": ('{"op":"publish","topic":"/a"}', "a publish without topic or msg"),
+    "a publish without topic": ('{"op":"publish","msg":{}}', "a publish without topic or msg"),
+    "a topic that is a list": ('{"op":"publish","topic":["/a"],"msg":{}}', "a publish without topic or msg"),
+    "a CBOR bomb": (b"\x9b\x7f\xff\xff\xff\xff\xff\xff\xff", "binary noise"),
+    "a CBOR list": (cbor2.dumps([GOOD]), "a frame that is not an object"),
+    "a CBOR object that holds itself": (b"\xd8\x1c\xa1\x62op\xd8\x1d\x00", "binary noise"),
+}
+
+
+@pytest.mark.parametrize(("frame", "why"), JUNK.values(), ids=JUNK)
+async def test_junk_is_counted_and_harms_nothing(frame: bytes | str, why: str) -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear):
+        await ear.hears("opened")
+        await bridge.say(frame)
+        await bridge.say(GOOD)
+        await ear.hears("message")
+        assert ear.told == [("opened", None), ("junk", why), ("message", ("/a", {"data": 1}, None))]
+
+
+QUIET: dict[str, bytes | str] = {
+    "an answer to nobody": '{"op":"service_response","id":"call:/x:9","values":{},"result":true}',
+    "an answer without id": '{"op":"service_response","values":{}}',
+    "an answer with a list for an id": '{"op":"service_response","id":[1],"values":{}}',
+    "an answer with an object for an id": '{"op":"service_response","id":{"a":[]},"values":{}}',
+    "an answer with an array for an id": cbor2.dumps({"op": "service_response", "id": cbor2.CBORTag(85, b"\0" * 8)}),
+}
+
+
+@pytest.mark.parametrize("frame", QUIET.values(), ids=QUIET)
+async def test_answers_that_nobody_waits_for_are_passed_over(frame: bytes | str) -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear):
+        await ear.hears("opened")
+        await bridge.say(frame)
+        await bridge.say(GOOD)
+        await ear.hears("message")
+        assert [name for name, _ in ear.told] == ["opened", "message"]
+
+
+STATUS: dict[str, tuple[dict[str, Any], tuple[str, str]]] = {
+    "words": ({"level": "error", "msg": "no such topic"}, ("error", "no such topic")),
+    "nothing": ({}, ("", "")),
+    "many words": ({"level": "e" * 999, "msg": "m" * 99_999}, ("e" * 20, "m" * 500)),
+    "no words": ({"level": 3, "msg": {"deep": [1]}}, ("(int)", "(dict)")),
+    "a long list": ({"level": None, "msg": [1.5] * 100_000}, ("", "(list)")),
+}
+
+
+@pytest.mark.parametrize(("fields", "told"), STATUS.values(), ids=STATUS)
+async def test_what_the_bridge_says_is_told_in_short(fields: dict[str, Any], told: tuple[str, str]) -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear):
+        await ear.hears("opened")
+        await bridge.say({"op": "status"} | fields)
+        assert await ear.hears("status") == told
+
+
+@on_both_loops
+async def test_indulgence_is_noted() -> None:
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear):
+        await ear.hears("opened")
+        await bridge.say('{"op":"publish","topic":"/fix","msg":{"position_covariance":[NaN]}}')
+        topic, message, note = await ear.hears("message")
+        assert topic == "/fix"
+        assert message["position_covariance"][0] != message["position_covariance"][0]
+        assert note == "bare NaN or Infinity, read as unknown"
+
+
+@on_both_loops
+async def test_a_message_of_20_mb_is_skipped_and_the_link_stays() -> None:
+    """Hanging up would not help: the next message of that topic would be as large, and the link would flap for ever."""
+    ear = Ear()
+    async with bridging() as bridge, linked(bridge.address, ear):
+        await ear.hears("opened")
+        before = psutil.Process().memory_info().rss
+        await bridge.say(b"x" * 20_000_000)
+        await ear.hears("junk")
+        grown = psutil.Process().memory_info().rss - before
+        pieces = ['{"op":"publish","topic":"/big","msg":"', *["x" * 5_000_000] * 4, '"}']
+        await bridge.socket.send(pieces)  # in fragments, each small enough
+        await bridge.say(GOOD)
+        await ear.hears("message", within_s=8)
+        why = "a message of more than 16 MB"
+        assert ear.told == [
+            ("opened", None),
+            ("junk", why),
+            ("large", (None, 20_000_000)),
+            ("junk", why),
+            ("large", ("/big", sum(map(len, pieces)))),
+            ("message", ("/a", {"data": 1}, None)),
+        ]
+        assert grown < 37e6  # the sender in this process holds 20 MB of it; a copy kept by the link would make it 40
+
+
+@on_both_loops
+async def test_a_message_just_as_large_as_may_be_is_read() -> None:
+    ear = Ear()
+    empty = len(orjson.dumps({"op": "publish", "topic": "/a", "msg": ""}))
+    async with bridging() as bridge, linked(bridge.address, ear):
+        await ear.hears("opened")
+        await bridge.say({"op": "publish", "topic": "/a", "msg": "x" * (MAX_MESSAGE_BYTES - empty)})
+        await ear.hears("message", within_s=8)
+        await bridge.say({"op": "publish", "topic": "/a", "msg": "x" * (MAX_MESSAGE_BYTES - empty + 1)})
+        await ear.hears("junk", within_s=8)
+
+
+FAULTY = {
+    "more than any message has": (b"\x82\x7f" + (MAX_SKIPPED_BYTES + 1).to_bytes(8, "big") + b"x" * 1000, "256 MB"),
+    "a length of 9 exabytes": (b"\x81\x7f\x7f" + b"\xff" * 7, "MB"),
+    "a masked frame": (b"\x81\x82\x00\x00\x00\x00{}", "masked"),
+    "reserved bits": (b"\xf1\x02{}", "RSV"),
+    "an unknown kind of frame": (b"\x83\x00", "reserved opcode"),
+    "a fragment of nothing": (b"\x80\x02{}", "continuation"),
+    "a message inside a message": (b"\x01\x01{\x81\x02{}", "fragmented"),
+    "a long ping": (b"\x89\x7e\x00\x80" + b"x" * 128, "125"),
+    "a goodbye with half a code": (b"\x88\x01\x03", "close"),
+    "a goodbye with a wrong code": (b"\x88\x02\x00\x01", "close code"),
+}
+
+
+@pytest.mark.parametrize(("frame", "words"), FAULTY.values(), ids=FAULTY)
+async def test_what_is_no_websocket_any_more_ends_the_connection_and_it_is_made_anew(frame: bytes, words: str) -> None:
+    ear = Ear()
+    openings = 0
+
+    async def err_once(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        nonlocal openings
+        openings += 1
+        await accept(reader, writer)
+        writer.write(frame if openings == 1 else text_frame(orjson.dumps(GOOD)))
+        await asyncio.sleep(5)
+
+    async with answering(err_once) as port, linked(f"127.0.0.1:{port}", ear):
+        problem = await ear.hears("closed")
+        assert problem.code == "closed"
+        assert words in problem.hint
+        await ear.hears("message")
+        assert [name for name, _ in ear.told] == ["opened", "closed", "opened", "message"]
+
+
+@on_both_loops
+async def test_a_message_in_pieces_with_pings_between_is_whole() -> None:
+    ear = Ear()
+    text = orjson.dumps(GOOD)
+
+    async def split(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await accept(reader, writer)
+        pieces = (
+            text_frame(text[:5], final=False) + text_frame(b"hi", opcode=9) + text_frame(b"", opcode=0, final=False)
+        )
+        for letter in pieces + text_frame(text[5:], opcode=0):
+            writer.write(bytes([letter]))
+            await asyncio.sleep(0.0005)
+        await asyncio.sleep(5)
+
+    async with answering(split) as port, linked(f"127.0.0.1:{port}", ear):
+        assert await ear.hears("message") == ("/a", {"data": 1}, None)
+
+
+@on_both_loops
+async def test_ten_thousand_messages_at_once_come_in_order() -> None:
+    ear = Ear()
+    one = b"".join(text_frame(b'{"op":"publish","topic":"/a","msg":%d}' % n) for n in range(10_000))
+
+    async def flood(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await accept(reader, writer)
+        writer.write(one)
+        await asyncio.sleep(5)
+
+    async with answering(flood) as port, linked(f"127.0.0.1:{port}", ear):
+        await ear.hears("message", 10_000)
+        assert [message for _, message, _ in ear.all("message")] == list(range(10_000))
+
+
+# -- faults of our own -----------------------------------------------------------------------------------------------
+
+
+@on_both_loops
+async def test_a_listener_that_stumbles_costs_one_message_and_is_told_once() -> None:
+    ear = Ear()
+    told: list[logging.LogRecord] = []
+    handler = logging.Handler()
+    handler.emit = told.append  # type: ignore[method-assign]
+    link_module.log.addHandler(handler)
+    take = ear.message_received
+
+    def stumble(topic: str, message: Any, note: str | None) -> None:
+        if topic == "/bad":
+            raise KeyError(topic)
+        take(topic, message, note)
+
+    ear.message_received = stumble  # type: ignore[method-assign]
+    try:
+        async with bridging() as bridge, linked(bridge.address, ear):
+            await ear.hears("opened")
+            for _ in range(5):
+                await bridge.say({"op": "publish", "topic": "/bad", "msg": {}})
+            await bridge.say(GOOD)
+            await ear.hears("message")
+            assert ear.all("junk") == ["a message on which catgraph itself stumbled"] * 5
+            assert ear.all("closed") == []
+            assert len(told) == 1
+    finally:
+        link_module.log.removeHandler(handler)
+
+
+@on_both_loops
+async def test_a_listener_that_stumbles_over_a_failed_dial_does_not_end_the_dialling() -> None:
+    ear = Ear()
+    problems: list[Any] = []
+
+    def stumble(problem: Any) -> None:
+        problems.append(problem)
+        raise RuntimeError("no")
+
+    ear.dial_failed = stumble  # type: ignore[method-assign]
+    logging.getLogger("catgraph.link").addFilter(hush := lambda record: False)
+    try:
+        async with linked("127.0.0.1:1", ear):
+            deadline_s = time.monotonic() + 3
+            while len(problems) < 3 and time.monotonic() < deadline_s:
+                await asyncio.sleep(0.01)
+            assert len(problems) == 3
+    finally:
+        logging.getLogger("catgraph.link").removeFilter(hush)
+
+
+NOISY = """
+import asyncio, logging, sys, time
+from tests.server.ear import *
+from server.rosbridge.link import Subscription
+
+logging.basicConfig(level=logging.INFO)
+logging.getLogger("websockets").propagate = False  # the other side, which is only here in the test
+
+async def http(reader, writer):
+    writer.write(b"HTTP/1.1 404 X\\r\\n\\r\\n")
+
+async def rude(reader, writer):
+    await accept(reader, writer)
+    writer.write(b"\\xff\\xff")
+
+async def silent(reader, writer):
+    await accept(reader, writer)
+    await asyncio.sleep(3)
+
+async def hostile(reader, writer):
+    await accept(reader, writer)
+    writer.write(text_frame(b"noise") + text_frame(b"x" * 200, opcode=2) + b"\\x82\\x7f\\x7f" + b"\\xff" * 100)
+
+async def main():
+    ears = []
+
+    def link_to(address):
+        ears.append(Ear())
+        return linked(address, ears[-1])
+
+    async with answering(http) as a, answering(rude) as b, answering(silent) as c, answering(hostile) as d:
+        async with bridging() as e, link_to(f"127.0.0.1:{a}"), link_to(f"127.0.0.1:{b}"), \\
+                link_to(f"127.0.0.1:{c}"), link_to(f"127.0.0.1:{d}"), link_to("127.0.0.1:1"), \\
+                link_to(f"wss://127.0.0.1:{e.port}"), link_to(e.address) as last:
+            await asyncio.sleep(0.2)
+            last.subscribe(Subscription(topic="/a", type=None))
+            task = asyncio.create_task(last.call("/rosapi/get_time", timeout_s=0.1))
+            await asyncio.sleep(1.8)
+            e.sockets[-1].transport.abort()
+            await asyncio.sleep(0.1)
+            kinds = [set(kind for kind, _ in ear.told) for ear in ears]
+            assert kinds == [{"failed"}, {"opened", "closed"}, {"opened", "closed"}, {"opened", "junk", "closed"},
+                             {"failed"}, {"failed"}, {"opened", "closed"}], kinds
+            assert isinstance(task.exception(), Exception)
+    print("done")
+
+if sys.argv[1] == "uvloop":
+    import uvloop
+    uvloop.run(main())
+else:
+    asyncio.run(main())
+"""
+
+
+@pytest.mark.parametrize("loop", ["asyncio", "uvloop"])
+def test_nothing_of_all_this_reaches_the_operators_terminal(loop: str) -> None:
+    """However logging is set up: what a dropped connection means is told once, by us, in the page."""
+    ended = subprocess.run(
+        [sys.executable, "-W", "error", "-c", NOISY, loop],
+        cwd=PROJECT,
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+        env={"PATH": "/usr/bin:/bin"},
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "done\n", "")

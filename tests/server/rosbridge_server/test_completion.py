@@ -1,0 +1,95 @@
+"""What clients publish, checked and completed."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from server.rosbridge_server.completion import Misfit, stamp
+from server.rosbridge_server.types import MessageTypes
+
+ROS1, ROS2 = MessageTypes(1), MessageTypes(2)
+
+
+def test_what_was_left_out_is_zero_and_the_header_is_now() -> None:
+    made = ROS1.complete("nav_msgs/Odometry", {"header": {"frame_id": "odom"}, "child_frame_id": "base"}, 12.5)
+    assert made["header"] == {"seq": 0, "stamp": {"secs": 12, "nsecs": 500_000_000}, "frame_id": "odom"}
+    assert made["child_frame_id"] == "base"
+    assert made["pose"]["pose"]["orientation"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
+    assert np.array_equal(made["pose"]["covariance"], np.zeros(36))
+
+
+def test_a_given_stamp_stays() -> None:
+    made = ROS2.complete("std_msgs/msg/Header", {"stamp": {"sec": 3, "nanosec": 4}}, 12.5)
+    assert made == {"stamp": {"sec": 3, "nanosec": 4}, "frame_id": ""}
+    assert ROS1.complete("std_msgs/Time", {"data": "now"}, 2.0) == {"data": {"secs": 2, "nsecs": 0}}
+
+
+def test_arrays_become_typed_and_bytes_come_as_base64_or_numbers() -> None:
+    scan = ROS1.complete("sensor_msgs/LaserScan", {"ranges": [1, 2.5, math.nan]}, 0.0)
+    assert scan["ranges"].dtype == np.float32
+    for data in ("AP8=", [0, 255]):
+        assert ROS1.complete("std_msgs/UInt8MultiArray", {"data": data}, 0.0)["data"] == b"\x00\xff"
+    names = ROS1.complete("sensor_msgs/JointState", {"name": ["a", "b"]}, 0.0)
+    assert names["name"] == ["a", "b"]
+
+
+def test_empty_messages_and_unknown_types_pass() -> None:
+    assert ROS1.complete("std_msgs/Empty", {}, 0.0) == {}
+    assert ROS2.complete("std_msgs/msg/Empty", {}, 0.0) == {}
+    assert ROS1.complete("my_msgs/Strange", {"anything": [None]}, 0.0) == {"anything": [None]}
+
+
+@pytest.mark.parametrize(
+    ("type", "message", "why"),
+    [
+        ("geometry_msgs/Twist", {"linear": {"x": None}}, "a number for linear.x, got None"),
+        ("geometry_msgs/Twist", {"linear": {"x": "1"}}, "a number for linear.x, got '1'"),
+        ("geometry_msgs/Twist", {"linear": {"x": True}}, "a number for linear.x, got True"),
+        ("geometry_msgs/Twist", {"linear": {"x": 10**400}}, "a smaller number for linear.x, got a huge number"),
+        ("geometry_msgs/Twist", {"speed": 1}, "no field speed"),
+        ("geometry_msgs/Twist", {"linear": None}, "an object for linear, got None"),
+        ("std_msgs/Bool", {"data": 1}, "true or false for data"),
+        ("std_msgs/String", {"data": 1}, "text for data"),
+        ("std_msgs/Int8", {"data": 128}, "a whole number between -128 and 127 for data"),
+        ("std_msgs/Int8", {"data": 1.0}, "a whole number"),
+        ("std_msgs/UInt64", {"data": -1}, "a whole number"),
+        ("std_msgs/Time", {"data": 5}, "a time for data"),
+        ("std_msgs/UInt8MultiArray", {"data": [256]}, "a whole number between 0 and 255"),
+        ("std_msgs/UInt8MultiArray", {"data": "%%"}, "base64 or a list of numbers"),
+        ("sensor_msgs/NavSatFix", {"position_covariance": [0.0] * 8}, "takes 9 values for position_covariance, got 8"),
+        ("sensor_msgs/LaserScan", {"ranges": 5}, "a list for ranges"),
+        ("diagnostic_msgs/DiagnosticArray", {"status": [{"level": "x"}]}, "a number for status.level"),
+    ],
+)
+def test_what_does_not_fit_is_named(type: str, message: dict[str, Any], why: str) -> None:
+    with pytest.raises(Misfit, match=why):
+        ROS1.complete(type, message, 0.0)
+
+
+def test_a_definition_of_the_topic_s_own_counts() -> None:
+    types = MessageTypes(1)
+    types.learn(
+        "tank_msgs/Fuel", "float64 volume\ntank_msgs/Cap cap\n" + "=" * 80 + "\nMSG: tank_msgs/Cap\nbool open\n"
+    )
+    assert types.complete("tank_msgs/Fuel", {"volume": 3}, 0.0) == {"volume": 3.0, "cap": {"open": False}}
+    with pytest.raises(Misfit, match="no field colour"):
+        types.complete("tank_msgs/Fuel", {"colour": 3}, 0.0)
+
+
+@pytest.mark.parametrize("definition", ["this is no definition", "tank_msgs/Fuel again\n", "\0"])
+def test_a_bad_definition_does_no_harm(definition: str) -> None:
+    types = MessageTypes(1)
+    types.learn("tank_msgs/Fuel", definition)
+    types.complete("tank_msgs/Fuel", {}, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("at_s", "expected"), [(1464818234.25, (1464818234, 250_000_000)), (1.9999999999, (2, 0)), (0.0, (0, 0))]
+)
+def test_stamps_are_exact_and_carry(at_s: float, expected: tuple[int, int]) -> None:
+    assert stamp(at_s, 1) == {"secs": expected[0], "nsecs": expected[1]}
+    assert stamp(at_s, 2) == {"sec": expected[0], "nanosec": expected[1]}

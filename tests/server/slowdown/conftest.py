@@ -1,0 +1,103 @@
+"""A simulated car with a server that watches it, in the test's own loop; every command is seen at the car's bridge."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncIterator, Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from server.app.config import Config, Vehicle
+from server.simulator.service import CarService
+from tests.server.conftest import serving
+
+PATIENCE_S = 20.0
+
+
+class Field:
+    """One car, one server, one client of its API."""
+
+    def __init__(self, service: CarService, client: httpx.AsyncClient) -> None:
+        self.service = service
+        self.client = client
+        self.heard: list[tuple[float, str, dict[str, Any]]] = []  # what any client published, and when it arrived
+        self.driven: list[float] = []  # how fast the car was then
+        service.bridge.on_publish.append(self._hear)
+
+    def _hear(self, topic: str, kind: str, said: dict[str, Any]) -> None:
+        self.heard.append((time.monotonic(), topic, said))
+        self.driven.append(self.speed_mps)
+
+    @property
+    def speed_mps(self) -> float:
+        return self.service.car.motion.speed_mps
+
+    @property
+    def speeds(self) -> list[tuple[float, float]]:
+        """The ordered speeds and when they arrived."""
+        return [(at_s, said["linear"]["x"]) for at_s, topic, said in self.heard if topic == "/catvehicle/cmd_vel"]
+
+    async def state(self) -> dict[str, Any]:
+        found: dict[str, Any] = (await self.client.get("/api/state")).json()
+        return found
+
+    async def slow(self) -> dict[str, Any]:
+        found: dict[str, Any] = (await self.state())["decelerate"]
+        return found
+
+    async def post(self, what: str, **body: Any) -> httpx.Response:
+        return await self.client.post(f"/api/slow-down/{what}", json=body or None)
+
+    async def until(self, true: Callable[[Mapping[str, Any]], Any], seconds: float = PATIENCE_S) -> dict[str, Any]:
+        """The first state of which it is true."""
+        ends_s = time.monotonic() + seconds
+        while True:
+            state = await self.state()
+            if true(state):
+                return state
+            assert time.monotonic() < ends_s, state["decelerate"]
+            await asyncio.sleep(0.02)
+
+    async def armed(self, speed_mps: float = 4.0) -> None:
+        """Drives, and slow-down is armed."""
+        await self.until(lambda state: state["decelerate"]["state"] == "safe")
+        await self.until(lambda state: state["decelerate"]["rivals"] is not None)
+        await self.until(lambda _: self.speed_mps >= speed_mps)
+        assert (await self.post("arm")).status_code == 200
+
+    async def events(self, change: str = "slow_down") -> list[dict[str, Any]]:
+        found = (await self.client.get("/api/events", params={"limit": 1000})).json()["events"]
+        return [event for event in found if event["change"] == change]
+
+    async def steps(self) -> list[str]:
+        return [event["step"] for event in await self.events()]
+
+
+@contextlib.asynccontextmanager
+async def simulated(**how: Any) -> AsyncIterator[tuple[CarService, str]]:
+    """A car that drives, and the address of its bridge; `how`: of the CarService."""
+    service = CarService(**how)
+    port = await service.start()
+    try:
+        yield service, f"ws://127.0.0.1:{port}"
+    finally:
+        await service.stop()
+
+
+@contextlib.asynccontextmanager
+async def watching(service: CarService, address: str, data: Path | None = None) -> AsyncIterator[Field]:
+    """A server that watches it."""
+    config = Config(vehicles=(Vehicle(name="car", address=address),), data=data)
+    async with serving(config) as base, httpx.AsyncClient(base_url=base, timeout=10.0) as client:
+        yield Field(service, client)
+
+
+@contextlib.asynccontextmanager
+async def field(**how: Any) -> AsyncIterator[Field]:
+    """Both."""
+    async with simulated(**how) as (service, address), watching(service, address) as car:
+        yield car

@@ -1,0 +1,116 @@
+"""Two operators and one car: anybody slows it, only the one in control arms and releases; what is late is refused."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+
+from tests.server.slowdown.conftest import Field, field
+from tests.server.viewer import Viewer, viewer
+
+pytestmark = pytest.mark.slow
+SEEN = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready"}
+
+
+class Phone:
+    """A page of an operator, seen all the time."""
+
+    def __init__(self, name: str, page: Viewer) -> None:
+        self.name = name
+        self._page = page
+
+    async def order(self, kind: str, **fields: Any) -> dict[str, Any]:
+        """The answer to a command."""
+        identity = f"{kind} {time.monotonic()}"
+        await self._page.send({"kind": kind, "id": identity, **fields})
+        ends_s = time.monotonic() + 10
+        while True:
+            for said in self._page.other:
+                if said.get("id") == identity:
+                    return said
+            assert time.monotonic() < ends_s
+            await asyncio.sleep(0.01)
+
+    async def slow(self, **late: float) -> dict[str, Any]:
+        """Slow down, with what proves that it is new."""
+        newest = self._page.states[-1]["server"]["time_ms"]
+        held_s = time.time() - self._page.got_s[-1]
+        return await self.order("slow_down", **{"pressed_ago_s": 0.01, "heard_ms": newest, "held_s": held_s} | late)
+
+
+@contextlib.asynccontextmanager
+async def phone(car: Field, name: str) -> AsyncIterator[Phone]:
+    async with viewer(str(car.client.base_url).rstrip("/")) as page:
+        await page.send({"kind": "hello", "name": name, "page": f"page-of-{name.lower()}", "have_event": 0})
+        await page.send(SEEN)
+        await page.state()
+
+        async def be_seen() -> None:
+            while True:
+                await asyncio.sleep(1.0)
+                await page.send(SEEN)
+
+        seen = asyncio.create_task(be_seen())
+        try:
+            yield Phone(name, page)
+        finally:
+            seen.cancel()
+            with contextlib.suppress(asyncio.CancelledError, Exception):
+                await seen
+
+
+async def test_anybody_may_slow_the_car_and_only_the_one_in_control_releases_it() -> None:
+    async with field() as car, phone(car, "Ann") as ann, phone(car, "Ben") as ben:
+        await car.until(lambda state: state["decelerate"]["state"] == "safe")
+        await car.until(lambda _: car.speed_mps > 4.0)
+        assert (await ann.order("arm"))["ok"]  # and takes control by it
+        refused = await ben.order("disarm")
+        assert not refused["ok"]
+        assert "Ann is in control" in refused["reason"]
+        assert (await ben.slow())["ok"]
+        order = (await car.slow())["order"]
+        assert order["by"] == "Ben"
+        assert order["steps"]["pressed_ms"] <= order["steps"]["server_ms"]
+        assert (await ann.slow())["ok"]  # a second press, of another: the same order
+        assert (await car.slow())["order"]["number"] == order["number"]
+        refused = await ben.order("release", number=order["number"])
+        assert not refused["ok"]
+        assert (await car.slow())["order"] is not None
+        assert (await ann.order("release", number=order["number"]))["ok"]
+        assert (await car.slow())["state"] == "armed"
+
+
+@pytest.mark.parametrize(
+    ("late", "is_obeyed"),
+    [({"pressed_ago_s": 0.2}, True), ({"pressed_ago_s": 0.5}, False), ({"held_s": 0.0, "heard_ms": 1.7e12}, False)],
+)
+async def test_what_was_pressed_too_long_ago_is_refused(late: dict[str, float], is_obeyed: bool) -> None:
+    async with field() as car, phone(car, "Ann") as ann:
+        await car.armed(1.0)
+        answer = await ann.slow(**late)
+        assert answer["ok"] is is_obeyed
+        if not is_obeyed:
+            assert "pressed" in answer["reason"]
+            assert await car.steps() == ["refused"]
+            assert car.speeds == []
+
+
+async def test_an_order_outlives_the_phone_that_gave_it() -> None:
+    async with field() as car:
+        async with phone(car, "Ann") as ann:
+            await car.until(lambda state: state["decelerate"]["state"] == "safe")
+            await car.until(lambda _: car.speed_mps > 4.0)
+            await ann.order("arm")
+            assert (await ann.slow())["ok"]
+        await car.until(lambda _: car.speed_mps == 0.0)  # the phone is gone
+        state = await car.state()
+        assert state["decelerate"]["state"] == "holding"
+        async with phone(car, "Ben") as ben:
+            await car.until(lambda state: state["control"]["holder"] is None)
+            assert (await ben.order("release", number=state["decelerate"]["order"]["number"]))["ok"]
+            await car.until(lambda _: car.speed_mps > 1.0)

@@ -1,0 +1,149 @@
+"""The page's joined files: made of what lies here now, or not used."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import httpx
+import pytest
+
+from server.app.config import Config
+from server.system.page_files import static_dir
+from server.web.assets.bundle import STYLES, find, join
+from server.web.routes.pages import parts_of
+from tests.server.conftest import serving
+from tests.tree import PROJECT
+
+TOOLS = PROJECT / "node_modules" / ".bin"
+NODE = shutil.which("node") or "node"
+
+
+@pytest.fixture
+def static(tmp_path: Path) -> Path:
+    """A small page that loads a part of itself later."""
+    (tmp_path / "js").mkdir()
+    (tmp_path / "css").mkdir()
+    (tmp_path / "js" / "app.js").write_text(
+        "import { word } from './words.js';\nconsole.log(word);\n"
+        "globalThis.later = () => import('./later.js');\nglobalThis.theirs = () => import('../vendor/theirs.js');\n"
+        "globalThis.thread = new URL('./scan-painter.js', import.meta.url).href;\n"
+    )
+    (tmp_path / "js" / "scan-painter.js").write_text(
+        "import { word } from './words.js';\nconsole.log('painting', word);\n"
+    )
+    (tmp_path / "js" / "words.js").write_text("// said at once\nexport const word = 'hello';\n")
+    (tmp_path / "js" / "later.js").write_text(
+        "import { word } from './words.js';\nexport const said = word + ' later';\n"
+    )
+    (tmp_path / "js" / "early.js").write_text("// before all others\n(() => {\n  globalThis.early = 'first';\n})();\n")
+    for name in STYLES:
+        (tmp_path / "css" / f"{name}.css").write_text(f".{name} {{ color: red; }}\n")
+    (tmp_path / "css" / "tokens.css").write_text("@font-face { font-family: n; src: url('../fonts/n.woff2'); }\n")
+    join(TOOLS, tmp_path)
+    return tmp_path
+
+
+def test_what_is_installed_here_is_current() -> None:
+    built = find(static_dir())
+    assert built is not None, "run `make test`, or `python -m server.web.assets.bundle node_modules/.bin`"
+    assert all((static_dir() / name).is_file() for name in (built.script, built.style, *built.needed))
+
+
+def test_the_joined_script_says_what_the_many_said_and_the_rest_comes_later(static: Path) -> None:
+    built = find(static)
+    assert built is not None
+    program = (
+        f"await import({json.dumps(str(static / built.script))}); console.log((await later()).said);"
+        "theirs().catch((why) => console.log(why.message));"
+    )
+    done = subprocess.run([NODE, "--input-type=module", "-e", program], capture_output=True, text=True, check=True)
+    first, second, third = done.stdout.splitlines()
+    assert (first, second) == ("hello", "hello later")
+    assert str(static / "vendor" / "theirs.js") in third, "others' files are not joined, and are found from here too"
+    assert " later" not in (static / built.script).read_text() + "".join((static / n).read_text() for n in built.needed)
+    style = (static / built.style).read_text()
+    assert re.findall(r"\.(\w+)\{", style) == list(STYLES[1:]), "in their order"
+    assert "../fonts/n.woff2" in style
+    assert "first" in built.early
+    assert "before" not in built.early, "without comments"
+    assert "\n" not in built.early
+
+
+def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(static: Path) -> None:
+    built = find(static)
+    assert built is not None
+
+    def thread() -> Path:
+        found = find(static)
+        assert found is not None
+        program = f"await import({json.dumps(str(static / found.script))}); console.log(globalThis.thread);"
+        done = subprocess.run([NODE, "--input-type=module", "-e", program], capture_output=True, text=True, check=True)
+        return Path(done.stdout.splitlines()[-1].removeprefix("file://"))
+
+    first = thread()
+    said = subprocess.run([NODE, "--input-type=module", "-e", first.read_text()], capture_output=True, text=True)
+    assert said.stdout == "painting hello\n"
+    (static / "js" / "scan-painter.js").write_text("console.log('painting anew');\n")
+    join(TOOLS, static)
+    second = thread()
+    assert second.name != first.name
+    assert second.is_file()
+    renewed = find(static)
+    assert renewed is not None
+    assert renewed.script != built.script, "what asks for another thread is another script"
+
+
+@pytest.mark.parametrize("changed", ["js/words.js", "js/later.js", "css/wide.css"])
+def test_after_a_change_the_joined_files_are_not_used(static: Path, changed: str) -> None:
+    assert find(static) is not None
+    before = (static / changed).read_text()
+    (static / changed).write_text(before + "\n/* new */\n")
+    assert find(static) is None
+    (static / changed).write_text(before)
+    assert find(static) is not None, "it is the content that counts, and no time"
+    (static / "js" / "new.js").write_text("export {};\n")
+    assert find(static) is None
+
+
+@pytest.mark.parametrize("what", ["absent", "torn", "foreign", "lost"])
+def test_a_damaged_folder_is_no_folder(static: Path, what: str) -> None:
+    listed = static / "built" / "built.json"
+    match what:
+        case "absent":
+            listed.unlink()
+        case "torn":
+            listed.write_text(listed.read_text()[:40])
+        case "foreign":
+            listed.write_text('["built"]')
+        case "lost":
+            next((static / "built").glob("app-*.js")).unlink()
+    assert find(static) is None
+
+
+def test_what_cannot_be_joined_is_said_with_the_reason(static: Path) -> None:
+    (static / "js" / "later.js").write_text("import './nowhere.js';\n")
+    with pytest.raises(SystemExit, match=r"nowhere\.js"):
+        join(TOOLS, static)
+    assert find(static) is None
+
+
+async def test_the_page_begins_with_few_files_that_may_be_kept_for_ever() -> None:
+    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+        text = (await client.get("/")).text
+        named = re.findall(r'(?:src|href)="(/static/built/[^"]+)"', text)
+        assert 2 <= len(named) <= 20
+        for path in named:
+            answer = await client.get(path, headers={"Accept-Encoding": "gzip"})
+            assert answer.status_code == 200
+            assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"
+
+
+def test_without_joined_files_all_are_named_and_none_may_be_kept_unasked() -> None:
+    parts = parts_of(None, lambda name: f"/static/{name}?v=1")
+    assert parts["script"] == "/static/js/app.js?v=1"
+    assert parts["styles"] == [f"/static/css/{name}.css?v=1" for name in STYLES]
+    assert parts["needed"] == []
