@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,10 +15,10 @@ from server.access.cookie import Cookies
 from server.access.devices import Device, Devices
 from server.access.identity import LOCAL, Role, Who
 from server.access.invitations import PIN_DIGITS, Invitation, Invitations
+from server.access.keys import Keys
 from server.access.names import Names
 from server.access.pin_throttle import Guesses
 from server.access.tickets import Tickets
-from server.app.config import Config
 from server.control import display_name
 
 log = logging.getLogger("catgraph.access")
@@ -47,15 +47,29 @@ class Known:
 class Access:
     """Everything of one server that decides who is let in."""
 
-    def __init__(self, config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> None:
-        """Raises OSError where its folder cannot be used, ValueError where the configuration names nonsense."""
-        self._config = config
+    def __init__(
+        self,
+        data: Path | None,
+        *,
+        names: Sequence[str],
+        keys: Keys,
+        is_open: bool,
+        now: Callable[[], float],
+        wall_ms: Callable[[], int],
+    ) -> None:
+        """`data`: the data folder, None: nothing is kept. `names`: what else this server is called.
+        `is_open`: everybody who reaches this server may act, because it listens on this machine only.
+
+        Raises OSError where its folder cannot be used, ValueError where `names` holds nonsense.
+        """
+        self.is_open = is_open
+        self._keys = keys
         self._now = now
         self._wall_ms = wall_ms
-        self._folder: Path | None = None if config.data is None else config.data / FOLDER
+        self._folder: Path | None = None if data is None else data / FOLDER
         if self._folder is not None:
             secret_file.folder(self._folder)
-        self.names = Names(config.names, is_open=config.is_open)
+        self.names = Names(names, is_open=is_open)
         self.devices = Devices(self._folder)
         self.visits = Visits()
         self._invitations = Invitations()
@@ -66,11 +80,6 @@ class Access:
         self._removed: dict[str, str] = {}  # devices that were removed in this run: why
         self.address: str | None = None  # where phones reach this server, as it was announced
         self.on_paired: Callable[[str, Role], None] = lambda name, role: None  # a device came in: its name and role
-
-    @property
-    def is_open(self) -> bool:
-        """Whether everybody who reaches this server may act: it listens on this machine only."""
-        return self._config.is_open
 
     # -- invitations -------------------------------------------------------------------------------------------------
 
@@ -183,7 +192,7 @@ class Access:
             return Known(who=LOCAL, by="local")
         authorization = headers.get("authorization")
         if authorization is not None:
-            program = self._config.keys.who(authorization)
+            program = self._keys.who(authorization)
             return None if program is None else Known(who=program, by="key")
         read = self._read_cookie(headers, scheme)
         if read is None:

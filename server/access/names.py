@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 import ifaddr
 
-from server.app.config import is_loopback
+from server.system.loopback import is_loopback
 
 _AUTHORITY = re.compile(r"(\[[0-9a-f:.]{2,45}\]|[a-z0-9._-]{1,253})(?::([0-9]{1,5}))?")
 _LOOK_EVERY_S = 2.0

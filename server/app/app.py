@@ -8,10 +8,8 @@ import secrets
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from fastapi import FastAPI
 from starlette.types import ASGIApp
@@ -31,12 +29,9 @@ from server.recording.recover import Recovered
 from server.recording.recovery import recover_left
 from server.replay.manager import Desk
 from server.storage.data_folder import DataFolder
-from server.system.page_files import static_dir
 from server.vehicle.session import Session
-from server.vehicle.vitals import problems
 from server.version import catgraph_version
-from server.web.assets.bundle import find
-from server.web.assets.service_worker import build_of
+from server.web.maps.layers import Ground
 from server.web.maps.tile_proxy import Upstream
 from server.web.middleware import errors
 from server.web.middleware.access_guard import Guard
@@ -49,63 +44,9 @@ from server.web.routes import log as alarm_log
 from server.web.routes import mail as web_mail
 from server.web.routes import map as web_ground
 from server.web.routes import recordings as web_recordings
-from server.web.routes.map import Ground
+from server.web.services import Services
 
 log = logging.getLogger("catgraph.app")
-
-
-@dataclass(slots=True)
-class Running:
-    """What the routes of one app use."""
-
-    config: Config
-    folder: DataFolder | None  # held until the app ends; None: nothing is kept
-    bus: LocalBus
-    hub: Hub
-    access: Access
-    sessions: dict[str, Session]
-    now: Callable[[], float]
-    wall_ms: Callable[[], int]
-    boot: str
-    version: str
-    started_s: float
-    ground: Ground
-    mailer: Mailer | None  # None: nothing is kept, so nothing is mailed
-    recordings: Catalog | None  # None: nothing is kept, so nothing is recorded
-    desk: Desk
-    exports: Exports | None = None  # None: nothing is kept, so nothing is exported
-
-    def server_facts(self) -> dict[str, Any]:
-        """The `server` part of a state."""
-        return {
-            "time_ms": self.wall_ms(),
-            "boot": self.boot,
-            "version": self.version,
-            "pages": self.hub.pages,
-            "frames_skipped": self.hub.skipped,
-        }
-
-    def problems(self) -> list[str]:
-        """What is wrong with the server, a sentence each; those of a vehicle begin with its name."""
-        found = [f"{name}: {what}" for name, session in self.sessions.items() for what in problems(session.vitals())]
-        if self.recordings is not None:
-            found += self.recordings.problems()
-        if self.mailer is not None:
-            found += self.mailer.problems()
-        return found
-
-    def hello(self, vehicle: str) -> dict[str, Any]:
-        return {
-            "kind": "hello",
-            "version": self.version,
-            "boot": self.boot,
-            "vehicle": vehicle,
-            "vehicles": list(self.sessions),
-            "build": build_of(find(static_dir())),
-            "time_ms": self.wall_ms(),
-            "last_event": self.bus.last_event(vehicle),
-            "veil_after_s": 2.0,
-        }
 
 
 def create_app(
@@ -126,12 +67,14 @@ def create_app(
     journal = Journal(config.data / "events.sqlite" if config.data is not None else None)
     bus = LocalBus(journal, now=now)
     desk = Desk(lambda id: _recording(running, id), now=now)
-    running = Running(
-        config=config,
+    running = Services(
+        is_open=config.is_open,
+        keeps_shell=config.worker,
+        found=config.found,
         folder=folder,
         bus=bus,
         hub=Hub(bus, desk=desk, server=lambda: running.server_facts(), limits=config.limits, now=now),
-        access=Access(config, now=now, wall_ms=wall_ms),
+        access=_access(config, now=now, wall_ms=wall_ms),
         sessions={},
         now=now,
         wall_ms=wall_ms,
@@ -197,7 +140,8 @@ def create_app(
         docs_url=None,  # FastAPI's own page loads its scripts from the internet
         redoc_url=None,
     )
-    app.state.running = running
+    app.state.services = running
+    app.state.strict_transport = config.tls is not None and config.tls.mode == "files"
     app.add_middleware(Throttle, limits=config.limits, now=now)
     app.add_middleware(Guard, access=running.access)
     errors.install(app)
@@ -220,10 +164,11 @@ class _Served(FastAPI):
     """Every answer has the headers: those of a bug too, which Starlette gives outside of all that is added to it."""
 
     def build_middleware_stack(self) -> ASGIApp:
-        config: Config = self.state.running.config
-        return SecurityHeaders(
-            super().build_middleware_stack(), is_strict=config.tls is not None and config.tls.mode == "files"
-        )
+        return SecurityHeaders(super().build_middleware_stack(), is_strict=self.state.strict_transport)
+
+
+def _access(config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Access:
+    return Access(config.data, names=config.names, keys=config.keys, is_open=config.is_open, now=now, wall_ms=wall_ms)
 
 
 def _upstream(config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Callable[[], Upstream] | None:
@@ -247,7 +192,7 @@ def _mailer(data: Path | None, path_of: Callable[[str], Path | None], *, wall_ms
     return None if data is None else Mailer(data / "mail", Recorded(path_of), wall_ms=wall_ms)
 
 
-def _recover(running: Running) -> asyncio.Task[None] | None:
+def _recover(running: Services) -> asyncio.Task[None] | None:
     """Begins to make whole what the last run left, which must be looked for before anything is recorded anew."""
     recordings = running.recordings
     if recordings is None:
@@ -269,6 +214,6 @@ def _recover(running: Running) -> asyncio.Task[None] | None:
     return asyncio.create_task(recover_left(left, told=told), name="recover recordings") if left else None
 
 
-def _recording(running: Running, id: str) -> Path | None:
+def _recording(running: Services, id: str) -> Path | None:
     """Where a finished recording lies."""
     return None if running.recordings is None else running.recordings.path(id)

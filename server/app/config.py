@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,15 +9,9 @@ from typing import Literal
 
 from server.access.keys import Keys
 from server.protocol.rate_limit import Limits
+from server.system.loopback import is_loopback
+from server.vehicle.vehicle import Vehicle
 from server.web.maps.map_options import MapUpstream
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Vehicle:
-    """A vehicle to watch; without an address it waits for one from the connect screen."""
-
-    name: str
-    address: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,29 +54,7 @@ class Config:
         return not self.is_open if self.tls is None else self.tls.mode != "off"
 
 
-def is_loopback(host: str) -> bool:
-    """Whether `host` means this machine and nothing else; no name but localhost is looked up."""
-    if host.lower() == "localhost":
-        return True
-    try:
-        address = ipaddress.ip_address(host)
-    except ValueError:
-        return False
-    mapped = getattr(address, "ipv4_mapped", None)
-    return (mapped or address).is_loopback
-
-
 def default_data() -> Path:
     """The folder for what is kept, where none is named."""
     base = os.environ.get("XDG_DATA_HOME")
     return (Path(base) if base else Path.home() / ".local" / "share") / "catgraph"
-
-
-def vehicle_from_text(text: str, *, index: int) -> Vehicle:
-    """`NAME=ws://car:9090` or only the address. Raises ValueError with one sentence."""
-    name, separator, address = text.partition("=")
-    if not separator or "://" in name:
-        name, address = ("car" if index == 0 else f"car{index + 1}"), text
-    if not name or not name.replace("-", "").replace("_", "").isalnum() or len(name) > 40:
-        raise ValueError(f"“{name[:40]}” is no name for a vehicle: use letters, digits, - and _.")
-    return Vehicle(name=name, address=address)

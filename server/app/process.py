@@ -19,7 +19,7 @@ import uvicorn
 
 from server.access.invitations import LASTS_S
 from server.app import tls_options
-from server.app.app import Running, create_app
+from server.app.app import create_app
 from server.app.banner import Announcement, Pairing, addresses, invitation, lines
 from server.app.config import Config, Tls, default_data
 from server.app.tls_process import Secured, Server, secure, serve_secured
@@ -31,6 +31,7 @@ from server.tls.setup import Whereabouts
 from server.web.maps import map_options
 from server.web.maps.mbtiles import MapRefused
 from server.web.middleware import http_protocol
+from server.web.services import Services
 
 log = logging.getLogger("catgraph.serving")
 
@@ -115,7 +116,7 @@ async def serve(config: Config) -> int:
             timeout_graceful_shutdown=2,
         )
     )
-    _announce(config, port, secured, explainer, app.state.running)
+    _announce(config, port, secured, explainer, app.state.services)
     _settle_memory()
     if secured is None:
         await server.serve(sockets=[listening])
@@ -163,7 +164,7 @@ def _listen_to_explain(config: Config, secured: Secured | None, port: int) -> so
 
 
 def _announce(
-    config: Config, port: int, secured: Secured | None, explainer: socket.socket | None, running: Running
+    config: Config, port: int, secured: Secured | None, explainer: socket.socket | None, running: Services
 ) -> None:
     """Tells people (and, on the first line, scripts) where it is."""
     said = Announcement(config=config, url=_plain_url(config.host, port))
@@ -188,12 +189,12 @@ def _announce(
         running.access.on_paired = lambda name, role: _tell_paired(running, said.url, f"{name} was paired as {role}.")
 
 
-def _tell_paired(running: Running, url: str, what: str) -> None:
+def _tell_paired(running: Services, url: str, what: str) -> None:
     for line in invitation(url, _pairing(running), f"  {what} The next device:"):
         print(line, flush=True)
 
 
-def _pairing(running: Running) -> Pairing:
+def _pairing(running: Services) -> Pairing:
     next_one = running.access.invitation()
     return Pairing(token=next_one.token, pin=next_one.pin, minutes=round(LASTS_S / 60))
 

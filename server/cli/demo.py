@@ -8,10 +8,11 @@ import sys
 
 from server.access.keys import keys_from
 from server.app import tls_options
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.app.process import CannotServe, add_common_arguments, serve
 from server.app.process import run as run_server
 from server.cli.simulate import CarService
+from server.vehicle.vehicle import Vehicle
 from server.web.maps import map_options
 
 

@@ -8,9 +8,10 @@ import sys
 
 from server.access.keys import keys_from
 from server.app import tls_options
-from server.app.config import Config, Vehicle, vehicle_from_text
+from server.app.config import Config
 from server.app.process import CannotServe, add_common_arguments, serve
 from server.app.process import run as run_server
+from server.vehicle.vehicle import Vehicle, vehicle_from_text
 from server.web.maps import map_options
 
 

@@ -18,8 +18,8 @@ from monitor.signals import SIGNALS
 
 HEAD = """# Alarms and thresholds
 
-Made from the declarations in `monitor/checks/` by `python -m server.protocol.reference > docs/alarms.md`; a test fails when it
-is out of date.
+Made from the declarations in `monitor/checks/` by `python -m server.protocol.reference > docs/alarms.md`.
+A test fails when it is out of date.
 
 Each check answers *OK*, *FAULT* or *not checked* (why). A fault that lasts for the *on* delay raises the alarm, *OK*
 that lasts for the *off* delay clears it; *not checked* does neither. While an alarm of the column *explained by*

@@ -26,8 +26,8 @@ from server.recording.read.encode import Misfit
 from server.recording.read.schemas import Schema, TypeBook, standard
 from server.recording.space import Allowance, Space
 from server.rosbridge.codec import TooManyParts, Unreadable
+from server.rosbridge.message_bytes import Unencodable, json_bytes
 from server.rosbridge.raw_frame import RawFrame
-from server.rosbridge_server.encoding import Unencodable, json_bytes
 
 log = logging.getLogger("catgraph.recorder")
 

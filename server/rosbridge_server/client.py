@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 from websockets.exceptions import ConnectionClosed
 
 from server.judge.ros_names import BadName
+from server.rosbridge.message_bytes import Unencodable
 from server.rosbridge_server import fields
 from server.rosbridge_server.calls import Calls
 from server.rosbridge_server.completion import Misfit
 from server.rosbridge_server.connection import Connection
-from server.rosbridge_server.encoding import Encoding, Outgoing, Unencodable, json_frame
+from server.rosbridge_server.encoding import Encoding, Outgoing, json_frame
 from server.rosbridge_server.fields import Refused
 from server.rosbridge_server.fragments import Fragments
 from server.rosbridge_server.graph import Topic

@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-import base64
-import math
-from typing import Any, Literal
+from typing import Literal
 
 import cbor2
-import numpy as np
 import orjson
 
 from server.judge.message import Json
+from server.rosbridge.message_bytes import cbor_bytes, json_bytes
 
 Encoding = Literal["json", "cbor"]
 
 _TEXT, _BINARY = 0x1, 0x2
-
-# RFC 8746 tags for typed arrays, little-endian. uint8 has none here: rosbridge sends byte arrays as plain byte strings.
-_ARRAY_TAGS = {
-    "u2": 69, "u4": 70, "u8": 71,
-    "i1": 72, "i2": 77, "i4": 78, "i8": 79,
-    "f4": 85, "f8": 86,
-}  # fmt: skip
-
-
-class Unencodable(ValueError):
-    """The message holds something that neither JSON nor CBOR can carry."""
 
 
 def frame(opcode: int, payload: bytes) -> bytes:
@@ -53,26 +40,6 @@ def binary_frame(payload: bytes) -> bytes:
 def json_frame(message: Json) -> bytes:
     """A text frame of one JSON object; NaN and ±Inf become null."""
     return frame(_TEXT, json_bytes(message))
-
-
-def json_bytes(message: Any) -> bytes:
-    """JSON as rosbridge writes it: NaN and ±Inf as null, byte arrays as base64, numpy arrays as lists."""
-    try:
-        return orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY, default=_json_default)
-    except TypeError:
-        pass  # an array in foreign byte order, a key that is no text, a lone surrogate: take the slow road once
-    try:
-        return orjson.dumps(_plain(message))
-    except (TypeError, RecursionError) as error:
-        raise Unencodable(str(error)) from None
-
-
-def cbor_bytes(message: Any) -> bytes:
-    """CBOR as rosbridge writes it: NaN and ±Inf kept, numeric arrays as little-endian typed arrays, bytes as bytes."""
-    try:
-        return cbor2.dumps(message, default=_cbor_default)
-    except (TypeError, ValueError, RecursionError, cbor2.CBOREncodeError) as error:
-        raise Unencodable(str(error)) from None
 
 
 class Outgoing:
@@ -108,46 +75,3 @@ class Outgoing:
 _CBOR_OP = cbor2.dumps("op") + cbor2.dumps("publish")
 _CBOR_TOPIC = cbor2.dumps("topic")
 _CBOR_MSG = cbor2.dumps("msg")
-
-
-def _json_default(value: Any) -> Any:
-    if isinstance(value, bytes | bytearray | memoryview):
-        return base64.b64encode(value).decode("ascii")
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} cannot be sent")
-
-
-def _plain(value: Any) -> Any:
-    """The same value in plain Python, for what the fast road refuses."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, str):
-        return value.encode("utf-8", "replace").decode("utf-8")
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, bool | int) or value is None:
-        return value
-    return _json_default(value)
-
-
-def _cbor_default(encoder: Any, value: Any) -> None:
-    if isinstance(value, np.ndarray):
-        encoder.encode(_typed_array(value))
-    elif isinstance(value, np.generic):
-        encoder.encode(value.item())
-    else:
-        raise TypeError(f"{type(value).__name__} cannot be sent")
-
-
-def _typed_array(array: np.ndarray[Any, Any]) -> Any:
-    code = array.dtype.kind + str(array.dtype.itemsize)
-    if array.ndim == 1 and code in _ARRAY_TAGS:
-        return cbor2.CBORTag(_ARRAY_TAGS[code], array.astype("<" + code, copy=False).tobytes())
-    if array.ndim == 1 and code == "u1":
-        return array.tobytes()
-    return array.tolist()

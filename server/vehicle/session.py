@@ -18,7 +18,6 @@ from monitor.signal_limits import expected_rates
 from monitor.state import LinkFacts, Phase, State
 from monitor.transport import TransportDelay
 from monitor.trends import Trends
-from server.app.config import Vehicle
 from server.bus.bus import LocalBus
 from server.control.authorization import Caller, Gate
 from server.judge import pipeline
@@ -48,6 +47,7 @@ from server.vehicle.scan_feed import ScanFeed
 from server.vehicle.state_frame import Facts, state_frame
 from server.vehicle.subscriptions import Conversation
 from server.vehicle.undelivered import CLIENT_COUNT
+from server.vehicle.vehicle import Vehicle
 from server.vehicle.vitals import Vitals
 
 log = logging.getLogger("catgraph.session")

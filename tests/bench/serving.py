@@ -74,7 +74,7 @@ async def main() -> None:
     kept = tempfile.TemporaryDirectory()  # the alarm log is on a disk, as in earnest
     with contextlib.redirect_stdout(announced):
         running = asyncio.create_task(process.serve(Config(port=0, data=Path(kept.name))))
-        while "listens on" not in announced.getvalue() or not made[-1].state.running.bus.vehicles:
+        while "listens on" not in announced.getvalue() or not made[-1].state.services.bus.vehicles:
             if running.done():
                 running.result()
             await asyncio.sleep(0.01)
@@ -82,7 +82,7 @@ async def main() -> None:
 
     async def command(**command: Any) -> Any:
         """What a page may ask for: connect, disconnect."""
-        return await made[-1].state.running.bus.request(VEHICLE, command)
+        return await made[-1].state.services.bus.request(VEHICLE, command)
 
     async def timings() -> dict[str, Any]:
         """Calls and processor time [ns] of the timed functions so far, and the clock [ns]."""

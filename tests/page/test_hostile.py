@@ -10,10 +10,11 @@ from typing import Any
 import httpx
 from playwright.async_api import expect
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.recording.catalog import annotations as remarks
 from server.recording.catalog.annotations import Remarks
 from server.rosbridge_server.graph import SOURCE, Topic
+from server.vehicle.vehicle import Vehicle
 from tests.page.conftest import Phone
 from tests.page.roamer import Roamer, roaming
 from tests.page.test_policy import NOTE_VIOLATIONS, violations

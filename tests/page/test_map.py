@@ -14,7 +14,8 @@ import pytest
 from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import expect
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
+from server.vehicle.vehicle import Vehicle
 from tests.page.conftest import Phone
 from tests.page.radio import Radio
 from tests.page.roamer import Roamer, roaming

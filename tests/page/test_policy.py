@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from playwright.async_api import expect
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
+from server.vehicle.vehicle import Vehicle
 from tests.page.conftest import Phone
 from tests.page.roamer import roaming
 from tests.page.test_map import plan

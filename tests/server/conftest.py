@@ -13,8 +13,9 @@ import uvicorn
 from fastapi import FastAPI
 
 from server.app.app import create_app
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
 from server.web.middleware import http_protocol
 
 

@@ -17,10 +17,10 @@ import numpy as np
 import orjson
 import pytest
 
-from server.app.config import Vehicle
 from server.bus.bus import LocalBus
 from server.bus.journal import Journal
 from server.vehicle.session import Session
+from server.vehicle.vehicle import Vehicle
 from tests.world.bridge_player import FILES, Player, name_of, playing
 
 pytestmark = [

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.cli.main import main
 from server.judge.message import RosVersion
 from server.recording.folder import RecordingsFolder
@@ -20,6 +20,7 @@ from server.rosbridge.rosapi_client import Asks
 from server.rosbridge_server.server import RosBridge
 from server.vehicle import delivery, discovery
 from server.vehicle.undelivered import CLIENT_COUNT, Passing
+from server.vehicle.vehicle import Vehicle
 from tests.server.cars import scan, twist
 from tests.server.conftest import serving
 from tests.server.rosbridge_server.conftest import bridging

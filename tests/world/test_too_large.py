@@ -9,10 +9,11 @@ import cbor2
 import orjson
 import pytest
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.rosbridge.large_message import ENDS_BYTES, topic_of
 from server.rosbridge.link import MAX_MESSAGE_BYTES
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.rosbridge_server.conftest import bridging

@@ -1,7 +1,8 @@
 """Reads a recording once and tells what a list says of it: how long, how far, how fast, which alarms, along which way.
 
-As a process of its own (`python -m server.recording.catalog.survey`): the path of a file in hex on each line of its input, what
-was found as one line of JSON on its output. It gives way to everything else on the machine, and a file that breaks it
+As a process of its own (`python -m server.recording.catalog.survey`): the path of a file in hex on each line of its
+input, what was found as one line of JSON on its output. It gives way to everything else on the machine, and a file
+that breaks it
 breaks nothing else.
 """
 

@@ -7,7 +7,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from server.judge.message import Json
-from server.rosbridge_server.encoding import Outgoing, json_bytes
+from server.rosbridge.message_bytes import json_bytes
+from server.rosbridge_server.encoding import Outgoing
 from server.rosbridge_server.real import cbor, text
 from server.rosbridge_server.real.raw import raw_bytes
 from server.rosbridge_server.real.shape import Lost

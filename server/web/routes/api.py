@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import orjson
 from fastapi import APIRouter, Body, HTTPException, Query, Request, Response, WebSocket
@@ -14,9 +14,7 @@ from server.control import display_name
 from server.replay import commands
 from server.replay.manager import NoReplay
 from server.web.middleware.errors import Problem
-
-if TYPE_CHECKING:
-    from server.app.app import Running
+from server.web.services import Services, services
 
 router = APIRouter()
 NAME_HEADER = "x-catgraph-name"  # what the caller wants to be called in the log
@@ -51,12 +49,7 @@ class AcknowledgeRequest(BaseModel):
     occurrence: int = Field(ge=0, le=2**53, description="Which occurrence was seen; an older one is refused")
 
 
-def running(connection: Request | WebSocket) -> Running:
-    found: Running = connection.app.state.running
-    return found
-
-
-def vehicle_of(app: Running, name: str | None) -> str:
+def vehicle_of(app: Services, name: str | None) -> str:
     if name is None:
         return next(iter(app.sessions))
     if name not in app.sessions:
@@ -69,7 +62,7 @@ async def ask(request: Request, vehicle: str | None, message: dict[str, Any]) ->
 
     Who gave the order is in the log as the header X-Catgraph-Name has it, else as "api" and the program's name.
     """
-    app = running(request)
+    app = services(request)
     by = display_name.clean(request.headers.get(NAME_HEADER)) or display_name.of_program(
         request.headers.get("user-agent")
     )
@@ -90,7 +83,7 @@ def _sender(request: Request) -> dict[str, Any]:
         "who": who_of(request).id,
         "page": None,
         "fence": int(fence) if fence.isascii() and fence.isdigit() and len(fence) < 16 else None,
-        "console": running(request).config.is_open,
+        "console": services(request).is_open,
     }
 
 
@@ -101,7 +94,7 @@ async def _ask_either(
     if replay is None:
         return await ask(request, vehicle, message)
     try:
-        return await running(request).desk.by_token(replay).ask(message)
+        return await services(request).desk.by_token(replay).ask(message)
     except NoReplay as why:
         raise HTTPException(404, str(why)) from None
 
@@ -113,7 +106,7 @@ def _json(body: Any) -> Response:
 @router.get("/api/health", tags=["server"], summary="Is the server well?")
 async def health(request: Request) -> Response:
     """200 and "ok", or 503 and "impaired" with the problems. A caller who is not known gets status and version only."""
-    app = running(request)
+    app = services(request)
     found = app.problems()
     body: dict[str, Any] = {"status": "impaired" if found else "ok", "version": app.version}
     if is_known(request):
@@ -132,13 +125,13 @@ async def health(request: Request) -> Response:
 
 @router.get("/api/vehicles", tags=["vehicle"], summary="The vehicles this server watches, and those found nearby")
 async def vehicles(request: Request) -> dict[str, Any]:
-    app = running(request)
+    app = services(request)
     return {
         "vehicles": [
             {"name": name, "address": session.address_url or session.configured, "phase": session.phase}
             for name, session in app.sessions.items()
         ],
-        "found": [{"name": vehicle.name, "address": vehicle.address} for vehicle in app.config.found],
+        "found": [{"name": vehicle.name, "address": vehicle.address} for vehicle in app.found],
     }
 
 
@@ -184,7 +177,7 @@ async def events(
     after: Annotated[int, Query(ge=0, le=2**53)] = 0,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> Response:
-    app = running(request)
+    app = services(request)
     name = vehicle_of(app, vehicle)
     return _json({"events": app.bus.events_after(name, after, limit), "last": app.bus.last_event(name)})
 
@@ -261,7 +254,7 @@ async def change_settings(
 @router.get("/api/settings.toml", tags=["settings"], summary="What was changed, as a TOML file")
 async def export_settings(request: Request, vehicle: VehicleName = None) -> Response:
     body = await ask(request, vehicle, {"kind": "settings"})
-    name = f"catgraph-{vehicle_of(running(request), vehicle)}.toml"
+    name = f"catgraph-{vehicle_of(services(request), vehicle)}.toml"
     return Response(
         body["toml"],
         media_type="application/toml; charset=utf-8",
@@ -294,7 +287,7 @@ async def page_socket(
     socket: WebSocket, vehicle: str | None = None, replay: str | None = None, t: str | None = None
 ) -> None:
     """The page's socket; docs/protocol.md. `replay`: the recording it begins with, `t` seconds after its beginning."""
-    app = running(socket)
+    app = services(socket)
     name = vehicle if vehicle is not None else next(iter(app.sessions))
     if name not in app.sessions:
         await socket.close(code=1008, reason="no such vehicle")

@@ -14,9 +14,9 @@ from server.access.devices import Device
 from server.access.identity import Role, Who, who_of
 from server.access.invitations import LASTS_S
 from server.access.tickets import LASTS_S as TICKET_LASTS_S
-from server.app.config import is_loopback
+from server.system.loopback import is_loopback
 from server.web.middleware.errors import Problem
-from server.web.routes.api import running
+from server.web.services import services
 
 router = APIRouter()
 DeviceId = Annotated[str, Path(max_length=40)]
@@ -72,7 +72,7 @@ def _me(who: Who) -> Me:
 
 @router.post("/api/pair", tags=["access"], summary="Pair this device by the token of a link or a PIN")
 async def pair(request: Request, response: Response, body: Annotated[PairRequest, Body()]) -> Me:
-    access = running(request).access
+    access = services(request).access
     if access.is_open:
         return _me(who_of(request))
     if (body.token is None) == (body.pin is None):
@@ -106,12 +106,12 @@ async def me(request: Request) -> Me:
 
 @router.post("/api/ticket", tags=["access"], summary="A ticket for one socket, within 5 s: /ws?ticket=…")
 async def ticket(request: Request) -> Ticket:
-    return Ticket(ticket=running(request).access.ticket(who_of(request)))
+    return Ticket(ticket=services(request).access.ticket(who_of(request)))
 
 
 @router.get("/api/devices", tags=["access"], summary="The paired devices, newest first")
 async def devices(request: Request) -> dict[str, Any]:
-    access = running(request).access
+    access = services(request).access
     return {
         "you": who_of(request).id,
         "open": access.is_open,
@@ -121,7 +121,7 @@ async def devices(request: Request) -> dict[str, Any]:
 
 @router.post("/api/devices/invite", tags=["access"], summary="A link and a PIN for one more device")
 async def invite(request: Request, body: Annotated[InviteRequest, Body()]) -> Invited:
-    access = running(request).access
+    access = services(request).access
     if access.is_open:
         raise HTTPException(409, "This server is open to its own machine only: nobody pairs. Start it with --host.")
     made = access.another(body.role)
@@ -133,7 +133,7 @@ async def invite(request: Request, body: Annotated[InviteRequest, Body()]) -> In
 @router.patch("/api/devices/{id}", tags=["access"], summary="Another role or name; it counts at once")
 async def change(request: Request, id: DeviceId, body: Annotated[DeviceChange, Body()]) -> dict[str, Any]:
     try:
-        device = running(request).access.change(id, role=body.role, name=body.name, but=answering())
+        device = services(request).access.change(id, role=body.role, name=body.name, but=answering())
     except OSError as why:
         raise HTTPException(503, f"{_NOT_KEPT}: {why.strerror or why}.") from None
     return _listed(request, _there(device))
@@ -141,7 +141,7 @@ async def change(request: Request, id: DeviceId, body: Annotated[DeviceChange, B
 
 @router.delete("/api/devices/{id}", tags=["access"], summary="It may not come any more, and what it has open ends now")
 async def remove(request: Request, id: DeviceId) -> dict[str, bool]:
-    access = running(request).access
+    access = services(request).access
     who = who_of(request)
     try:
         _there(access.remove(id, by="itself" if who.id == id else who.name, but=answering()))
@@ -164,7 +164,7 @@ def _listed(request: Request, device: Device) -> dict[str, Any]:
         "role": device.role,
         "paired_ms": device.paired_ms,
         "seen_ms": device.seen_ms,
-        "sockets": running(request).access.visits.sockets(device.id),  # pages it has open now
+        "sockets": services(request).access.visits.sockets(device.id),  # pages it has open now
     }
 
 
@@ -173,8 +173,8 @@ def _base(request: Request) -> str:
     server's own machine."""
     host = request.headers.get("host", "")
     name = host.partition(":")[0] if not host.startswith("[") else host.partition("]")[0][1:]
-    announced = running(request).access.address
+    announced = services(request).access.address
     if is_loopback(name) and announced is not None:
         return announced
-    access = running(request).access
+    access = services(request).access
     return f"{'https' if access.is_secure(request.url.scheme, host) else 'http'}://{host}/"

@@ -15,7 +15,7 @@ from server.recording.export.formats import FORMATS
 from server.recording.export.jobs import Exports, Job, NoSuchRecording, NotYet, TooMany
 from server.web.middleware.errors import Problem
 from server.web.middleware.ranges import file_answer
-from server.web.routes.api import running
+from server.web.services import services
 
 router = APIRouter(tags=["recordings"])
 Id = Annotated[str, InPath(max_length=100, description="The recording's `id` in the list")]
@@ -36,7 +36,7 @@ class ClipRequest(BaseModel):
 
 
 def exports(request: Request) -> Exports:
-    found: Exports | None = running(request).exports
+    found: Exports | None = services(request).exports
     if found is None:
         raise HTTPException(404, "This server keeps nothing: start it with --data FOLDER to have recordings.")
     return found
@@ -127,7 +127,7 @@ async def _file(request: Request, job: Job) -> Response:
 
 def _answer(request: Request, job: Job, path: Path) -> Response:
     """Named after the recording as the list has it."""
-    form, recordings = FORMATS[job.format], running(request).recordings
+    form, recordings = FORMATS[job.format], services(request).recordings
     row = recordings.row(job.of) if recordings is not None else None
     name = f"{job.of} {(row or {}).get('title') or ''}".strip()
     answer = file_answer(request, path, name=f"{name}.{form.ending}", media_type=form.media_type)

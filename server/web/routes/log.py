@@ -15,7 +15,8 @@ from fastapi.responses import Response, StreamingResponse
 from monitor.alarm_spec import Priority
 from server.bus.bus import LocalBus
 from server.bus.event_table import COLUMNS, event_row
-from server.web.routes.api import VehicleName, running, vehicle_of
+from server.web.routes.api import VehicleName, vehicle_of
+from server.web.services import services
 
 router = APIRouter()
 _PAGE = 500
@@ -78,7 +79,7 @@ async def log_page(
 ) -> Response:
     """`next_before` asks for the page after this one; null: there is none. A page may be short, even empty, with more
     to come: after 2000 events that do not fit, looking further is another request."""
-    app = running(request)
+    app = services(request)
     name = vehicle_of(app, vehicle)
     events, more = _page(app.bus, name, which, before, limit)
     body = {"events": events, "next_before": more, "last": app.bus.last_event(name)}
@@ -87,7 +88,7 @@ async def log_page(
 
 @router.get("/api/log.csv", tags=["alarms"], summary="The alarm log as CSV, oldest first")
 async def log_csv(request: Request, which: Wanted, vehicle: VehicleName = None) -> StreamingResponse:
-    app = running(request)
+    app = services(request)
     name = vehicle_of(app, vehicle)
     return StreamingResponse(
         _csv(_all(app.bus, name, which)),
@@ -98,7 +99,7 @@ async def log_csv(request: Request, which: Wanted, vehicle: VehicleName = None) 
 
 @router.get("/api/log.json", tags=["alarms"], summary="The alarm log as JSON, oldest first")
 async def log_json(request: Request, which: Wanted, vehicle: VehicleName = None) -> StreamingResponse:
-    app = running(request)
+    app = services(request)
     name = vehicle_of(app, vehicle)
     return StreamingResponse(
         _json(_all(app.bus, name, which)),

@@ -17,7 +17,8 @@ from server.mail.order import Format, Letter, Order, Recipient, State, TooLarge,
 from server.mail.settings import BadMailSetting, MailSettings, Security
 from server.mail.test_mail import Trial, TrialFailed, try_out
 from server.web.middleware.errors import Problem
-from server.web.routes.api import NAME_HEADER, running
+from server.web.routes.api import NAME_HEADER
+from server.web.services import services
 
 router = APIRouter(prefix="/api/mail", tags=["mail"])
 MAX_RECIPIENTS = 20
@@ -242,7 +243,7 @@ async def test(request: Request, body: Annotated[TrialIn, Body()]) -> TrialOut:
         if not address.is_allowed(to, mailer.settings.allowed):
             raise Problem(422, f"{to.shown} is not among the allowed recipients.", field="to")
     try:
-        found: Trial = await try_out(mailer.settings, to, running(request).wall_ms())
+        found: Trial = await try_out(mailer.settings, to, services(request).wall_ms())
     except TrialFailed as why:
         raise Problem(502, str(why)) from None
     return TrialOut(**asdict(found))
@@ -276,7 +277,7 @@ async def resend(request: Request, n: Number) -> MailOut:
 
 
 def _mailer(request: Request) -> Mailer:
-    found: Mailer | None = running(request).mailer
+    found: Mailer | None = services(request).mailer
     if found is None:
         raise Problem(404, "This server keeps nothing: start it with --data FOLDER to send mail.")
     return found

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, HTTPException, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from server.web.maps.mbtiles import Layer, MapFile
-from server.web.maps.site_image import SiteImage, site_image
+from server.web.maps.mbtiles import Layer
 from server.web.maps.tile_proxy import Upstream
-from server.web.routes.api import running
+from server.web.services import services
 
 router = APIRouter()
 _YEAR = "public, max-age=31536000, immutable"  # a file with other content has another name
@@ -21,38 +18,9 @@ _DAY_S = 86_400  # a phone keeps a fetched tile no longer: it may be another one
 _NUMBER = re.compile(r"[0-9]{1,9}")  # more digits are no tile's, and turning them into a number may cost or fail
 
 
-class Ground:
-    """What may be fetched, the open map files in the order in which they lie on it, and the picture above them."""
-
-    def __init__(
-        self, maps: Iterable[Path] = (), image: Path | None = None, upstream: Callable[[], Upstream] | None = None
-    ) -> None:
-        """Raises MapRefused."""
-        self.maps: dict[str, MapFile] = {}
-        self.upstream: Upstream | None = None
-        try:
-            for path in maps:
-                one = MapFile(path)
-                if one.layer.name in self.maps:
-                    one.close()
-                else:
-                    self.maps[one.layer.name] = one
-            self.image: SiteImage | None = site_image(image) if image is not None else None
-            self.upstream = upstream() if upstream is not None else None
-        except BaseException:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        for one in self.maps.values():
-            one.close()
-        if self.upstream is not None:
-            self.upstream.close()
-
-
 @router.get("/api/map", tags=["map"], summary="What lies under the map: layers of tiles, the picture of the site")
 async def ground(request: Request) -> dict[str, Any]:
-    under = running(request).ground
+    under = services(request).ground
     image, fetched = under.image, under.upstream
     layers = [] if fetched is None else [_told(fetched.layer) | {"upstream": fetched.told()}]
     return {
@@ -75,7 +43,7 @@ def _told(layer: Layer) -> dict[str, Any]:
 
 @router.get("/map/site/{name}", tags=["map"], summary="The picture of the site", response_class=Response)
 async def picture(request: Request, name: str) -> Response:
-    image = running(request).ground.image
+    image = services(request).ground.image
     if image is None or name != image.name:
         raise HTTPException(404, "There is no such picture.")
     return Response(image.data, media_type=image.media_type, headers={"Cache-Control": _YEAR})
@@ -88,7 +56,7 @@ async def picture(request: Request, name: str) -> Response:
     response_class=Response,
 )
 async def tile(request: Request, name: str, z: str, x: str, y: str) -> Response:
-    under = running(request).ground
+    under = services(request).ground
     found = under.maps.get(name)
     fetched = under.upstream if under.upstream is not None and under.upstream.layer.name == name else None
     if (found is None and fetched is None) or not all(_NUMBER.fullmatch(number) for number in (z, x, y)):

@@ -9,7 +9,7 @@ from fastapi.responses import PlainTextResponse
 
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.catalog_db import Which
-from server.web.routes.api import running
+from server.web.services import services
 
 router = APIRouter()
 _TEXT = "text/plain; version=0.0.4; charset=utf-8"
@@ -17,7 +17,7 @@ _TEXT = "text/plain; version=0.0.4; charset=utf-8"
 
 @router.get("/metrics", tags=["server"], summary="Counters, as Prometheus reads them", response_class=PlainTextResponse)
 async def metrics(request: Request) -> PlainTextResponse:
-    app = running(request)
+    app = services(request)
     lines = []
 
     def add(name: str, kind: str, help: str, rows: list[tuple[str, float]]) -> None:

@@ -24,7 +24,8 @@ from server.web.assets.manifest import manifest as manifest_of
 from server.web.assets.service_worker import OFFLINE, WORKER, Shell, build_of, shell_of, withdrawn
 from server.web.assets.static_files import StaticText, answer, packed
 from server.web.middleware.headers import policy_of
-from server.web.routes.api import running, vehicle_of
+from server.web.routes.api import vehicle_of
+from server.web.services import services
 
 log = logging.getLogger("catgraph.page")
 
@@ -83,10 +84,10 @@ def install(app: FastAPI) -> None:
 
     @app.get("/", response_class=HTMLResponse, include_in_schema=False)
     async def page(request: Request, vehicle: str | None = None) -> Response:
-        one, built = running(request), find(static)
+        one, built = services(request), find(static)
         access = "open" if one.access.is_open else "paired"
         context = {"version": one.version, "vehicle": vehicle_of(one, vehicle), "access": access}
-        body = page_of("page.html", request, built, worker=built is not None and one.config.worker, **context)
+        body = page_of("page.html", request, built, worker=built is not None and one.keeps_shell, **context)
         return sent(body, request, built)
 
     @app.get(OFFLINE, response_class=HTMLResponse, include_in_schema=False)
@@ -101,7 +102,7 @@ def install(app: FastAPI) -> None:
     async def worker(request: Request) -> Response:
         """The worker that keeps the shell; with single modules, or where there shall be none, the one that goes."""
         built = find(static)
-        is_kept = built is not None and running(request).config.worker
+        is_kept = built is not None and services(request).keeps_shell
         script = shell(request, built).worker(static) if built is not None and is_kept else withdrawn(static)
         answered = answer(packed(script.encode()), request.headers, "text/javascript; charset=utf-8", "no-cache")
         answered.headers["Service-Worker-Allowed"] = "/"

@@ -17,7 +17,7 @@ from server.recording.catalog.catalog import MAX_ROWS, Catalog, NotThere, Refuse
 from server.recording.catalog.catalog_db import Which
 from server.web.middleware.errors import Problem
 from server.web.middleware.ranges import file_answer
-from server.web.routes.api import running
+from server.web.services import services
 
 # None of these routes is `async`: they look at a disk, so they run in threads, and the event loop goes on.
 router = APIRouter(tags=["recordings"])
@@ -40,7 +40,7 @@ class Remarks(BaseModel):
 
 
 def catalog(request: Request) -> Catalog:
-    found: Catalog | None = running(request).recordings
+    found: Catalog | None = services(request).recordings
     if found is None:
         raise HTTPException(404, "This server keeps nothing: start it with --data FOLDER to have recordings.")
     return found

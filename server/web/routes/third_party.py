@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from server.system.page_files import static_dir
 from server.web.assets.third_party import Part, parts
-from server.web.routes.api import running
+from server.web.services import services
 
 router = APIRouter()
 
@@ -40,7 +40,7 @@ def _parts() -> tuple[Part, ...]:
 @router.get("/api/about", tags=["server"], summary="Versions of the server and of everything in it")
 def about(request: Request) -> About:
     return About(
-        version=running(request).version,
+        version=services(request).version,
         python=platform.python_version(),
         system=f"{platform.system()} {platform.machine()}",
         parts=[

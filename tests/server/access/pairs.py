@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -75,4 +75,9 @@ def cookie_of(browser: httpx.AsyncClient) -> str:
 async def paired_server(of: Config) -> AsyncIterator[Served]:
     app = create_app(of)
     async with serving_app(app, of) as base:
-        yield Served(base, app.state.running.access)
+        yield Served(base, app.state.services.access)
+
+
+def access_of(config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Access:
+    """As the app makes it."""
+    return Access(config.data, names=config.names, keys=config.keys, is_open=config.is_open, now=now, wall_ms=wall_ms)

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from server.access import pending_invitations, secret_file
-from server.access.access import Access
 from server.access.cookie import Cookies
 from server.access.devices import FORGOTTEN_AFTER_MS, MOST, Devices
 from server.access.identity import Role
@@ -18,8 +17,9 @@ from server.access.keys import BadKey, keys_from, keys_of
 from server.access.names import Names
 from server.access.pin_throttle import FEW, MANY, Guesses
 from server.access.tickets import Tickets
-from server.app.config import Config, is_loopback
-from tests.server.access.pairs import config
+from server.app.config import Config
+from server.system.loopback import is_loopback
+from tests.server.access.pairs import access_of, config
 
 DAY_MS = 86_400_000
 
@@ -54,7 +54,7 @@ def test_few_pins_stand_at_once() -> None:
 
 def test_the_terminal_shows_the_same_until_it_is_used_or_old() -> None:
     now_s = 0.0
-    access = Access(config(), now=lambda: now_s, wall_ms=lambda: 0)
+    access = access_of(config(), now=lambda: now_s, wall_ms=lambda: 0)
     told: list[tuple[str, Role]] = []
     access.on_paired = lambda name, role: told.append((name, role))
     first = access.invitation()
@@ -182,7 +182,7 @@ def test_under_tls_the_cookie_is_bound_to_this_host() -> None:
 
 def test_only_the_hash_of_a_secret_is_on_the_disk_and_only_for_the_servers_user(tmp_path: Path) -> None:
     os.umask(0)
-    access = Access(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 1000)
+    access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 1000)
     device, secret = access.pair(token=access.invite(), pin=None, name="Pixel", peer="")
     access.listens_at("http://192.168.4.1:8000/")
     pending_invitations.lay(tmp_path / "access", Role.VIEWER, wall_ms=0)
@@ -250,7 +250,7 @@ def test_names_are_told_apart_and_the_list_is_bounded(tmp_path: Path) -> None:
 
 
 def test_a_device_that_cannot_be_kept_is_not_paired(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    access = Access(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 0)
+    access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 0)
     token = access.invite()
     (tmp_path / "access" / "devices.json").unlink()
     (tmp_path / "access" / "devices.json").mkdir()  # nothing can take its place

@@ -8,8 +8,9 @@ import pytest
 import segno
 
 from server.app.banner import Announcement, Pairing, addresses, code, fingerprint_lines, lines
-from server.app.config import Config, Tls, Vehicle
+from server.app.config import Config, Tls
 from server.tls.setup import Whereabouts
+from server.vehicle.vehicle import Vehicle
 
 FINGERPRINT = ":".join(f"{n:02X}" for n in range(32))
 PAIRING = Pairing(token="a-token-that-nobody-guesses", pin="012345", minutes=10)

@@ -12,9 +12,10 @@ import orjson
 import websockets
 
 from server.access.identity import Role
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.recording.read.read import open_recording
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
 from tests.server.access.pairs import OPERATOR_KEY, cookie_of, keyed, paired_server
 from tests.server.cars import driving
 from tests.server.conftest import serving

@@ -14,7 +14,7 @@ import httpx
 import pytest
 import websockets
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.judge import profiles
 from server.judge.active_settings import Tuning
 from server.judge.profiles import GENERIC
@@ -22,6 +22,7 @@ from server.judge.settings import BadSetting, Settings, SettingsFile, change, di
 from server.judge.topics import candidates
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.queries import refusal
+from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving, twist
 from tests.server.conftest import serving
 from tests.server.viewer import viewer

@@ -12,7 +12,7 @@ import httpx
 import pytest
 
 from server.analysis.recorded_events import told_by
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.judge.active_settings import Tuning
 from server.judge.settings import SettingsFile
 from server.recording.controller import SessionRecording
@@ -21,6 +21,7 @@ from server.recording.read.read import open_recording
 from server.recording.recorded_topics import choose
 from server.recording.standing import read_standing
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
 from tests.page.processes import Process
 from tests.server.cars import driving
 from tests.server.conftest import serving

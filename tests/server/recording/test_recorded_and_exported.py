@@ -22,9 +22,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.recording.export.bag import write_bag
 from server.recording.read.read import Message, Recording, open_recording
+from server.vehicle.vehicle import Vehicle
 from tests.server.conftest import serving
 from tests.server.recording.bags import Drive, Row, write_ros1, write_ros2
 from tests.tree import PROJECT

@@ -17,9 +17,10 @@ import psutil
 import pytest
 import websockets
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.replay import manager
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
 from tests.page import drives
 from tests.server.cars import driving
 from tests.server.conftest import serving

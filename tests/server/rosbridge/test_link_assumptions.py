@@ -1,4 +1,4 @@
-"""What server/rosbridge/link.py takes for granted of roslibpy and of autobahn below it: another version fails here, loudly."""
+"""What server/rosbridge/link.py assumes of roslibpy and of autobahn below it: another version fails here."""
 
 from __future__ import annotations
 

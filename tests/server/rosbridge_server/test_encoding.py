@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from websockets.frames import Frame, Opcode
 
-from server.rosbridge_server.encoding import Encoding, Outgoing, Unencodable, cbor_bytes, frame, json_bytes
+from server.rosbridge.message_bytes import Unencodable, cbor_bytes, json_bytes
+from server.rosbridge_server.encoding import Encoding, Outgoing, frame
 
 NOT_NUMBERS = np.array([1.5, math.nan, math.inf, -math.inf], dtype=np.float32)
 

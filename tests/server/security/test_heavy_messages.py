@@ -16,11 +16,12 @@ import numpy as np
 import orjson
 import pytest
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.recording.read.read import open_recording
 from server.rosbridge import codec
 from server.rosbridge.codec import TooManyParts, Unreadable, decode
 from server.rosbridge.raw_frame import raw_frame
+from server.vehicle.vehicle import Vehicle
 from tests.server.conftest import serving
 from tests.server.security.heavy_bridge import JUDGED, MESSAGES, OTHER
 from tests.server.viewer import viewer

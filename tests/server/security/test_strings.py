@@ -22,11 +22,12 @@ import pytest
 from starlette.routing import Mount, Route
 
 from server.app.app import create_app
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.mail import address as mail_address
 from server.mail import compose
 from server.mail.compose import Attachment, Draft
 from server.rosbridge.address import BadAddress, parse, refuse_forbidden
+from server.vehicle.vehicle import Vehicle
 from server.web.middleware.ranges import disposition, file_name
 from tests.server.conftest import serving
 from tests.server.recording.made import record

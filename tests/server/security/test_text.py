@@ -9,11 +9,12 @@ import json
 import httpx
 import pytest
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.bus.event_table import safe_cell
 from server.protocol import commands
 from server.rosbridge_server.server import RosBridge
 from server.system.clean_text import clean, cleaned
+from server.vehicle.vehicle import Vehicle
 from server.web.page_socket import Page
 from tests.server.cars import driving
 from tests.server.conftest import serving

@@ -11,8 +11,9 @@ from typing import Any
 
 import httpx
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.simulator.service import CarService
+from server.vehicle.vehicle import Vehicle
 from tests.server.conftest import serving
 
 PATIENCE_S = 20.0

@@ -15,9 +15,10 @@ import pytest
 import websockets
 
 from server.app.app import create_app
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.protocol import commands
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
 from tests.server.access.test_rules import all_routes
 from tests.server.cars import driving
 from tests.server.conftest import serving_app

@@ -7,11 +7,12 @@ import asyncio
 import httpx
 import pytest
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.protocol import commands
 from server.protocol.rate_limit import SLOW_DOWN, Limits, Rate
 from server.slowdown.order import DESERTED_S
 from server.system.supervision import Supervisor
+from server.vehicle.vehicle import Vehicle
 from tests.server.conftest import serving
 from tests.server.slowdown.conftest import simulated
 from tests.server.slowdown.rig import Rig

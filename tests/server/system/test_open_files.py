@@ -6,10 +6,11 @@ import resource
 
 import pytest
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.system import open_files
 from server.system.open_files import KEPT_FREE, FilesExhausted, demand_free
+from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.viewer import viewer

@@ -14,10 +14,11 @@ import pytest
 
 from monitor.recorder import RecorderFacts
 from server.app.app import create_app
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.system.supervision import Supervisor
 from server.vehicle.session import Session
+from server.vehicle.vehicle import Vehicle
 from server.vehicle.vitals import Vitals, problems
 from tests.server.cars import driving
 from tests.server.conftest import serving_app
@@ -127,7 +128,7 @@ async def watched(bridge: RosBridge, tmp_path: Path) -> AsyncIterator[tuple[str,
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
     app = create_app(config)
     async with serving_app(app, config) as base, driving(bridge, speed=lambda _: 4.2):
-        session = app.state.running.sessions["car"]
+        session = app.state.services.sessions["car"]
         await until(lambda: session.phase == "monitoring", 10)
         yield base, session
 
@@ -180,7 +181,7 @@ async def test_a_part_that_fails_is_an_alarm_and_keeps_no_check_from_being_judge
         def fail(*_: Any) -> None:
             raise RuntimeError("broken")
 
-        monkeypatch.setattr(app.state.running.sessions["car"], part, fail)
+        monkeypatch.setattr(app.state.services.sessions["car"], part, fail)
         speed["now"] = 14.0
         state = await page.state(
             lambda state: {"speed_limit", "monitoring_impaired"} <= {alarm["id"] for alarm in state["alarms"]}

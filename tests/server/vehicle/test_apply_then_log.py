@@ -10,9 +10,10 @@ import httpx
 import pytest
 
 from server.app.app import create_app
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.session import Session
+from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
 from tests.server.conftest import serving_app
 from tests.server.viewer import viewer
@@ -29,7 +30,7 @@ async def test_a_limit_counts_although_the_log_fails_and_its_event_comes_later(
 ) -> None:
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
     app = create_app(config)
-    bus = app.state.running.bus
+    bus = app.state.services.bus
     async with serving_app(app, config) as base, driving(bridge, speed=lambda _: 4.2), viewer(base) as page:
         await page.state(lambda state: state["signals"]["speed"]["freshness"] == "fresh")
         with monkeypatch.context() as patch:
@@ -58,7 +59,7 @@ async def test_an_order_that_was_obeyed_is_answered_so(
 ) -> None:
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
     app = create_app(config)
-    session: Session = app.state.running.sessions["car"]
+    session: Session = app.state.services.sessions["car"]
     async with serving_app(app, config) as base, driving(bridge, speed=lambda _: 4.2), viewer(base) as page:
         await page.state(lambda state: state["signals"]["speed"]["freshness"] == "fresh")
         if broken == "frame":
@@ -79,7 +80,7 @@ async def test_a_limit_counts_before_it_is_logged(
 ) -> None:
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
     app = create_app(config)
-    session: Session = app.state.running.sessions["car"]
+    session: Session = app.state.services.sessions["car"]
     judged_by: list[float] = []
     monkeypatch.setattr(
         session._logbook, "settings", lambda *_, **__: judged_by.append(session._monitor.limits.speed_limit.max_mps)

@@ -14,9 +14,10 @@ import httpx
 import pytest
 
 from server.analysis.rehearse import rehearse
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.judge.pipeline import TICK_S
 from server.recording.read.read import open_recording
+from server.vehicle.vehicle import Vehicle
 from tests.environment import users_own
 from tests.server import scan_frames
 from tests.server.conftest import serving

@@ -11,11 +11,12 @@ import pytest
 from monitor.phones import NO_PHONE, PhoneWord
 from monitor.state import State
 from monitor.values import GpsFix, PhoneFix
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.protocol import commands
 from server.rosbridge_server.server import RosBridge
 from server.simulator.scenarios import planned
 from server.vehicle import phone
+from server.vehicle.vehicle import Vehicle
 from tests.server.conftest import serving
 from tests.server.riding import WALL_MS, Ride, Rider, ride
 from tests.server.viewer import Viewer, viewer

@@ -11,8 +11,9 @@ from typing import Any
 import httpx
 import pytest
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
 from tests.page.processes import Process
 from tests.server.cars import driving
 from tests.server.conftest import serving

@@ -12,8 +12,9 @@ import psutil
 import pytest
 
 from server.app.app import create_app
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
 from server.web.fair_wakeup import Turns
 from tests.server import scan_frames
 from tests.server.cars import driving, scan, twist
@@ -56,7 +57,7 @@ async def test_events_reach_a_page_before_a_state_is_made(bridge: RosBridge) -> 
             happened.append("told")
 
     async with serving_app(app, config), driving(bridge, speed=lambda _: speeds["now"]):
-        bus = app.state.running.bus
+        bus = app.state.services.bus
         writer = asyncio.create_task(page())
         bus.watch("car", watch)
         async with asyncio.timeout(20):

@@ -8,9 +8,10 @@ import httpx
 import pytest
 
 from monitor.state import Snapshot, TrackPoint
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle import queries
+from server.vehicle.vehicle import Vehicle
 from tests.server.cars import twist
 from tests.server.conftest import serving
 from tests.server.vehicle.test_phone import gps

@@ -115,8 +115,8 @@ async def serving(upstream: MapUpstream, data: Path, clock: Clock | None = None,
         async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
             yield Server(client, clock)
     finally:
-        app.state.running.ground.close()
-        app.state.running.folder.close()
+        app.state.services.ground.close()
+        app.state.services.folder.close()
 
 
 def drawn(path: str) -> bytes:

@@ -16,12 +16,20 @@ import pytest
 import websockets
 from starlette.types import Message, Receive, Scope, Send
 
-from server.access.access import Access
 from server.access.identity import Role
 from server.app.config import Config
 from server.protocol.rate_limit import Limits
 from server.web.middleware.access_guard import Guard
-from tests.server.access.pairs import OPERATOR_KEY, VIEWER_KEY, Served, config, cookie_of, keyed, paired_server
+from tests.server.access.pairs import (
+    OPERATOR_KEY,
+    VIEWER_KEY,
+    Served,
+    access_of,
+    config,
+    cookie_of,
+    keyed,
+    paired_server,
+)
 from tests.server.conftest import serving
 
 
@@ -386,7 +394,7 @@ async def test_a_request_of_who_is_removed_ends(served: Served) -> None:
 
 
 async def test_an_answer_half_given_to_who_is_removed_breaks_off() -> None:
-    access = Access(config(), now=time.monotonic, wall_ms=lambda: 1_790_000_000_000)
+    access = access_of(config(), now=time.monotonic, wall_ms=lambda: 1_790_000_000_000)
     device, secret = access.pair(token=access.invite(), pin=None, name="Lost", peer="")
     sent: list[str] = []
 

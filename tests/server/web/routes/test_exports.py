@@ -14,11 +14,12 @@ import orjson
 import pytest
 import pytest_asyncio
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.recording.export.clip import Window
 from server.recording.export.jobs import KEEP_BYTES, KEEP_S, MOST_WAITING, Exports, Job, NotYet, TooMany
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
+from server.vehicle.vehicle import Vehicle
 from tests.server.conftest import serving
 from tests.server.recording.export.ours import OurFile
 from tests.server.recording.made import BEGAN_MS, record

@@ -10,10 +10,11 @@ import httpx
 import pytest
 import pytest_asyncio
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.bus.event_table import COLUMNS
 from server.control import display_name
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.viewer import viewer

@@ -40,7 +40,7 @@ async def asking(**config: Any) -> AsyncIterator[httpx.AsyncClient]:
     app = create_app(Config(**config))
     async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
         yield client
-    app.state.running.ground.close()
+    app.state.services.ground.close()
 
 
 @pytest.fixture

@@ -14,7 +14,8 @@ import pytest_asyncio
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
+from server.vehicle.vehicle import Vehicle
 from tests.server.conftest import serving
 from tests.server.recording.made import BEGAN_MS, record
 

@@ -1,0 +1,23 @@
+"""Which car a session watches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vehicle:
+    """A vehicle to watch; without an address it waits for one from the connect screen."""
+
+    name: str
+    address: str | None = None
+
+
+def vehicle_from_text(text: str, *, index: int) -> Vehicle:
+    """`NAME=ws://car:9090` or only the address. Raises ValueError with one sentence."""
+    name, separator, address = text.partition("=")
+    if not separator or "://" in name:
+        name, address = ("car" if index == 0 else f"car{index + 1}"), text
+    if not name or not name.replace("-", "").replace("_", "").isalnum() or len(name) > 40:
+        raise ValueError(f"“{name[:40]}” is no name for a vehicle: use letters, digits, - and _.")
+    return Vehicle(name=name, address=address)
