@@ -59,7 +59,7 @@ def explaining(
     page = templates.get_template("setup.html")
     # Read once: the page must come while the disk is busy recording, and it never changes while the server runs.
     style = b"\n".join((static / "css" / name).read_bytes() for name in ("tokens.css", "setup.css"))
-    script = (static / "js" / "setup.js").read_bytes()
+    script = (static / "js" / "boot" / "setup.js").read_bytes()
     fonts = {name: (static / "fonts" / name).read_bytes() for name in FONTS}
     profile = mobileconfig(authority)
 

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { countWords, rowsOf } from '../../static/js/alarms-layout.js';
+import { countWords, rowsOf } from '../../static/js/alarms/alarms-layout.js';
 
 /** @param {string} id @param {any} [more] @returns {any} */
 const alarm = (id, more) => ({

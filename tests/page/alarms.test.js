@@ -1,10 +1,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { layOut, soundOf, stripOf, tilesOf } from '../../static/js/alarm-layout.js';
-import { showTiles } from '../../static/js/checks.js';
-import { dialogOf, linkWords, lossKey } from '../../static/js/dialogs.js';
-import { chainOf } from '../../static/js/link.js';
-import { eventWords } from '../../static/js/log-layout.js';
+import { layOut, soundOf, stripOf, tilesOf } from '../../static/js/alarms/alarm-layout.js';
+import { showTiles } from '../../static/js/alarms/checks.js';
+import { dialogOf, linkWords, lossKey } from '../../static/js/shell/dialogs.js';
+import { chainOf } from '../../static/js/core/link.js';
+import { eventWords } from '../../static/js/alarms/log-layout.js';
 import { alarm, state } from './frames.js';
 
 const link = (more = {}) => alarm({ id: 'link_lost', title: 'Connection lost', actions: ['reconnect', 'change_address', 'exit'], ...more });

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { badgeOf } from '../../static/js/badge.js';
+import { badgeOf } from '../../static/js/shell/badge.js';
 import { alarm, state } from './frames.js';
 
 const seen = { isSilent: false, isMonitoring: true, word: 'Live' };

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { ServerClock } from '../../static/js/clock.js';
+import { ServerClock } from '../../static/js/core/clock.js';
 
 const SKEW = 1_790_000_000_000; // the clocks of server and page have nothing to do with one another
 

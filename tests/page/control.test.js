@@ -3,11 +3,11 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { askedOf, chipOf, noticeOf, reachOf, seconds, sheetOf } from '../../static/js/control-layout.js';
-import { isApple } from '../../static/js/handset.js';
-import { phoneOf } from '../../static/js/map-words.js';
-import { nameOf, othersOn, phoneRow, phonesLine } from '../../static/js/phones-layout.js';
-import { rowsOf, verdictOf } from '../../static/js/this-phone-layout.js';
+import { askedOf, chipOf, noticeOf, reachOf, seconds, sheetOf } from '../../static/js/control/control-layout.js';
+import { isApple } from '../../static/js/phone/device-status.js';
+import { phoneOf } from '../../static/js/map/map-text.js';
+import { nameOf, othersOn, phoneRow, phonesLine } from '../../static/js/phone/phones-layout.js';
+import { rowsOf, verdictOf } from '../../static/js/phone/this-phone-layout.js';
 
 const FREE = { holder: null, page: null, fence: null, former: null, requests: [] };
 const ANNS = { ...FREE, holder: 'Ann', page: 'page-a', fence: 7 };

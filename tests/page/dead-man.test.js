@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { DeadMan } from '../../static/js/dead-man.js';
+import { DeadMan } from '../../static/js/core/dead-man.js';
 
 test('two seconds without a frame cover, and three fresh frames lift', () => {
   const man = new DeadMan();

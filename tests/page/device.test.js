@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { deviceName, kindOf } from '../../static/js/device.js';
+import { deviceName, kindOf } from '../../static/js/control/device-name.js';
 
 const AGENTS = /** @type {const} */ ([
   ['Mozilla/5.0 (Linux; Android 14; Pixel 7) AppleWebKit/537.36 (KHTML, like Gecko) Chrome/125.0.0.0 Mobile Safari/537.36', 'Pixel 7'],

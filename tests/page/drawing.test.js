@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Drawing } from '../../static/js/drawing.js';
-import { namesOf } from '../../static/js/undrawn.js';
+import { Drawing } from '../../static/js/core/drawing.js';
+import { namesOf } from '../../static/js/shell/undrawn.js';
 
 /** @param {Drawing} drawing @param {number} times */
 function draw(drawing, times) {

@@ -1,9 +1,9 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { takeEarly } from '../../static/js/early-socket.js';
-import { Wire } from '../../static/js/wire.js';
+import { takeEarly } from '../../static/js/boot/early-socket.js';
+import { Wire } from '../../static/js/core/socket.js';
 
-/** @typedef {import('../../static/js/early-socket.js').Early} Early */
+/** @typedef {import('../../static/js/boot/early-socket.js').Early} Early */
 
 class Socket {
   /** @type {string[]} */

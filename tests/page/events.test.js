@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { EventLog, gapWords } from '../../static/js/events.js';
+import { EventLog, gapWords } from '../../static/js/core/event-log.js';
 
 const event = (/** @type {number} */ n, change = 'raised') => /** @type {any} */ ({ n, at_ms: n, alarm: 'speed_limit', occurrence: 1, change, title: 'Speed', priority: 'critical', text: '' });
 

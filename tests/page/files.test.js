@@ -5,10 +5,10 @@ import { test } from 'node:test';
 
 import {
   alarmWords, choiceOf, countsOf, distanceWords, factWords, lengthWords, liveOf, nameOf, originWords, pointsOf, queryOf, sizeWords, tagsOf, warningWords, whenWords,
-} from '../../static/js/files-layout.js';
+} from '../../static/js/files/files-layout.js';
 
 const NOW = new Date(2026, 10, 21, 15, 0).getTime();
-const row = (more = {}) => /** @type {import('../../static/js/files-layout.js').Recording} */ ({
+const row = (more = {}) => /** @type {import('../../static/js/files/files-layout.js').Recording} */ ({
   id: 'car_1', vehicle: 'car', session: null, part: 1, started_ms: NOW - 3_600_000, length_s: 512.4, size_bytes: 38_000_000, distance_m: 1302, top_speed_mps: 12.64,
   alarms: { critical: 2, warning: 1, advisory: 0 }, title: '', note: '', tags: [], state: 'read', problem: null, damage: [], ended: 'closed', ended_why: null,
   is_clip: false, file: 'car_1.mcap', format: 'mcap', sketch: null, trashed_ms: null, ...more,

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { inkOf } from '../../static/js/freshness.js';
+import { inkOf } from '../../static/js/core/freshness.js';
 
 /** @returns {any} */
 const signal = (more = {}) => ({ freshness: 'fresh', age_s: 0.02, horizon_s: 1, period_s: 0.0133, ...more });

@@ -1,8 +1,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { accelerationAngle, digitsBox, faceOf, speedAngle } from '../../static/js/gauge-layout.js';
-import { onTape, stopsWords } from '../../static/js/nearest.js';
-import { pedalFill, steeringFill, steeringWords } from '../../static/js/pedals.js';
+import { accelerationAngle, digitsBox, faceOf, speedAngle } from '../../static/js/home/gauge-layout.js';
+import { onTape, stopsWords } from '../../static/js/home/nearest.js';
+import { pedalFill, steeringFill, steeringWords } from '../../static/js/home/pedals.js';
 
 test('V_max is 180°, reversing counts by its size, beyond the end is the end', () => {
   assert.deepEqual([0, 7.5, 15, 99, -7.5].map((v) => speedAngle(v, 15)), [0, 90, 180, 180, 90]);

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { bearing_deg, distance_m, mercatorScale, offsetOf, placeAt, placeOf, turnTo, turned } from '../../static/js/geodesy.js';
+import { bearing_deg, distance_m, mercatorScale, offsetOf, placeAt, placeOf, turnTo, turned } from '../../static/js/core/geodesy.js';
 
 /** @param {[number, number]} place */
 const at = ([lat_deg, lon_deg]) => ({ lat_deg, lon_deg });

@@ -31,10 +31,10 @@ def build(house: Path) -> None:
 
 def change(house: Path, word: str) -> None:
     """Another version of the page: the script that begins it and one that is fetched later both say `word`."""
-    for name in ("app.js", "log.js"):
+    for name, word_of in (("main.js", "app"), ("alarms/log.js", "log")):
         path = house / "static" / "js" / name
         text = path.read_text(encoding="utf-8").split("\n// --- another version ---\n")[0]
         path.write_text(
-            f"{text}\n// --- another version ---\ndocument.documentElement.dataset['{name[:3]}'] = '{word}';\n"
+            f"{text}\n// --- another version ---\ndocument.documentElement.dataset['{word_of}'] = '{word}';\n"
         )
     build(house)

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { chainOf } from '../../static/js/link.js';
+import { chainOf } from '../../static/js/core/link.js';
 import { state } from './frames.js';
 
 const now = { isSilent: false, silence_s: 0.1, lag_s: 0.1, heard_ms: 0 };

@@ -1,8 +1,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { heldWords } from '../../static/js/connect.js';
-import { asked, dayWords, joined, lowest, tookWords } from '../../static/js/log-layout.js';
-import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/standing.js';
+import { heldWords } from '../../static/js/shell/connect.js';
+import { asked, dayWords, joined, lowest, tookWords } from '../../static/js/alarms/log-layout.js';
+import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/alarms/standing.js';
 
 const ALARM = /** @type {any} */ ({ active: true, text: '12.6 m/s', trip_text: '11.2 m/s', state: 'UNACKED', acknowledged_by: null, shelved_by: null, shelved_until_ms: null });
 const noon_ms = new Date(2026, 5, 1, 12, 0, 0).getTime();

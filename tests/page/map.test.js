@@ -1,13 +1,13 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { distance_m, offsetOf, placeAt } from '../../static/js/geodesy.js';
+import { distance_m, offsetOf, placeAt } from '../../static/js/core/geodesy.js';
 import {
   CLOSEST, FIRST, WIDEST, between, bounded, ellipseOf, fitted, gridPaths, gridStep_m, groundMatrix, metresOf, panned, pictureMatrix, pixelOf, scaleBar_m, tileScale,
   upOf, zoomed,
-} from '../../static/js/map-layout.js';
-import { besideWay, inside } from '../../static/js/map-figure.js';
-import { MOST, Track, trackPaths } from '../../static/js/map-track.js';
-import { apartOf, bearingWords, carOf, distanceWords, phoneOf, pictureWords } from '../../static/js/map-words.js';
+} from '../../static/js/map/map-layout.js';
+import { besideWay, inside } from '../../static/js/map/map-figure.js';
+import { MOST, Track, trackPaths } from '../../static/js/map/map-track.js';
+import { apartOf, bearingWords, carOf, distanceWords, phoneOf, pictureWords } from '../../static/js/map/map-text.js';
 import { state } from './frames.js';
 
 const HERE = { lat_deg: 32.2319, lon_deg: -110.9501 };

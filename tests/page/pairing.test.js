@@ -7,11 +7,11 @@ import { test } from 'node:test';
 globalThis.location ??= /** @type {any} */ ({ hash: '', pathname: '/', search: '', origin: 'https://192.168.4.1:8000' });
 globalThis.window ??= /** @type {any} */ ({ addEventListener() {} });
 
-const { digitsOf, pinShown, reasonWords, triedWords, waitWords } = await import('../../static/js/pairing-layout.js');
-const { leftWords, removalWords, seenWords } = await import('../../static/js/devices-layout.js');
-const { thenOf } = await import('../../static/js/pair-link.js');
-const { forgetWork, OF_THE_WORK } = await import('../../static/js/forget.js');
-const { screenOf } = await import('../../static/js/page.js');
+const { digitsOf, pinShown, reasonWords, triedWords, waitWords } = await import('../../static/js/pairing/pairing-layout.js');
+const { leftWords, removalWords, seenWords } = await import('../../static/js/pairing/devices-layout.js');
+const { thenOf } = await import('../../static/js/boot/pairing-token.js');
+const { forgetWork, OF_THE_WORK } = await import('../../static/js/boot/forget.js');
+const { screenOf } = await import('../../static/js/shell/router.js');
 
 test('a PIN is its digits, however it is typed', () => {
   for (const [typed, digits, shown] of [['', '', ''], ['12', '12', '12'], ['123', '123', '123'], ['123 4', '1234', '123 4'], ['12-34-56-78', '123456', '123 456'], ['a1', '1', '1']]) {
@@ -88,7 +88,7 @@ test('whatever a page keeps is either forgotten, or is of the phone alone', asyn
   const OF_THE_PHONE = ['device', 'range', 'speed-unit', 'tab', 'theme', 'hand'];
   const OF_THE_TAB = ['phone', 'armed']; // gone with it
   const folder = new URL('../../static/js/', import.meta.url);
-  const texts = await Promise.all((await readdir(folder)).filter((name) => name.endsWith('.js')).map((name) => readFile(new URL(name, folder), 'utf8')));
+  const texts = await Promise.all((await readdir(folder, { recursive: true })).filter((name) => name.endsWith('.js')).map((name) => readFile(new URL(name, folder), 'utf8')));
   const kept = new Set(texts.flatMap((text) => [...text.matchAll(/'catgraph\.([a-z-]+)'/g)].map(([, name]) => name)));
   assert.deepEqual([...kept].sort(), [...OF_THE_WORK, ...OF_THE_PHONE, ...OF_THE_TAB].sort());
 });

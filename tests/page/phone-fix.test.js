@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { FixClock, Teller, whyOf } from '../../static/js/phone-fix.js';
+import { FixClock, Teller, whyOf } from '../../static/js/phone/phone-fix.js';
 
 const HOUR_MS = 3_600_000;
 const coords = { latitude: 32.23, longitude: -110.95, accuracy: 5, altitude: null, speed: NaN, heading: NaN };

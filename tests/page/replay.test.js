@@ -1,12 +1,12 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Store } from '../../static/js/store.js';
-import { badgeOf } from '../../static/js/badge.js';
-import { dialogOf } from '../../static/js/dialogs.js';
-import { chainOf } from '../../static/js/link.js';
-import { Track } from '../../static/js/map-track.js';
-import { readMessage } from '../../static/js/protocol.js';
-import { asideOf, atByKey, atOf, BASE, clockOf, gapBands, markBeside, markPath, placed, rateWords, speedPath, spoken, toldOf, xOf } from '../../static/js/replay-layout.js';
+import { Store } from '../../static/js/core/store.js';
+import { badgeOf } from '../../static/js/shell/badge.js';
+import { dialogOf } from '../../static/js/shell/dialogs.js';
+import { chainOf } from '../../static/js/core/link.js';
+import { Track } from '../../static/js/map/map-track.js';
+import { readMessage } from '../../static/js/core/protocol.js';
+import { asideOf, atByKey, atOf, BASE, clockOf, gapBands, markBeside, markPath, placed, rateWords, speedPath, spoken, toldOf, xOf } from '../../static/js/replay/replay-layout.js';
 import { alarm, state } from './frames.js';
 
 const mark = (at_s, more = {}) => ({ at_s, alarm: 'speed_limit', title: 'Speed above limit', priority: /** @type {const} */ ('critical'), text: '', ...more });

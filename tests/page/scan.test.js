@@ -1,17 +1,17 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, readScan } from '../../static/js/scan-frame.js';
-import { NOT_IN_VIEW, beamWords, behind, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan-layout.js';
-import { edgesOf, endOf } from '../../static/js/scan-corridor.js';
-import { beside, follow, nearestShown, nearestTo } from '../../static/js/scan-pick.js';
-import { ScanMark } from '../../static/js/scan-mark.js';
+import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, readScan } from '../../static/js/scan/scan-frame.js';
+import { NOT_IN_VIEW, beamWords, behind, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
+import { edgesOf, endOf } from '../../static/js/scan/scan-corridor.js';
+import { beside, follow, nearestShown, nearestTo } from '../../static/js/scan/scan-pick.js';
+import { ScanMark } from '../../static/js/scan/scan-mark.js';
 
 const DEGREE = Math.PI / 180;
 const NOTHING_JUDGED = { tyre_angle_rad: 0, wider_m: 0, gap_m: null, beam: null, isBlind: false, stopping_m: null };
 
 /**
  * @param {ArrayLike<number>} codes
- * @param {Partial<import('../../static/js/scan-frame.js').Scan>} [more]
+ * @param {Partial<import('../../static/js/scan/scan-frame.js').Scan>} [more]
  */
 const scan = (codes, more = {}) => ({ number: 1, age_s: 0, angle_min_rad: -Math.PI / 2, angle_increment_rad: DEGREE, range_max_m: 81, scale_m: 0.01, judged: NOTHING_JUDGED, codes: Uint16Array.from(codes), ...more });
 

@@ -1,12 +1,12 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { armWords, bare, foundIn, isSameCar, remembered } from '../../static/js/connect.js';
-import { screenOf } from '../../static/js/page.js';
-import { details, headline, kindWords } from '../../static/js/signals.js';
-import { tabByHash, tabByKey } from '../../static/js/tabs.js';
-import { savedWords } from '../../static/js/dialogs.js';
-import { recordingWords } from '../../static/js/topbar.js';
-import { thenWords } from '../../static/js/veil.js';
+import { armWords, bare, foundIn, isSameCar, remembered } from '../../static/js/shell/connect.js';
+import { screenOf } from '../../static/js/shell/router.js';
+import { details, headline, kindWords } from '../../static/js/home/signals.js';
+import { tabByHash, tabByKey } from '../../static/js/shell/tabs.js';
+import { savedWords } from '../../static/js/shell/dialogs.js';
+import { recordingWords } from '../../static/js/shell/topbar.js';
+import { thenWords } from '../../static/js/shell/veil.js';
 import { state } from './frames.js';
 
 test('tabs by key and by link', () => {

@@ -2,12 +2,12 @@ import assert from 'node:assert/strict';
 import { afterEach, test } from 'node:test';
 import {
   DEFAULTS, changeLines, changeTo, endText, found, groupsOf, readNumber, scaleOf, shareOf, stepped, textOf, valueAt,
-} from '../../static/js/settings-layout.js';
-import { fileProblem } from '../../static/js/settings-file.js';
-import { topicWords } from '../../static/js/settings-topics.js';
-import { optionsOf } from '../../static/js/topic-picker.js';
-import { trialWords } from '../../static/js/preferences.js';
-import { chooseSpeedUnit } from '../../static/js/units.js';
+} from '../../static/js/settings/settings-layout.js';
+import { fileProblem } from '../../static/js/settings/settings-file.js';
+import { topicWords } from '../../static/js/settings/settings-topics.js';
+import { optionsOf } from '../../static/js/settings/topic-picker.js';
+import { trialWords } from '../../static/js/shell/preferences.js';
+import { chooseSpeedUnit } from '../../static/js/core/units.js';
 
 afterEach(() => chooseSpeedUnit('m/s'));
 
@@ -16,7 +16,7 @@ const base = { title: 'Wheelbase', heading: 'Vehicle', unit: 'm', default: 2.62,
 const rate = { title: 'Speed: expected rate', heading: 'Expected rates', unit: 'Hz', default: 0, minimum: 0, maximum: 1000, step: 0.5, description: "0: learn the car's own rate." };
 const ahead = { title: 'Laser ahead', heading: 'Vehicle', unit: 'm', default: 2.5, minimum: -2, maximum: 8, step: 0.1 };
 
-/** @returns {import('../../static/js/settings-layout.js').Settings} */
+/** @returns {import('../../static/js/settings/settings-layout.js').Settings} */
 const settings = (more = {}) => ({
   version: 3, profile: { name: 'generic', title: 'Any car', chosen: 'auto', recognised: 'Any car' },
   profiles: [{ name: 'generic', title: 'Any car' }, { name: 'catvehicle', title: 'CATVehicle' }],
@@ -133,7 +133,7 @@ test('a change in words', () => {
   assert.deepEqual(changeLines(now, { values: { 'gone.x': 1 } }, () => ''), []);
 });
 
-/** @returns {import('../../static/js/protocol.js').Signal} */
+/** @returns {import('../../static/js/core/protocol.js').Signal} */
 const signal = (more = {}) => ({
   label: 'Speed', freshness: 'fresh', age_s: 0.1, horizon_s: 1, period_s: 0.05, expected_hz: 20, rate_hz: 20, topic: '/vel', type: 'geometry_msgs/Twist', note: null,
   count: 9, rejected: 0, rejected_why: null, value: { speed_mps: 1 }, lowest: null, highest: null, ...more,

@@ -3,8 +3,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { wayToInstall } from '../../static/js/install.js';
-import { holdsReload } from '../../static/js/shell.js';
+import { wayToInstall } from '../../static/js/shell/install.js';
+import { holdsReload } from '../../static/js/boot/service-worker.js';
 
 const alarm = (priority, state) => ({ priority, state });
 const frame = (more = {}) => ({ alarms: [], decelerate: { state: 'off' }, signals: {}, ...more });

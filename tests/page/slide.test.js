@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { FAR_ENOUGH, HOLD_MS, KNOB_PX, Slide } from '../../static/js/slide-layout.js';
+import { FAR_ENOUGH, HOLD_MS, KNOB_PX, Slide } from '../../static/js/slowdown/slide-layout.js';
 
 const WAY = 140;
 

@@ -1,13 +1,13 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { soundOf, stripOf } from '../../static/js/alarm-layout.js';
-import { orderMark } from '../../static/js/gauge-layout.js';
-import { chainOf } from '../../static/js/link.js';
-import { eventWords } from '../../static/js/log-layout.js';
-import { NOT_CONFIRMED, connectRow, countdownOf, guardWords, holdOf, orderWords, releaseOf, sheetOf, slideOf, stateWord, stepsOf, stripWords } from '../../static/js/slow-layout.js';
+import { soundOf, stripOf } from '../../static/js/alarms/alarm-layout.js';
+import { orderMark } from '../../static/js/home/gauge-layout.js';
+import { chainOf } from '../../static/js/core/link.js';
+import { eventWords } from '../../static/js/alarms/log-layout.js';
+import { NOT_CONFIRMED, connectRow, countdownOf, guardWords, holdOf, orderWords, releaseOf, sheetOf, slideOf, stateWord, stepsOf, stripWords } from '../../static/js/slowdown/slow-layout.js';
 import { alarm, state } from './frames.js';
 
-/** @typedef {import('../../static/js/slow-layout.js').Seen} Seen */
+/** @typedef {import('../../static/js/slowdown/slow-layout.js').Seen} Seen */
 
 /** @returns {any} */
 const slow = (/** @type {string} */ name, more = {}) => ({

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { burstOf, samplesOf } from '../../static/js/sound-layout.js';
+import { burstOf, samplesOf } from '../../static/js/alarms/sound-layout.js';
 
 const PULSES = { high: 10, medium: 3, low: 2 };
 

@@ -61,13 +61,13 @@ FORBIDDEN = {
         "require-trusted-types-for",
     ),
     "a frame's document": ("document.createElement('iframe').srcdoc = 'x'", "require-trusted-types-for"),
-    "a script's address": ("document.createElement('script').src = '/static/js/app.js'", "require-trusted-types-for"),
+    "a script's address": ("document.createElement('script').src = '/static/js/main.js'", "require-trusted-types-for"),
     "a script's text": ("document.createElement('script').textContent = '1'", "require-trusted-types-for"),
     "text as code": ("eval('1')", "require-trusted-types-for"),
     "a function of text": ("new Function('return 1')", "require-trusted-types-for"),
     "another policy": ("trustedTypes.createPolicy('mine', {createHTML: (s) => s})", "trusted-types"),
     "another default": ("trustedTypes.createPolicy('default', {createHTML: (s) => s})", "trusted-types"),
-    "another worker": ("navigator.serviceWorker.register('/static/js/app.js')", "require-trusted-types-for"),
+    "another worker": ("navigator.serviceWorker.register('/static/js/main.js')", "require-trusted-types-for"),
 }
 
 

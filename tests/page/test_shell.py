@@ -205,12 +205,12 @@ async def test_only_the_page_and_named_files_go_through_the_worker(browser: Brow
         page.on("response", lambda answer: through.update({answer.url: answer.from_service_worker}))
         await page.reload()
         await page.evaluate(
-            "() => Promise.all(['/api/state', '/api/map', '/static/js/store.js'].map((one) => fetch(one)))"
+            "() => Promise.all(['/api/state', '/api/map', '/static/js/core/store.js'].map((one) => fetch(one)))"
         )
         by = {url.removeprefix(served): is_so for url, is_so in through.items()}
         assert by["/"]
         assert all(is_so for url, is_so in by.items() if url.startswith("/static/built/"))
-        assert not any(by[url] for url in ("/api/state", "/api/map", "/static/js/store.js"))
+        assert not any(by[url] for url in ("/api/state", "/api/map", "/static/js/core/store.js"))
 
 
 # -- when the server is gone -------------------------------------------------------------------------------------------
@@ -326,7 +326,7 @@ async def test_single_modules_are_never_kept_and_a_worker_of_before_goes(
         one = await Process(*server(tmp_path / "data", port=port), folder=changing).start()
         await kept_by(page, one.address)
         shutil.rmtree(changing / "static" / "built")  # as after an edit
-        script = changing / "static" / "js" / "app.js"
+        script = changing / "static" / "js" / "main.js"
         script.write_text(script.read_text() + "\ndocument.documentElement.dataset.app = 'edited';\n")
         await page.reload()
         await page.wait_for_function("() => document.documentElement.dataset.app === 'edited'")

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Minute, SPAN, SPECS, STEP_S, extent, unknown_s, viewAfter } from '../../static/js/trends-layout.js';
+import { Minute, SPAN, SPECS, STEP_S, extent, unknown_s, viewAfter } from '../../static/js/home/trends-layout.js';
 
 const NAMES = SPECS.map(({ name }) => name);
 

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { afterEach, test } from 'node:test';
-import { chooseSpeedUnit, inUnits, shownIn, speedIn, speedUnit, speedWords, spokenSpeedUnit, wireOf } from '../../static/js/units.js';
+import { chooseSpeedUnit, inUnits, shownIn, speedIn, speedUnit, speedWords, spokenSpeedUnit, wireOf } from '../../static/js/core/units.js';
 
 afterEach(() => chooseSpeedUnit('m/s'));
 

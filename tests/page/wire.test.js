@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { readMessage } from '../../static/js/protocol.js';
-import { Wire } from '../../static/js/wire.js';
+import { readMessage } from '../../static/js/core/protocol.js';
+import { Wire } from '../../static/js/core/socket.js';
 
 /** A socket as a browser has it, moved by the test. */
 class Socket {

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { age, bearing, duration, fixed, heading, pieces, signed, timeOfDay } from '../../static/js/words.js';
+import { age, bearing, duration, fixed, heading, pieces, signed, timeOfDay } from '../../static/js/core/format.js';
 
 test('a number has a true minus, never −0.0, and unknown is a dash', () => {
   assert.equal(fixed(4.25, 1), '4.3');

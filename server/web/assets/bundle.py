@@ -19,9 +19,9 @@ from pathlib import Path
 
 FOLDER = "built"  # in static/, beside js/ and css/, so that what they name by ../ is found from here too
 STYLES = ("tokens", "frame", "instruments", "map", "sheets", "screens", "settings", "slowing", "wide")  # in this order
-ENTRY = "app.js"
-EARLY = "early.js"  # stands in the page itself
-THREADS = ("scan-painter",)  # scripts of threads, each joined for itself
+ENTRY = "main.js"
+EARLY = "boot/early.js"  # stands in the page itself
+THREADS = ("scan/scan-painter",)  # scripts of threads, each joined for itself
 _LIST = "built.json"  # written last
 _TARGET = "es2022"  # private fields and top-level await: every browser of 2022 and later
 _CONFIG = Path(__file__).with_name("rollup.config.mjs")
@@ -58,7 +58,7 @@ def join(tools: Path, static: Path) -> None:
             "CATGRAPH_ENTRY": str(static / "js" / ENTRY),
             "CATGRAPH_INTO": str(joined),
             "CATGRAPH_THREADS": json.dumps(
-                {f"{name}.js": next(path.name for path in into.glob(f"{name}-*.js")) for name in THREADS}
+                {f"../{name}.js": next(path.name for path in into.glob(f"{Path(name).name}-*.js")) for name in THREADS}
             ),
         }
         _run([str(tools / "rollup"), "--config", str(_CONFIG), "--silent"], {**os.environ, **entry})
@@ -92,7 +92,7 @@ def digest_of_sources(static: Path) -> str:
     """Hash of all that the joined files are made of, and of how."""
     digest = hashlib.sha256(f"{STYLES} {_TARGET} {sys.modules[__name__].__doc__}".encode() + _CONFIG.read_bytes())
     for path in _sources(static):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+        digest.update(path.relative_to(static).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
@@ -111,7 +111,7 @@ def _find(static: Path, stamps: tuple[tuple[str, int], ...], listed_ns: int) -> 
 
 
 def _sources(static: Path) -> list[Path]:
-    return sorted([*(static / "js").glob("*.js"), *(static / "css").glob("*.css")])
+    return sorted([*(static / "js").rglob("*.js"), *(static / "css").glob("*.css")])
 
 
 def _run(command: list[str], environment: dict[str, str] | None = None) -> str:

@@ -20,8 +20,11 @@ const list = {
 const threads = {
   name: 'threads',
   transform(code) {
-    for (const [plain, hashed] of Object.entries(JSON.parse(env.CATGRAPH_THREADS))) code = code.replaceAll(`'./${plain}'`, `'./${hashed}'`);
+    for (const [plain, hashed] of Object.entries(JSON.parse(env.CATGRAPH_THREADS))) code = code.replaceAll(`'${plain}'`, `'./${hashed}'`);
     return { code, map: null };
+  },
+  renderChunk(code) {
+    return { code: code.replaceAll("'../../vendor/", "'../vendor/"), map: null }; // joined files stand one folder higher
   },
 };
 

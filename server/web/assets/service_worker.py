@@ -19,7 +19,7 @@ from server.web.assets.bundle import FOLDER, Built
 WORKER, OFFLINE = "/worker.js", "/offline"
 FONTS = tuple(f"/static/fonts/catgraph-numerals-{weight}.woff2" for weight in (500, 700))
 _MARKS = ("", "-critical", "-warning", "-lost", "-replay")
-OF_OFFLINE = ("js/offline.js",)
+OF_OFFLINE = ("js/boot/offline.js",)
 _SOURCES = "worker"  # in static/
 
 

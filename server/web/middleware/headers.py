@@ -29,7 +29,7 @@ POLICY = "; ".join(
         "form-action 'none'",
         "frame-ancestors 'none'",
         "require-trusted-types-for 'script'",
-        "trusted-types default",  # the one of static/js/trusted-types.js
+        "trusted-types default",  # the one of static/js/boot/trusted-types.js
     )
 )
 

@@ -114,7 +114,7 @@ async def test_the_socket_of_a_page_goes_over_tls_compressed(served: Field) -> N
 
 @pytest.mark.parametrize("port", ["port", "setup_port"])
 @pytest.mark.parametrize(
-    "path", ["/api/health", "/docs", "/ws", "/static/js/app.js", "/../authority.pem", "/tls/leaf.pem"]
+    "path", ["/api/health", "/docs", "/ws", "/static/js/main.js", "/../authority.pem", "/tls/leaf.pem"]
 )
 async def test_without_tls_nothing_but_the_plain_page_is_served(served: Field, port: str, path: str) -> None:
     async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{getattr(served, port)}") as client:

@@ -29,7 +29,7 @@ ANSWERS = {  # method, path, headers, status, its policy
     "the page without a server": ("GET", "/offline", {}, 200, POLICY_OF_PAGES),
     "its description": ("GET", "/docs", {}, 200, POLICY),
     "its worker": ("GET", "/worker.js", {}, None, POLICY),
-    "a part": ("GET", "/static/js/app.js", {}, 200, POLICY_OF_PARTS),
+    "a part": ("GET", "/static/js/main.js", {}, 200, POLICY_OF_PARTS),
     "a picture": ("GET", "/static/icons/catgraph.svg", {}, 200, POLICY_OF_PARTS),
     "no part": ("GET", "/static/js/nothing.js", {}, 404, POLICY_OF_PARTS),
     "data": ("GET", "/api/state", {}, 200, POLICY_OF_DATA),
@@ -65,7 +65,7 @@ async def test_every_answer_has_them(
 
 async def test_what_is_kept_is_renewed_with_them() -> None:
     async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
-        for path, its_policy in (("/", POLICY_OF_PAGES), ("/static/js/app.js", POLICY_OF_PARTS)):
+        for path, its_policy in (("/", POLICY_OF_PAGES), ("/static/js/main.js", POLICY_OF_PARTS)):
             first = await client.get(path)
             again = await client.get(path, headers={"If-None-Match": first.headers["etag"]})
             assert again.status_code == 304

@@ -25,21 +25,27 @@ NODE = shutil.which("node") or "node"
 @pytest.fixture
 def static(tmp_path: Path) -> Path:
     """A small page that loads a part of itself later."""
-    (tmp_path / "js").mkdir()
+    for folder in ("boot", "core", "scan"):
+        (tmp_path / "js" / folder).mkdir(parents=True)
     (tmp_path / "css").mkdir()
-    (tmp_path / "js" / "app.js").write_text(
-        "import { word } from './words.js';\nconsole.log(word);\n"
+    (tmp_path / "js" / "main.js").write_text(
+        "import { word } from './core/format.js';\nconsole.log(word);\n"
         "globalThis.later = () => import('./later.js');\nglobalThis.theirs = () => import('../vendor/theirs.js');\n"
-        "globalThis.thread = new URL('./scan-painter.js', import.meta.url).href;\n"
+        "import './boot/threads.js';\n"
     )
-    (tmp_path / "js" / "scan-painter.js").write_text(
-        "import { word } from './words.js';\nconsole.log('painting', word);\n"
+    (tmp_path / "js" / "boot" / "threads.js").write_text(
+        "globalThis.thread = new URL('../scan/scan-painter.js', import.meta.url).href;\n"
     )
-    (tmp_path / "js" / "words.js").write_text("// said at once\nexport const word = 'hello';\n")
+    (tmp_path / "js" / "scan" / "scan-painter.js").write_text(
+        "import { word } from '../core/format.js';\nconsole.log('painting', word);\n"
+    )
+    (tmp_path / "js" / "core" / "format.js").write_text("// said at once\nexport const word = 'hello';\n")
     (tmp_path / "js" / "later.js").write_text(
-        "import { word } from './words.js';\nexport const said = word + ' later';\n"
+        "import { word } from './core/format.js';\nexport const said = word + ' later';\n"
     )
-    (tmp_path / "js" / "early.js").write_text("// before all others\n(() => {\n  globalThis.early = 'first';\n})();\n")
+    (tmp_path / "js" / "boot" / "early.js").write_text(
+        "// before all others\n(() => {\n  globalThis.early = 'first';\n})();\n"
+    )
     for name in STYLES:
         (tmp_path / "css" / f"{name}.css").write_text(f".{name} {{ color: red; }}\n")
     (tmp_path / "css" / "tokens.css").write_text("@font-face { font-family: n; src: url('../fonts/n.woff2'); }\n")
@@ -87,7 +93,7 @@ def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(stat
     first = thread()
     said = subprocess.run([NODE, "--input-type=module", "-e", first.read_text()], capture_output=True, text=True)
     assert said.stdout == "painting hello\n"
-    (static / "js" / "scan-painter.js").write_text("console.log('painting anew');\n")
+    (static / "js" / "scan" / "scan-painter.js").write_text("console.log('painting anew');\n")
     join(TOOLS, static)
     second = thread()
     assert second.name != first.name
@@ -97,7 +103,7 @@ def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(stat
     assert renewed.script != built.script, "what asks for another thread is another script"
 
 
-@pytest.mark.parametrize("changed", ["js/words.js", "js/later.js", "css/wide.css"])
+@pytest.mark.parametrize("changed", ["js/core/format.js", "js/later.js", "css/wide.css"])
 def test_after_a_change_the_joined_files_are_not_used(static: Path, changed: str) -> None:
     assert find(static) is not None
     before = (static / changed).read_text()
@@ -120,7 +126,7 @@ def test_a_damaged_folder_is_no_folder(static: Path, what: str) -> None:
         case "foreign":
             listed.write_text('["built"]')
         case "lost":
-            next((static / "built").glob("app-*.js")).unlink()
+            next((static / "built").glob("main-*.js")).unlink()
     assert find(static) is None
 
 
@@ -144,6 +150,6 @@ async def test_the_page_begins_with_few_files_that_may_be_kept_for_ever() -> Non
 
 def test_without_joined_files_all_are_named_and_none_may_be_kept_unasked() -> None:
     parts = parts_of(None, lambda name: f"/static/{name}?v=1")
-    assert parts["script"] == "/static/js/app.js?v=1"
+    assert parts["script"] == "/static/js/main.js?v=1"
     assert parts["styles"] == [f"/static/css/{name}.css?v=1" for name in STYLES]
     assert parts["needed"] == []

@@ -14,7 +14,7 @@ from tests.server.conftest import serving
 
 async def test_a_text_comes_small_to_whoever_can_unpack_it_and_is_asked_about_each_time() -> None:
     async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
-        for path in ("/", "/static/js/store.js", "/static/css/frame.css", "/static/icons/catgraph.svg"):
+        for path in ("/", "/static/js/core/store.js", "/static/css/frame.css", "/static/icons/catgraph.svg"):
             small = await client.get(path, headers={"Accept-Encoding": "gzip"})
             plain = await client.get(path, headers={"Accept-Encoding": "identity"})
             assert small.headers["content-encoding"] == "gzip"
@@ -35,7 +35,7 @@ async def test_a_text_comes_small_to_whoever_can_unpack_it_and_is_asked_about_ea
                 "require-trusted-types-for" in small.headers["content-security-policy"]
             ) == is_document  # short for the parts
             assert small.headers["x-content-type-options"] == "nosniff"
-        head = await client.head("/static/js/store.js")
+        head = await client.head("/static/js/core/store.js")
         assert head.status_code == 200
         for path in (
             "/static/js/nothing.js",

@@ -180,7 +180,7 @@ async def test_a_name_that_is_not_its_own_is_refused_everywhere(served: Served) 
                 ("GET", "/"),
                 ("GET", "/api/me"),
                 ("POST", "/api/pause"),
-                ("GET", "/static/js/app.js"),
+                ("GET", "/static/js/main.js"),
             ):
                 answer = await browser.request(method, path, headers={"Host": shown, "Origin": f"http://{shown}"})
                 assert (answer.status_code, answer.json()["code"]) == (403, "host"), (host, path)
@@ -322,7 +322,7 @@ async def test_the_shell_needs_nobody_and_tells_nothing_of_the_car(served: Serve
         page = await browser.get("/")
         assert page.status_code == 200
         assert 'data-access="paired"' in page.text
-        assert (await browser.get("/static/js/app.js")).status_code == 200
+        assert (await browser.get("/static/js/main.js")).status_code == 200
         health = (await browser.get("/api/health")).json()
         assert sorted(health) == ["status", "version"]
         for path in (

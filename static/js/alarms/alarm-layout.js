@@ -1,0 +1,148 @@
+// Which alarm shows where: one rule a place, none an alarm. Pure functions.
+
+import { stripWords } from '../slowdown/slow-layout.js';
+import { counted, fixed, timeOfDay } from '../core/format.js';
+
+/**
+ * @typedef {import('../core/protocol.js').Alarm} Alarm
+ * @typedef {import('../core/protocol.js').State} State
+ * @typedef {import('../core/protocol.js').SoundName} SoundName
+ */
+
+const RANK = { critical: 3, warning: 2, advisory: 1 };
+const LOUD = /** @type {SoundName[]} */ (['high', 'medium', 'low']);
+
+/** @param {Alarm} alarm */
+const isAsking = (alarm) => alarm.state === 'UNACKED' || alarm.state === 'RTN_UNACKED';
+
+/**
+ * Alarms about the chain itself. Their dialogs show the chain, with what can be done about it.
+ * @param {Alarm} alarm
+ */
+export const isAboutLink = (alarm) => LINK_ACTIONS.some((action) => alarm.actions.includes(action));
+const LINK_ACTIONS = ['retry', 'reconnect', 'exit', 'change_address'];
+
+/**
+ * What still stands before what has returned; then by danger, then the newest.
+ * @param {Alarm[]} alarms
+ */
+export function byUrgency(alarms) {
+  return [...alarms].sort((a, b) => Number(b.active) - Number(a.active) || RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
+}
+
+/**
+ * What stands where.
+ * @param {Alarm[]} alarms
+ */
+export function layOut(alarms) {
+  const sorted = byUrgency(alarms);
+  const asking = sorted.filter(isAsking);
+  const standing = sorted.filter((alarm) => alarm.state !== 'SHELVED');
+  return {
+    dialog: asking.find((alarm) => alarm.place === 'dialog') ?? null,
+    snackbars: asking.filter((alarm) => alarm.place === 'snackbar'),
+    standing,
+    shelved: sorted.length - standing.length,
+    worst: standing[0] ?? null,
+  };
+}
+
+/**
+ * The sound that must be heard now, or null. What is acknowledged, shelved or over is silent. While paused the server
+ * tells only what a pause does not hide: a lost link, a pause that somebody forgot. A server that fell silent while it
+ * watched a car is the loudest alarm of all, for nothing else can be announced; a paused one watches nothing.
+ * @param {State | null} frame
+ * @param {{isServerLost: boolean, isLossAcknowledged: boolean}} page
+ * @returns {SoundName | 'count' | null} count: the car is slowed by itself in a moment, unless somebody vetoes it
+ */
+export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
+  if (!frame) return null;
+  if (isServerLost) return isLossAcknowledged || frame.session.paused ? null : 'high';
+  if (frame.decelerate.countdown) return 'count';
+  const asking = frame.alarms.filter((alarm) => alarm.state === 'UNACKED').map((alarm) => alarm.sound);
+  return LOUD.find((sound) => asking.includes(sound)) ?? null;
+}
+
+/** @typedef {{kind: 'crit' | 'warn' | 'invert' | 'order' | 'armed' | '', icon: string, text: string, end: string, opens: 'alarms' | 'signals', hasReturned?: boolean}} Strip
+ * hasReturned: nothing urgent stands any more, and nobody has acknowledged it */
+
+/**
+ * The one line under the tabs.
+ * @param {State | null} frame
+ * @param {{isSilent: boolean, chain: import('../core/link.js').ChainView, paused_s: number}} seen
+ * @returns {Strip}
+ */
+export function stripOf(frame, { isSilent, chain, paused_s }) {
+  if (!frame) return { kind: 'invert', icon: 'unknown', text: 'Nothing received yet', end: 'not checked', opens: 'signals' };
+  if (frame.session.paused && !isSilent) {
+    return { kind: 'invert', icon: 'pause', text: `Paused ${paused(paused_s)}: no alarm will come`, end: '', opens: 'alarms' };
+  }
+  if (chain.word === 'Lost') {
+    return { kind: 'crit', icon: 'link-off', text: 'Connection lost', end: chain.since_ms === null ? '' : `since ${timeOfDay(chain.since_ms)}`, opens: 'alarms' };
+  }
+  if (isSilent) return { kind: 'invert', icon: 'clock', text: 'Values are not live', end: 'not checked', opens: 'signals' };
+  const { standing, shelved } = layOut(frame.alarms);
+  // An advisory that stands does not hide a warning that returned and waits to be acknowledged.
+  const worst = standing.find(({ priority }) => priority !== 'advisory') ?? standing[0];
+  const order = stripWords(frame.decelerate, standing.length);
+  // A critical alarm comes before the order, whose steps stand beneath; all else after it.
+  if (order && order.kind !== 'armed' && worst?.priority !== 'critical') {
+    return { ...order, icon: order.kind === 'crit' ? 'crit' : 'slow', opens: 'alarms' };
+  }
+  if (worst && worst.priority !== 'advisory') {
+    const isOne = standing.length === 1 && worst.priority === 'critical' && worst.active;
+    const among = isOne ? `${fixed(worst.for_s)} s` : counted(standing.length, 'alarm', 'alarms');
+    return {
+      kind: worst.priority === 'critical' ? 'crit' : 'warn', icon: worst.priority === 'critical' ? 'crit' : 'warn',
+      text: worst.active ? worst.title : `${worst.title}: returned`, end: among, hasReturned: !worst.active, opens: 'alarms',
+    };
+  }
+  if (chain.cut === 2) {
+    const isFirst = frame.link.topics_heard === 0;
+    return { kind: 'invert', icon: isFirst ? 'unknown' : 'clock', text: isFirst ? 'Nothing received yet' : 'Values are not live', end: 'not checked', opens: 'signals' };
+  }
+  const ok = tilesOf(frame.checks).filter((tile) => tile.verdict === 'ok').length;
+  const unknown = tilesOf(frame.checks).filter((tile) => tile.verdict === 'unknown' && tile.brief !== 'not published').length;
+  const counts = `${ok} OK · ${unknown} not checked`;
+  if (worst) {
+    const end = standing.length > 1 ? counted(standing.length, 'alarm', 'alarms') : unknown ? `${unknown} not checked` : `${ok} OK`;
+    return { kind: '', icon: 'info', text: worst.title, end, opens: 'alarms' };
+  }
+  if (order) return { ...order, icon: 'slow', opens: 'alarms' };
+  return { kind: '', icon: 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${unknown} not checked` : counts, opens: 'alarms' };
+}
+
+/**
+ * @typedef {import('../core/protocol.js').Check} Check
+ * @typedef {{label: string, verdict: import('../core/protocol.js').Verdict, brief: string, text: string, ids: string[]}} Tile
+ */
+
+const WORSE = { fault: 2, unknown: 1, ok: 0 };
+
+/**
+ * One tile a label, in the order of their first; the worst of those that share it speaks.
+ * @param {Check[]} checks
+ * @returns {Tile[]}
+ */
+export function tilesOf(checks) {
+  /** @type {Map<string, Tile>} */
+  const tiles = new Map();
+  for (const check of checks) {
+    const { label } = check;
+    const ids = check.checks ?? [check.id];
+    const tile = tiles.get(label);
+    if (!tile) {
+      tiles.set(label, { label, verdict: check.verdict, brief: check.brief, text: check.text, ids: [...ids] });
+      continue;
+    }
+    tile.ids.push(...ids);
+    if (WORSE[check.verdict] > WORSE[tile.verdict]) Object.assign(tile, { verdict: check.verdict, brief: check.brief, text: check.text });
+  }
+  return [...tiles.values()];
+}
+
+/** @param {number} seconds */
+function paused(seconds) {
+  const whole = Math.max(0, Math.floor(seconds));
+  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, '0')}`;
+}

@@ -1,0 +1,121 @@
+// The alarm log as words: how an event reads, what a filter leaves, which day it was. Pure functions, no DOM.
+
+import { age } from '../core/format.js';
+
+/**
+ * @typedef {import('../core/protocol.js').AlarmEvent} AlarmEvent
+ * @typedef {import('../core/event-log.js').Row} Row
+ * @typedef {'all' | 'critical' | 'warning' | 'advisory' | 'other'} Kind other: what is no alarm (paused, connected, settings …)
+ * @typedef {{kind: Kind, text: string}} Filter
+ */
+
+export const KINDS = /** @type {const} */ ([
+  ['all', 'All'], ['critical', 'Critical'], ['warning', 'Warning'], ['advisory', 'Advisory'], ['other', 'Other'],
+]);
+export const MARKS = { critical: ['crit', 'c-crit'], warning: ['warn', 'c-warn'], advisory: ['info', ''] };
+const CHANGES = /** @type {Record<string, string>} */ ({
+  raised: '', recaused: 'again', cleared: 'cleared', acknowledged: 'acknowledged', shelved: 'shelved', unshelved: 'no longer shelved',
+  suppressed: 'not announced', unsuppressed: 'announced again',
+});
+const SLOWING = new Set(['armed', 'disarmed', 'slow_down']);
+const DAYS = ['Sunday', 'Monday', 'Tuesday', 'Wednesday', 'Thursday', 'Friday', 'Saturday'];
+const MONTHS = ['January', 'February', 'March', 'April', 'May', 'June', 'July', 'August', 'September', 'October', 'November', 'December'];
+
+/**
+ * How one event reads.
+ * @param {AlarmEvent} event
+ */
+export function eventWords(event) {
+  if (event.alarm === null && SLOWING.has(event.change)) {
+    const [mark, kind] = event.step === 'not_confirmed' ? ['crit', 'c-crit'] : ['slow', 'c-order'];
+    return { icon: mark, kind, title: event.text || event.change, text: event.by ? `by ${event.by}` : '' };
+  }
+  if (event.alarm === null) return { icon: event.change === 'lost' || event.change === 'stalled' ? 'link-off' : 'info', kind: '', title: event.text || event.change, text: event.by ? `by ${event.by}` : '' };
+  const change = CHANGES[event.change] ?? event.change;
+  const isRise = event.change === 'raised' || event.change === 'recaused' || event.change === 'unsuppressed';
+  const [mark, kind] = isRise ? MARKS[event.priority ?? 'advisory'] : ['ok', ''];
+  return {
+    icon: mark ?? 'info', kind: kind ?? '', title: `${event.title ?? event.alarm} ${change}`.trim(),
+    text: [event.text, event.by ? `by ${event.by}` : ''].filter(Boolean).join(' · '),
+  };
+}
+
+/**
+ * Does a filter leave this event? As the server filters, so that what is here and what is fetched make one list.
+ * @param {AlarmEvent} event
+ * @param {Filter} filter
+ */
+export function fits(event, { kind, text }) {
+  if (kind === 'other' ? event.alarm !== null : kind !== 'all' && event.priority !== kind) return false;
+  const wanted = text.trim().toLowerCase();
+  if (!wanted) return true;
+  return [event.title, event.text, event.by, event.alarm, event.change].map((part) => part ?? '').join(' ').toLowerCase().includes(wanted);
+}
+
+/**
+ * The same filter for the server.
+ * @param {Filter} filter
+ * @returns {Record<string, string>}
+ */
+export function asked({ kind, text }) {
+  const wanted = text.trim();
+  return {
+    ...(kind === 'other' ? { alarm: '' } : kind === 'all' ? {} : { priority: kind }),
+    ...(wanted ? { text: wanted } : {}),
+  };
+}
+
+/**
+ * One list, newest first: what this page heard, with the times in which it was blind, and what the server told of before.
+ * A blind time is shown whatever the filter: nobody knows what would have stood there.
+ * @param {Row[]} here newest first
+ * @param {AlarmEvent[]} older newest first, from the server
+ * @param {Filter} filter
+ * @returns {Row[]}
+ */
+export function joined(here, older, filter) {
+  const known = new Set(here.map(({ event }) => event?.n));
+  const before = older.filter((event) => !known.has(event.n)).map((event) => ({ event, gap: null }));
+  return [...here, ...before].filter(({ event }) => !event || fits(event, filter));
+}
+
+/**
+ * The number below which the server is asked for more.
+ * @param {Row[]} here
+ * @returns {number | null} null: from the newest on
+ */
+export function lowest(here) {
+  const numbers = here.flatMap(({ event }) => (event ? [event.n] : []));
+  return numbers.length ? Math.min(...numbers) : null;
+}
+
+/**
+ * "Today", "Yesterday", "Friday, 20 November", with the year where it is another.
+ * @param {number} at_ms
+ * @param {number} now_ms
+ */
+export function dayWords(at_ms, now_ms) {
+  const [day, today] = [new Date(at_ms), new Date(now_ms)];
+  const days = Math.round((midnight(today) - midnight(day)) / 86_400_000); // a day of 23 or 25 hours is a day
+  if (days === 0) return 'Today';
+  if (days === 1) return 'Yesterday';
+  const year = day.getFullYear() === today.getFullYear() ? '' : ` ${day.getFullYear()}`;
+  return `${DAYS[day.getDay()]}, ${day.getDate()} ${MONTHS[day.getMonth()]}${year}`;
+}
+
+/** @param {Date} date */
+function midnight(date) {
+  return new Date(date.getFullYear(), date.getMonth(), date.getDate()).getTime();
+}
+
+/**
+ * How the row of an acknowledgement says how long it took: "12.6 m/s · by Ann · in 2.3 s".
+ * @param {AlarmEvent} event an acknowledgement
+ * @param {Row[]} rows
+ */
+export function tookWords(event, rows) {
+  if (event.change !== 'acknowledged') return '';
+  const raised = rows.find((row) => row.event && row.event.alarm === event.alarm && row.event.occurrence === event.occurrence && RISES.has(row.event.change));
+  return raised?.event ? `in ${age((event.at_ms - raised.event.at_ms) / 1000)} s` : '';
+}
+const RISES = new Set(['raised', 'recaused', 'unsuppressed']);

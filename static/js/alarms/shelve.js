@@ -1,0 +1,22 @@
+// Shelving: by name, for a while, never longer than 15 minutes.
+
+import { closeSheet, openSheet } from '../shell/sheet.js';
+import { field, need, setWords } from '../core/dom.js';
+
+/**
+ * @param {import('../core/store.js').Store} store
+ * @param {import('../core/protocol.js').Alarm} alarm
+ * @param {(sentence: string, title?: string) => void} say
+ */
+export function openShelve(store, alarm, say) {
+  const sheet = /** @type {HTMLDialogElement} */ (need(document, '#sheet-shelve'));
+  setWords(field(sheet, 'words'), `“${alarm.title}” is not announced meanwhile. It comes back by itself.`);
+  for (const key of /** @type {NodeListOf<HTMLElement>} */ (sheet.querySelectorAll('[data-minutes]'))) {
+    key.onclick = async () => {
+      closeSheet(sheet);
+      const answer = await store.ask('shelve', { alarm: alarm.id, occurrence: alarm.occurrence, minutes: Number(key.dataset['minutes']) });
+      if (!answer.ok) say(answer.reason ?? 'Refused.', 'Not shelved');
+    };
+  }
+  openSheet(sheet);
+}

@@ -1,0 +1,66 @@
+// How a standing alarm and the alarm load read: pure functions, no DOM.
+
+import { age, fixed, timeOfDay } from '../core/format.js';
+
+/**
+ * What is wrong, and who has said what to it.
+ * @param {import('../core/protocol.js').Alarm} alarm
+ */
+export function standingWords(alarm) {
+  return [alarm.active ? snackWords(alarm) : alarm.trip_text || alarm.text, said(alarm)].filter(Boolean).join(' · ');
+}
+
+/**
+ * What the snackbar tells: what is wrong now; of what is over, what it was.
+ * @param {import('../core/protocol.js').Alarm} alarm
+ */
+export function snackWords(alarm) {
+  const was = alarm.trip_text || alarm.title;
+  if (!alarm.active) return `Returned to normal. It was: ${was}`;
+  if (alarm.verdict === 'ok') return `Returning to normal: ${alarm.text || 'OK'}. It was: ${was}`; // it clears once that has lasted
+  return alarm.verdict === 'unknown' ? `Not checked now: ${alarm.text || 'unknown'}. It was: ${was}` : alarm.text || was;
+}
+
+/**
+ * The sentences of an alarm's dialog: what is wrong where no two numbers say it, since when and with what it began, what to do.
+ * @param {import('../core/protocol.js').Alarm} alarm
+ */
+export function dialogWords(alarm) {
+  const at = timeOfDay(alarm.raised_ms);
+  const began = alarm.trip_text && alarm.trip_text !== alarm.text ? ` with ${bare(alarm.trip_text)}` : '';
+  const worst = worstWords(alarm);
+  if (!alarm.active) return [`It has returned to normal; it began at ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
+  const isBlind = alarm.verdict === 'unknown';
+  const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.verdict === 'ok' ? `Returning to normal: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
+  return [cause, `Stands for ${age(alarm.for_s)} s, since ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
+}
+
+/** How bad it was, where that is not what is measured now. @param {import('../core/protocol.js').Alarm} alarm */
+function worstWords({ active, verdict, measured, worst }) {
+  if (!worst) return '';
+  const isNow = active && verdict !== 'unknown' && measured && fixed(measured.value) === fixed(worst.value);
+  return isNow ? '' : `${worst.side === 'above' ? 'Highest' : 'Lowest'} ${fixed(worst.value)} ${worst.unit}.`;
+}
+
+/** A sentence without its end. @param {string} sentence */
+function bare(sentence) {
+  return sentence.replace(/[.!?]$/, '');
+}
+
+/** @param {import('../core/protocol.js').Alarm} alarm */
+function said(alarm) {
+  const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
+  if (alarm.state === 'SHELVED') return `shelved${by(alarm.shelved_by)} until ${timeOfDay(alarm.shelved_until_ms)}`;
+  if (alarm.state === 'ACKED') return `acknowledged${by(alarm.acknowledged_by)}`;
+  return alarm.state === 'RTN_UNACKED' ? 'returned unacknowledged' : 'unacknowledged';
+}
+
+/**
+ * When there are too many alarms to work by: "Alarm flood: 12 in 10 min", and which chatter; else nothing.
+ * @param {import('../core/protocol.js').AlarmLoad | undefined} load
+ */
+export function loadWords(load) {
+  if (!load) return '';
+  const flood = load.flood ? `Alarm flood: ${load.in_10_min} in 10 min` : '';
+  return [flood, load.chattering.length ? `Chattering: ${load.chattering.join(', ')}` : ''].filter(Boolean).join(' · ');
+}

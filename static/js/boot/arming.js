@@ -1,0 +1,53 @@
+// What the tap on Connect asks of the phone: sound, a screen that stays awake, its position. What is refused is said.
+
+/**
+ * @typedef {'asks' | 'ready' | 'refused' | 'missing'} Armed asks: not asked yet; missing: this browser or page cannot
+ * @typedef {{sound: Armed, screen: Armed, position: Armed}} Arms
+ */
+
+export class Arming {
+  /** @type {WakeLockSentinel | null} */
+  #lock = null;
+  #isAsked = false;
+  /** @type {Armed} */
+  screen = 'wakeLock' in navigator ? 'asks' : 'missing';
+
+  /** @param {import('../alarms/alarm-sound.js').Voice} voice @param {import('../phone/phone.js').Phone} phone */
+  constructor(voice, phone) {
+    this.voice = voice;
+    this.phone = phone;
+    document.addEventListener('visibilitychange', () => this.#stayAwake());
+  }
+
+  /** @returns {Arms} */
+  get arms() {
+    return { sound: this.#soundArm(), screen: this.screen, position: this.phone.armed };
+  }
+
+  /** Within the tap. Nothing here is waited for: the vehicle is connected meanwhile. */
+  ask() {
+    this.#isAsked = true;
+    this.voice.arm();
+    this.#stayAwake();
+    this.phone.arm();
+  }
+
+  #soundArm() {
+    if (!this.voice.isPossible) return 'missing';
+    if (this.voice.isRunning) return 'ready';
+    return this.#isAsked ? 'refused' : 'asks';
+  }
+
+  #stayAwake() {
+    if (!this.#isAsked || document.hidden || this.screen === 'missing' || (this.#lock && !this.#lock.released)) return;
+    navigator.wakeLock.request('screen').then(
+      (lock) => {
+        this.#lock = lock;
+        this.screen = 'ready';
+        // Hidden, the phone takes it back and it is asked for again; while the page is seen it is the battery saver's doing.
+        lock.addEventListener('release', () => { if (!document.hidden) this.screen = 'refused'; });
+      },
+      () => { this.screen = 'refused'; },
+    );
+  }
+}

@@ -1,0 +1,23 @@
+// Before the first frame: that the server is being reached, or that it does not answer.
+
+import { drawBigChain } from '../shell/chain.js';
+import { field, setText, setWords } from '../core/dom.js';
+
+/**
+ * @param {HTMLElement} root
+ * @param {import('../core/store.js').Store} store
+ */
+export function mount(root, store) {
+  const [title, chain, text] = [field(root, 'title'), field(root, 'chain'), field(root, 'words')];
+
+  function draw() {
+    if (root.hidden) return;
+    const { chain: view, isSilent } = store;
+    drawBigChain(chain, isSilent ? view : { ...view, nodes: view.nodes.map((node, i) => (i === 1 ? { ...node, mark: 'dialled', isBad: false } : node)) });
+    setText(title, isSilent ? 'The server does not answer' : 'Reaching the server');
+    setWords(text, isSilent ? 'No value and no alarm can be shown. This page keeps trying by itself.' : '');
+  }
+
+  draw();
+  return store.on('draw', draw);
+}

@@ -1,0 +1,95 @@
+// What the page says of control and of who would hear an alarm: pure functions of the newest frame and of events.
+
+import { fixed } from '../core/format.js';
+
+/**
+ * @typedef {import('../core/protocol.js').ControlNow} ControlNow
+ * @typedef {import('../core/protocol.js').ReachNow} ReachNow
+ * @typedef {import('../core/protocol.js').AlarmEvent} AlarmEvent
+ */
+
+/**
+ * The chip in the top bar.
+ * @param {ControlNow | null} control null: nobody has told yet
+ * @param {string} page this page
+ * @param {boolean} isSilent
+ */
+export function chipOf(control, page, isSilent) {
+  if (isSilent || !control) return { text: '?', label: 'Control: the server does not answer, so nobody knows who is in control', is: 'unknown' };
+  if (control.page && control.page === page) return { text: 'You', label: 'You are in control', is: 'you' };
+  if (control.holder) return { text: control.holder, label: `${control.holder} is in control`, is: 'other' };
+  return { text: 'No one', label: 'No one is in control', is: 'free' };
+}
+
+/**
+ * The line that says whom an alarm would reach.
+ * @param {ReachNow | null | undefined} reach
+ */
+export function reachOf(reach) {
+  if (!reach) return { text: 'Not known who can hear alarms', why: '', isBad: false };
+  const who = reach.of === 1 ? 'operator' : 'operators';
+  const text = reach.of === 0 ? 'No operator is here to hear alarms' : `${reach.can} of ${reach.of} ${who} can hear alarms`;
+  return { text, why: reach.why, isBad: reach.can === 0 };
+}
+
+/**
+ * What a page is told of what happened to control, or null where it is this page's own doing or shown otherwise.
+ * @param {AlarmEvent} event
+ * @param {string} page
+ * @returns {{title: string, text: string, offers: 'take' | 'request' | null} | null}
+ */
+export function noticeOf(event, page) {
+  const { text } = event;
+  const [isMine, wasMine, isByMe] = [event.page === page, event.before_page === page, event.by_page === page];
+  switch (event.act) {
+    case 'requested':
+    case 'withdrawn':
+      return isMine || isByMe ? null : { title: event.act === 'requested' ? 'Control is asked for' : 'Not asked for any more', text, offers: null };
+    case 'kept':
+      return isByMe ? null : { title: 'Control is kept', text, offers: null };
+    case 'lapsed':
+      return wasMine
+        ? { title: 'You lost control', text: 'This page was not seen for more than 3 s. Now nobody is in control.', offers: 'take' }
+        : { title: 'Nobody is in control', text, offers: 'take' };
+    case 'released':
+      return isByMe ? null : { title: 'Nobody is in control', text, offers: 'take' };
+    case 'returned':
+      return { title: isMine ? 'You are in control again' : 'Control is back', text, offers: null };
+    case 'taken':
+      return isMine ? null : { title: 'Control was taken', text, offers: null };
+    default:
+      if (isMine) return isByMe ? null : { title: 'You are in control', text, offers: null };
+      if (wasMine && isByMe) return null;
+      return { title: wasMine ? 'You lost control' : 'Control changed', text, offers: wasMine ? 'request' : null };
+  }
+}
+
+/**
+ * What the sheet offers this page.
+ * @param {ControlNow} control
+ * @param {ReachNow | null | undefined} reach
+ * @param {string} page
+ */
+export function sheetOf(control, reach, page) {
+  const others = (reach?.pages ?? []).filter((one) => one.here && one.page !== page);
+  const asked = (control.requests ?? []).find((one) => one.page === page);
+  const former = control.former && control.former.page !== page ? ` ${control.former.name} has it again by coming back within ${seconds(control.former.may_return_s)}.` : '';
+  if (control.page === page && page) {
+    return { state: 'you', title: 'You are in control', text: 'Only this page may connect, pause, stop and change settings. Anybody may acknowledge alarms.', handTo: others, asked_s: null };
+  }
+  if (control.holder) {
+    const text = asked ? `You asked for it: silence grants it in ${seconds(asked.left_s)}.` : 'Ask for it, and it is yours unless it is refused within 10 s. To take it over is told on every page.';
+    return { state: asked ? 'asking' : 'other', title: `${control.holder} is in control`, text, handTo: [], asked_s: asked ? asked.left_s : null };
+  }
+  return { state: 'free', title: 'No one is in control', text: `Whoever orders something takes it.${former}`, handTo: [], asked_s: null };
+}
+
+/** The oldest request, where this page must answer it. @param {ControlNow | null} control @param {string} page */
+export function askedOf(control, page) {
+  return control && page && control.page === page ? ((control.requests ?? [])[0] ?? null) : null;
+}
+
+/** Whole seconds, begun ones too: what counts down ends at 0. @param {number} value */
+export function seconds(value) {
+  return `${fixed(Math.ceil(Math.max(0, value)), 0)} s`;
+}

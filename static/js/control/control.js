@@ -1,0 +1,115 @@
+// Who is in control, on every tab: the chip in the top bar, the request that its holder must answer, and what happened to it.
+
+import { askedOf, chipOf, noticeOf, seconds } from './control-layout.js';
+import { field, html, icon, listen, need, setAttribute, setText, setWords } from '../core/dom.js';
+
+/** A refusal is answered with a key for so long: another one of the same words is another [ms]. */
+const REFUSED_MS = 3000;
+/** What happened to control waits so long for its turn to be said, and is then no news any more [ms]. */
+const NEWS_MS = 20_000;
+/** What happened longer before it was told is no news [ms]. */
+const FRESH_MS = 5000;
+/** A page that wakes has more to tell at once, and the last to speak would take the place of the others [ms]. */
+const SETTLES_MS = 400;
+
+/**
+ * @typedef {import('../core/store.js').Store} Store
+ * @typedef {import('../shell/notice.js').Way} Way
+ * @typedef {(sentence: string, title?: string, way?: Way) => void} Say
+ */
+
+export class Control {
+  /** @type {{reason: string, at_ms: number} | null} */
+  #refused = null;
+
+  /** @param {Store} store @param {Say} say tells without offering a key by itself @param {() => void} openPhone */
+  constructor(store, say, openPhone) {
+    this.store = store;
+    this.say = say;
+    this.openPhone = openPhone;
+  }
+
+  /** Ask the server for something about control. @param {string} act @param {object} [fields] */
+  async order(act, fields = {}) {
+    const answer = await this.store.ask('control', { do: act, ...fields });
+    if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Control is as it was');
+    return answer;
+  }
+
+  /** Told once of every refusal, so that whoever says it can offer a way. @param {import('../core/store.js').Answer} answer */
+  note(answer) {
+    this.#refused = answer.heldBy && answer.reason ? { reason: answer.reason, at_ms: this.store.now() } : null;
+  }
+
+  /** What helps where an order was refused because another is in control. @param {string} sentence @returns {Way | undefined} */
+  wayOf(sentence) {
+    const refused = this.#refused;
+    if (refused?.reason !== sentence || this.store.now() - refused.at_ms > REFUSED_MS) return undefined;
+    return { label: 'Ask for control', act: () => void this.order('request') };
+  }
+}
+
+/**
+ * @param {HTMLElement} root
+ * @param {HTMLElement} snacks where the request stands
+ * @param {Store} store
+ * @param {Control} control
+ */
+export function mount(root, snacks, store, control) {
+  const [chip, name] = [field(root, 'who'), field(root, 'who-name')];
+  const text = html('span');
+  const keep = html('button', { type: 'button', class: 'key' }, 'Keep');
+  const give = html('button', { type: 'button', class: 'key solid' }, 'Hand over');
+  const asks = html('div', { class: 'snack asks', role: 'alert', 'data-f': 'asks' },
+    html('div', { class: 'side' }, icon('operator')), html('div', { class: 'tx' }, html('b', {}, 'Control is asked for'), text), html('div', { class: 'ac' }, keep, give));
+  let asking = '';
+  /** @type {{notice: NonNullable<ReturnType<typeof noticeOf>>, at_ms: number} | null} */
+  let news = null;
+
+  function draw() {
+    speak();
+    const { control: now } = store;
+    const chipWords = chipOf(now, store.page, store.isSilent);
+    setText(name, chipWords.text);
+    setAttribute(chip, 'aria-label', `${chipWords.text}: ${chipWords.label}`);
+    setAttribute(chip, 'data-is', chipWords.is);
+    const request = store.isSilent ? null : askedOf(now, store.page);
+    asking = request?.page ?? '';
+    if (!request) asks.remove();
+    else if (!asks.isConnected) snacks.prepend(asks);
+    if (request) setWords(text, `${request.name} gets it in ${seconds(request.left_s - store.lag_s)} unless you keep it.`);
+  }
+
+  /** @param {import('../core/protocol.js').AlarmEvent[]} events */
+  function tell(events) {
+    const now_ms = store.frame?.server.time_ms ?? Infinity; // a page that was just loaded is told old news: who has control now, the bar says
+    const notice = events.filter((event) => event.change === 'control' && now_ms - event.at_ms <= FRESH_MS).map((event) => noticeOf(event, store.page)).findLast((one) => one !== null);
+    if (notice) news = { notice, at_ms: store.now() };
+    speak();
+  }
+
+  /** It takes no other notice's place: that this page was blind, or why an order was refused, is told first. */
+  function speak() {
+    if (!news || snacks.querySelector('.note:not([data-of="control"])')) return;
+    const { notice: { title, text: words, offers }, at_ms } = news;
+    if (store.now() - at_ms < SETTLES_MS) return;
+    news = null;
+    if (store.now() - at_ms > NEWS_MS) return;
+    const way = offers ? { label: offers === 'take' ? 'Take control' : 'Ask for it', act: () => void control.order(offers) } : undefined;
+    control.say(words, title, way);
+    setAttribute(need(snacks, '.note'), 'data-of', 'control');
+  }
+
+  draw();
+  tell(store.log.events); // what came before there was anybody to tell
+  const stops = [
+    store.on('draw', draw),
+    store.on('log', tell),
+    listen(chip, 'click', () => {
+      import('./control-sheet.js').then(({ openControl }) => openControl(store, control)).catch(() => control.say('What shows who is in control could not be fetched.', 'Not opened'));
+    }),
+    listen(keep, 'click', () => void control.order('keep', { to: asking })),
+    listen(give, 'click', () => void control.order('hand_over', { to: asking })),
+  ];
+  return () => stops.forEach((stop) => stop());
+}

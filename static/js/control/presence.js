@@ -1,0 +1,60 @@
+// Tells the server once a second how this page stands: whether it is seen, whether it draws, and whether an alarm would be heard from it.
+
+/** A word so often while nothing changes [ms]; three are missed before control lapses. */
+const EVERY_MS = 1000;
+/** An age beyond this says no more [s]. */
+const MOST_LAG_S = 86_400;
+
+export class Presence {
+  #told_ms = -Infinity;
+  #told = '';
+
+  /**
+   * @param {import('../core/store.js').Store} store
+   * @param {import('../boot/arming.js').Arming} arming
+   * @param {import('../phone/device-status.js').Handset} handset
+   */
+  constructor(store, arming, handset) {
+    this.store = store;
+    this.arming = arming;
+    this.handset = handset;
+    const look = () => this.#look();
+    store.on('tick', look);
+    store.on('beat', look); // while the page is hidden frames come and its timers hardly run
+    store.whenOpen(() => {
+      this.#told_ms = -Infinity;
+      look();
+    });
+    document.addEventListener('visibilitychange', look);
+    window.addEventListener('pageshow', look);
+    window.addEventListener('pagehide', () => this.#send({ ...this.#word(), leaves: true }));
+  }
+
+  #word() {
+    const { voice, arms } = this.arming;
+    return {
+      visible: !document.hidden,
+      draws: !this.store.drawing.isFailed,
+      sound: voice.isInterrupted ? 'interrupted' : arms.sound,
+      awake: arms.screen,
+      vibrates: this.handset.vibrates,
+      battery: this.handset.battery,
+      charging: this.handset.charging,
+    };
+  }
+
+  #look() {
+    const word = this.#word();
+    const key = JSON.stringify(word);
+    const now_ms = this.store.now();
+    if (key === this.#told && now_ms - this.#told_ms < EVERY_MS) return;
+    if (!this.#send(word)) return;
+    this.#told = key;
+    this.#told_ms = now_ms;
+  }
+
+  /** @param {object} word */
+  #send(word) {
+    return this.store.wire.send({ kind: 'present', ...word, lag_s: Math.min(MOST_LAG_S, this.store.lag_s) });
+  }
+}

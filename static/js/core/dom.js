@@ -1,0 +1,174 @@
+// The few ways in which the page touches its document. Text goes in as text; nothing is written that is already there.
+
+import { inUnits } from './units.js';
+import { pieces } from './format.js';
+
+const SVG = 'http://www.w3.org/2000/svg';
+
+/** @typedef {Record<string, string | number | boolean | null | undefined>} Attributes */
+
+/** @type {WeakMap<Element, string>} the text last written into an element */
+const written = new WeakMap();
+
+/**
+ * The element `selector` names inside `root`; the template must hold it.
+ * @param {ParentNode} root
+ * @param {string} selector
+ * @returns {HTMLElement}
+ */
+export function need(root, selector) {
+  const found = root.querySelector(selector);
+  if (!found) throw new Error(`The template lacks ${selector}`);
+  return /** @type {HTMLElement} */ (found);
+}
+
+/**
+ * The field `data-f="name"` inside `root`.
+ * @param {ParentNode} root
+ * @param {string} name
+ */
+export function field(root, name) {
+  return need(root, `[data-f="${name}"]`);
+}
+
+/**
+ * An HTML element.
+ * @param {string} tag
+ * @param {Attributes} [attributes]
+ * @param {...(Node | string)} children
+ * @returns {HTMLElement}
+ */
+export function html(tag, attributes = {}, ...children) {
+  return /** @type {HTMLElement} */ (dress(document.createElement(tag), attributes, children));
+}
+
+/**
+ * An SVG element.
+ * @param {string} tag
+ * @param {Attributes} [attributes]
+ * @param {...(Node | string)} children
+ * @returns {SVGElement}
+ */
+export function svg(tag, attributes = {}, ...children) {
+  return /** @type {SVGElement} */ (dress(document.createElementNS(SVG, tag), attributes, children));
+}
+
+/**
+ * An icon of templates/_icons.html.
+ * @param {string} name
+ * @param {string} [kind] "s" small, "fill", "dashed"
+ */
+export function icon(name, kind = '') {
+  return svg('svg', { class: `i ${kind}`.trim(), viewBox: '0 0 24 24', 'aria-hidden': 'true' }, svg('use', { href: `#i-${name}` }));
+}
+
+/**
+ * Show another icon in an icon element.
+ * @param {Element} element
+ * @param {string} name
+ */
+export function setIcon(element, name) {
+  const use = need(element, 'use');
+  if (use.getAttribute('href') !== `#i-${name}`) use.setAttribute('href', `#i-${name}`);
+}
+
+/**
+ * Write text, if it is not there yet.
+ * @param {Element} element
+ * @param {string} text
+ */
+export function setText(element, text) {
+  if (written.get(element) === text) return;
+  element.textContent = text;
+  written.set(element, text); // last: what failed is written again
+}
+
+/**
+ * Write a sentence whose numbers stand in the face of numbers, its speeds in the unit of this phone.
+ * @param {Element} element
+ * @param {string} sentence
+ */
+export function setWords(element, sentence) {
+  const shown = inUnits(sentence);
+  if (written.get(element) === shown) return;
+  element.replaceChildren(...words(shown));
+  written.set(element, shown);
+}
+
+/**
+ * A sentence as nodes, its numbers in spans of class n, its speeds in the unit of this phone.
+ * @param {string} sentence
+ * @returns {(HTMLElement | string)[]}
+ */
+export function words(sentence) {
+  return pieces(inUnits(sentence)).map((piece) => (piece.isNumber ? html('span', { class: 'n' }, piece.text) : piece.text));
+}
+
+/**
+ * Set an attribute, if it is not so yet; null, undefined and false take it away.
+ * @param {Element} element
+ * @param {string} name
+ * @param {string | number | boolean | null | undefined} value
+ */
+export function setAttribute(element, name, value) {
+  if (value === null || value === undefined || value === false) {
+    if (element.hasAttribute(name)) element.removeAttribute(name);
+    return;
+  }
+  const text = value === true ? '' : String(value);
+  if (element.getAttribute(name) !== text) element.setAttribute(name, text);
+}
+
+/**
+ * Show or hide.
+ * @param {Element} element
+ * @param {boolean} isShown
+ */
+export function show(element, isShown) {
+  setAttribute(element, 'hidden', !isShown);
+}
+
+/**
+ * Keep an attribute of `element` as something else is: a rule of style that asked for it (`:has()`) would be asked anew for
+ * every element with every frame.
+ * @param {Element} element
+ * @param {string} name
+ * @param {() => boolean} isSo
+ * @param {Node[]} seen what it depends on
+ * @param {MutationObserverInit} changes of theirs
+ */
+export function mirror(element, name, isSo, seen, changes) {
+  const look = () => setAttribute(element, name, isSo());
+  const observer = new MutationObserver(look);
+  for (const one of seen) observer.observe(one, changes);
+  look();
+}
+
+/** Lets the browser do what waits, so that no single task keeps a finger or a picture waiting for long. @returns {Promise<void>} */
+export function breath() {
+  const { scheduler } = /** @type {{scheduler?: {yield?: () => Promise<void>}}} */ (globalThis);
+  return scheduler?.yield?.() ?? new Promise((resolve) => { setTimeout(resolve); });
+}
+
+/**
+ * Listen, and get the way to stop listening.
+ * @param {EventTarget} target
+ * @param {string} type
+ * @param {(event: any) => void} listener
+ * @param {AddEventListenerOptions} [options]
+ */
+export function listen(target, type, listener, options) {
+  target.addEventListener(type, listener, options);
+  return () => target.removeEventListener(type, listener, options);
+}
+
+/**
+ * @param {Element} element
+ * @param {Attributes} attributes
+ * @param {(Node | string)[]} children
+ */
+function dress(element, attributes, children) {
+  for (const [name, value] of Object.entries(attributes)) setAttribute(element, name, value);
+  element.append(...children);
+  return element;
+}

@@ -1,0 +1,38 @@
+// Saved data while no car is monitored: the list of the Files tab on a board of its own, over the connect screen.
+
+import { mount } from './files.js';
+import { html, icon, listen, need, setAttribute } from '../core/dom.js';
+
+/**
+ * @param {import('../core/store.js').Store} store
+ * @param {(sentence: string, title?: string, way?: import('../shell/notice.js').Way) => void} say
+ * @param {import('../shell/router.js').Page} page
+ */
+export function openSaved(store, say, page) {
+  if (document.querySelector('.saved-board')) return;
+  const beneath = need(document, '#connect');
+  const back = html('button', { type: 'button', class: 'btn', 'aria-label': 'Back', 'data-f': 'saved-back' }, icon('back'));
+  const title = html('h2', { tabindex: -1 }, 'Saved data');
+  const panel = html('section', { class: 'panel', 'aria-label': 'Recordings', tabindex: 0 });
+  const board = html('div', { class: 'board saved-board', role: 'region', 'aria-label': 'Saved data' }, html('div', { class: 'titlebar' }, back, title), html('div', { class: 'view' }, panel));
+  setAttribute(beneath, 'inert', true);
+  document.body.append(board);
+  const files = mount(panel, store, say, () => true);
+  history.pushState({ saved: true }, '');
+  title.focus();
+
+  function close() {
+    stops.forEach((stop) => stop());
+    files.stop();
+    board.remove();
+    setAttribute(beneath, 'inert', null);
+    if (!beneath.hidden) need(beneath, '[data-f="saved"]').focus();
+  }
+  const stops = [
+    listen(back, 'click', () => history.back()),
+    listen(window, 'popstate', close), // the phone's back key too
+    store.on('draw', () => {
+      if (page.isMonitorShown) close(); // a car is monitored, or a recording is shown
+    }),
+  ];
+}

@@ -1,0 +1,228 @@
+// How recordings read in the list: their time, length, size and alarms in words. Pure functions, no DOM.
+
+import { missingWords } from './missing-topics.js';
+import { duration, fixed, NOTHING } from '../core/format.js';
+import { speedWords } from '../core/units.js';
+
+/**
+ * @typedef {'critical' | 'warning' | 'advisory'} Priority
+ * @typedef {{lines: number[][], start: [number, number], marks: [number, number, Priority][]}} Sketch in a square of 64 units
+ *
+ * @typedef {object} Recording a row of GET /api/recordings
+ * @property {string} id
+ * @property {string} vehicle
+ * @property {string | null} session
+ * @property {number | null} part
+ * @property {number} started_ms
+ * @property {number | null} length_s null: not read yet, or unreadable
+ * @property {number} size_bytes
+ * @property {number | null} distance_m null: no position
+ * @property {number | null} top_speed_mps
+ * @property {Record<Priority, number> | null} alarms null: whoever recorded it recorded no alarms
+ * @property {string} title
+ * @property {string} note
+ * @property {string[]} tags
+ * @property {'waiting' | 'read' | 'unreadable'} state
+ * @property {string | null} problem why it cannot be read
+ * @property {string[]} damage what of it cannot be read
+ * @property {string[]} [left_out] topics that were not recorded
+ * @property {string[]} [not_received] topics that had a publisher, and of which no message came
+ * @property {1 | 2 | null} [ros_version] null: not read yet, or unreadable
+ * @property {string | null} ended closed, recovered, or null where nobody says
+ * @property {string | null} ended_why
+ * @property {boolean} is_clip
+ * @property {string} file its name in the folder
+ * @property {string} format mcap, bag or db3
+ * @property {Sketch | null} sketch
+ * @property {number | null} trashed_ms
+ * @property {{at_ms: number, priority: Priority, alarm: string, title: string, text: string}[]} [raised] of one recording asked for alone
+ *
+ * @typedef {{count: number, bytes: number}} Total
+ * @typedef {object} Listing the answer of GET /api/recordings
+ * @property {Recording[]} recordings
+ * @property {string | null} next
+ * @property {Total} found
+ * @property {Total} all
+ * @property {Total} trash
+ * @property {number | null} free_bytes
+ * @property {number} waiting
+ * @property {string[]} vehicles
+ * @property {string[]} tags
+ */
+
+const MONTHS = ['Jan', 'Feb', 'Mar', 'Apr', 'May', 'Jun', 'Jul', 'Aug', 'Sep', 'Oct', 'Nov', 'Dec'];
+const DAY_MS = 86_400_000;
+const two = (/** @type {number} */ number) => String(number).padStart(2, '0');
+
+/**
+ * By this phone's clock: "Today 14:03", "Yesterday 16:20", "19 Nov 14:05", and in another year "19 Nov 2025 14:05".
+ * @param {number} at_ms
+ * @param {number} now_ms
+ */
+export function whenWords(at_ms, now_ms) {
+  const [at, now] = [new Date(at_ms), new Date(now_ms)];
+  if (Number.isNaN(at.getTime())) return NOTHING;
+  const time = `${two(at.getHours())}:${two(at.getMinutes())}`;
+  if (at.toDateString() === now.toDateString()) return `Today ${time}`;
+  const before = new Date(now.getFullYear(), now.getMonth(), now.getDate() - 1);
+  if (at.toDateString() === before.toDateString()) return `Yesterday ${time}`;
+  const year = at.getFullYear() === now.getFullYear() ? '' : ` ${at.getFullYear()}`;
+  return `${at.getDate()} ${MONTHS[at.getMonth()]}${year} ${time}`;
+}
+
+/** What a recording is called. @param {Recording} row @param {number} now_ms */
+export function nameOf(row, now_ms) {
+  return row.title || whenWords(row.started_ms, now_ms);
+}
+
+/**
+ * "57.1 MB", as disks are sold: 1 MB is a million bytes.
+ * @param {number | null | undefined} bytes
+ */
+export function sizeWords(bytes) {
+  if (bytes === null || bytes === undefined || !Number.isFinite(bytes)) return NOTHING;
+  if (bytes < 999.5) return `${fixed(Math.max(0, bytes), 0)} B`;
+  let value = bytes / 1000;
+  for (const unit of ['kB', 'MB', 'GB']) {
+    if (value < 999.5) return `${value < 9.95 || (value < 99.95 && unit !== 'kB') ? fixed(value) : fixed(value, 0)} ${unit}`;
+    value /= 1000;
+  }
+  return `${fixed(value)} TB`;
+}
+
+/** "12:48 min", "1:02:05 h". @param {number | null} length_s */
+export function lengthWords(length_s) {
+  if (length_s === null) return NOTHING;
+  return `${duration(length_s, true)} ${length_s < 3600 ? 'min' : 'h'}`;
+}
+
+/** "1.3 km", "76 m". @param {number} metres */
+export function distanceWords(metres) {
+  return metres < 999.5 ? `${fixed(metres, 0)} m` : `${fixed(metres / 1000)} km`;
+}
+
+/** What is beneath the name of a recording: whose it is, and what is to be known of it. @param {Recording} row @param {number} now_ms */
+export function originWords(row, now_ms) {
+  return [
+    row.title ? whenWords(row.started_ms, now_ms) : '',
+    row.vehicle,
+    row.is_clip ? 'clip' : '',
+    (row.part ?? 1) > 1 ? `part ${row.part}` : '',
+    row.format === 'bag' ? 'ROS 1 bag' : row.format === 'db3' ? 'ROS 2 db3' : '',
+    row.ended === 'recovered' ? 'recovered' : '',
+    row.damage.length ? 'damaged' : '',
+    row.trashed_ms === null ? '' : `deleted ${whenWords(row.trashed_ms, now_ms)}`,
+  ].filter(Boolean).join(' · ');
+}
+
+const WORDS = /** @type {[Priority, string, string][]} */ ([['critical', 'critical alarm', 'critical alarms'], ['warning', 'warning', 'warnings'], ['advisory', 'advisory', 'advisories']]);
+
+/** The counts that are not 0, most urgent first. @param {Recording['alarms']} alarms @returns {{priority: Priority, count: number, words: string}[]} */
+export function countsOf(alarms) {
+  return WORDS.flatMap(([priority, one, many]) => {
+    const count = alarms?.[priority] ?? 0;
+    return count > 0 ? [{ priority, count, words: `${count} ${count === 1 ? one : many}` }] : [];
+  });
+}
+
+/** "2 critical alarms, 1 warning", "no alarms"; "alarms not recorded" is not the same. @param {Recording['alarms']} alarms */
+export function alarmWords(alarms) {
+  if (alarms === null) return 'alarms not recorded';
+  return countsOf(alarms).map(({ words }) => words).join(', ') || 'no alarms';
+}
+
+/** All that is known of a recording in one sentence. @param {Recording} row */
+export function factWords(row) {
+  if (row.state === 'unreadable') return `${sizeWords(row.size_bytes)}. ${row.problem ?? 'It cannot be read.'}`;
+  if (row.state === 'waiting') return `${sizeWords(row.size_bytes)}, being read now.`;
+  const [speed, unit] = speedWords(row.top_speed_mps);
+  return `${[
+    lengthWords(row.length_s), sizeWords(row.size_bytes), row.distance_m === null ? 'no position' : distanceWords(row.distance_m),
+    row.top_speed_mps === null ? '' : `up to ${speed} ${unit}`, alarmWords(row.alarms),
+  ].filter(Boolean).join(', ')}.`;
+}
+
+/** What else there is to say of it, in sentences. @param {Recording} row */
+export function warningWords(row) {
+  const why = row.ended_why ?? 'the server ended while it was recorded.';
+  const recovered = row.ended === 'recovered' ? [/recover/i.test(why) ? why : `Recovered: ${why}`] : [];
+  const leftOut = row.left_out?.length ? [`Not recorded: ${row.left_out.join(', ')}.`] : [];
+  const silent = row.not_received?.length ? [`No message came from: ${row.not_received.join(', ')}.`] : [];
+  return [...recovered, ...row.damage, ...leftOut, ...silent];
+}
+
+/** @typedef {{kind: 'all' | 'vehicle' | 'tag' | 'days', value: string}} Choice */
+
+/** @param {string} text as the page's select has it: "vehicle:car" @returns {Choice} */
+export function choiceOf(text) {
+  const [kind = '', ...rest] = text.split(':');
+  return kind === 'vehicle' || kind === 'tag' || kind === 'days' ? { kind, value: rest.join(':') } : { kind: 'all', value: '' };
+}
+
+/**
+ * The query of a list.
+ * @param {{text: string, choice: Choice, cursor?: string | null, limit: number}} wish
+ * @param {number} now_ms
+ */
+export function queryOf({ text, choice, cursor, limit }, now_ms) {
+  const query = new URLSearchParams({ limit: String(limit) });
+  if (cursor) query.set('cursor', cursor);
+  if (text.trim()) query.set('text', text.trim().slice(0, 200));
+  if (choice.kind === 'vehicle' || choice.kind === 'tag') query.set(choice.kind, choice.value);
+  if (choice.kind === 'days') {
+    const today = new Date(now_ms);
+    query.set('since_ms', String(new Date(today.getFullYear(), today.getMonth(), today.getDate()).getTime() - (Number(choice.value) - 1) * DAY_MS));
+  }
+  return query.toString();
+}
+
+/** Tags as they are typed: "wet, lot 3". @param {string} text */
+export function tagsOf(text) {
+  return text.split(/[,;\n]/).map((tag) => tag.trim()).filter(Boolean);
+}
+
+/** The points of a line of a sketch as SVG has them. @param {number[]} line */
+export function pointsOf(line) {
+  const pairs = [];
+  for (let i = 0; i + 1 < line.length; i += 2) pairs.push(`${line[i]},${line[i + 1]}`);
+  return pairs.join(' ');
+}
+
+/**
+ * The recorder as the state tells of it.
+ * @typedef {object} Recorder
+ * @property {string} state off, recording, held, saving or stopped
+ * @property {number | null} for_s
+ * @property {number | null} [part]
+ * @property {number} [bytes]
+ * @property {number} [dropped] messages that were lost because the disk was too slow
+ * @property {string | null} [reason] why it is not recording
+ * @property {number} [as_json]
+ * @property {string[]} [left_out]
+ * @property {string[]} [not_received]
+ * @property {{topic: string, mb: number}[]} [too_large]
+ *
+ * @typedef {{name: string, mark: string, facts: string, missing: string, isOn: boolean, isBad: boolean, order: boolean | null}} Live order: what a key asks for, true to record; null: no key
+ */
+
+const NAMES = /** @type {Record<string, string>} */ ({ recording: 'Recording now', held: 'Recording held', saving: 'Being saved', stopped: 'Recording stopped', off: 'Not recording' });
+
+/**
+ * What stands above the list of what was recorded: what is recorded now, or why nothing is. Null: nothing is to be said.
+ * @param {Recorder | undefined} recorder
+ * @param {{vehicle: string | null, isMonitoring: boolean, isSilent: boolean}} now
+ * @returns {Live | null}
+ */
+export function liveOf(recorder, { vehicle, isMonitoring, isSilent }) {
+  if (!recorder || (recorder.state === 'off' && !isMonitoring)) return null;
+  const { state, for_s, part, bytes, dropped, reason } = recorder;
+  const isOn = state === 'recording';
+  const facts = [for_s === null || state === 'off' ? '' : lengthWords(for_s), bytes ? sizeWords(bytes) : '', dropped ? `${dropped} messages lost: the disk is too slow` : ''];
+  const mark = isOn ? [vehicle ?? '', (part ?? 1) > 1 ? `part ${part}` : ''] : [reason ?? ''];
+  if (isSilent) return { name: 'Recording?', mark: 'The server does not answer: nobody knows whether it records.', facts: '', missing: '', isOn: false, isBad: true, order: null };
+  return {
+    missing: isOn || state === 'held' ? missingWords(recorder) : '',
+    name: NAMES[state] ?? state, mark: mark.filter(Boolean).join(' · '), facts: facts.filter(Boolean).join(' · '), isOn, isBad: state === 'stopped' || Boolean(dropped),
+    order: state === 'saving' || !isMonitoring ? null : !(isOn || state === 'held'),
+  };
+}

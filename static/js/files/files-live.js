@@ -1,0 +1,50 @@
+// What is recorded now, above the list: it counts, says why where nothing is recorded, and is begun and ended by hand.
+
+import { liveOf } from './files-layout.js';
+import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
+
+export class FilesLive {
+  /**
+   * @param {import('../core/store.js').Store} store
+   * @param {(sentence: string, title?: string) => void} say
+   */
+  constructor(store, say) {
+    this.store = store;
+    this.name = html('div', { class: 't' });
+    this.mark = html('div', { class: 'm' });
+    this.facts = html('div', { class: 'm' });
+    this.missing = html('div', { class: 'm', 'data-f': 'files-missing' });
+    this.key = html('button', { type: 'button', class: 'key', 'data-f': 'files-record' });
+    this.dot = html('span', { class: 'thumb none' }, icon('rec', 'l'));
+    this.row = html('div', { class: 'file', 'data-live': '', hidden: true }, this.dot, html('div', { class: 'tx' }, this.name, this.mark, this.facts, this.missing), this.key);
+    this.element = html('section', { 'aria-label': 'The recorder' }, this.row);
+    this.stop = listen(this.key, 'click', async () => {
+      const on = this.key.dataset['on'] === 'true';
+      const answer = await store.ask('record', { on });
+      if (!answer.ok) say(answer.reason ?? 'Refused.', on ? 'Not recorded' : 'Not ended');
+      else if (!on) say('What was recorded is saved and listed. The car is still monitored.', 'Recording ended');
+    });
+  }
+
+  /** @param {boolean} isWanted not among what was searched for, and not in the trash */
+  draw(isWanted) {
+    const { store } = this;
+    const frame = store.heeded; // that of now, whatever is replayed
+    const phase = frame?.session.phase;
+    const live = isWanted ? liveOf(/** @type {import('./files-layout.js').Recorder | undefined} */ (frame?.recording), { vehicle: frame?.vehicle ?? null, isMonitoring: phase === 'monitoring' || phase === 'lost', isSilent: store.isSilent }) : null;
+    show(this.row, live !== null);
+    if (!live) return;
+    if (store.replaying) live.order = null; // its key is with the live car
+    setText(this.name, live.name);
+    setWords(this.mark, live.mark);
+    setWords(this.facts, live.facts);
+    setWords(this.missing, live.missing);
+    show(this.missing, live.missing !== '');
+    setAttribute(this.row, 'data-on', live.isOn);
+    setAttribute(this.row, 'data-bad', live.isBad);
+    show(this.key, live.order !== null);
+    setAttribute(this.key, 'data-on', String(live.order));
+    setText(this.key, live.order ? 'Record' : 'End');
+    setAttribute(this.key, 'aria-label', live.order ? 'Record' : 'End the recording');
+  }
+}

@@ -1,0 +1,116 @@
+// One recording in the list: its track, its name, whose it is, length, size and alarms; pressed anywhere it offers what can be done.
+
+import { alarmWords, countsOf, lengthWords, nameOf, originWords, pointsOf, sizeWords } from './files-layout.js';
+import { html, icon, listen, svg, words } from '../core/dom.js';
+
+/** @typedef {import('./files-layout.js').Recording} Recording */
+
+const HELD_MS = 500; // a press of this length is a long one
+const STILL_PX = 10; // a finger that moves farther scrolls
+
+const MARKS = /** @type {Record<string, [string, string]>} */ ({ critical: ['al', 'M0-5l5 5-5 5-5-5z'], warning: ['aw', 'M0-6.5l6 10.5h-12z'] });
+const ICONS = /** @type {Record<string, [string, string]>} */ ({ critical: ['crit', 'c-crit'], warning: ['warn', 'c-warn'], advisory: ['info', 'sub'] });
+
+/** The way it went, or in words that nobody knows. @param {Recording} row */
+export function thumbnail(row) {
+  const { sketch } = row;
+  if (!sketch) {
+    const why = row.state === 'unreadable' ? 'not readable' : row.state === 'waiting' ? 'being read' : 'no position';
+    return html('span', { class: 'thumb none' }, why);
+  }
+  return svg('svg', { class: 'thumb', viewBox: '0 0 64 64', 'aria-hidden': 'true' },
+    ...sketch.lines.map((line) => svg('polyline', { points: pointsOf(line) })),
+    svg('circle', { cx: sketch.start[0], cy: sketch.start[1], r: 3.5 }),
+    ...sketch.marks.flatMap(([x, y, priority]) => {
+      const mark = MARKS[priority];
+      return mark ? [svg('path', { class: mark[0], d: mark[1], transform: `translate(${x} ${y})` })] : [];
+    }));
+}
+
+/**
+ * Its alarms as the strip draws them.
+ * @param {Recording} row
+ */
+function counts(row) {
+  const found = countsOf(row.alarms);
+  if (!found.length) return [html('span', {}, alarmWords(row.alarms))];
+  return found.map(({ priority, count, words: said }) => {
+    const [glyph, kind] = ICONS[priority] ?? ['info', 'sub'];
+    return html('span', { class: `mini ${kind}` }, icon(glyph, 's'), html('span', { class: 'n b', 'aria-hidden': 'true' }, String(count)), html('span', { class: 'unseen' }, said));
+  });
+}
+
+/**
+ * @param {Recording} row
+ * @param {number} now_ms
+ * @param {(row: Recording, from: HTMLElement) => void} onPress
+ * @returns {HTMLElement}
+ */
+export function drawRow(row, now_ms, onPress) {
+  const name = nameOf(row, now_ms);
+  const more = html('button', { type: 'button', class: 'btn', 'aria-label': `Actions for ${name}`, 'aria-haspopup': 'dialog' }, icon('menu', 'dots'));
+  const third = row.state === 'unreadable' ? [html('span', {}, ...words(`${sizeWords(row.size_bytes)} · ${row.problem ?? ''}`))]
+    : row.state === 'waiting' ? [html('span', {}, ...words(sizeWords(row.size_bytes))), html('span', {}, 'being read')]
+      : [html('span', {}, ...words(lengthWords(row.length_s))), html('span', {}, ...words(sizeWords(row.size_bytes))), ...counts(row)];
+  const tags = row.tags.length ? [html('div', { class: 'm tags' }, ...row.tags.map((tag) => html('bdi', { class: 'chip' }, tag)))] : [];
+  const item = html('li', { class: 'file', 'data-id': row.id, 'data-state': row.state }, thumbnail(row),
+    html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm' }, originWords(row, now_ms)), html('div', { class: 'm facts-line' }, ...third), ...tags),
+    more);
+  pressed(item, () => onPress(row, more));
+  return item;
+}
+
+/** The finger that still lies there must not press what has come under it: its click goes nowhere. */
+function swallow() {
+  const stop = (/** @type {Event} */ event) => {
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  const leave = () => setTimeout(() => window.removeEventListener('click', stop, { capture: true }), 100);
+  window.addEventListener('click', stop, { capture: true });
+  for (const type of ['pointerup', 'pointercancel']) window.addEventListener(type, leave, { capture: true, once: true });
+}
+
+/**
+ * A short press, a long one and the right button of a mouse do the same; each is one press.
+ * @param {HTMLElement} item
+ * @param {() => void} act
+ */
+export function pressed(item, act) {
+  /** @type {{x: number, y: number} | null} */
+  let began = null;
+  let isDone = false;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let timer;
+  const end = () => {
+    clearTimeout(timer);
+    began = null;
+  };
+  const once = () => {
+    end();
+    if (isDone) return;
+    isDone = true;
+    act();
+  };
+  listen(item, 'pointerdown', (event) => {
+    isDone = false;
+    if (event.button !== 0) return;
+    began = { x: event.clientX, y: event.clientY };
+    timer = setTimeout(() => {
+      once();
+      swallow();
+    }, HELD_MS);
+  });
+  listen(item, 'pointermove', (event) => {
+    if (began && Math.hypot(event.clientX - began.x, event.clientY - began.y) > STILL_PX) end();
+  });
+  for (const type of ['pointerup', 'pointercancel', 'pointerleave']) listen(item, type, end);
+  listen(item, 'contextmenu', (event) => {
+    event.preventDefault();
+    once();
+  });
+  listen(item, 'click', (event) => {
+    if (event.detail === 0) isDone = false; // a key: no finger went down before it
+    once();
+  });
+}

@@ -1,0 +1,212 @@
+// The last minute of a signal as columns, and what of it is line, gap and scale: pure functions, no DOM.
+
+/** Steps kept: a minute. As the server has it. */
+export const SPAN = 300;
+export const STEP_S = 0.2;
+/** Nothing for longer than so many periods of the signal is a gap; but a step or two without a message are the radio's rhythm. */
+const GAP_PERIODS = 3;
+const GAP_LEAST_S = 0.5;
+
+/**
+ * @typedef {import('../core/protocol.js').Trends} Frame
+ * @typedef {'speed' | 'acceleration' | 'distance' | 'steering' | 'brake' | 'accelerator'} Name
+ *
+ * @typedef {object} Spec
+ * @property {Name} name
+ * @property {string} label short, for the small picture
+ * @property {string} title
+ * @property {string} unit of the wire
+ * @property {number} digits
+ * @property {boolean} isSigned shown with its sign
+ * @property {string | null} limit its name in the frame
+ * @property {(limits: Record<string, number>, low: number, high: number) => [number, number]} ends of the scale, in the wire's unit
+ */
+
+/** Their places are fixed. @type {Spec[]} */
+export const SPECS = [
+  { name: 'speed', label: 'Speed', title: 'Speed', unit: 'm/s', digits: 1, isSigned: false, limit: 'speed_limit.max_mps',
+    ends: (limits, low, high) => [low < 0 ? -upTo(-low, [1, 2, 5, 15, 60]) : 0, Math.max(limits['gauge.speed_max_mps'] ?? 15, high, limits['speed_limit.max_mps'] ?? 0)] },
+  { name: 'acceleration', label: 'Acceleration', title: 'Acceleration', unit: 'm/s²', digits: 1, isSigned: true, limit: null,
+    ends: (limits, low, high) => both(Math.max(limits['gauge.acceleration_max_mps2'] ?? 3, -low, high)) },
+  { name: 'distance', label: 'Nearest', title: 'Nearest object ahead', unit: 'm', digits: 1, isSigned: false, limit: 'obstacle.standoff_m',
+    ends: (limits, _, high) => [0, upTo(Math.max(high, 1.2 * (limits['obstacle.standoff_m'] ?? 0)), [20, 40, 80, 200])] },
+  { name: 'steering', label: 'Steering', title: 'Steering, negative is left', unit: '%', digits: 0, isSigned: true, limit: null,
+    ends: (_, low, high) => both(upTo(Math.max(-low, high), [20, 50, 100])) },
+  { name: 'brake', label: 'Brake', title: 'Brake', unit: '%', digits: 0, isSigned: false, limit: null, ends: (_, low, high) => [Math.min(0, low), Math.max(100, high)] },
+  { name: 'accelerator', label: 'Accelerator', title: 'Accelerator', unit: '%', digits: 0, isSigned: false, limit: null, ends: (_, low, high) => [Math.min(0, low), Math.max(100, high)] },
+];
+
+/** @param {number} end @returns {[number, number]} */
+function both(end) {
+  return [-end, end];
+}
+
+/** The first round end that holds `wanted`. @param {number} wanted @param {number[]} ends */
+function upTo(wanted, ends) {
+  return ends.find((end) => end >= wanted) ?? wanted;
+}
+
+/** In the place of a number: messages came and had none to give. */
+const NO_NUMBER = Infinity;
+
+/**
+ * The last minute of all signals, in rings that never grow. A step of which nothing was told holds NaN.
+ */
+export class Minute {
+  /** The newest step told, or −1. */
+  last = -1;
+  /** The first step since the car was dialled. */
+  since = 0;
+  /** First step after which some were missed and are not asked for yet; null: none. @type {number | null} */
+  missed = null;
+  /** The newest frame's moment, as a step and its part. */
+  now = 0;
+  /** @type {Record<string, {lowest: Float64Array, highest: Float64Array}>} */
+  #rings = Object.fromEntries(SPECS.map(({ name }) => [name, { lowest: new Float64Array(SPAN).fill(NaN), highest: new Float64Array(SPAN).fill(NaN) }]));
+
+  /** Forget everything: another run of the server counts anew. */
+  clear() {
+    this.last = -1;
+    this.missed = null;
+    this.now = 0;
+    for (const { lowest, highest } of Object.values(this.#rings)) {
+      lowest.fill(NaN);
+      highest.fill(NaN);
+    }
+  }
+
+  /**
+   * Steps the server told, in a state or on demand.
+   * @param {Frame} frame
+   * @param {boolean} [isAnswer] to what was asked: what it lacks is not to be had
+   */
+  take(frame, isAnswer = false) {
+    if (frame.since > this.since && this.last >= 0) this.clear(); // another car was dialled
+    this.since = frame.since;
+    this.now = Math.max(this.now, frame.now);
+    const count = Math.max(0, ...Object.values(frame.lowest).map((steps) => steps.length));
+    const end = frame.first + count - 1;
+    if (isAnswer) this.missed = null;
+    else if (frame.first > this.last + 1) {
+      const from = Math.max(this.last, this.since - 1);
+      if (frame.first > from + 1) this.missed = Math.min(this.missed ?? Infinity, from);
+    }
+    this.#open(end);
+    for (const [name, ring] of Object.entries(this.#rings)) {
+      for (let i = 0; i < count; i += 1) {
+        const step = frame.first + i;
+        if (step <= this.last - SPAN) continue;
+        ring.lowest[step % SPAN] = numberOf(frame.lowest[name]?.[i]);
+        ring.highest[step % SPAN] = numberOf(frame.highest[name]?.[i]);
+      }
+    }
+  }
+
+  /** Whatever lies between the newest step and this one is unknown until it is told. @param {number} end */
+  #open(end) {
+    if (end <= this.last) return;
+    const from = Math.max(this.last + 1, end - SPAN + 1);
+    for (const ring of Object.values(this.#rings)) {
+      for (let step = from; step <= end; step += 1) ring.lowest[step % SPAN] = ring.highest[step % SPAN] = NaN;
+    }
+    this.last = end;
+  }
+
+  /**
+   * One signal's minute up to a moment, cut into lines and gaps. Times are seconds before that moment, ≤ 0.
+   * @param {Name} name
+   * @param {number} now as a step and its part
+   * @param {number | null} period_s of the signal
+   * @returns {Course}
+   */
+  course(name, now, period_s) {
+    const ring = this.#rings[name];
+    const first = Math.max(0, Math.ceil(now) - SPAN);
+    const gap_steps = Math.max(GAP_LEAST_S, GAP_PERIODS * (period_s ?? 0)) / STEP_S;
+    /** @type {Course} */
+    const course = { times_s: [], lowest: [], highest: [], gaps: [], low: NaN, high: NaN, isEmpty: true };
+    if (!ring) return course;
+    let heard = now - SPAN; // up to where something was heard
+    for (let step = first; step <= this.last && step < now; step += 1) {
+      const low = ring.lowest[step % SPAN] ?? NaN;
+      if (Number.isNaN(low) || step <= this.last - SPAN) continue;
+      const at_s = Math.min(0, (step + 0.5 - now) * STEP_S);
+      if (step - heard > gap_steps) course.gaps.push([Math.max(-SPAN * STEP_S, (heard - now) * STEP_S), (step - now) * STEP_S]);
+      if (step - heard > gap_steps || low === NO_NUMBER) cut(course);
+      if (low !== NO_NUMBER) {
+        const high = ring.highest[step % SPAN] ?? low;
+        course.times_s.push(at_s);
+        course.lowest.push(low);
+        course.highest.push(high);
+        course.low = course.isEmpty ? low : Math.min(course.low, low);
+        course.high = course.isEmpty ? high : Math.max(course.high, high);
+        course.isEmpty = false;
+      }
+      heard = step + 1;
+    }
+    // The step under way is not told yet, and the frame that tells it takes its time.
+    if (now - heard > gap_steps + 2) course.gaps.push([Math.max(-SPAN * STEP_S, (heard - now) * STEP_S), 0]);
+    return course;
+  }
+}
+
+/**
+ * @typedef {object} Course
+ * @property {number[]} times_s before now, ascending; one after the other where a line is cut
+ * @property {(number | null)[]} lowest null: the line is cut here
+ * @property {(number | null)[]} highest
+ * @property {[number, number][]} gaps from and to [s before now]: nobody knows
+ * @property {number} low of the whole
+ * @property {number} high
+ * @property {boolean} isEmpty no number at all
+ */
+
+/** The line ends here. @param {Course} course */
+function cut(course) {
+  const last_s = course.times_s.at(-1);
+  if (last_s === undefined || course.lowest.at(-1) === null) return;
+  course.times_s.push(last_s + STEP_S / 4);
+  course.lowest.push(null);
+  course.highest.push(null);
+}
+
+/** @param {import('../core/protocol.js').Step | undefined} step */
+function numberOf(step) {
+  return typeof step === 'number' ? step : step === 'none' ? NO_NUMBER : NaN;
+}
+
+/**
+ * The lowest and highest of a course where it is looked at; NaN where it has no number there.
+ * @param {Course} course
+ * @param {number} from_s
+ * @param {number} to_s
+ */
+export function extent(course, from_s, to_s) {
+  let [low, high] = [NaN, NaN];
+  course.times_s.forEach((at_s, i) => {
+    const [a, b] = [course.lowest[i] ?? null, course.highest[i] ?? null];
+    if (at_s < from_s || at_s > to_s || a === null || b === null) return;
+    low = Number.isNaN(low) ? a : Math.min(low, a);
+    high = Number.isNaN(high) ? b : Math.max(high, b);
+  });
+  return { low, high };
+}
+
+/** How many seconds of a part of the minute nobody knows. @param {Course} course @param {number} from_s @param {number} to_s */
+export function unknown_s(course, from_s, to_s) {
+  return course.gaps.reduce((sum, [a, b]) => sum + Math.max(0, Math.min(b, to_s) - Math.max(a, from_s)), 0);
+}
+
+/**
+ * The window of a chart after a step of zoom or pan, always within the minute. Seconds before now.
+ * @param {[number, number]} view
+ * @param {{zoom?: number, pan?: number, about?: number}} change zoom: the new width by the old; pan: by the width; about: what stays in place, 0 … 1
+ * @returns {[number, number]}
+ */
+export function viewAfter([from_s, to_s], { zoom = 1, pan = 0, about = 1 }) {
+  const whole_s = SPAN * STEP_S;
+  const width_s = Math.min(whole_s, Math.max(4, (to_s - from_s) * zoom));
+  const still_s = from_s + (to_s - from_s) * about;
+  const begin_s = Math.min(-width_s, Math.max(-whole_s, still_s - width_s * about + width_s * pan));
+  return [begin_s, begin_s + width_s];
+}

@@ -1,0 +1,284 @@
+// The page's beginning: one store, one voice, every panel at its place.
+
+import './boot/trusted-types.js';
+import { thenOf } from './boot/pairing-token.js';
+
+import { Admission } from './pairing/admission.js';
+import { soundOf } from './alarms/alarm-layout.js';
+import { Arming } from './boot/arming.js';
+import { deviceName, keptHere } from './control/device-name.js';
+import { breath, field, listen, need, show } from './core/dom.js';
+import { gapWords } from './core/event-log.js';
+import { takeEarly } from './boot/early-socket.js';
+import { FilesTab } from './shell/files-tab.js';
+import { forgetWork } from './boot/forget.js';
+import { giveUp } from './boot/give-up.js';
+import { Handset } from './phone/device-status.js';
+import { holdTaps } from './boot/held-taps.js';
+import { MapTab } from './shell/map-tab.js';
+import { notices } from './shell/notice.js';
+import { ownName } from './control/own-name.js';
+import { Page } from './shell/router.js';
+import { Phone } from './phone/phone.js';
+import { Presence } from './control/presence.js';
+import { ScanTab } from './shell/scan-tab.js';
+import { Screens } from './shell/screens.js';
+import { SettingsTab } from './shell/settings-tab.js';
+import { closeSheet, mountSheets } from './shell/sheet.js';
+import { Store } from './core/store.js';
+import { Tabs } from './shell/tabs.js';
+import { Undrawn } from './shell/undrawn.js';
+import { Voice } from './alarms/alarm-sound.js';
+import { lossKey, mount as mountDialogs } from './shell/dialogs.js';
+import { mount as mountBadge } from './shell/badge.js';
+import { mount as mountChecks } from './alarms/checks.js';
+import { mount as mountConnect } from './shell/connect.js';
+import { Control, mount as mountControl } from './control/control.js';
+import { mount as mountGauge } from './home/gauge.js';
+import { mount as mountInstall } from './shell/install.js';
+import { mount as mountNearest } from './home/nearest.js';
+import { mount as mountPedals } from './home/pedals.js';
+import { mount as mountPosition } from './home/position.js';
+import { mount as mountPreferences } from './shell/preferences.js';
+import { mount as mountRail } from './shell/action-bar.js';
+import { mount as mountReach } from './control/alarm-reach.js';
+import { mount as mountSlowing } from './slowdown/slowing.js';
+import { mount as mountSnackbar } from './shell/snackbar.js';
+import { mount as mountStart } from './boot/start.js';
+import { mount as mountStrip } from './shell/strip.js';
+import { mount as mountTopbar } from './shell/topbar.js';
+import { mount as mountTrends } from './home/trends.js';
+import { mount as mountVeil } from './shell/veil.js';
+
+/** The rest of the page waits for the first values so long, and no longer [ms]. */
+const WAITS_MS = 400;
+
+/** Ends what has begun. */
+let stop = () => {};
+let isOver = false;
+/** @type {Undrawn | null} */
+let undrawn = null;
+
+void run();
+
+/** Nothing here may need more of the browser than the language itself: it is what remains when the browser fails. */
+async function run() {
+  try {
+    await begin();
+  } catch (error) {
+    isOver = true;
+    console.error(error);
+    try {
+      stop(); // values that look alive, on a page that could not ask for anybody, would be a lie
+    } finally {
+      undrawn?.show();
+      giveUp();
+    }
+  }
+}
+
+/**
+ * First what is seen at a glance, with its first values; then, part after part, what answers a finger. As one piece it would
+ * keep a slow phone from the values for a third of a second, and from everything else for as long.
+ */
+async function begin() {
+  const release = holdTaps();
+  const vehicle = document.documentElement.dataset['vehicle'];
+  const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
+
+  /** Where devices are paired, each socket needs a ticket. */
+  const admission = document.documentElement.dataset['access'] === 'paired' ? new Admission(address, shut) : null;
+  let name = ''; // one, also where nothing can be kept
+  const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), () => (name ||= deviceName(navigator.userAgent, keptHere())), ownName);
+  const voice = new Voice();
+  store.undrawn = undrawn = new Undrawn(() => store.frame, () => voice.say('high'));
+  stop = () => {
+    store.stop();
+    voice.say(null);
+  };
+  const monitor = need(document, '#monitor');
+  const tell = notices(field(document, 'snacks'));
+  const control = new Control(store, tell, openPhone);
+  /** What was refused because another is in control is said with a key that helps. @type {typeof tell} */
+  const say = (sentence, title, way) => tell(sentence, title, way ?? control.wayOf(sentence));
+  const page = new Page(store, say);
+  /** Called when another tab or screen came in front; the tabs' contents come later. */
+  let front = () => {};
+  const tabs = new Tabs(monitor, () => front());
+  page.onShown = () => {
+    tabs.place();
+    front();
+  };
+  store.on('draw', draw);
+  mountTopbar(monitor, store, say);
+  mountStrip(monitor, store);
+  mountVeil(monitor, store);
+  mountGauge(need(monitor, '[data-part="gauge"]'), store);
+  mountNearest(need(monitor, '[data-part="nearest"]'), store);
+  mountPedals(need(monitor, '[data-part="pedals"]'), store);
+  mountPosition(need(monitor, '[data-part="position"]'), store);
+  mountRail(monitor, store, page);
+  // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
+  for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
+  store.start();
+  await glanced(store);
+  store.greet();
+
+  // What asks for the operator, and what acts on the car.
+  store.on('beat', speak);
+  store.on('tick', speak);
+  mountDialogs(store, page);
+  mountSnackbar(field(document, 'snacks'), store, say);
+  mountSlowing(monitor, store, control, say); // after the dialogs: its count-down lies over them
+  await breath();
+  mountControl(monitor, field(document, 'snacks'), store, control);
+  await breath();
+  const arming = new Arming(voice, new Phone(store));
+  const handset = new Handset();
+  new Presence(store, arming, handset);
+  await breath();
+  mountStart(need(document, '#start'), store);
+  mountConnect(need(document, '#connect'), store, page, arming);
+  const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
+  const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null, say);
+  const files = new FilesTab(need(monitor, '[data-panel="files"]'), store, say, () => page.isMonitorShown && tabs.shows('files') && screens.open === null);
+  const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
+  const screens = new Screens(monitor, store, () => front());
+  mountSheets();
+  mountInstall(say);
+  mountPreferences(voice);
+  await breath();
+  mountReach(need(monitor, '[data-part="reach"]'), store, openPhone);
+  mountChecks(need(monitor, '[data-part="checks"]'), store);
+  await breath();
+  mountTrends(need(monitor, '[data-part="trends"]'), store);
+  await breath();
+  mountBadge(store);
+  page.onShown = () => {
+    tabs.place();
+    front();
+    unfold();
+  };
+
+  /** What lies under the fold of Home comes after what is seen first, a part at a time. */
+  async function unfold() {
+    if (!page.isMonitorShown) return;
+    for (const part of monitor.querySelectorAll('[data-late][hidden]')) {
+      await new Promise((resolve) => { requestAnimationFrame(resolve); });
+      await breath();
+      show(part, true);
+    }
+  }
+
+  /** The scan is sent and drawn only while its tab is in front and nothing lies over it; Settings is loaded once it is. */
+  front = () => {
+    queueMicrotask(() => {
+      scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null);
+      map.look();
+      files.look();
+      settings.look();
+    });
+  };
+
+  /** What this phone can do is looked at seldom. */
+  function openPhone() {
+    import('./phone/this-phone.js').then(({ openThisPhone }) => openThisPhone(store, arming, handset)).catch(() => say('What shows this phone could not be fetched.', 'Not opened'));
+  }
+
+  /** This device is not paired, or was removed just now. @param {import('./pairing/admission.js').Refusal} why */
+  function shut(why) {
+    if (isOver) return;
+    if (why.code === 'removed') forgetWork(keptHere());
+    if (store.frame) {
+      location.reload(); // nothing of the car stays on a page that may not look any more; the screen then says the reason
+      return;
+    }
+    page.isShut = true;
+    page.draw();
+    import('./pairing/pairing.js').then(({ openPairing }) => openPairing(need(document, '#pairing'), {
+      why,
+      name: store.name,
+      onPaired: () => {
+        page.isShut = false;
+        page.draw();
+        admission?.admit();
+      },
+    })).catch(() => say('The screen for pairing could not be fetched from the server. Load the page again.', 'Not paired'));
+  }
+
+  /** What a viewer may not do is greyed; once somebody is one, it is told so. */
+  let isViewed = false;
+  function greet() {
+    if (!store.isViewer || isViewed) return;
+    isViewed = true;
+    import('./control/viewer.js').then(({ mountViewer }) => mountViewer(store, say)).catch(() => {}); // the server refuses it all the same
+  }
+  store.whenOpen(greet);
+
+  function draw() {
+    page.draw();
+    show(field(monitor, 'sound-off'), voice.isPossible ? !voice.isRunning : false);
+  }
+
+  function speak() {
+    if (store.drawing.isFailed) return; // undrawn.js sounds
+    const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
+    voice.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
+  }
+
+  store.on('refused', (answer) => {
+    control.note(answer);
+    if (answer.heldBy) say(answer.reason, 'You are not in control'); // whoever ordered it may say it better
+  });
+  listen(field(need(document, '#sheet-menu'), 'this-phone'), 'click', () => {
+    closeSheet(/** @type {HTMLDialogElement} */ (need(document, '#sheet-menu')));
+    openPhone();
+  });
+  store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
+  listen(document, 'keydown', () => { document.documentElement.dataset['keys'] = ''; }, { capture: true });
+  listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
+  listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
+  listen(field(need(document, '#connect'), 'saved'), 'click', () => {
+    import('./files/files-board.js').then(({ openSaved }) => openSaved(store, say, page)).catch(() => say('The recordings could not be fetched from the server. Try again.', 'Not opened'));
+  });
+
+  // A link may lead to a moment of a recording.
+  const asked = new URLSearchParams(location.search);
+  const then = thenOf(asked.get('then'));
+  const recording = asked.get('replay');
+  let isAsked = false;
+  store.whenOpen(() => {
+    if (isAsked) return;
+    isAsked = true;
+    if (asked.has('then')) history.replaceState(history.state, '', location.pathname);
+    if (then) location.assign(then); // a link in a mail: now that this device is known
+    if (recording) import('./replay/replay.js').then(({ openReplay }) => openReplay(recording, store, say, Number(asked.get('t')) || 0)).catch(() => say('What shows a recording could not be fetched.', 'Not replayed'));
+  });
+  draw();
+  front();
+  unfold();
+  release();
+  // What outlasts this visit is seen to once the page stands.
+  setTimeout(() => import('./boot/service-worker.js').then(({ Shell }) => new Shell(store, say)).catch(() => {}), 2000);
+  // The screens an operator may want when the server is gone are fetched while it is there, once the page has begun.
+  setTimeout(prefetch, 10_000);
+  function prefetch() {
+    for (const load of [() => import('./slowdown/slow-sheet.js'), () => import('./alarms/log.js'), () => import('./home/signals.js'), () => import('./scan/scan.js'), () => import('./home/chart.js')]) load().catch(() => {});
+  }
+}
+
+/**
+ * Until the first values were painted. Where none come, or nothing is painted, as in the background, the page goes on without.
+ * @param {Store} store
+ * @returns {Promise<void>}
+ */
+function glanced(store) {
+  return new Promise((resolve) => {
+    setTimeout(resolve, WAITS_MS);
+    const off = store.on('draw', () => {
+      if (!store.frame) return;
+      off();
+      requestAnimationFrame(() => setTimeout(resolve)); // the next picture begins: this one was shown
+    });
+  });
+}

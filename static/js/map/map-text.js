@@ -1,0 +1,147 @@
+// What the map says of the car and of the phone, and how much ink each deserves: pure functions of the newest frame.
+
+import { bearing_deg, distance_m, placeOf } from '../core/geodesy.js';
+import { ellipseOf } from './map-layout.js';
+import { nameOf } from '../phone/phones-layout.js';
+import { age, fixed, heading } from '../core/format.js';
+
+/**
+ * @typedef {import('../core/geodesy.js').Place} Place
+ * @typedef {import('../core/protocol.js').State} State
+ * @typedef {import('../core/protocol.js').Freshness} Freshness
+ * @typedef {object} CarShown
+ * @property {Place | null} place where it was last known to be
+ * @property {boolean} isLive the place may be shown as where it is
+ * @property {Freshness} ink
+ * @property {number | null} age_s
+ * @property {import('./map-layout.js').Ellipse | null} ellipse one sigma
+ * @property {number | null} heading_deg
+ * @property {boolean} isHeadingLive
+ * @property {string} label on the map
+ * @property {string} says a sentence where something is to be said, else ""
+ *
+ * @typedef {object} PhoneOnMap
+ * @property {Place | null} place
+ * @property {boolean} isLive
+ * @property {number | null} age_s
+ * @property {number | null} accuracy_m
+ * @property {string} label
+ * @property {string} says
+ *
+ * @typedef {{distance_m: number, bearing_deg: number, allowed_m: number | null}} Apart allowed_m: null where the server did not compare them
+ */
+
+/** A phone's fix older than this tells where it was, not where it is; as the server has it [s]. */
+const PHONE_LIVES_S = 5;
+/** A comparison older than this is of another moment [s]. */
+const COMPARED_LIVES_S = 5;
+
+/**
+ * The car as the newest frame has it.
+ * @param {State} frame
+ * @param {(signal: string) => {ink: Freshness, age_s: number | null}} inkOf
+ * @returns {CarShown}
+ */
+export function carOf(frame, inkOf) {
+  const { ink, age_s } = inkOf('position');
+  const fix = frame.signals['position']?.value ?? null;
+  const hasFix = fix !== null && !(typeof fix['status'] === 'number' && fix['status'] < 0);
+  const place = hasFix ? placeOf(fix) : null;
+  const isLive = place !== null && (ink === 'fresh' || ink === 'ageing');
+  const ellipse = hasFix ? ellipseOf(fix['covariance_m2'], fix['sigma_m']) : null;
+  const turn = inkOf('heading');
+  const said_deg = frame.signals['heading']?.value?.['heading_deg'];
+  const heading_deg = typeof said_deg === 'number' && Number.isFinite(said_deg) ? said_deg : null;
+  const isHeadingLive = heading_deg !== null && (turn.ink === 'fresh' || turn.ink === 'ageing');
+  const whither = isHeadingLive ? '' : heading_deg === null ? ', heading unknown' : `, heading ${age(turn.age_s)} s old`;
+  return {
+    place, isLive, ink, age_s, ellipse,
+    heading_deg, isHeadingLive,
+    label: isLive ? `Car ${ellipse ? `±${metres(ellipse.major_m)}` : '±?'}${whither}` : `Car STALE ${age(age_s)} s`,
+    says: carSays(ink, age_s, fix !== null && !hasFix),
+  };
+}
+
+/** @param {Freshness} ink @param {number | null} age_s @param {boolean} isLost */
+function carSays(ink, age_s, isLost) {
+  if (ink === 'not_published') return 'The car publishes no position.';
+  if (ink === 'never') return 'No position has come from the car yet.';
+  if (ink === 'stale') return `The car’s position is ${age(age_s)} s old: it may be elsewhere by now.`;
+  if (isLost) return 'The car’s receiver has no fix: nobody knows where the car is.';
+  return '';
+}
+
+/**
+ * The phone as the newest frame has it.
+ * @param {State} frame
+ * @param {number} lag_s age of the frame at the glass
+ * @param {string} [page] this page
+ * @returns {PhoneOnMap}
+ */
+export function phoneOf(frame, lag_s, page = '') {
+  const phone = frame.phone ?? null;
+  if (!phone) return { place: null, isLive: false, age_s: null, accuracy_m: null, label: '', says: 'No phone is sharing its position.' };
+  const age_s = phone.age_s === null ? null : phone.age_s + lag_s;
+  const place = placeOf(phone);
+  // A coarse fix is one of now all the same; every other reason says that there is none of now.
+  const isLive = place !== null && (phone.used || phone.why === 'coarse') && age_s !== null && age_s <= PHONE_LIVES_S;
+  const name = phone.count > 1 ? nameOf(phone, page) : 'Phone'; // among several each has its own
+  const whose = phone.count > 1 && phone.label ? ` It is of ${phone.label}, one of ${phone.count} phones.` : '';
+  let says = '';
+  if (phone.why_text) says = `${phone.why_text}.`;
+  else if (place && !isLive) says = `The phone’s newest fix is ${age(age_s)} s old.`;
+  return {
+    place, isLive, age_s, accuracy_m: phone.accuracy_m,
+    label: isLive ? `${name} ±${metres(phone.accuracy_m ?? 0)}` : `${name} STALE ${age(age_s)} s`,
+    says: `${says}${whose}`.trim(),
+  };
+}
+
+/**
+ * How far car and phone are apart, and where the car is from the phone: as the server compared them, for one moment; where
+ * it did not, as the two newest fixes have it.
+ * @param {State} frame
+ * @param {number} lag_s
+ * @param {CarShown} car
+ * @param {PhoneOnMap} phone
+ * @returns {Apart | null}
+ */
+export function apartOf(frame, lag_s, car, phone) {
+  if (!car.isLive || !phone.isLive || !car.place || !phone.place) return null;
+  const told = frame.phone;
+  if (told?.used && typeof told.apart_m === 'number' && typeof told.bearing_deg === 'number' && (told.compared_age_s ?? Infinity) + lag_s <= COMPARED_LIVES_S) {
+    const least_m = frame.limits['phone_car.least_m'];
+    return { distance_m: told.apart_m, bearing_deg: told.bearing_deg, allowed_m: told.explained_m === null ? null : Math.max(told.explained_m, typeof least_m === 'number' ? least_m : 0) };
+  }
+  return { distance_m: distance_m(phone.place, car.place), bearing_deg: bearing_deg(phone.place, car.place), allowed_m: null };
+}
+
+/**
+ * A distance as it is read: "10.4 m", "320 m", "4.2 km".
+ * @param {number} value_m
+ * @returns {[string, string]} number and unit
+ */
+export function distanceWords(value_m) {
+  if (value_m < 99.95) return [fixed(value_m), 'm'];
+  if (value_m < 999.5) return [fixed(value_m, 0), 'm'];
+  return [fixed(value_m / 1000, value_m < 99_950 ? 1 : 0), 'km'];
+}
+
+/** A bearing as it is read: "323° NW". @param {number} bearing */
+export function bearingWords(bearing) {
+  const { degrees, point } = heading(bearing);
+  return `${degrees} ${point}`;
+}
+
+/** What a reader hears for the picture. @param {CarShown} car @param {PhoneOnMap} phone @param {Apart | null} apart */
+export function pictureWords(car, phone, apart) {
+  if (apart) return `Map: the car is ${distanceWords(apart.distance_m).join(' ')} from the phone, at ${bearingWords(apart.bearing_deg)} of it`;
+  const seen = [car.isLive ? 'the car' : '', phone.isLive ? 'the phone' : ''].filter(Boolean);
+  if (seen.length) return `Map: ${seen.join(' and ')}`;
+  return car.place || phone.place ? 'Map: nothing that is of now' : 'Map: no position';
+}
+
+/** "5 m", "4.2 m", "120 m". @param {number} value_m */
+function metres(value_m) {
+  return value_m < 9.95 ? `${Math.round(value_m * 10) / 10} m` : distanceWords(Math.round(value_m)).join(' ').replace('.0 ', ' ');
+}

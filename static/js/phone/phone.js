@@ -1,0 +1,185 @@
+// This phone's position: asked of the browser once the operator armed it, told to the server while a car is monitored.
+
+import { ownName } from '../control/own-name.js';
+import { Teller, whyOf } from './phone-fix.js';
+
+/** @typedef {import('../boot/arming.js').Armed} Armed */
+
+const ARMED = 'catgraph.armed';
+const OPTIONS = { enableHighAccuracy: true, maximumAge: 0, timeout: 10000 };
+/** A watch may say nothing while the phone lies still: it is asked again then [ms]. */
+const NUDGE_MS = 2500;
+/** The tap comes before the car is dialled [ms]. */
+const DIALLING_MS = 15000;
+/** The server's time in a frame older than this says little of the way [ms]. */
+const ECHO_MS = 2000;
+
+/** Only then a position is wanted. */
+const WATCHED = ['monitoring', 'lost'];
+
+/** @param {string} name */
+function kept(name) {
+  try {
+    return sessionStorage.getItem(name);
+  } catch {
+    return null; // storage may be forbidden
+  }
+}
+
+/** @param {string} name @param {string} value */
+function keep(name, value) {
+  try {
+    sessionStorage.setItem(name, value);
+  } catch {
+    // then a reload is another phone
+  }
+}
+
+export class Phone {
+  #name = ownName();
+  #teller = new Teller();
+  #isPossible = window.isSecureContext && 'geolocation' in navigator;
+  #isArmed = kept(ARMED) !== null;
+  #armed_ms = -Infinity;
+  /** @type {PermissionState | null} */
+  #permission = null;
+  /** @type {number | null} */
+  #watch = null;
+  #isNudged = false;
+  #hasFix = false;
+  /** No receiver is expected of a computer on a desk. */
+  #isHandheld = matchMedia('(pointer: coarse)').matches;
+
+  /** @param {import('../core/store.js').Store} store */
+  constructor(store) {
+    this.store = store;
+    if (!this.#isPossible) this.#teller.fail(window.isSecureContext ? 'unavailable' : 'insecure');
+    const look = () => this.#look();
+    store.on('tick', look);
+    store.on('beat', look); // while the page is hidden frames come and its timers hardly run
+    store.on('open', () => {
+      this.#teller.forget();
+      look();
+    });
+    document.addEventListener('visibilitychange', () => this.#turn());
+    window.addEventListener('pagehide', () => this.#leave());
+    window.addEventListener('pageshow', look);
+    // Browsers tell beforehand only what was answered before; this asks nothing of anybody.
+    navigator.permissions?.query({ name: 'geolocation' }).then((permission) => {
+      const note = () => this.#permitted(permission.state);
+      note();
+      permission.onchange = note;
+    }, () => {});
+  }
+
+  /** How the position stands before anything is connected. @returns {Armed} */
+  get armed() {
+    if (!this.#isPossible) return 'missing';
+    if (this.#permission === 'denied' || this.#teller.why(this.store.now()) === 'denied') return 'refused';
+    return this.#hasFix || this.#permission === 'granted' ? 'ready' : 'asks';
+  }
+
+  /** Within the tap: the browser may ask its question now. */
+  arm() {
+    this.#isArmed = true;
+    this.#armed_ms = this.store.now();
+    keep(ARMED, 'yes');
+    this.#start();
+  }
+
+  /** @param {PermissionState} state */
+  #permitted(state) {
+    const was = this.#permission;
+    this.#permission = state;
+    if (state === 'granted') {
+      this.#isArmed = true; // said once for this server: a reload needs no tap
+      if (was !== null) this.#again(); // the watch ended with the permission, whatever it says
+    } else if (was === 'granted') {
+      this.#stop();
+      this.#teller.fail('denied');
+    }
+    this.#look();
+  }
+
+  #start() {
+    if (!this.#isPossible || this.#watch !== null) return;
+    this.#teller.begin(this.store.now());
+    this.#watch = navigator.geolocation.watchPosition((found) => this.#found(found), (error) => this.#failed(error), OPTIONS);
+  }
+
+  #stop() {
+    if (this.#watch !== null) navigator.geolocation.clearWatch(this.#watch);
+    this.#watch = null;
+    this.#isNudged = false;
+  }
+
+  /** @param {GeolocationPosition} found */
+  #found({ coords, timestamp }) {
+    if (this.#watch === null) return; // an answer to what is not asked any more
+    this.#isNudged = false;
+    this.#hasFix = true;
+    this.#teller.fix(coords, timestamp, this.store.now(), Date.now());
+    this.#tell();
+  }
+
+  /** @param {GeolocationPositionError} error */
+  #failed({ code }) {
+    if (this.#watch === null) return;
+    this.#isNudged = false;
+    this.#teller.fail(whyOf(code));
+    if (code === 1) this.#stop();
+    this.#tell();
+  }
+
+  #look() {
+    const { store } = this;
+    if (!this.#isArmed) return;
+    const now_ms = store.now();
+    const phase = store.heeded?.session.phase;
+    const isWanted = (phase !== undefined && phase !== 'idle') || now_ms - this.#armed_ms < DIALLING_MS;
+    if (!isWanted) this.#stop();
+    else if (this.#watch === null && !document.hidden && this.#teller.why(now_ms) !== 'denied') this.#start();
+    if (this.#watch !== null && !this.#isNudged && !document.hidden && this.#teller.silence_ms(now_ms) > NUDGE_MS) {
+      this.#isNudged = true;
+      navigator.geolocation.getCurrentPosition((found) => this.#found(found), (error) => this.#failed(error), OPTIONS);
+    }
+    this.#tell();
+  }
+
+  #tell() {
+    const { store } = this;
+    const now_ms = store.now();
+    const { frame } = store;
+    const held_ms = now_ms - store.deadMan.heard_ms;
+    if (!this.#isArmed || !frame || held_ms > ECHO_MS || !WATCHED.includes(store.heeded?.session.phase ?? '')) return;
+    const word = this.#teller.due(now_ms);
+    if (!word) return;
+    const said = 'fix' in word ? { fix: { ...word.fix, heard_ms: frame.server.time_ms, held_s: held_ms / 1000 } } : word;
+    if (this.#send(said)) this.#teller.told(word, now_ms);
+  }
+
+  /** @param {object} said */
+  #send(said) {
+    if (this.store.isViewer) return false; // the car is compared with an operator's phone
+    return this.store.wire.send({ kind: 'position', id: 'position', phone: this.#name, handheld: this.#isHandheld, ...said });
+  }
+
+  /** In the background a phone gives no position; in front again its watch may be dead without saying so. */
+  #turn() {
+    this.#teller.isHidden = document.hidden;
+    this.#again();
+    this.#look();
+  }
+
+  /** What was refused may be allowed by now. */
+  #again() {
+    this.#stop();
+    if (this.#isPossible) this.#teller.begin(this.store.now());
+  }
+
+  #leave() {
+    this.#stop();
+    if (this.#isArmed && this.store.isMonitoring) this.#send({ why: 'off' });
+    this.#teller.forget();
+  }
+}

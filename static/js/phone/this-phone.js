@@ -1,0 +1,59 @@
+// The sheet that says what this phone can do: sound, screen, vibration, battery, network, position; and arms it.
+
+import { html, icon, setWords, words } from '../core/dom.js';
+import { addSheet, openSheet } from '../shell/sheet.js';
+import { rowsOf, verdictOf } from './this-phone-layout.js';
+
+const SAID = { sounding: 'That was an alarm’s sound. Not heard? Turn the media volume up.', missing: 'This browser has no sound.', blocked: 'The phone does not let this page sound: touch the page, then try again.', busy: 'An alarm sounds already.' };
+
+/**
+ * @param {import('../core/store.js').Store} store
+ * @param {import('../boot/arming.js').Arming} arming
+ * @param {import('./device-status.js').Handset} handset
+ */
+export function openThisPhone(store, arming, handset) {
+  const verdict = html('p', { class: 'sub', id: 'this-phone-words', role: 'status' });
+  const list = html('ul', { class: 'arm' });
+  const arm = html('button', { type: 'button', class: 'key solid wide', 'data-f': 'arm' }, 'Arm this phone');
+  const test = html('button', { type: 'button', class: 'key wide', 'data-f': 'test' }, 'Try the sound');
+  const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed tall', id: 'sheet-this-phone', 'aria-labelledby': 'this-phone-title', 'aria-describedby': 'this-phone-words' },
+    html('div', { class: 'bd' }, html('h2', { id: 'this-phone-title' }, 'This phone'), verdict), html('div', { class: 'menu-list' }, list),
+    html('div', { class: 'keys' }, html('div', { class: 'pair' }, test, arm), html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
+  let shown = '';
+  let said = '';
+
+  function factsNow() {
+    const { voice, arms } = arming;
+    const mine = (store.frame?.phones ?? []).find((one) => one.id === store.page);
+    return {
+      ...arms, sound: voice.isInterrupted ? /** @type {const} */ ('interrupted') : arms.sound, positionSays: mine?.why_text ? `${mine.why_text}.` : '', rides: mine?.chosen === true,
+      vibrates: handset.vibrates, battery: handset.battery, charging: handset.charging, isOnline: handset.isOnline, network: handset.network, lag_s: store.lag_s,
+      isApple: handset.isApple, isSecure: window.isSecureContext, isReplaying: store.replaying,
+    };
+  }
+
+  function draw() {
+    const facts = factsNow();
+    setWords(verdict, said || verdictOf(facts).text);
+    const rows = rowsOf(facts);
+    const key = JSON.stringify(rows);
+    if (key === shown) return;
+    shown = key;
+    list.replaceChildren(...rows.map((row) => html('li', {}, icon(row.icon), html('span', {}, html('span', { class: 't' }, row.what), html('br'), html('span', { class: 'm' }, ...words(row.says))),
+      html('span', { class: row.kind === 'plain' ? 'tag' : `tag ${row.kind}` }, ...(row.kind === 'plain' ? [icon('ok', 's')] : row.kind === 'warn' ? [icon('warn', 's')] : []), ...words(row.tag)))));
+  }
+
+  arm.addEventListener('click', () => {
+    said = '';
+    arming.ask();
+    draw();
+  });
+  test.addEventListener('click', async () => {
+    said = SAID[await arming.voice.test('medium')];
+    draw();
+  });
+  const stops = [store.on('draw', draw), store.on('tick', draw), addSheet(sheet)];
+  sheet.addEventListener('close', () => stops.forEach((stop) => stop()), { once: true });
+  openSheet(sheet);
+  draw();
+}

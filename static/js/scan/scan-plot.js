@@ -1,0 +1,326 @@
+// Draws the scan from above on a canvas. What stands still is drawn once and kept; a scan adds hatching and points.
+
+import { edgesOf, endOf } from './scan-corridor.js';
+import { bearingOf, rangeOf } from './scan-frame.js';
+import { codeWords, namedSectors, plotScale, pointsOf, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
+import { fixed } from '../core/format.js';
+
+const NAMES_SHOWN = 4;
+const HATCH = { apart_px: 10, width_px: 2.5 };
+
+/**
+ * @typedef {import('./scan-corridor.js').Point} Point
+ * @typedef {ReturnType<typeof plotScale>} Scale
+ *
+ * @typedef {object} Around what is drawn beside the scan
+ * @property {number} reach_m
+ * @property {Omit<import('./scan-corridor.js').Corridor, 'tyre_angle_rad'> | null} car null: its measures are not known yet
+ * @property {number | null} limit_m
+ * @property {{x_m: number, y_m: number, isSeen: boolean} | null} mark the return that the operator marked
+ */
+
+/**
+ * @typedef {object} Picture all that one drawing needs
+ * @property {import('./scan-frame.js').Scan} scan
+ * @property {Around} around
+ * @property {number} width [CSS px]
+ * @property {number} height [CSS px]
+ * @property {number} dpr pixels of the canvas for one of CSS
+ * @property {import('./scan-theme.js').Theme} theme
+ *
+ * @typedef {HTMLCanvasElement | OffscreenCanvas} Surface
+ * @typedef {CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D} Pen
+ */
+
+export class ScanPlot {
+  #ground = surface(1, 1);
+  #groundKey = '';
+  #hatchingKey = '';
+  /** @type {CanvasPattern | null} */
+  #hatching = null;
+  /** @type {import('./scan-theme.js').Theme['colour']} */
+  #colour = /** @type {any} */ ({});
+  #font = '';
+  #width = 0;
+
+  /** @param {Surface} canvas */
+  constructor(canvas) {
+    this.canvas = canvas;
+  }
+
+  /** @param {Picture} picture */
+  draw({ scan, around, width, height, dpr, theme }) {
+    const [w, h] = [Math.round(width * dpr), Math.round(height * dpr)];
+    for (const canvas of [this.canvas, this.#ground]) {
+      if (canvas.width === w && canvas.height === h) continue;
+      canvas.width = w;
+      canvas.height = h;
+      this.#groundKey = '';
+    }
+    const g = penOf(this.canvas, { alpha: false });
+    if (!g) return;
+    ({ colour: this.#colour, font: this.#font } = theme);
+    this.#width = width;
+    const { reach_m } = around;
+    this.#drawGround(width, height, dpr, reach_m, theme.key);
+    g.setTransform(1, 0, 0, 1, 0, 0);
+    g.drawImage(this.#ground, 0, 0);
+    g.setTransform(dpr, 0, 0, dpr, 0, 0);
+    const scale = plotScale(width, height, reach_m);
+    const sectors = [...sectorsOf(scan), ...unseenOf(scan)];
+    const { tyre_angle_rad, wider_m } = scan.judged;
+    const corridor = around.car ? { ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad } : null;
+    if (corridor) this.#stoppingStrip(g, scale, corridor, scan.judged.stopping_m);
+    this.#hatch(g, scale, sectors, width + height, dpr, theme.key);
+    if (corridor) this.#corridor(g, scale, corridor, reach_m, scan.judged.stopping_m, around.limit_m);
+    this.#rings(g, scale, reach_m);
+    this.#names(g, scale, reach_m, sectors, width);
+    this.#points(g, scale, pointsOf(scan, reach_m * 1.05, 1 / scale.k));
+    this.#nearest(g, scale, scan, reach_m);
+    if (around.mark) this.#mark(g, scale, around.mark);
+    this.#car(g, scale, height);
+  }
+
+  /** Rings and spokes. @param {number} width @param {number} height @param {number} dpr @param {number} reach_m @param {string} look */
+  #drawGround(width, height, dpr, reach_m, look) {
+    const key = `${width} ${height} ${dpr} ${reach_m} ${look}`;
+    if (key === this.#groundKey) return;
+    this.#groundKey = key;
+    const g = penOf(this.#ground);
+    if (!g) return;
+    const { cx, cy, k, at } = plotScale(width, height, reach_m);
+    g.setTransform(dpr, 0, 0, dpr, 0, 0);
+    g.fillStyle = this.#colour.panel;
+    g.fillRect(0, 0, width, height);
+    g.strokeStyle = this.#colour.line;
+    g.lineWidth = 1.5;
+    g.beginPath();
+    const rings = ringsOf(reach_m);
+    for (const r of rings) {
+      g.moveTo(cx - r * k, cy);
+      g.arc(cx, cy, r * k, Math.PI, 0);
+    }
+    const inner = rings[0] ?? reach_m / 4;
+    for (const degrees of [-90, -60, -30, 30, 60, 90]) {
+      const a = (degrees * Math.PI) / 180;
+      g.moveTo(...at(inner * Math.cos(a), inner * Math.sin(a)));
+      g.lineTo(...at(reach_m * Math.cos(a), reach_m * Math.sin(a)));
+    }
+    g.stroke();
+  }
+
+  /** The part of the corridor that the car needs to stop. @param {Pen} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number | null} stopping_m */
+  #stoppingStrip(g, scale, corridor, stopping_m) {
+    if (!stopping_m) return;
+    const { left, right } = edgesOf(corridor, 0, Math.min(stopping_m, endOf(corridor, scale.far_m)));
+    g.beginPath();
+    trace(g, scale, [...left, ...right.reverse()]);
+    g.closePath();
+    g.fillStyle = this.#colour.raise;
+    g.fill();
+  }
+
+  /** @param {Pen} g @param {Scale} scale @param {import('./scan-layout.js').Sector[]} sectors @param {number} far @param {number} dpr @param {string} look */
+  #hatch(g, { cx, cy }, sectors, far, dpr, look) {
+    if (!sectors.length) return;
+    g.beginPath();
+    for (const { from_rad, to_rad } of sectors) {
+      g.moveTo(cx, cy);
+      if (to_rad - from_rad > 0.3) g.arc(cx, cy, far, -Math.PI / 2 - to_rad, -Math.PI / 2 - from_rad);
+      else for (const a of [to_rad, from_rad]) g.lineTo(cx - far * Math.sin(a), cy - far * Math.cos(a));
+      g.closePath();
+    }
+    g.fillStyle = this.#colour.panel;
+    g.fill();
+    const hatching = this.#hatchingOf(g, dpr, look);
+    if (hatching) g.fillStyle = hatching;
+    g.fill();
+  }
+
+  /** Diagonal lines as a pattern, made once a theme. @param {Pen} g @param {number} dpr @param {string} look */
+  #hatchingOf(g, dpr, look) {
+    const key = `${dpr} ${look}`;
+    if (key === this.#hatchingKey) return this.#hatching;
+    const side = Math.round(HATCH.apart_px * dpr);
+    const tile = surface(side, side);
+    const t = penOf(tile);
+    if (!t) return null;
+    t.strokeStyle = this.#colour.hatch;
+    t.lineWidth = HATCH.width_px * dpr;
+    t.beginPath();
+    for (const shift of [-side, 0, side]) {
+      t.moveTo(shift - side, side * 2);
+      t.lineTo(shift + side * 2, -side);
+    }
+    t.stroke();
+    this.#hatching = g.createPattern(tile, 'repeat');
+    this.#hatching?.setTransform(new DOMMatrix().scale(1 / dpr));
+    this.#hatchingKey = key;
+    return this.#hatching;
+  }
+
+  /** @param {Pen} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number} reach_m @param {number | null} stopping_m @param {number | null} limit_m */
+  #corridor(g, scale, corridor, reach_m, stopping_m, limit_m) {
+    const colour = this.#colour;
+    const end_m = endOf(corridor, scale.far_m);
+    const stop_m = Math.min(stopping_m ?? 0, end_m);
+    g.strokeStyle = colour.ink2;
+    g.lineWidth = 2;
+    for (const [from_m, to_m, dashes] of /** @type {[number, number, number[]][]} */ ([[0, stop_m, []], [stop_m, end_m, [7, 5]]])) {
+      if (to_m <= from_m) continue;
+      const { left, right } = edgesOf(corridor, from_m, to_m);
+      g.setLineDash(dashes);
+      g.beginPath();
+      trace(g, scale, left);
+      trace(g, scale, right);
+      g.stroke();
+    }
+    g.setLineDash([]);
+    if (stopping_m !== null && stopping_m > 0 && stopping_m <= end_m) {
+      const [left] = this.#across(g, scale, corridor, stopping_m, colour.ink, 5, 5);
+      if (left && left[1] > 0) this.#words(g, `stop ${fixed(stopping_m)} m`, Math.max(100, left[0] - 7), left[1], colour.ink, 'right');
+    }
+    if (limit_m !== null && limit_m > 0 && limit_m <= end_m) {
+      const [, right] = this.#across(g, scale, corridor, limit_m, colour.you, 3, 0);
+      if (right && right[1] > 0) this.#words(g, `limit ${fixed(limit_m)} m`, Math.min(scale.width - 92, right[0] + 12), right[1], colour.you, 'left', 14, 700);
+    }
+  }
+
+  /**
+   * A line across the corridor; gives its ends on the plot.
+   * @param {Pen} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number} way_m @param {string} colour @param {number} width @param {number} beyond_px
+   */
+  #across(g, scale, corridor, way_m, colour, width, beyond_px) {
+    const { left, right } = edgesOf(corridor, way_m, way_m);
+    if (!left[0] || !right[0]) return [];
+    const [a, b] = [scale.at(...left[0]), scale.at(...right[0])];
+    const long = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
+    const [dx, dy] = [((b[0] - a[0]) / long) * beyond_px, ((b[1] - a[1]) / long) * beyond_px];
+    g.strokeStyle = colour;
+    g.lineWidth = width;
+    g.beginPath();
+    g.moveTo(a[0] - dx, a[1] - dy);
+    g.lineTo(b[0] + dx, b[1] + dy);
+    g.stroke();
+    return [[a[0] - dx, a[1] - dy], b];
+  }
+
+  /** @param {Pen} g @param {Scale} scale @param {number} reach_m */
+  #rings(g, { at }, reach_m) {
+    const a = (19 * Math.PI) / 180;
+    for (const r of ringsOf(reach_m)) this.#words(g, String(r), ...at(r * Math.cos(a), r * Math.sin(a)), this.#colour.ink2, 'center');
+  }
+
+  /** @param {Pen} g @param {Scale} scale @param {number} reach_m @param {import('./scan-layout.js').Sector[]} sectors @param {number} width */
+  #names(g, { cx, k, at }, reach_m, sectors, width) {
+    for (const sector of namedSectors(sectors, NAMES_SHOWN)) {
+      const a = (sector.from_rad + sector.to_rad) / 2;
+      if (Math.cos(a) < 0) continue; // behind: not in the picture
+      const aside = Math.abs(Math.sin(a));
+      // As far out as the edge allows, so that the word stands where its sector is wide.
+      const r = Math.min(reach_m * 0.36, aside > 0.05 ? (cx - 44) / (k * aside) : reach_m);
+      const [x, y] = at(r * Math.cos(a), r * Math.sin(a));
+      this.#words(g, codeWords(sector.code), Math.min(width - 42, Math.max(42, x)), y, this.#colour.ink, 'center', 14, 700);
+    }
+  }
+
+  /** @param {Pen} g @param {Scale} scale @param {Float32Array} points */
+  #points(g, { cx, cy, k }, points) {
+    g.fillStyle = this.#colour.ink;
+    g.beginPath();
+    for (let i = 0; i < points.length; i += 2) g.rect(cx - (points[i + 1] ?? 0) * k - 2.5, cy - (points[i] ?? 0) * k - 2.5, 5, 5);
+    g.fill();
+  }
+
+  /** What the obstacle check found. @param {Pen} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {number} reach_m */
+  #nearest(g, { at }, scan, reach_m) {
+    const { beam, gap_m } = scan.judged;
+    const range_m = beam === null ? null : rangeOf(scan, beam);
+    if (beam === null || range_m === null || range_m > reach_m) return;
+    const bearing_rad = bearingOf(scan, beam);
+    const [x, y] = at(range_m * Math.cos(bearing_rad), range_m * Math.sin(bearing_rad));
+    this.#ring(g, x, y, this.#colour.ink);
+    const way = x + 120 > this.#width ? -1 : 1;
+    g.beginPath();
+    g.moveTo(x + 15 * way, y);
+    g.lineTo(x + 36 * way, y);
+    g.stroke();
+    this.#words(g, `${fixed(gap_m)} m`, x + 44 * way, y - 1, this.#colour.ink, way > 0 ? 'left' : 'right', 22, 700);
+  }
+
+  /** Its words stand under the plot: here they would hide other returns. @param {Pen} g @param {Scale} scale @param {NonNullable<Around['mark']>} mark */
+  #mark(g, { at }, mark) {
+    if (!mark.isSeen) g.setLineDash([4, 4]);
+    this.#ring(g, ...at(mark.x_m, mark.y_m), this.#colour.you);
+    g.setLineDash([]);
+  }
+
+  /** @param {Pen} g @param {number} x @param {number} y @param {string} colour */
+  #ring(g, x, y, colour) {
+    g.strokeStyle = colour;
+    g.lineWidth = 3;
+    g.beginPath();
+    g.arc(x, y, 15, 0, 7);
+    g.stroke();
+  }
+
+  /** The car, its nose at the laser. @param {Pen} g @param {Scale} scale @param {number} height */
+  #car(g, { cx, cy, k }, height) {
+    const half = Math.min(60, Math.max(7, 0.9 * k));
+    g.strokeStyle = this.#colour.ink;
+    g.fillStyle = this.#colour.panel;
+    g.lineWidth = 2.5;
+    g.lineJoin = 'round';
+    g.beginPath();
+    g.moveTo(cx - half * 0.7, cy);
+    g.lineTo(cx + half * 0.7, cy);
+    g.lineTo(cx + half, cy + 12);
+    g.lineTo(cx + half, height + 4);
+    g.lineTo(cx - half, height + 4);
+    g.lineTo(cx - half, cy + 12);
+    g.closePath();
+    g.fill();
+    g.stroke();
+    g.beginPath();
+    g.moveTo(cx - half, cy + 22);
+    g.lineTo(cx + half, cy + 22);
+    g.stroke();
+  }
+
+  /** Words on a plate of the panel's colour. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {string} css @param {CanvasTextAlign} [align] @param {number} [size] @param {number} [weight] */
+  #words(g, text, x, y, css, align = 'left', size = 14, weight = 400) {
+    g.font = `${weight} ${size}px ${this.#font}`;
+    g.textAlign = align;
+    g.textBaseline = 'middle';
+    const width = g.measureText(text).width + 8;
+    const left = align === 'left' ? x - 4 : align === 'right' ? x - width + 4 : x - width / 2;
+    g.fillStyle = this.#colour.panel;
+    g.fillRect(left, y - size * 0.72, width, size * 1.44);
+    g.fillStyle = css;
+    g.fillText(text, x, y);
+  }
+}
+
+/** A canvas that nobody sees: a thread has no document. @param {number} width @param {number} height @returns {Surface} */
+function surface(width, height) {
+  if (typeof document === 'undefined') return new OffscreenCanvas(width, height);
+  const canvas = document.createElement('canvas');
+  [canvas.width, canvas.height] = [width, height];
+  return canvas;
+}
+
+/** @param {Surface} canvas @param {CanvasRenderingContext2DSettings} [how] */
+function penOf(canvas, how) {
+  return /** @type {Pen | null} */ (canvas.getContext('2d', how));
+}
+
+/** A line through points of the plane, its part behind the laser left out. @param {Pen} g @param {Scale} scale @param {Point[]} points */
+function trace(g, { at }, points) {
+  let isFirst = true;
+  for (const [x_m, y_m] of points) {
+    if (x_m < -0.01) continue;
+    if (isFirst) g.moveTo(...at(x_m, y_m));
+    else g.lineTo(...at(x_m, y_m));
+    isFirst = false;
+  }
+}

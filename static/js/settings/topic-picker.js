@@ -1,0 +1,73 @@
+// The sheet in which another topic is picked for a signal: those of the car whose type can be read as it, or the server's own choice.
+
+import { field, html, icon, need, setText, setWords, show } from '../core/dom.js';
+import { closeSheet, openSheet } from '../shell/sheet.js';
+import { counted } from '../core/format.js';
+
+/**
+ * @typedef {import('./settings-model.js').Candidate} Candidate
+ * @typedef {{topic: string | null, title: string, says: string, isChosen: boolean}} Option
+ */
+
+/**
+ * What can be picked for a signal.
+ * @param {Candidate[] | null} candidates null: the bridge does not say what the car has
+ * @param {string | null} now the topic that carries the signal
+ * @param {string | undefined} picked by the operator
+ * @returns {Option[]}
+ */
+export function optionsOf(candidates, now, picked) {
+  const gone = picked !== undefined && !candidates?.some(({ topic }) => topic === picked);
+  return [
+    { topic: null, title: 'Choose automatically', says: picked === undefined ? (now ? `now ${now}` : 'now none fits') : 'by name, then by type', isChosen: picked === undefined },
+    ...(gone ? [{ topic: picked, title: picked, says: candidates ? 'picked, and the car does not have it with a fitting type' : 'picked', isChosen: true }] : []),
+    ...(candidates ?? []).map(({ topic, type }) => ({ topic, title: topic, says: topic === now ? `${type} · now` : type, isChosen: topic === picked })),
+  ];
+}
+
+/**
+ * @param {import('../core/store.js').Store} store
+ * @param {import('./settings-model.js').SettingsModel} model
+ * @param {string} signal
+ */
+export async function openTopicPicker(store, model, signal) {
+  const sheet = /** @type {HTMLDialogElement} */ (need(document, '#sheet-topic'));
+  const label = store.signal(signal)?.label ?? signal;
+  const list = field(sheet, 'list');
+  setText(field(sheet, 'title'), `Topic of ${label}`);
+  setWords(field(sheet, 'words'), 'The topics of the car are being asked for.');
+  setWords(field(sheet, 'refused'), '');
+  sheet.dataset['signal'] = signal;
+  list.replaceChildren();
+  openSheet(sheet);
+  /** @type {Candidate[] | null} */
+  let candidates = null;
+  let words;
+  try {
+    if (!model.body) await model.load();
+    const known = (await model.candidates()).candidates;
+    candidates = known?.[signal] ?? null;
+    words = candidates === null ? 'The bridge does not say which topics the car has.' : candidates.length
+      ? `${counted(candidates.length, 'topic')} of the car can be read as this signal.` : 'No topic of the car has a type that can be read as this signal.';
+  } catch {
+    words = 'The topics could not be asked for: the server does not answer.';
+  }
+  if (sheet.dataset['signal'] !== signal) return; // another signal was asked for meanwhile
+  setWords(field(sheet, 'words'), words);
+  const options = optionsOf(candidates, store.signal(signal)?.topic ?? null, model.body?.topics[signal]);
+  list.replaceChildren(...options.map((option) => html('li', {}, key(option))));
+
+  /** @param {Option} option */
+  function key({ topic, title, says, isChosen }) {
+    const mark = icon('ok');
+    show(mark, isChosen);
+    const button = html('button', { type: 'button', 'aria-pressed': String(isChosen) }, html('span', { class: 'tx' }, html('b', {}, title), html('small', {}, says)), mark);
+    button.addEventListener('click', async () => {
+      setWords(field(sheet, 'refused'), '');
+      const outcome = await model.set({ topics: { [signal]: topic } });
+      if (outcome.ok) closeSheet(sheet);
+      else setWords(field(sheet, 'refused'), `Not changed. ${outcome.reason}`);
+    });
+    return button;
+  }
+}

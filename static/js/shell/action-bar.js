@@ -1,0 +1,42 @@
+// The thumb's edge: Stop (confirmed), Pause or Resume. What acts on the car, beside them: slowing.js.
+
+import { closeSheet, openSheet } from './sheet.js';
+import { field, listen, need, setAttribute, setIcon, setText } from '../core/dom.js';
+
+/**
+ * @param {HTMLElement} root
+ * @param {import('../core/store.js').Store} store
+ * @param {import('./router.js').Page} page
+ */
+export function mount(root, store, page) {
+  const pause = field(root, 'pause');
+  const word = field(root, 'pause-word');
+  const mark = need(pause, '.i');
+  const stopSheet = /** @type {HTMLDialogElement} */ (need(document, '#sheet-stop'));
+
+  const stops = [
+    listen(field(root, 'stop'), 'click', () => openSheet(stopSheet)),
+    listen(field(stopSheet, 'yes'), 'click', async () => {
+      closeSheet(stopSheet);
+      await page.stop();
+    }),
+    listen(pause, 'click', async () => {
+      const isPaused = store.frame?.session.paused === true;
+      const answer = await store.ask(isPaused ? 'resume' : 'pause');
+      if (!answer.ok) page.say(answer.reason ?? 'Refused.', isPaused ? 'Not resumed' : 'Not paused');
+    }),
+    store.on('draw', draw),
+  ];
+
+  function draw() {
+    const isPaused = store.frame?.session.paused === true;
+    setText(word, isPaused ? 'Resume' : 'Pause');
+    setAttribute(pause, 'aria-label', isPaused ? 'Resume monitoring' : 'Pause monitoring');
+    setAttribute(pause, 'class', isPaused ? 'key solid' : 'key');
+    setAttribute(mark, 'class', isPaused ? 'i fill' : 'i');
+    setIcon(mark, isPaused ? 'play' : 'pause');
+  }
+
+  if (store.frame) draw(); // before the first frame it is not shown
+  return () => stops.forEach((stop) => stop());
+}

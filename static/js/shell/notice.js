@@ -1,0 +1,35 @@
+// A word of the page itself: something was refused, a blind time is over. It goes by itself, and takes no place of an alarm.
+
+import { html, icon, mirror, words } from '../core/dom.js';
+
+const STAYS_MS = 8000;
+const OFFERS_MS = 15_000; // what can be pressed must be found and reached first
+
+/** @typedef {{label: string, act: () => void}} Way what a notice offers, as one key */
+
+/**
+ * @param {HTMLElement} root where snackbars stand
+ * @returns {(sentence: string, title?: string, way?: Way) => void}
+ */
+export function notices(root) {
+  const isCovering = () => root.querySelector('.snack:not([hidden])') !== null;
+  mirror(document.body, 'data-snack', isCovering, [root], { childList: true, subtree: true, attributeFilter: ['hidden'] });
+  return (sentence, title = '', way = undefined) => {
+    const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close' }, icon('close'));
+    const text = html('div', { class: 'tx' }, ...(title ? [html('b', {}, ...words(title))] : []), html('span', {}, ...words(sentence)));
+    const note = html('div', { class: 'snack note', role: 'status' }, html('div', { class: 'side' }, icon('info')), text, close);
+    const take = () => note.remove();
+    if (way) {
+      const key = html('button', { type: 'button', class: 'key' }, way.label);
+      key.addEventListener('click', () => {
+        take();
+        way.act();
+      });
+      note.append(html('div', { class: 'ac' }, key));
+    }
+    close.addEventListener('click', take);
+    setTimeout(take, way ? OFFERS_MS : STAYS_MS);
+    for (const old of root.querySelectorAll('.note')) old.remove();
+    root.append(note);
+  };
+}

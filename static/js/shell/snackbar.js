@@ -1,0 +1,48 @@
+// Warnings: one snackbar at a time over the rail, until it is acknowledged, shelved or over. The list of alarms needs none.
+
+import { layOut } from '../alarms/alarm-layout.js';
+import { html, icon, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { openShelve } from '../alarms/shelve.js';
+import { snackWords } from '../alarms/standing.js';
+
+/**
+ * @param {HTMLElement} root
+ * @param {import('../core/store.js').Store} store
+ * @param {(sentence: string, title?: string) => void} say
+ */
+export function mount(root, store, say) {
+  const title = html('b');
+  const text = html('span');
+  const shelve = html('button', { type: 'button', class: 'key' }, 'Shelve');
+  const acknowledge = html('button', { type: 'button', class: 'key solid' }, 'Acknowledge');
+  const mark = icon('warn');
+  const bar = html('div', { class: 'snack', role: 'status', hidden: true, 'data-f': 'warning' }, html('div', { class: 'side' }, mark),
+    html('div', { class: 'tx' }, title, text), html('div', { class: 'ac' }, shelve, acknowledge));
+  root.append(bar);
+  /** @type {import('../core/protocol.js').Alarm | null} */
+  let shown = null;
+
+  acknowledge.addEventListener('click', async () => {
+    if (!shown) return;
+    const answer = await store.ask('acknowledge', { alarm: shown.id, occurrence: shown.occurrence });
+    if (!answer.ok) say(answer.reason ?? 'Refused.', 'Not acknowledged');
+  });
+  shelve.addEventListener('click', () => shown && openShelve(store, shown, say));
+
+  function draw() {
+    const isListed = document.querySelector('.screen:not([hidden]) [data-f="alarms"]') !== null; // with keys of its own, which this would cover
+    const waiting = store.isSilent || !store.frame || store.replaying || isListed ? [] : layOut(store.frame.alarms).snackbars;
+    shown = waiting[0] ?? null;
+    show(bar, shown !== null);
+    if (!shown) return;
+    setAttribute(bar, 'data-priority', shown.priority);
+    setIcon(mark, shown.priority === 'advisory' ? 'info' : 'warn');
+    setWords(title, waiting.length > 1 ? `${shown.title} (${waiting.length} alarms)` : shown.title);
+    setWords(text, snackWords(shown));
+    show(shelve, shown.active && shown.priority !== 'critical' && shown.actions.includes('shelve'));
+    setText(acknowledge, 'Acknowledge');
+  }
+
+  draw();
+  return store.on('draw', draw);
+}

@@ -1,0 +1,111 @@
+// The dead-man veil: covers the values when frames stop. The covering itself is a CSS animation (sheets of
+// frame.css) that every completed drawing of a fresh frame rewinds, so that it comes even when this script hangs.
+
+import { drawBigChain } from './chain.js';
+import { DrawProof } from '../core/draw-proof.js';
+import { field, html, mirror, need, setAttribute, setText, setWords, show, words } from '../core/dom.js';
+import { speedWords } from '../core/units.js';
+import { age, fixed, timeOfDay } from '../core/format.js';
+
+/** What is known of the recorder under the veil: what it did then, or what is safe for good. @type {Record<string, string>} */
+const RECORDED = { recording: 'it was recording', held: 'saved', saving: 'it was being saved', stopped: 'it had stopped' };
+
+/**
+ * The last values, told as what they are.
+ * @param {import('../core/protocol.js').State | null} frame
+ */
+export function thenWords(frame) {
+  const speed_mps = frame?.signals.speed?.value?.speed_mps;
+  const distance_m = frame?.signals.distance?.value?.distance_m;
+  const parts = [];
+  if (typeof speed_mps === 'number') parts.push(speedWords(speed_mps).join(' '));
+  if (typeof distance_m === 'number') parts.push(`object at ${fixed(distance_m)} m`);
+  return parts.join(', ') || 'nothing';
+}
+
+/**
+ * Does the veil stand? Where the server lives, it covers the values of a car that fell silent; before the first word of a
+ * car there is nothing to cover, but the empty instruments must not look like instruments.
+ * @param {import('../core/store.js').Store} store
+ */
+export function veilOf(store) {
+  if (store.isSilent || store.drawing.isFailed) return 'all';
+  const { frame } = store;
+  if (!frame) return 'all';
+  if (frame.session.phase === 'lost' || store.chain.cut !== null) return 'values';
+  return null;
+}
+
+/**
+ * @param {HTMLElement} root
+ * @param {import('../core/store.js').Store} store
+ */
+export function mount(root, store) {
+  const veil = field(root, 'veil');
+  const [title, sentence, then, recName, rec] = ['veil-title', 'veil-words', 'veil-then', 'veil-rec-name', 'veil-rec'].map((name) => field(root, name));
+  const chain = field(veil, 'chain');
+  if (!title || !sentence || !then || !recName || !rec) throw new Error('The template lacks the veil');
+  const sheets = ['#sheet-lost', '#sheet-mute'].map((id) => need(document, id)); // they say it all
+  mirror(veil, 'data-told', () => sheets.some((sheet) => sheet.hasAttribute('open')), sheets, { attributeFilter: ['open'] });
+  const proof = new DrawProof();
+  let beat = 0;
+  /** @type {import('../core/protocol.js').State | null} */
+  let seen = null;
+  let told = '';
+  let isDrawn = false;
+  const plate = need(veil, '.plate');
+
+  /** Everything was drawn: the page draws, and where it drew a fresh frame, its values are not covered for 2 s more. */
+  function rewind() {
+    if (!proof.isDrawn()) {
+      store.drawing.distrust();
+      throw new Error('What was written is not there');
+    }
+    beat = 1 - beat;
+    const { dataset } = document.documentElement;
+    dataset['drawn'] = String(beat);
+    if (dataset['drawn'] !== String(beat)) throw new Error('The covers are not rewound');
+    if (store.deadMan.covered || store.frame === seen) return;
+    seen = store.frame;
+    dataset['beat'] = String(beat);
+  }
+
+  function draw() {
+    const kind = veilOf(store);
+    setAttribute(veil, 'data-on', kind);
+    if (kind === null && plate.hidden && !isDrawn) {
+      isDrawn = true; // the first values come before what is said once they end: with the next drawing
+      return;
+    }
+    show(plate, true);
+    const view = store.chain;
+    // While all is well the plate already says what it will have to say if this script hangs: then nobody knows where the chain is cut.
+    const isUnsaid = kind === null || store.drawing.isFailed;
+    show(chain, !isUnsaid);
+    drawBigChain(chain, view);
+    setWords(title, isUnsaid || view.age_s === null ? 'Stale' : `${view.word === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
+    const bold = isUnsaid ? 'Nothing new has been drawn.' : view.sentence;
+    const plain = isUnsaid ? 'The page or the server has stopped. Watch the car.' : detailOf(view);
+    if (told !== `${bold}|${plain}`) {
+      sentence.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
+      told = `${bold}|${plain}`;
+    }
+    setWords(then, thenWords(store.frame));
+    const recording = RECORDED[store.frame?.recording.state ?? 'off'] ?? '';
+    setText(rec, recording);
+    show(recName, recording !== '');
+    show(rec, recording !== '');
+  }
+
+  if (store.frame) draw(); // before the first frame it is not shown
+  const stops = [store.on('drawn', rewind), store.on('draw', draw)];
+  return () => stops.forEach((stop) => stop());
+}
+
+/** @param {import('../core/link.js').ChainView} view */
+function detailOf(view) {
+  if (view.word === 'Silent' && view.since_ms !== null) {
+    return `${view.detail} Last message at ${timeOfDay(view.since_ms)}.`;
+  }
+  return view.detail;
+}

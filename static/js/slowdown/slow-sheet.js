@@ -1,0 +1,68 @@
+// The sheet behind the slow-down's slide: why it is off, what it would command, and the key that arms it. Made when it is wanted.
+
+import { html, icon, setText, setWords, show, words } from '../core/dom.js';
+import { addSheet, openSheet } from '../shell/sheet.js';
+import { sheetOf } from './slow-layout.js';
+import { seenOf } from './slowing.js';
+
+/**
+ * @typedef {import('../core/store.js').Store} Store
+ * @typedef {import('../control/control.js').Control} Control
+ */
+
+const KEYS = /** @type {const} */ ({ arm: ['Arm', 'main'], disarm: ['Disarm', 'key wide'], ask: ['Ask for control', 'main'] });
+
+/** @param {Store} store @param {Control} control */
+export function openSlow(store, control) {
+  const mark = icon('slow');
+  const title = html('span');
+  const text = html('p');
+  const facts = html('dl', { class: 'facts' });
+  const guard = html('p', { 'data-f': 'guard' });
+  const aid = html('p', { class: 'sub' });
+  const says = html('p', { class: 'bad', role: 'status', 'data-f': 'says' });
+  const keys = html('div', { class: 'keys' });
+  const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-slow', 'aria-labelledby': 'slow-title', 'aria-describedby': 'slow-words' },
+    html('div', { class: 'bd' }, html('h2', { id: 'slow-title' }, mark, title), html('div', { id: 'slow-words' }, text, guard, aid)), facts, html('div', { class: 'bd' }, says), keys,
+    html('div', { class: 'keys' }, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
+  let shown = '';
+  let refused = '';
+
+  /** @param {'arm' | 'disarm' | 'ask'} act */
+  async function obey(act) {
+    const answer = act === 'ask' ? await store.ask('control', { do: 'request' }) : await store.ask(act);
+    refused = answer.ok ? '' : (answer.reason ?? 'Refused.');
+    if (answer.ok && act === 'ask') refused = 'Asked: silence grants control within 10 s. Then arm it.';
+    else if (answer.ok) return sheet.close();
+    draw();
+  }
+
+  function draw() {
+    const seen = sheetOf(seenOf(store), store.lag_s);
+    setText(title, seen.title);
+    setWords(text, seen.text);
+    setWords(guard, seen.guard);
+    guard.toggleAttribute('data-bad', !seen.isGuarded);
+    setText(aid, seen.aid);
+    setWords(says, refused || seen.says);
+    const key = JSON.stringify([seen.facts, seen.act]);
+    if (key === shown) return;
+    shown = key;
+    show(facts, seen.facts.length > 0);
+    facts.replaceChildren(...seen.facts.flatMap(([name, value, isBad]) => [
+      html('dt', {}, name), html('dd', isBad ? { class: 'bad' } : {}, ...(isBad ? [icon('warn', 's'), ' '] : []), html('span', {}, ...words(value))),
+    ]));
+    show(keys, seen.act !== null);
+    const { act } = seen;
+    if (act === null) return;
+    const [label, kind] = KEYS[act];
+    const button = html('button', { type: 'button', class: kind, 'data-act': act }, label);
+    button.addEventListener('click', () => void obey(act));
+    keys.replaceChildren(button);
+  }
+
+  const stops = [store.on('draw', draw), addSheet(sheet)];
+  sheet.addEventListener('close', () => stops.forEach((stop) => stop()), { once: true });
+  draw();
+  openSheet(sheet);
+}
