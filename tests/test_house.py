@@ -13,7 +13,7 @@ import pytest
 
 from tests.tree import PROJECT, project_files, text_of
 
-EMPTY_NAMES = {"util", "utils", "helper", "helpers", "common", "manager", "managers", "misc"}
+EMPTY_NAMES = {"util", "utils", "helper", "helpers", "common", "misc"}
 
 PYTHON = [path for path in project_files() if path.suffix == ".py" and path.parts[0] in ("monitor", "server")]
 PAGE = [path for path in project_files() if path.parts[0] in ("static", "templates")]

@@ -16,7 +16,7 @@ from playwright.async_api import Browser, Page, async_playwright
 
 from tests.chromium import FLAGS, find_chromium
 from tests.page.canned import Canned, alarm, idle, live, slow, slowed
-from tests.server.web.maps import png
+from tests.server.web.map_files import png
 
 OUT = Path(__file__).resolve().parents[2] / "out" / "screenshots"
 PHONE: dict[str, Any] = {

@@ -20,8 +20,8 @@ from tests.page.conftest import Phone
 from tests.page.radio import Radio
 from tests.page.roamer import Roamer, roaming
 from tests.server.conftest import serving
-from tests.server.web import maps
-from tests.server.web.maps import png
+from tests.server.web import map_files as maps
+from tests.server.web.map_files import png
 from tests.server.web.maps.test_tile_proxy import Source
 
 FIRST = 0.135  # metres a pixel at the first look

@@ -203,13 +203,13 @@ async def test_no_settings_file_holds_the_server_up() -> None:
 
 async def test_settings_are_read_beside_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     """A file that takes long, as none should, delays its own answer only."""
-    import server.tuning
+    from server.judge import active_settings
 
     def slow(*_: object) -> object:
         time.sleep(0.5)
         raise BadSetting("", "Too slow.")
 
-    monkeypatch.setattr(server.tuning, "from_toml", slow)
+    monkeypatch.setattr(active_settings, "from_toml", slow)
     async with serving(Config()) as base, httpx.AsyncClient(base_url=base, timeout=20) as client:
         order = asyncio.create_task(client.put("/api/settings.toml", content=b"[limits]\n"))
         await asyncio.sleep(0.05)

@@ -63,7 +63,7 @@ def test_one_file_uses_the_gate() -> None:
     users = [
         path.relative_to(PROJECT).as_posix()
         for path in sorted((PROJECT / "server").rglob("*.py"))
-        if "slowing.mouth" in path.read_text(encoding="utf-8")
+        if "slowdown.publisher" in path.read_text(encoding="utf-8")
     ]
     assert users == ["server/slowdown/guard_client.py", "server/slowdown/sender.py"]
 

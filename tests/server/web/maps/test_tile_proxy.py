@@ -25,7 +25,7 @@ from server.web.maps.map_options import MapUpstream, checked
 from server.web.maps.mbtiles import MapFile, MapRefused
 from server.web.maps.tile_cache import Kept, TileCache
 from tests.environment import users_own
-from tests.server.web.tile_server import picture
+from tests.server.web.maps.tile_server import picture
 
 SERVER = Path(__file__).with_name("tile_server.py")
 

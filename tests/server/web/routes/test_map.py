@@ -20,8 +20,8 @@ from server.web.maps.image_type import media_type, plain_text
 from server.web.maps.mbtiles import MapFile, MapRefused
 from server.web.maps.site_image import site_image
 from tests.environment import users_own
-from tests.server.web import maps
-from tests.server.web.maps import png
+from tests.server.web import map_files as maps
+from tests.server.web.map_files import png
 
 NORTH, SOUTH = png(255, 0, 0, 8), png(0, 0, 255, 8)
 HALVES = [(0, 0, 0, png(9, 9, 9, 8)), (1, 0, 0, SOUTH), (1, 0, 1, NORTH)]  # MBTiles counts rows from the south

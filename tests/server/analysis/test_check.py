@@ -322,7 +322,7 @@ def test_a_fault_of_its_own_is_not_taken_for_an_alarm(
 # The command with a progress that is eager to speak: the drive is too short for one.
 _SLOW = """
 import sys
-from server.analysis import progress
+from server.cli import progress
 progress.FIRST_AFTER_S = progress.EVERY_S = 0.0
 from server.cli.main import main
 sys.exit(main(sys.argv[1:]))
