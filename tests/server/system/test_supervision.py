@@ -161,14 +161,14 @@ async def test_health_is_impaired_while_no_check_is_judged(
         def fail(*_: Any) -> None:
             raise RuntimeError("no judge")
 
-        monkeypatch.setattr(session, "_judge", fail)
+        monkeypatch.setattr(session._parts.judgement, "judge", fail)
         await until(lambda: session.vitals().tick_age_s > 1.0)
         answer = await client.get("/api/health")
     assert answer.status_code == 503
     assert answer.json()["problems"][0].startswith("car: No check was judged for 1.")
 
 
-@pytest.mark.parametrize("part", ["_watch_recording", "_watch_slowing", "_watch_control"])
+@pytest.mark.parametrize("part", ["watch_recording", "watch_slow_down", "watch_control"])
 async def test_a_part_that_fails_is_an_alarm_and_keeps_no_check_from_being_judged(
     bridge: RosBridge, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, part: str
 ) -> None:
@@ -181,7 +181,7 @@ async def test_a_part_that_fails_is_an_alarm_and_keeps_no_check_from_being_judge
         def fail(*_: Any) -> None:
             raise RuntimeError("broken")
 
-        monkeypatch.setattr(app.state.services.sessions["car"], part, fail)
+        monkeypatch.setattr(app.state.services.sessions["car"]._tick, part, fail)
         speed["now"] = 14.0
         state = await page.state(
             lambda state: {"speed_limit", "monitoring_impaired"} <= {alarm["id"] for alarm in state["alarms"]}

@@ -65,14 +65,14 @@ async def test_an_order_that_was_obeyed_is_answered_so(
         if broken == "frame":
             monkeypatch.setattr(session, "frame", fails)
         else:
-            monkeypatch.setattr(session._recording, "asked", fails)
+            monkeypatch.setattr(session._parts.recording, "asked", fails)
         async with httpx.AsyncClient(base_url=base, timeout=20) as client:
             answer = await client.post("/api/pause")
             assert answer.status_code == 200, answer.text
-            assert session._pause.since_s is not None
+            assert session._parts.pause.since_s is not None
             answer = await client.post("/api/resume")
             assert answer.status_code == 200, answer.text
-            assert session._pause.since_s is None
+            assert session._parts.pause.since_s is None
 
 
 async def test_a_limit_counts_before_it_is_logged(
@@ -83,7 +83,9 @@ async def test_a_limit_counts_before_it_is_logged(
     session: Session = app.state.services.sessions["car"]
     judged_by: list[float] = []
     monkeypatch.setattr(
-        session._logbook, "settings", lambda *_, **__: judged_by.append(session._monitor.limits.speed_limit.max_mps)
+        session._parts.event_log,
+        "settings",
+        lambda *_, **__: judged_by.append(session._parts.judgement.monitor.limits.speed_limit.max_mps),
     )
     async with serving_app(app, config) as base, driving(bridge, speed=lambda _: 4.2), viewer(base) as page:
         await page.state(lambda state: state["signals"]["speed"]["freshness"] == "fresh")

@@ -1,0 +1,177 @@
+"""Carries out the commands of pages, and answers what pages ask of a session."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from monitor.alarm import Refused
+from server.control.authorization import Caller
+from server.protocol import commands, serialize
+from server.rosbridge.address import BadAddress
+from server.vehicle import phone, queries
+from server.vehicle.session_parts import SessionActions, SessionParts
+
+log = logging.getLogger("catgraph.session")
+
+
+class CommandHandler:
+    """Of one vehicle. `now` is a monotonic clock in seconds, `wall_ms` the time of day in ms since 1970.
+
+    A command is carried out first and logged then: the answer says what became of it, whatever the log does.
+    """
+
+    def __init__(
+        self,
+        vehicle: str,
+        parts: SessionParts,
+        actions: SessionActions,
+        frame: Callable[[], dict[str, Any]],
+        *,
+        now: Callable[[], float],
+        wall_ms: Callable[[], int],
+    ) -> None:
+        self._vehicle = vehicle
+        self._parts = parts
+        self._actions = actions
+        self._frame = frame
+        self._now = now
+        self._wall_ms = wall_ms
+
+    async def handle(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """The answer to a command or a query."""
+        answer = self._query(message)
+        if answer is not None:
+            return answer
+        parts = self._parts
+        caller = Caller.of(message)
+        by = caller.name
+        try:
+            command = commands.read(dict(message))
+            if isinstance(command, commands.PresentWord):
+                return self._present(command, caller)
+            parts.authorization.admit(command, caller, self._now())
+            if isinstance(command, commands.Import):  # a file may take a while to read, and control may pass meanwhile
+                read = await asyncio.to_thread(parts.settings.read, command.toml)
+                parts.authorization.admit(command, caller, self._now())
+                self._actions.settings_changed(parts.settings.replace(read), by=by)
+                parts.publisher.put()
+            else:
+                self._obey(command, caller)
+            if isinstance(command, commands.Record):
+                await parts.recording.demand_settled()
+        except queries.REFUSALS as why:
+            if isinstance(why, BadAddress) and parts.connection.refuse(why):
+                parts.publisher.put()
+            refusal = queries.refusal(why)
+            self._record(message, by=by, reason=refusal["reason"])
+            return refusal
+        self._record(message, by=by)
+        version = {"version": parts.settings.settings.version} if commands.is_of_settings(command) else {}
+        fence = parts.authorization.fence_of(caller)
+        return {"ok": True} | version | ({} if fence is None else {"fence": fence})
+
+    def _query(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
+        """The answer to a query; None: it is a command."""
+        parts, judgement = self._parts, self._parts.judgement
+        match message.get("kind"):
+            case "state":
+                return self._frame()
+            case "refresh":
+                parts.publisher.put()
+                return {"ok": True}
+            case "signals":
+                topics = parts.connection.subscriptions
+                return queries.signals(topics.unmapped, judgement.reception, topics.offered)
+            case "settings":
+                return parts.settings.as_json() | {"toml": parts.settings.as_toml()}
+            case "trends":
+                return serialize.trends(judgement.trends.piece(self._now(), after=message.get("after")))
+            case "track":
+                return queries.track(judgement.snapshot())
+            case "track_points":
+                after = message.get("after")
+                return queries.track_points(
+                    judgement.snapshot(),
+                    number=judgement.track_number,
+                    after=after if isinstance(after, int) else 0,
+                )
+        return None
+
+    def _record(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
+        """The command is obeyed or refused by now: the answer says so, whether or not it can be recorded."""
+        try:
+            self._parts.recording.asked(message, by=by, reason=reason)
+        except Exception:
+            log.exception("a command to %s could not be recorded", self._vehicle)
+
+    def _present(self, word: commands.PresentWord, caller: Caller) -> dict[str, Any]:
+        if self._parts.authorization.hear(word, caller, self._now()):
+            self._parts.publisher.put_soon()
+        return {"ok": True}
+
+    def _obey(self, command: commands.Command, caller: Caller) -> None:
+        parts, now_s, by = self._parts, self._now(), caller.name
+        match command:
+            case commands.Connect():
+                self._actions.connect(command.address, by=by)
+            case commands.Retry():
+                if parts.connection.link is None:
+                    raise Refused("There is no address to dial.")
+                parts.connection.link.retry_now()
+            case commands.Disconnect():
+                self._actions.disconnect(by=by)
+            case commands.Pause():
+                parts.pause.begin(parts.judgement.state, now_s, by=by)
+            case commands.Resume():
+                if parts.pause.end(parts.judgement.state, by=by):
+                    parts.judgement.judge(now_s)
+            case commands.Record():
+                parts.recording.order(command.on, by=by)
+                begins = "begins" if command.on else "ends"
+                parts.event_log.note("recording", f"Recording {begins}, by hand.", by=by)
+                self._actions.recording_ordered()
+            case commands.Acknowledge() | commands.Shelve() | commands.Unshelve():
+                self._respond(command, now_s, by)
+            case commands.Set():
+                lines = parts.settings.change(
+                    values=command.values, topics=command.topics, profile=command.profile, version=command.version
+                )
+                self._actions.settings_changed(lines, by=by)
+            case commands.TakeControl():
+                parts.authorization.obey(command, caller, now_s)
+            case commands.Ride():
+                self._ride(command.phone, now_s, by=by)
+            case commands.Arm() | commands.Disarm() | commands.Decelerate() | commands.Release() | commands.Veto():
+                parts.slow_down.obey(command, by=by)
+                self._actions.slow_down_ordered()
+            case commands.Position():
+                if parts.connection.phase == "idle":
+                    raise Refused("No car is monitored: no position is needed.")
+                parts.judgement.state.hear_phone(phone.word(command, now_s, self._wall_ms(), by), now_s)
+                return  # many phones may report every second; the next tick judges and puts a state
+        parts.publisher.put()
+
+    def _respond(
+        self, command: commands.Acknowledge | commands.Shelve | commands.Unshelve, now_s: float, by: str
+    ) -> None:
+        """What an operator does about an alarm."""
+        judgement = self._parts.judgement
+        match command:
+            case commands.Acknowledge():
+                found = judgement.monitor.acknowledge(command.alarm, command.occurrence, by=by, now_s=now_s)
+            case commands.Shelve():
+                found = judgement.monitor.shelve(
+                    command.alarm, command.occurrence, minutes=command.minutes, by=by, now_s=now_s
+                )
+            case _:
+                found = judgement.monitor.unshelve(command.alarm, by=by, now_s=now_s)
+        judgement.report(found)
+
+    def _ride(self, phone_: str | None, now_s: float, *, by: str) -> None:
+        judgement = self._parts.judgement
+        judgement.ride(phone_, now_s)
+        judgement.judge(now_s)
+        self._parts.event_log.note("ride", phone.riding_words(judgement.snapshot(), phone_), by=by, phone=phone_)

@@ -1,0 +1,104 @@
+"""What the monitor and the pages are told of a session: gathered from its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from monitor.state import LinkFacts
+from server.rosbridge.connection_errors import Problem
+from server.vehicle.restore import Past
+from server.vehicle.session_parts import SessionParts
+from server.vehicle.state_frame import Facts
+
+FLOWS_S = 2.0  # a message of the car so lately: data flow
+TRENDS_A_FRAME = 4  # steps of the trends in each state: so many frames in a row may be lost without a gap
+
+
+def behind(parts: SessionParts, now_s: float) -> Problem | None:
+    """The part that failed behind the open bridge, whether or not messages still come."""
+    if parts.connection.phase != "monitoring":
+        return None
+    last_s = parts.judgement.last_message_s
+    return parts.connection.subscriptions.problem(now_s, flows=last_s is not None and now_s - last_s < FLOWS_S)
+
+
+def link_facts(parts: SessionParts, now_s: float, *, wall_ms: int, log_trouble: str | None) -> LinkFacts:
+    """What the checks of the connection look at."""
+    connection, judgement = parts.connection, parts.judgement
+    link, topics, problem = connection.link, connection.subscriptions, connection.problem
+    failed = behind(parts, now_s)
+    return LinkFacts(
+        phase=connection.phase,
+        since_s=connection.since_s,
+        attempts=link.attempts if link is not None else 0,
+        bridge_heard_s=link.heard_s if link is not None else None,
+        bridge_answers=connection.bridge_answers(now_s),
+        problem_title=problem.title if problem else None,
+        problem_hint=problem.hint if problem else None,
+        behind_title=failed.title if failed else None,
+        behind_hint=failed.hint if failed else None,
+        behind_mark=failed.mark if failed else None,
+        topics_subscribed=topics.judged,
+        connected_s=connection.connected_s,
+        last_message_s=judgement.last_message_s,
+        published=topics.published(),
+        log_trouble=log_trouble,
+        late_s=judgement.transport.late_s(now_s) if connection.phase == "monitoring" else None,
+        throttled=topics.load.throttled(now_s),
+        reduced=f"{topics.load.level.words}." if topics.load.step else None,
+        wall_zero_s=wall_ms / 1000 - now_s,
+    )
+
+
+def frame_facts(
+    vehicle: str,
+    parts: SessionParts,
+    now_s: float,
+    *,
+    wall_ms: int,
+    server: Mapping[str, Any],
+    configured: str | None,
+    held: Past | None,
+    log_trouble: str | None,
+) -> Facts:
+    """What a state is made of. `configured`: the address of the car the session was started for; `held`: what stood
+    when the server ended, while no car is monitored yet."""
+    connection, judgement, topics = parts.connection, parts.judgement, parts.connection.subscriptions
+    return Facts(
+        vehicle=vehicle,
+        server=server,
+        now_s=now_s,
+        wall_ms=wall_ms,
+        phase=connection.phase,
+        address=connection.address,
+        configured=configured,
+        ros_version=topics.ros_version,
+        connected_s=connection.connected_s,
+        paused_since_s=parts.pause.since_s,
+        paused_by=parts.pause.by,
+        held=held,
+        load=judgement.load,
+        log_trouble=log_trouble,
+        profile=parts.settings.profile.title,
+        settings_version=parts.settings.settings.version,
+        since_s=connection.since_s,
+        dialled_s=connection.dialled_s,
+        problem=connection.problem,
+        link=connection.link,
+        last_message_s=judgement.last_message_s,
+        ros_answered_s=topics.ros_answered_s,
+        ros_alive=topics.ros_alive,
+        offers_nothing=topics.offers_nothing,
+        behind=behind(parts, now_s),
+        bridge_answers=connection.bridge_answers(now_s),
+        reception=judgement.reception,
+        sources=topics.sources,
+        topics_heard=len(judgement.topics),
+        topics_judged=topics.judged,
+        recording=parts.recording.frame(now_s),
+        trends=judgement.trends.piece(now_s, at_most=TRENDS_A_FRAME),
+        track_number=judgement.track_number,
+        operators=parts.authorization.as_json(now_s, wall_ms),
+        decelerate=parts.slow_down.frame(),
+    )

@@ -1,0 +1,123 @@
+"""What is known of one car, and what the checks say of it: messages and time go in, transitions of alarms come out."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Collection, Sequence
+from typing import Any
+
+from monitor.alarm import Transition
+from monitor.catalog import AnyCheck
+from monitor.load import AlarmLoad, RecentLoad
+from monitor.runner import Monitor
+from monitor.signal_limits import expected_rates
+from monitor.state import Snapshot, State
+from monitor.transport import TransportDelay
+from monitor.trends import Trends
+from server.judge import pipeline
+from server.judge.active_settings import Tuning
+from server.judge.reception_stats import Reception
+from server.judge.topics import Source
+
+log = logging.getLogger("catgraph.session")
+
+
+class Judgement:
+    """The state of a car and its monitor. `now` is a monotonic clock in seconds.
+
+    `on_transitions` is called with what happened to alarms, at the moment it happens.
+    """
+
+    def __init__(
+        self,
+        checks: Sequence[AnyCheck] | None,
+        tuning: Tuning,
+        *,
+        now: Callable[[], float],
+        on_transitions: Callable[[Collection[Transition]], None],
+    ) -> None:
+        """`checks` None: all there are."""
+        self._tuning = tuning
+        self._now = now
+        self._on_transitions = on_transitions
+        self._crashes_logged: set[str] = set()
+        self._load = RecentLoad()
+        self.monitor = Monitor(checks, tuning.limits)
+        self.rides: str | None = None  # the phone that rides in the car, as the operator in control says
+        self.track_number = 0  # of this run of the server; another number is another track
+        self.reset()
+
+    def reset(self) -> None:
+        """Another car is to be judged: nothing is known of it. The monitor keeps its alarms until `end`."""
+        self.reception = Reception()
+        self.transport = TransportDelay()
+        self.state = State(expected_rates(self._tuning.limits))
+        self.state.ride(self.rides, self._now())
+        self.trends = Trends(self._now())
+        self.track_number += 1  # with the state begins another track
+        self.topics: set[str] = set()  # that came and carry signals
+        self.last_message_s: float | None = None
+
+    @property
+    def load(self) -> AlarmLoad:
+        """The alarms announced lately, of whichever car was monitored: it is one operator who bears them."""
+        return self._load.at(self._now())
+
+    def add_load(self, transitions: Collection[Transition]) -> None:
+        """Counts transitions of before this run."""
+        self._load.add(transitions)
+
+    def snapshot(self) -> Snapshot:
+        return self.state.snapshot(self._now())
+
+    def receive(
+        self, sources: tuple[Source, ...], topic: str, message: Any, note: str | None, now_s: float
+    ) -> tuple[str, ...]:
+        """Decodes, applies and judges one message in one pass; the signals that changed."""
+        self.topics.add(topic)
+        self.last_message_s = now_s
+        changed = pipeline.receive(
+            sources,
+            message,
+            now_s,
+            note,
+            reception=self.reception,
+            state=self.state,
+            profile=self._tuning.profile,
+            tyre_rad_per_unit=self.monitor.limits.steering.tyre_rad_per_unit,
+            transport=self.transport,
+        )
+        if changed:
+            self.judge(now_s, changed)
+            self.trends.hear(changed, self.state, now_s)
+        return changed
+
+    def judge(self, now_s: float, changed: tuple[str, ...] | None = None) -> None:
+        """Judges what changed; None: time passed, everything."""
+        transitions = pipeline.judge(self.monitor, self.state, now_s, changed)
+        if self.monitor.crashes:
+            self._log_crashes()
+        self.report(transitions)
+
+    def report(self, transitions: Collection[Transition]) -> None:
+        """Transitions that an operator or the end of monitoring brought about are counted and reported likewise."""
+        if transitions:
+            self._load.add(transitions)
+            self._on_transitions(transitions)
+
+    def ride(self, phone: str | None, now_s: float) -> None:
+        """From now on this phone is compared with the car, whatever the others report; it is kept over connections."""
+        self.rides = phone
+        self.state.ride(phone, now_s)
+
+    def apply_settings(self) -> None:
+        """The limits in force are those of the settings from this moment on."""
+        self.monitor.limits = self._tuning.limits
+        self.state.expect(expected_rates(self._tuning.limits))
+
+    def _log_crashes(self) -> None:
+        """Each failing check once; the page says "monitoring impaired" as long as it fails."""
+        for crash in self.monitor.crashes.values():
+            if crash.check_id not in self._crashes_logged:
+                self._crashes_logged.add(crash.check_id)
+                log.error("check %s failed: %s\n%s", crash.check_id, crash.error, crash.where)

@@ -1,0 +1,115 @@
+"""Takes each message of a car to the parts that need it: recorder, slow-down, judge, scans."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from server.bus.bus import LocalBus
+from server.recording.controller import SessionRecording
+from server.rosbridge.raw_frame import RawFrame
+from server.slowdown.command_target import GUARD_STATE
+from server.slowdown.sender import Slowing
+from server.vehicle.connection import Connection
+from server.vehicle.judgement import Judgement
+from server.vehicle.scan_feed import ScanFeed
+from server.vehicle.tick_parts import TickParts
+from server.vehicle.undelivered import CLIENT_COUNT
+
+RECORDING = "recording of messages"  # its name where it fails
+
+
+class MessageIntake:
+    """Of one vehicle. `now` is a monotonic clock in seconds."""
+
+    def __init__(
+        self,
+        vehicle: str,
+        bus: LocalBus,
+        judgement: Judgement,
+        recording: SessionRecording,
+        slow_down: Slowing,
+        tick_parts: TickParts,
+        *,
+        now: Callable[[], float],
+    ) -> None:
+        self._vehicle = vehicle
+        self._bus = bus
+        self._judgement = judgement
+        self._recording = recording
+        self._slow_down = slow_down
+        self._tick_parts = tick_parts
+        self._now = now
+        self._connection: Connection | None = None
+        self.reset()
+
+    def follow(self, connection: Connection) -> None:
+        """From now on messages of this connection come; to be called once."""
+        self._connection = connection
+
+    def reset(self) -> None:
+        """Another car's messages come."""
+        self._scans = ScanFeed(self._vehicle, self._bus)
+
+    def junk_received(self, why: str) -> None:
+        """Something came that is no message."""
+        self._judgement.reception.junk(why)
+        if why == "binary noise" and self._scans.is_empty and self._connection is not None:
+            self._connection.subscriptions.binary_noise()
+
+    def frame_received(self, frame: RawFrame) -> bool:
+        """A message that is only recorded goes to the recorder as it came: parsing it is no work for the loop."""
+        connection = self._connection
+        if connection is None or frame.topic in (GUARD_STATE, CLIENT_COUNT):
+            return False
+        topics = connection.subscriptions
+        if frame.topic not in topics.others:
+            return False
+        topics.heard(frame.topic)
+        if self._recording.is_on:
+            self._record(connection, frame.topic, frame, self._now(), len(frame.payload))
+        return True
+
+    def message_received(self, topic: str, message: Any, note: str | None) -> None:
+        """One message of the car: recorded, decoded, applied and judged in the same pass."""
+        connection = self._connection
+        if connection is None:
+            return
+        now_s = self._now()
+        topics = connection.subscriptions
+        topics.heard(topic)
+        if self._recording.is_on and connection.link is not None:
+            self._record(connection, topic, message, now_s, connection.link.frame_bytes)
+        if self._slow_down.heard(topic, message) or topics.took(topic, message):
+            return
+        if topic in topics.others:
+            return  # subscribed to be recorded: what is judged must not depend on what is recorded
+        sources = topics.by_topic.get(topic)
+        if sources is None:
+            self._judgement.reception.unasked += 1
+            return
+        connection.prove()
+        changed = self._judgement.receive(sources, topic, message, note, now_s)
+        if "scan" in changed:
+            self._show_scan(message, now_s)
+
+    def _show_scan(self, message: Any, now_s: float) -> None:
+        self._scans.count()
+        if self._scans.is_due(now_s):
+            monitor = self._judgement.monitor
+            self._scans.put(
+                self._judgement.state.snapshot(now_s),
+                monitor.limits.obstacle,
+                was_active="obstacle" in monitor.alarms and monitor.alarms["obstacle"].active,
+                kinds_kept=not isinstance(message["ranges"], list),
+            )
+
+    def _record(self, connection: Connection, topic: str, message: Any, now_s: float, size: int) -> None:
+        """A recording that fails must not keep the message from being judged."""
+
+        def take() -> None:
+            topics = connection.subscriptions
+            self._recording.ros_version = topics.ros_version  # a part begins with its first message
+            self._recording.take(topic, topics.type_of(topic), message, now_s, size)
+
+        self._tick_parts.attempt(RECORDING, take)

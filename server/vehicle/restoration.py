@@ -1,0 +1,62 @@
+"""After a restart of the server: what stood when it ended is held until a car is monitored again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from server.bus.bus import LocalBus
+from server.vehicle import restore
+from server.vehicle.restore import Past
+from server.vehicle.session_parts import SessionParts
+
+
+class Restoration:
+    """Of one vehicle's session. `now` is a monotonic clock in seconds, `wall_ms` the time of day in ms since 1970."""
+
+    def __init__(
+        self,
+        vehicle: str,
+        bus: LocalBus,
+        parts: SessionParts,
+        *,
+        now: Callable[[], float],
+        wall_ms: Callable[[], int],
+    ) -> None:
+        self._vehicle = vehicle
+        self._bus = bus
+        self._parts = parts
+        self._now = now
+        self._wall_ms = wall_ms
+        self.held: Past | None = None  # what stood when the server ended, until a car is monitored again
+
+    def begin(self) -> None:
+        """At the start: reads the log; numbers of occurrences and settings count on."""
+        before, parts = self._recall(), self._parts
+        judgement, event_log = parts.judgement, parts.event_log
+        judgement.monitor.number_on(before.transitions)
+        judgement.add_load(before.recent)
+        judgement.ride(restore.phone_chosen(self._bus, self._vehicle), self._now())
+        for sentence in (self._bus.log_complaint, parts.settings.complaint):
+            if sentence:
+                event_log.note("restarted", sentence)
+        if parts.settings.number_on(before.settings_version):
+            event_log.settings("The settings are not those that were last in force: they were lost.", by=None)
+        if before.address is not None or before.standing:
+            self.held = before
+            event_log.note("restarted", before.words(judgement.monitor.alarms))
+
+    def of(self, url: str) -> Past | None:
+        """Before a car is dialled: the past of that very car, where the server ended while it was monitored. Its
+        alarms stand again; so do those of another car, which end with its monitoring."""
+        if self.held is None:
+            return None
+        self.held = None
+        before = self._recall()
+        self._parts.judgement.monitor.restore(before.transitions)
+        if before.address != url:
+            return None
+        self._parts.recording.remember(before.stood)
+        return before
+
+    def _recall(self) -> Past:
+        return restore.recall(self._bus, self._vehicle, now_s=self._now(), wall_ms=self._wall_ms())

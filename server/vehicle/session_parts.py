@@ -1,0 +1,134 @@
+"""The parts of one vehicle's session: made and joined here, for those that work with several of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from monitor.alarm import Transition
+from monitor.catalog import AnyCheck
+from server.bus.bus import LocalBus
+from server.control.authorization import Gate
+from server.judge.active_settings import Tuning
+from server.recording.controller import SessionRecording
+from server.recording.folder import RecordingsFolder
+from server.rosbridge.link import RosLink
+from server.slowdown.sender import Slowing
+from server.system.supervision import Supervisor
+from server.vehicle.connection import Connection, ConnectionObserver
+from server.vehicle.event_log import Logbook
+from server.vehicle.judgement import Judgement
+from server.vehicle.message_intake import MessageIntake
+from server.vehicle.pause import Pause
+from server.vehicle.state_publisher import StatePublisher
+from server.vehicle.subscriptions import Conversation
+from server.vehicle.tick_parts import TickParts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionParts:
+    """Each has one job and is testable without the others."""
+
+    settings: Tuning
+    connection: Connection
+    judgement: Judgement
+    recording: SessionRecording
+    event_log: Logbook
+    authorization: Gate
+    pause: Pause
+    slow_down: Slowing
+    publisher: StatePublisher
+    intake: MessageIntake
+
+
+class SessionActions(Protocol):
+    """What only the session as a whole can do."""
+
+    def connect(self, typed: str, *, by: str | None) -> None:
+        """Dials what was typed, or the configured car where it is empty. Raises BadAddress."""
+
+    def disconnect(self, *, by: str) -> None:
+        """Ends monitoring."""
+
+    def settings_changed(self, lines: Sequence[str], *, by: str | None) -> None:
+        """New settings count from this moment on; `lines`: what changed, for the log."""
+
+    def recording_ordered(self) -> None:
+        """The recorder was switched on or off: topics to record are subscribed to, or no longer."""
+
+    def slow_down_ordered(self) -> None:
+        """The slow-down and the checks act on an order at once."""
+
+
+class SessionObserver(ConnectionObserver, Protocol):
+    """What the parts report to the session."""
+
+    def alarms_changed(self, transitions: Collection[Transition]) -> None: ...
+    def settings_changed(self, lines: Sequence[str], *, by: str | None) -> None: ...
+
+
+def session_parts(
+    vehicle: str,
+    bus: LocalBus,
+    *,
+    observer: SessionObserver,
+    supervisor: Supervisor,
+    attempts: TickParts,
+    checks: Sequence[AnyCheck] | None,
+    settings: Tuning,
+    recordings: RecordingsFolder | None,
+    on_finished: Callable[[Path], None],
+    frame: Callable[[], dict[str, Any]],
+    now: Callable[[], float],
+    wall_ms: Callable[[], int],
+) -> SessionParts:
+    """Makes the parts and joins them. `observer` learns what happens, `frame` makes a state for the pages."""
+    judgement = Judgement(checks, settings, now=now, on_transitions=observer.alarms_changed)
+    recording = SessionRecording(
+        vehicle,
+        recordings,
+        settings,
+        now=now,
+        wall_ms=wall_ms,
+        told=on_finished,
+        unreadable=lambda why: intake.junk_received(why),
+    )
+    event_log = Logbook(vehicle, bus, settings, wall_ms=wall_ms, also=recording.events)
+    slow_down = Slowing(
+        event_log.note,
+        now=now,
+        wall_ms=wall_ms,
+        snapshot=judgement.snapshot,
+        record=lambda sent: recording.own("commands", sent),
+        number=bus.last_event(vehicle),
+    )
+    intake = MessageIntake(vehicle, bus, judgement, recording, slow_down, attempts, now=now)
+
+    def subscriptions(link: RosLink | None) -> Conversation:
+        return Conversation(
+            link,
+            settings,
+            now=now,
+            proved=lambda: connection.prove(),
+            recognised=lambda title: observer.settings_changed([f"Taken for: {title}"], by=None),
+            learned=recording.learn,
+            noted=lambda text: event_log.note("not_received", text),
+            timed=lambda asked_s, ros_s: judgement.transport.clock.answered(asked_s, now(), ros_s),
+        )
+
+    connection = Connection(vehicle, observer, intake, subscriptions, supervisor, now=now)
+    intake.follow(connection)
+    return SessionParts(
+        settings=settings,
+        connection=connection,
+        judgement=judgement,
+        recording=recording,
+        event_log=event_log,
+        authorization=Gate(event_log.note, fence=bus.last_event(vehicle)),
+        pause=Pause(event_log),
+        slow_down=slow_down,
+        publisher=StatePublisher(vehicle, bus, frame, now=now),
+        intake=intake,
+    )

@@ -1,0 +1,147 @@
+"""One tick of a session, ten a second: each part looks at the others, then every check is judged."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from functools import partial
+
+from server.bus.bus import LocalBus
+from server.judge.pipeline import TICK_S
+from server.slowdown.command_target import GUARD_STATE, way_of
+from server.vehicle import facts
+from server.vehicle.link_load import RESTORE_BELOW_S
+from server.vehicle.session_parts import SessionParts
+from server.vehicle.tick_parts import LogKeeper, OpenFilesWatch, TickParts
+
+log = logging.getLogger("catgraph.session")
+
+READ_UP_S = 0.1  # to read what waits after the loop stood still
+TELL_STALL_S = 2.0  # a page that was covered for so long is told why
+SICK_LOOP_S = 0.25  # a loop later than this lets one heartbeat fall: a sign of life from a sick server is a lie
+
+
+class Tick:
+    """Of one vehicle's session. `now` is its monotonic clock in s, `wall_ms` the time of day in ms since 1970."""
+
+    def __init__(
+        self,
+        vehicle: str,
+        parts: SessionParts,
+        attempts: TickParts,
+        bus: LocalBus,
+        *,
+        now: Callable[[], float],
+        wall_ms: Callable[[], int],
+    ) -> None:
+        self._vehicle = vehicle
+        self._parts = parts
+        self._attempts = attempts
+        self._now = now
+        self._ended_s = now()  # when the newest tick came to its end
+        self.lag_s = 0.0  # how late the newest one began
+        self._wall_ms = wall_ms
+        self._log_keeper = LogKeeper(parts.event_log, bus)
+        self._open_files = OpenFilesWatch()
+
+    @property
+    def log_trouble(self) -> str | None:
+        """Why the log is not kept on the disk, as a sentence; None: it is."""
+        return self._log_keeper.trouble
+
+    def restart(self) -> None:
+        """The age counts from now."""
+        self._ended_s = self._now()
+
+    def age_s(self, now_s: float) -> float:
+        """Since every check was last judged."""
+        return now_s - self._ended_s
+
+    async def loop(self) -> None:
+        """Ticks until it is cancelled."""
+        loop = asyncio.get_running_loop()
+        due_s = loop.time()
+        while True:
+            self.lag_s = max(0.0, loop.time() - due_s)
+            if self.lag_s > SICK_LOOP_S and self._parts.connection.phase == "monitoring":
+                await self._catch_up()
+            await self._parts.slow_down.go_first()
+            try:
+                self.run(self._now(), put=self.lag_s <= SICK_LOOP_S)
+                self._ended_s = self._now()
+            except Exception:  # the one net: a fault in a tick must not end the ticking
+                log.exception("a tick of %s failed", self._vehicle)
+            due_s = max(due_s + TICK_S, loop.time())
+            await asyncio.sleep(due_s - loop.time())
+
+    async def _catch_up(self) -> None:
+        """After the loop stood still: what the car sent meanwhile waits to be read, and its silence was ours."""
+        if self.lag_s > TELL_STALL_S:
+            text = f"The server stood still for {self.lag_s:.1f} s: nothing was judged meanwhile."
+            self._parts.event_log.note("stalled", text)
+        await asyncio.sleep(READ_UP_S)
+
+    def run(self, now_s: float, *, put: bool) -> None:
+        """Time judges: freshness, silence, delays. `put`: then the pages get a state."""
+        for part, work in (
+            ("event log", self._log_keeper.tick),
+            ("link load", self.watch_load),
+            ("link", self.watch_link),
+            ("files and connections", self._open_files.tick),
+            ("recorder", self.watch_recording),
+            ("control", self.watch_control),
+            ("slow-down", self.watch_slow_down),
+        ):
+            self._attempts.attempt(part, partial(work, now_s))
+        judgement, publisher = self._parts.judgement, self._parts.publisher
+        judgement.monitor.failed_parts = self._attempts.failed
+        judgement.judge(now_s)
+        if put and not publisher.is_due:
+            publisher.put()
+
+    def slow_down_ordered(self, now_s: float) -> None:
+        """The slow-down and the checks act on an order at once."""
+        self._attempts.attempt("slow-down", partial(self.watch_slow_down, now_s))
+        self._attempts.attempt("checks", partial(self._parts.judgement.judge, now_s))
+
+    def watch_link(self, now_s: float) -> None:
+        found = facts.link_facts(self._parts, now_s, wall_ms=self._wall_ms(), log_trouble=self.log_trouble)
+        self._parts.judgement.state.link(found)
+
+    def watch_load(self, now_s: float) -> None:
+        """Over a slow link less is subscribed to before what is judged grows old."""
+        topics, transport = self._parts.connection.subscriptions, self._parts.judgement.transport
+        if self._parts.connection.phase == "monitoring" and topics.watch_load(transport.queued_s(now_s)):
+            late_s = transport.late_s(now_s)
+            why = f"The link is slow, {late_s:.1f} s late" if late_s > RESTORE_BELOW_S else "The link is in time"
+            self._parts.event_log.note("reduced", f"{why}. {topics.load.level.words}.", step=topics.load.step)
+
+    def watch_recording(self, now_s: float) -> None:
+        """The recorder learns what the subscriptions know, and the other way round."""
+        topics, recording = self._parts.connection.subscriptions, self._parts.recording
+        recording.ros_version = topics.ros_version
+        recording.missing = topics.missing
+        recording.tick(now_s)
+        topics.record(recording.also)
+        self._parts.judgement.state.recorder(recording.facts(now_s))
+
+    def watch_control(self, now_s: float) -> None:
+        authorization = self._parts.authorization
+        if authorization.tick(now_s):
+            self._parts.publisher.put_soon()
+        self._parts.judgement.state.reach(authorization.facts(now_s))
+
+    def watch_slow_down(self, now_s: float) -> None:
+        """What slows the car learns what the judge knows, and the other way round."""
+        parts, topics, slow_down = self._parts, self._parts.connection.subscriptions, self._parts.slow_down
+        monitor = parts.judgement.monitor
+        target = way_of(phase=parts.connection.phase, sources=topics.sources, offered=topics.offered)
+        slow_down.limits = monitor.limits.slow_down
+        slow_down.rivals = topics.publishers
+        slow_down.is_steering_known = monitor.limits.steering.tyre_rad_per_unit != 0.0
+        slow_down.watch_operators(parts.authorization.heard_s())
+        is_paused = parts.pause.since_s is not None
+        found = slow_down.tick(target, monitor.alarms, ros_version=topics.ros_version, is_paused=is_paused)
+        parts.judgement.state.slow(found)
+        topics.watch_commands(target.topic or None, guard=GUARD_STATE if target.has_guard else None)

@@ -1,0 +1,72 @@
+"""The parts of a tick beside the checks: one that fails is an alarm of its own and keeps no other from its work."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+from server.bus.bus import LocalBus
+from server.system import open_files
+from server.vehicle.event_log import Logbook
+
+log = logging.getLogger("catgraph.session")
+
+EVERY_S = 1.0  # how often the log is asked whether it is kept, and open files are counted
+
+
+class TickParts:
+    """Which parts fail now, and how."""
+
+    def __init__(self, vehicle: str) -> None:
+        self._vehicle = vehicle
+        self._failed: dict[str, str] = {}
+
+    def attempt(self, part: str, work: Callable[[], object]) -> None:
+        """Does the work of one part. Its failure is logged once, until it works again."""
+        try:
+            work()
+        except Exception as error:
+            if part not in self._failed:
+                log.exception("the part %s of %s fails", part, self._vehicle)
+            self._failed[part] = f"{type(error).__name__}: {error}"[:200]
+        else:
+            self._failed.pop(part, None)
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        return tuple(self._failed)
+
+    def problems(self) -> tuple[str, ...]:
+        """A sentence each."""
+        return tuple(f"The part “{part}” fails: {why}." for part, why in self._failed.items())
+
+
+class LogKeeper:
+    """Asks now and then whether the event log is kept."""
+
+    def __init__(self, event_log: Logbook, bus: LocalBus) -> None:
+        self._event_log = event_log
+        self._bus = bus
+        self._looked_s = -EVERY_S
+        self.trouble: str | None = None  # why it is not kept on the disk, as a sentence
+
+    def tick(self, now_s: float) -> None:
+        if now_s - self._looked_s >= EVERY_S:
+            self._looked_s = now_s
+            self._event_log.retry()
+            self.trouble = self._event_log.trouble or self._bus.save_events()
+
+
+class OpenFilesWatch:
+    """Looks now and then whether files and connections can still be opened."""
+
+    def __init__(self) -> None:
+        self._looked_s = -EVERY_S
+        self._fails = False
+
+    def tick(self, now_s: float) -> None:
+        """Raises OSError while the process has none left."""
+        if now_s - self._looked_s >= EVERY_S or self._fails:
+            self._looked_s, self._fails = now_s, True
+            open_files.demand_free()
+            self._fails = False
