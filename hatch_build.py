@@ -55,11 +55,11 @@ class PageHook(BuildHookInterface):
 
     @property
     def _built(self) -> ModuleType:
-        return load(Path(self.root, "server", "web", "built.py"))
+        return load(Path(self.root, "server", "web", "assets", "bundle.py"))
 
     @property
     def _icons(self) -> ModuleType:
-        return load(Path(self.root, "server", "web", "icons.py"))
+        return load(Path(self.root, "server", "web", "assets", "icons.py"))
 
     def _draw(self, modules: Path) -> None:
         why = self._icons.draw(modules, self._static)

@@ -16,7 +16,7 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 
 from server.recording.mcap.chunks import HEAD_BYTES
-from server.recording.unpack import verified
+from server.recording.read.unpack import verified
 
 _MESSAGE = int(Opcode.MESSAGE)
 _MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time

@@ -12,7 +12,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, Metadata, Schema
 
-from server.recording.unpack import verified
+from server.recording.read.unpack import verified
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD_BYTES = 1 + 8  # of a record: what it is, and how long

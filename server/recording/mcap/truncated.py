@@ -14,7 +14,7 @@ from mcap.stream_reader import breakup_chunk
 
 from server.recording.mcap.mcap_file import Index, McapFile, latest
 from server.recording.read.errors import RecordingUnreadable
-from server.recording.unpack import verified
+from server.recording.read.unpack import verified
 
 MAGIC = b"\x89MCAP0\r\n"  # begins a file, and ends one that was closed
 _HEAD_BYTES = 1 + 8  # of a record: what it is, and how long

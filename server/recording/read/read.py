@@ -23,7 +23,7 @@ from server.recording.read.recognise import Kind, recognise
 from server.recording.read.rosbag1 import Bag1
 from server.recording.read.rosbag2 import Bag2
 from server.recording.read.source import Channel, FileSource
-from server.recording.unpack import PartTooLarge
+from server.recording.read.unpack import PartTooLarge
 
 __all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
 

@@ -19,7 +19,7 @@ from rosbags.rosbag1.reader import Header, RecordType
 from server.judge.message import RosVersion
 from server.recording.read.errors import RecordingUnreadable
 from server.recording.read.source import Channel, Damage
-from server.recording.unpack import PartTooLarge, unpack
+from server.recording.read.unpack import PartTooLarge, unpack
 
 CACHE_BYTES = 64_000_000  # unpacked chunks kept: chunks may overlap in time
 _CONNECTION = 7  # the op of a record that may stand before a message in its chunk

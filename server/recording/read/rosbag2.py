@@ -13,8 +13,8 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from server.judge.message import RosVersion
-from server.recording import rosbags_bounds
 from server.recording.mcap.chunk_rows import ChunkRow, chunk_rows, in_order
+from server.recording.read import rosbags_bounds
 from server.recording.read.errors import RecordingUnreadable
 from server.recording.read.source import Channel, Damage, DefinitionFormat
 

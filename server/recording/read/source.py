@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from server.judge.message import RosVersion
-from server.recording.unpack import PartTooLarge
+from server.recording.read.unpack import PartTooLarge
 
 DefinitionFormat = Literal["none", "msg", "idl"]
 

@@ -16,12 +16,12 @@ from pathlib import Path
 import orjson
 import pytest
 
-from server.recording import rosbags_bounds, unpack
 from server.recording.folder import RecordingsFolder
 from server.recording.mcap.chunks import LARGEST_CHUNK
+from server.recording.read import rosbags_bounds, unpack
 from server.recording.read.read import RecordingUnreadable, open_recording
+from server.recording.read.unpack import MOST_BYTES
 from server.recording.recover import recover
-from server.recording.unpack import MOST_BYTES
 from tests.server.recording import bombs
 from tests.server.recording.bags import Drive, write_ros2
 

@@ -23,7 +23,7 @@ from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEv
 
 from server.recording import space
 from server.recording.read.errors import RecordingUnreadable
-from server.recording.unpack import unpack, unpack_message
+from server.recording.read.unpack import unpack, unpack_message
 
 MOST_METADATA = 2 << 20  # bytes of metadata.yaml: a thousand topics
 MOST_QOS = 64 << 10  # letters of the quality of service of one topic
