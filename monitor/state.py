@@ -9,17 +9,17 @@ from types import MappingProxyType
 from typing import Any, Generic, Literal, TypeVar, overload
 
 from monitor.components import Components
-from monitor.earlier import Earlier
+from monitor.freeze_detection import COMPARED, RepeatFollower, Repeats, Wheels
 from monitor.gps_watch import GpsFollower, GpsWatch
-from monitor.headings import Headings
+from monitor.heading_fusion import HeadingFusion
 from monitor.link import LinkFacts, Phase
 from monitor.motion import Slope, Standstill
 from monitor.phones import NO_PHONE, Phones, PhoneView, PhoneWord
 from monitor.quick import maker
 from monitor.rates import Rate, RateMeter
 from monitor.reach import ReachFacts
+from monitor.reading_history import ReadingHistory
 from monitor.recorder import RecorderFacts
-from monitor.repeats import COMPARED, RepeatFollower, Repeats, Wheels
 from monitor.signals import SIGNALS, Signal
 from monitor.slow_proof import NOTHING_SHOWN, ProofFollower, SlowProof
 from monitor.slowing import SlowingFacts
@@ -227,13 +227,13 @@ _TELLING = frozenset({Twist, GpsFix, Odometry, Heading})  # from which something
 class _Heard:
     """What the state keeps of one signal between messages."""
 
-    __slots__ = ("alone", "count", "earlier", "headline", "highest", "lowest", "meter", "repeats", "stamps")
+    __slots__ = ("alone", "count", "headline", "highest", "history", "lowest", "meter", "repeats", "stamps")
 
     def __init__(self, signal: Signal, set_hz: float | None, *, one_writer: bool) -> None:
         self.alone = (signal.name,)
         self.headline = signal.headline
         self.lowest, self.highest = math.inf, -math.inf  # headline since connecting
-        self.earlier: Earlier | None = None  # where a check wants to know
+        self.history: ReadingHistory | None = None  # where a check wants to know
         self.meter = RateMeter(signal.expected_hz, set_hz)
         self.repeats = RepeatFollower()
         self.stamps = StampFollower() if one_writer else None
@@ -276,15 +276,15 @@ class State:
         self._clock_jump: ClockJump | None = None
         self._standstill = Standstill()
         self._track = Track()
-        self._headings = Headings()
+        self._headings = HeadingFusion()
         self._components = Components()
         self._gps_follower = GpsFollower()
         self._gps = GpsWatch()
         self._phones = Phones()
         self._fix_s = -math.inf  # when the newest position was sent
         self._rides: str | None = None
-        self._scan_earlier = self._heard["scan"].earlier = Earlier()
-        self._distance_earlier = self._heard["distance"].earlier = Earlier()
+        self._scan_history = self._heard["scan"].history = ReadingHistory()
+        self._distance_history = self._heard["distance"].history = ReadingHistory()
         # Read by whoever likes, written by `link` and `set_paused` alone: asked at every message.
         self.link_facts = LinkFacts()
         self.paused = False
@@ -341,8 +341,8 @@ class State:
             self._readings = self._readings.copy()
             self._readings_shared = None
         self._readings[signal] = reading
-        if heard.earlier is not None:
-            heard.earlier.add(reading)
+        if heard.history is not None:
+            heard.history.add(reading)
         if heard.headline is not None:
             number = getattr(value, heard.headline, None)
             if number is not None and not heard.lowest <= number <= heard.highest:
@@ -399,11 +399,11 @@ class State:
 
     @property
     def scan_before(self) -> Reading[LaserScan] | None:
-        return self._scan_earlier.before
+        return self._scan_history.before
 
     @property
     def distance_before(self) -> Reading[Distance] | None:
-        return self._distance_earlier.before
+        return self._distance_history.before
 
     @property
     def standing_since_s(self) -> float | None:
@@ -469,8 +469,8 @@ class State:
             gps=self._gps,
             phone=self._phones.view,
             phones=self._phones.views,
-            scan_before=self._scan_earlier.before,
-            distance_before=self._distance_earlier.before,
+            scan_before=self._scan_history.before,
+            distance_before=self._distance_history.before,
             standing_since_s=self._standstill.since_s if self._is_fresh("speed", now_s) else None,
             speed_slope_mps2=self._slope_mps2,
             clock_jump=self._clock_jump,

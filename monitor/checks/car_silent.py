@@ -20,7 +20,7 @@ from monitor.check import (
 )
 from monitor.inhibition import GRACE_S
 from monitor.signals import SIGNALS
-from monitor.silence import BRIDGE_WITHIN_S, FAST_HORIZON_S, silence
+from monitor.staleness import BRIDGE_WITHIN_S, FAST_HORIZON_S, silence
 from monitor.state import Snapshot
 
 

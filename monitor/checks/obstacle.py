@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from monitor.ahead import corridor_ahead, is_blind, look_ahead, tyre_angle_rad
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -26,6 +25,7 @@ from monitor.check import (
 )
 from monitor.figures import beside
 from monitor.instruments import ObstacleLimits, stopping_m
+from monitor.obstacle_view import corridor_ahead, is_blind, look_ahead, tyre_angle_rad
 from monitor.state import NotFresh, Snapshot
 
 CLOSING_AT_LEAST_MPS = 0.3  # slower is noise of two distances

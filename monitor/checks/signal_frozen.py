@@ -26,8 +26,8 @@ from monitor.check import (
     ok,
     unknown,
 )
+from monitor.freeze_detection import Repeats
 from monitor.motion import MOVES_ABOVE_MPS
-from monitor.repeats import Repeats
 from monitor.signal_limits import GROUP, SignalLimits, SlowLimits
 from monitor.signals import SIGNALS, Signal
 from monitor.state import Reading, Snapshot

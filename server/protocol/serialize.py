@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from monitor import values
-from monitor.ahead import ANGLE_STEP_RAD
 from monitor.alarm import Alarm, Transition
 from monitor.alarm_spec import AlarmSpec
 from monitor.check import Finding, Quantity, Verdict
 from monitor.load import AlarmLoad
+from monitor.obstacle_view import ANGLE_STEP_RAD
 from monitor.runner import Tile
 from monitor.scan import usable
 from monitor.trends import STEP_S, Piece

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from monitor.ahead import corridor_ahead, is_blind, look_ahead
 from monitor.instruments import ObstacleLimits, stopping_m
+from monitor.obstacle_view import corridor_ahead, is_blind, look_ahead
 from monitor.state import Snapshot
 from monitor.values import LaserScan, Twist
 from server.bus.bus import LocalBus

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from monitor.check import Finding, Verdict
+from monitor.freeze_detection import Repeats
 from monitor.link import LinkFacts
-from monitor.repeats import Repeats
 from monitor.runner import Monitor
 from monitor.stamps import ClockJump
 from monitor.state import Reading, Snapshot, State

@@ -13,12 +13,12 @@ import pytest
 
 from monitor.catalog import CHECKS
 from monitor.check import Verdict
+from monitor.freeze_detection import Repeats
 from monitor.gps_watch import GpsWatch
 from monitor.link import LinkFacts
 from monitor.rates import Rate
 from monitor.reach import ReachFacts
 from monitor.recorder import RecorderFacts
-from monitor.repeats import Repeats
 from monitor.slow_proof import SlowProof
 from monitor.slowing import SlowingFacts
 from monitor.stamps import ClockJump

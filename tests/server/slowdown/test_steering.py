@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from monitor.ahead import corridor_ahead
 from monitor.alarm import Refused
 from monitor.catalog import CHECKS, AllLimits
+from monitor.obstacle_view import corridor_ahead
 from monitor.state import State
 from monitor.values import Steering, Twist
 from server.judge import pipeline, profiles

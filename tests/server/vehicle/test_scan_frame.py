@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from monitor.ahead import corridor_ahead, is_blind, look_ahead
 from monitor.instruments import ObstacleLimits
+from monitor.obstacle_view import corridor_ahead, is_blind, look_ahead
 from monitor.state import Snapshot
 from monitor.values import LaserScan, Steering, Twist
 from server.protocol import serialize

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from monitor.repeats import KNOWN_AFTER, RepeatFollower, Repeats, Wheels
+from monitor.freeze_detection import KNOWN_AFTER, RepeatFollower, Repeats, Wheels
 from monitor.values import Effort, GpsFix, Odometry, Twist, Value
 from tests.monitor.drive import sweep
 

@@ -14,7 +14,7 @@ DOUBTS = 5
 REVERSING_MPS = -0.3
 
 
-class Headings:
+class HeadingFusion:
     """Chooses. A published heading wins; then the yaw of odometry which is fixed to the earth; then the course.
 
     Yaw is a heading only in a frame whose x is east: REP-105 lets `odom` begin anywhere. A frame is taken for one when

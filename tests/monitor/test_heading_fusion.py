@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from monitor.headings import DOUBTS, Headings
+from monitor.heading_fusion import DOUBTS, HeadingFusion
 from monitor.values import Heading, Odometry
 
 
@@ -14,7 +14,7 @@ def odometry(yaw_rad: float | None, frame_id: str = "map", x_m: float = 0.0, y_m
     return Odometry(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad, frame_id=frame_id)
 
 
-def tell(headings: Headings, course_deg: float, times: int = 1, speed_mps: float | None = 2.0) -> Heading | None:
+def tell(headings: HeadingFusion, course_deg: float, times: int = 1, speed_mps: float | None = 2.0) -> Heading | None:
     found = None
     for _ in range(times):
         found = headings.on_course(course_deg, speed_mps, yaw_is_fresh=True)
@@ -35,7 +35,7 @@ def tell(headings: Headings, course_deg: float, times: int = 1, speed_mps: float
     ],
 )
 def test_which_odometry_is_a_heading(message: Odometry, believed: bool) -> None:
-    headings = Headings()
+    headings = HeadingFusion()
     headings.on_odometry(odometry(0.99, message.frame_id, message.x_m, message.y_m))
     found = headings.on_odometry(message)
     assert (found is not None) == believed
@@ -45,7 +45,7 @@ def test_which_odometry_is_a_heading(message: Odometry, believed: bool) -> None:
 
 def test_an_orientation_that_never_changes_is_none() -> None:
     """Some drivers send UTM positions with an identity quaternion: always east would be a comfortable lie."""
-    headings = Headings()
+    headings = HeadingFusion()
     assert [headings.on_odometry(odometry(0.0)) for _ in range(9)] == [None] * 9
     course = tell(headings, 10.0)
     assert course is not None
@@ -53,7 +53,7 @@ def test_an_orientation_that_never_changes_is_none() -> None:
 
 
 def test_a_yaw_which_the_course_contradicts_is_not_believed() -> None:
-    headings = Headings()
+    headings = HeadingFusion()
     for n in range(5):
         headings.on_odometry(odometry(0.001 * n))  # east
     assert tell(headings, 0.0, DOUBTS - 1) is None
@@ -66,7 +66,7 @@ def test_a_yaw_which_the_course_contradicts_is_not_believed() -> None:
 
 
 def test_a_published_heading_wins() -> None:
-    headings = Headings()
+    headings = HeadingFusion()
     headings.on_odometry(odometry(0.0))
     headings.is_published = True
     assert headings.on_odometry(odometry(0.1)) is None
@@ -74,21 +74,21 @@ def test_a_published_heading_wins() -> None:
 
 
 def test_the_course_is_the_heading_unless_the_car_reverses() -> None:
-    forward, backward = tell(Headings(), 350.0), tell(Headings(), 350.0, speed_mps=-1.0)
+    forward, backward = tell(HeadingFusion(), 350.0), tell(HeadingFusion(), 350.0, speed_mps=-1.0)
     assert forward is not None
     assert backward is not None
     assert (forward.heading_deg, backward.heading_deg) == (350.0, 170.0)
-    unknown = tell(Headings(), 350.0, speed_mps=None)
+    unknown = tell(HeadingFusion(), 350.0, speed_mps=None)
     assert unknown is not None
     assert unknown.heading_deg == 350.0
 
 
 def test_standing_has_no_course() -> None:
-    assert Headings().on_course(None, 0.0, yaw_is_fresh=False) is None
+    assert HeadingFusion().on_course(None, 0.0, yaw_is_fresh=False) is None
 
 
 def test_odometry_that_fell_silent_makes_way_for_the_course() -> None:
-    headings = Headings()
+    headings = HeadingFusion()
     for n in range(5):
         headings.on_odometry(odometry(0.001 * n))
     assert tell(headings, 90.0) is None

@@ -12,7 +12,7 @@ BEFORE_S = 0.4  # long enough to tell a walking person from noise, short enough 
 AT_MOST_S = 1.2
 
 
-class Earlier:
+class ReadingHistory:
     """The last second of one signal's readings; bounded by time and number."""
 
     __slots__ = ("_readings", "before")
