@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
 from monitor.quick import maker
-from monitor.state import NotFresh, Snapshot
+from monitor.snapshot import NotFresh, Snapshot
 
 __all__ = [
     "OK",

@@ -6,7 +6,7 @@ import math
 
 from monitor.corridor import Corridor, Sight, look
 from monitor.instruments import ObstacleLimits
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 from monitor.values import LaserScan
 
 BLIND_AT_M = 5.0  # where the beams of the corridor are counted

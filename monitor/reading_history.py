@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from monitor.state import Reading
+from monitor.reading import Reading
 
 BEFORE_S = 0.4  # long enough to tell a walking person from noise, short enough for a car that brakes
 AT_MOST_S = 1.2

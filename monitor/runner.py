@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from traceback import format_exception
-from typing import Any
 
 from monitor import response
-from monitor.alarm import Alarm, Refused, Transition, advance, end
+from monitor.alarm import Alarm, Refused, Transition
+from monitor.alarm_life import advance, end
+from monitor.alarm_order import standing, suppressed
 from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
 from monitor.catalog import CHECKS, AllLimits, AnyCheck, compose
-from monitor.check import OK, Finding, Scope, Verdict, fault, unknown
+from monitor.check import Finding, Scope, Verdict, unknown
+from monitor.check_runner import CheckRow, CheckRunner, Crash
 from monitor.inhibition import table_of
 from monitor.link import LinkFacts
 from monitor.restoring import numbered_on, restore
-from monitor.state import NotFresh, Snapshot, State
+from monitor.snapshot import Snapshot
+from monitor.state import State
 from monitor.tiles import Tile, places, tiles
 
 __all__ = ["Crash", "Monitor", "Refused", "Tile", "Transition"]
@@ -34,37 +35,7 @@ IMPAIRED_SPEC = AlarmSpec(
     advice="What is named is not watched. Tell whoever keeps catgraph.",
 )
 
-NO_LINK = unknown("No link to the car", short="no link")
-PAUSED = unknown("Monitoring is paused", short="paused")
 ENDED = "Monitoring ended"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Crash:
-    """A check that fails, for the shell to log once."""
-
-    check_id: str
-    error: str  # "ZeroDivisionError: division by zero"
-    where: str  # traceback
-    count: int  # ever; 1 is worth a line in the log
-
-
-class _Row:
-    """A check made ready to be looked at again and again."""
-
-    __slots__ = ("calm", "check", "id", "limits", "look")
-
-    def __init__(self, check: AnyCheck, limits: Any) -> None:
-        self.check = check
-        self.id = check.id
-        self.look: Callable[[Any, Any], bool] = check.is_harmless or _never
-        self.limits = limits
-        self.calm: Alarm | None = None  # its alarm, as it was last found at rest
-
-
-def _never(snapshot: Any, limits: Any) -> bool:
-    """The look of a check which has none: it is always asked."""
-    return False
 
 
 class Monitor:
@@ -85,9 +56,9 @@ class Monitor:
         self._asked: set[str] = set()  # since the last tick began
         self._passed_on: Snapshot | None = None  # of which the others were not asked, because harmless
         self._ticks = 0
-        self.crashes: dict[str, Crash] = {}
+        self._runner = CheckRunner(declared)
+        self.crashes = self._runner.crashes
         self.failed_parts: tuple[str, ...] = ()  # of what feeds the checks; written by the caller before a step
-        self._failed: dict[str, int] = {}
         self.alarms = {check.id: Alarm(id=check.id, spec=check.alarm) for check in declared}
         if len(self.alarms) < len(declared):
             raise ValueError("two checks have one id")
@@ -108,9 +79,9 @@ class Monitor:
     def limits(self, limits: AllLimits) -> None:
         self._limits = limits
         self._rows = tuple(
-            _Row(check, getattr(limits, check.limits_group, None) or check.limits()) for check in self._checks
+            CheckRow(check, getattr(limits, check.limits_group, None) or check.limits()) for check in self._checks
         )
-        self._rows_by_signals: dict[Collection[str], tuple[_Row, ...]] = {}  # of the sets that were ever asked for
+        self._rows_by_signals: dict[Collection[str], tuple[CheckRow, ...]] = {}  # of the sets that were ever asked for
 
     def step(self, snapshot: Snapshot, changed: Collection[str] | None = None) -> tuple[Transition, ...]:
         """Judge. None: a tick, all checks; else only those that need one of the `changed` signals.
@@ -128,7 +99,7 @@ class Monitor:
                 continue  # its words are the last tick's, for a moment
             transitions += self._judge(row, snapshot)
         if self.crashes:
-            transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
+            transitions += self._advance(IMPAIRED, self._runner.impaired(self.failed_parts), snapshot.now_s, ())
         return tuple(transitions)
 
     @property
@@ -138,7 +109,7 @@ class Monitor:
             snapshot, self._passed_on = self._passed_on, None
             for row in self._rows:
                 if row.id not in self._asked:
-                    self._findings[row.id] = self._find(row, snapshot)
+                    self._findings[row.id] = self._runner.find(row, snapshot, is_active=self.alarms[row.id].active)
         return self._findings
 
     def _tick(self, snapshot: Snapshot) -> tuple[Transition, ...]:
@@ -157,13 +128,13 @@ class Monitor:
             transitions += self._judge(row, snapshot)
         self._passed_on = snapshot if may_pass else None
         if self.crashes or self.failed_parts or not self.alarms[IMPAIRED].is_at_rest:
-            transitions += self._advance(IMPAIRED, self._impaired(), snapshot.now_s, ())
+            transitions += self._advance(IMPAIRED, self._runner.impaired(self.failed_parts), snapshot.now_s, ())
         return tuple(transitions)
 
     def _may_pass(self, link: LinkFacts, paused: bool) -> bool:
         return link.phase == "monitoring" and not paused
 
-    def _is_calm(self, row: _Row) -> bool:
+    def _is_calm(self, row: CheckRow) -> bool:
         """Whether its alarm is at rest, so that a look is enough. Asked once: an alarm is replaced, not changed."""
         alarm = self.alarms[row.id]
         if not alarm.is_at_rest or self._causes.remembers(row.id):
@@ -171,7 +142,7 @@ class Monitor:
         row.calm = alarm
         return True
 
-    def _is_harmless(self, row: _Row, snapshot: Snapshot) -> bool:
+    def _is_harmless(self, row: CheckRow, snapshot: Snapshot) -> bool:
         try:
             return self._is_calm(row) and row.look(snapshot, row.limits)
         except Exception:  # as in `_find`: it is asked, and if it fails too, that is said
@@ -224,30 +195,11 @@ class Monitor:
 
     def standing(self) -> list[Alarm]:
         """Alarms to show, most urgent first: active or unacknowledged, shelved ones last, suppressed ones not."""
-        shown = [
-            alarm
-            for alarm in self.alarms.values()
-            if (alarm.is_standing or alarm.shelved_until_s is not None)
-            and not alarm.suppressed_by
-            and not alarm.out_of_service
-        ]
-        return sorted(
-            shown,
-            key=lambda alarm: (
-                alarm.shelved_until_s is not None,
-                alarm.spec.priority.rank,
-                -(alarm.announced_s or 0.0),
-            ),
-        )
+        return standing(self.alarms.values())
 
     def suppressed(self) -> list[Alarm]:
         """Alarms that would stand if nothing explained them, most urgent first."""
-        hidden = [
-            alarm
-            for alarm in self.alarms.values()
-            if alarm.suppressed_by and (alarm.is_standing or (alarm.finding and alarm.finding.verdict is Verdict.FAULT))
-        ]
-        return sorted(hidden, key=lambda alarm: (alarm.spec.priority.rank, alarm.id))
+        return suppressed(self.alarms.values())
 
     def tiles(self) -> list[Tile]:
         """What the home tab shows of the checks: a tile for each label, at its fixed place."""
@@ -276,7 +228,7 @@ class Monitor:
         self.alarms[alarm_id], transitions = act(alarm)
         return transitions
 
-    def _needing(self, changed: Collection[str]) -> tuple[_Row, ...]:
+    def _needing(self, changed: Collection[str]) -> tuple[CheckRow, ...]:
         together = changed if type(changed) is tuple else frozenset(changed)
         found = self._rows_by_signals.get(together)
         if found is None:
@@ -286,8 +238,8 @@ class Monitor:
                 self._rows_by_signals[together] = found
         return found
 
-    def _judge(self, row: _Row, snapshot: Snapshot) -> tuple[Transition, ...]:
-        check, finding = row.check, self._find(row, snapshot)
+    def _judge(self, row: CheckRow, snapshot: Snapshot) -> tuple[Transition, ...]:
+        check, finding = row.check, self._runner.find(row, snapshot, is_active=self.alarms[row.id].active)
         self._asked.add(check.id)
         by = self._causes.holding(check.id, snapshot.now_s)
         if not by and finding.verdict is not Verdict.FAULT and not snapshot.paused:
@@ -308,35 +260,3 @@ class Monitor:
         self.alarms[alarm_id] = alarm
         self._causes.note(alarm, now_s)
         return transitions
-
-    def _find(self, row: _Row, snapshot: Snapshot) -> Finding:
-        check = row.check
-        if check.scope is Scope.CAR:
-            if snapshot.link.phase != "monitoring":
-                return NO_LINK
-            if snapshot.paused:
-                return PAUSED
-        try:
-            finding = check.find(snapshot, row.limits, self.alarms[check.id].active)
-            if type(finding) is not Finding:
-                raise TypeError(f"{check.id} found {finding!r}, which is no finding")
-        except NotFresh as missing:
-            finding = unknown(missing.why, short=missing.short)
-        except Exception as error:  # the one net: a broken check must not silence the others
-            self._failed[check.id] = self._failed.get(check.id, 0) + 1
-            self.crashes[check.id] = Crash(
-                check_id=check.id,
-                error=f"{type(error).__name__}: {error}",
-                where="".join(format_exception(error)),
-                count=self._failed[check.id],
-            )
-            return unknown("This check fails", short="failed")
-        if self.crashes:
-            self.crashes.pop(check.id, None)
-        return finding
-
-    def _impaired(self) -> Finding:
-        if not self.crashes and not self.failed_parts:
-            return OK
-        labels = (*(check.label for check in self._declared if check.id in self.crashes), *self.failed_parts)
-        return fault(f"Not watched: {', '.join(labels)}", causes=labels)

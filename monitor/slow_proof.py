@@ -17,13 +17,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from monitor.motion import STANDS_BELOW_MPS
 from monitor.slowing import SlowingFacts
+from monitor.speed_fit import BIN_S, Fit, Floats, Line, binned, least_chi2, line, quantum
 
 Shown = Literal["slows", "stopped"]
-Floats = npt.NDArray[np.float64]
 
 SHARE = 0.5  # of the ordered deceleration: a real car follows loosely
 SHARE_ERRORS = 2.0  # standard errors by which the measured deceleration is above that share
@@ -33,7 +32,6 @@ LEAST_BEFORE = 4  # speeds, likewise
 NEWEST_BEFORE_S = 1.0  # before the first command the newest of them is no older
 REACTS_WITHIN_S = 3.0  # a change that begins later is not explained by the order
 SEARCHED_S = 6.0  # after the first command: a proof is searched for so long
-BIN_S = 0.04  # speeds that come faster are averaged
 LEAST_AFTER = 3  # speeds after the change
 SIGMAS = 5.0  # by which the change must stand out …
 SIGMAS_AT_FIRST = 6.0  # … and as long as it has lasted no longer than this: a change shortly before looks alike
@@ -45,12 +43,10 @@ LEAST_CHANGED_S = 0.35  # from the change to the newest speed
 MOST_UNSURE_S = 0.5
 STEPS = 1.5  # quanta of the reported speed that a drop must exceed
 NOISE_FLOOR_MPS = 0.01
-FINEST_STEP_MPS = 1e-4  # values nearer to each other differ by rounding
 HARDEST_MPS2 = 8.0  # no car brakes harder: a speed that falls faster is a fault of the sensor
 SLACK_MPS = 0.3  # of a single speed, likewise
 STOOD_S = 0.3  # at rest for so long
 STOPS_WITHIN_S = 2.5  # of the first command; a faster car brakes for longer, and is shown by that
-ROLLS_OUT_MPS2 = 0.15  # by which a car may slow without any cause of its own
 STILL_MOVES_MPS = 0.25  # at this speed the motion before would not have led to standstill
 SPANS_S = (
     1.2,
@@ -132,7 +128,7 @@ class _Before:
     sign: float  # −1: it rolled backwards
     times_s: Floats
     speeds_mps: Floats
-    lines: tuple[_Line, ...]  # through the last seconds, the longest first
+    lines: tuple[Line, ...]  # through the last seconds, the longest first
 
     @property
     def level_mps(self) -> float:
@@ -148,37 +144,6 @@ class _Before:
         return min(one.lowest_mps(at_s) for one in self.lines)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Line:
-    """A straight line through speeds, with its standard errors; times count from the first command."""
-
-    level_mps: float
-    slope_mps2: float
-    level_error_mps: float
-    slope_error_mps2: float
-    sigma_mps: float  # of one speed
-
-    def lowest_mps(self, at_s: float) -> float:
-        slope_mps2 = min(0.0, self.slope_mps2 - 2 * self.slope_error_mps2) - ROLLS_OUT_MPS2
-        return self.level_mps - 2 * self.level_error_mps + slope_mps2 * at_s
-
-
-def _line(times: Floats, values: Floats, least_sigma: float) -> _Line:
-    middle_s = float(times.mean())
-    spread = float(((times - middle_s) ** 2).sum())
-    slope = float(((times - middle_s) * values).sum()) / spread
-    level = float(values.mean()) - slope * middle_s
-    rest = values - level - slope * times
-    sigma = math.sqrt(max(float(rest @ rest) / (len(times) - 2), least_sigma**2))
-    return _Line(
-        level_mps=level,
-        slope_mps2=slope,
-        level_error_mps=sigma * math.sqrt(1 / len(times) + middle_s**2 / spread),
-        slope_error_mps2=sigma / math.sqrt(spread),
-        sigma_mps=sigma,
-    )
-
-
 def _before(speeds: list[tuple[float, float]], since_s: float) -> _Before | None:
     """None: too little is known of it."""
     known = [(at_s - since_s, speed) for at_s, speed in speeds if -BEFORE_S <= at_s - since_s <= 0.0]
@@ -186,23 +151,15 @@ def _before(speeds: list[tuple[float, float]], since_s: float) -> _Before | None
         return None
     times, values = np.array(known).T
     sign = -1.0 if float(np.median(values)) < 0.0 else 1.0
-    times, values = _binned(times, values * sign)
+    times, values = binned(times, values * sign)
     if len(times) < LEAST_BEFORE:
         return None
-    lines = [_line(times, values, NOISE_FLOOR_MPS)]
+    lines = [line(times, values, NOISE_FLOOR_MPS)]
     for span_s in SPANS_S:
         late = times >= -span_s
         if LEAST_BEFORE <= int(late.sum()) < len(times):
-            lines.append(_line(times[late], values[late], NOISE_FLOOR_MPS))
+            lines.append(line(times[late], values[late], NOISE_FLOOR_MPS))
     return _Before(sign=sign, times_s=times, speeds_mps=values, lines=tuple(lines))
-
-
-def _binned(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Means over BIN_S; a line through them is a line through the speeds."""
-    bins = np.floor(times / BIN_S)
-    starts = np.flatnonzero(np.diff(bins, prepend=-math.inf))
-    counts = np.diff(np.append(starts, len(times)))
-    return np.add.reduceat(times, starts) / counts, np.add.reduceat(values, starts) / counts
 
 
 def _evaluate(
@@ -212,7 +169,7 @@ def _evaluate(
         return None
     times, values = np.array(after).T
     times, values = times - since_s, values * motion.sign
-    step = _quantum(motion.speeds_mps, values)
+    step = quantum(motion.speeds_mps, values)
     newest_s = float(times[-1])
     newest_mps = float(values[-LEAST_AFTER:].mean())
     led_mps = motion.led_mps(float(times[-LEAST_AFTER:].mean()))
@@ -226,16 +183,8 @@ def _evaluate(
     until = int(standing[0]) if len(standing) else len(values)
     if until < LEAST_AFTER or newest_s > SEARCHED_S:
         return None
-    times, values = _binned(times[:until], values[:until])
+    times, values = binned(times[:until], values[:until])
     return "slows" if _slows(motion, times, values, step, deceleration_mps2) else None
-
-
-def _quantum(before: Floats, after: Floats) -> float:
-    """The step in which the speed is reported, as far as it shows; 0: it shows none."""
-    values = np.unique(np.concatenate((before, after)))
-    gaps = np.diff(values)
-    gaps = gaps[gaps > FINEST_STEP_MPS]
-    return float(gaps.min()) if len(gaps) else 0.0
 
 
 def _falls_too_fast(motion: _Before, times: Floats, values: Floats, step: float) -> bool:
@@ -263,8 +212,8 @@ def _slows(motion: _Before, times: Floats, values: Floats, step: float, decelera
         return False
     all_times, all_values = np.append(motion.times_s, times), np.append(motion.speeds_mps, values)
     early = np.array([one for one in BEFORE_KNOTS_S if int((motion.times_s < -one).sum()) >= 2])
-    fit = _Fit.of(all_times, all_values, early, changes)
-    sigma = math.sqrt(fit.rest_with / _least_chi2(max(1, len(all_times) - 4)))
+    fit = Fit.of(all_times, all_values, early, changes)
+    sigma = math.sqrt(fit.rest_with / least_chi2(max(1, len(all_times) - 4)))
     sigma = max(NOISE_FLOOR_MPS, step / math.sqrt(12.0), sigma)
     rate_hz = len(all_times) / float(all_times[-1] - all_times[0])
     # Within this a change before the order looks like one after it.
@@ -290,65 +239,3 @@ def _changes(times: Floats) -> Floats:
     """The moments at which the order may have begun to act."""
     last_s = min(float(times[-LEAST_AFTER]), float(times[-1]) - LEAST_CHANGED_S, REACTS_WITHIN_S)
     return np.linspace(0.0, last_s, min(16, 2 + int(last_s / 0.08))) if last_s > 0.0 else np.empty(0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Fit:
-    """Speeds as a line with at most one change before the order and one after it: least squares for all pairs."""
-
-    times: Floats
-    values: Floats
-    early: Floats  # seconds before the order
-    late: Floats  # and after it
-    rests: Floats  # sums of squares without a late change: of no early change, then of each
-    rest_with: float  # the least, with one
-    pair: tuple[int, int]  # the changes that leave it; the first counts from 1, 0: none
-
-    @classmethod
-    def of(cls, times: Floats, values: Floats, early: Floats, late: Floats) -> _Fit:
-        base = np.stack((np.ones_like(times), times - times.mean()), axis=1)
-        base /= np.sqrt((base * base).sum(axis=0))
-        every = np.concatenate(
-            (np.maximum(0.0, times[:, None] + early), np.maximum(0.0, times[:, None] - late)), axis=1
-        )
-        every -= base @ (base.T @ every)
-        first, second = every[:, : len(early)], every[:, len(early) :]
-        rest = values - base @ (base.T @ values)
-        square = float(rest @ rest)
-        weight = np.maximum((first * first).sum(axis=0), 1e-9)
-        along = rest @ first
-        rests = np.append(square, np.maximum(0.0, square - along * along / weight))
-        common = first.T @ second
-        left = np.maximum(
-            (second * second).sum(axis=0) - np.vstack((0.0 * common[:1], common**2 / weight[:, None])), 1e-9
-        )
-        towards = rest @ second - np.vstack((0.0 * common[:1], common * (along / weight)[:, None]))
-        gains = np.where(towards < 0.0, towards * towards / left, 0.0)
-        with_both = np.maximum(0.0, rests[:, None] - gains)
-        at = int(np.argmin(with_both))
-        pair = divmod(at, len(late))
-        return cls(
-            times=times, values=values, early=early, late=late, rests=rests, rest_with=float(with_both[pair]), pair=pair
-        )
-
-    def rest_without(self, unsure_s: float) -> float:
-        """The least without a late change, where an early one is no later than `unsure_s` before the order."""
-        return float(self.rests[np.append(True, self.early >= unsure_s - 1e-9)].min())
-
-    @property
-    def changed_s(self) -> float:
-        return float(self.late[self.pair[1]])
-
-    def slopes(self) -> tuple[float, float]:
-        """The change of slope at the late change, and the slope from then on [m/s²]."""
-        columns = [np.ones_like(self.times), self.times, np.maximum(0.0, self.times - self.changed_s)]
-        if self.pair[0]:
-            columns.append(np.maximum(0.0, self.times + self.early[self.pair[0] - 1]))
-        found = np.linalg.lstsq(np.stack(columns, axis=1), self.values, rcond=None)[0]
-        return float(found[2]), float(found[1:].sum())
-
-
-def _least_chi2(freedom: int) -> float:
-    """A sum of squares is smaller in one case of a hundred only (Wilson and Hilferty, PNAS 17, 1931)."""
-    share = 2.0 / (9.0 * freedom)
-    return max(0.02, float(freedom * max(0.0, 1.0 - share - 2.33 * math.sqrt(share)) ** 3))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from monitor.signals import SIGNALS
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 OVERDUE_PERIODS = 3
 OVERDUE_S = 0.3  # later than this nothing of Wi-Fi's usual bunching explains

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 NOT_A_NUMBER = " is not a number"
 
@@ -26,3 +28,24 @@ class Unusable:
 
     def is_coming(self, now_s: float) -> bool:
         return now_s - self.at_s <= self.horizon_s
+
+
+def refused(
+    before: Mapping[str, Unusable], signal: str, reason: str, at_s: float, horizon_s: float, period_s: float | None
+) -> Mapping[str, Unusable]:
+    """The unusable signals after one more message of `signal` that cannot be used."""
+    known = before.get(signal)
+    now = Unusable(
+        reason=reason,
+        at_s=at_s,
+        since_s=at_s if known is None else known.since_s,
+        count=1 if known is None else known.count + 1,
+        horizon_s=horizon_s,
+        period_s=period_s,
+    )
+    return MappingProxyType({**before, signal: now})
+
+
+def without(before: Mapping[str, Unusable], signal: str) -> Mapping[str, Unusable]:
+    """The unusable signals after a usable message of `signal`."""
+    return MappingProxyType({name: one for name, one in before.items() if name != signal})

@@ -17,7 +17,7 @@ from monitor.check import (
 )
 from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
 from monitor.signals import SIGNALS
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 AT_LEAST = 3  # signals: fewer are judged each by itself
 SHARE, SHARE_WHILE_ACTIVE = 0.5, 0.3

@@ -15,7 +15,7 @@ from monitor.check import (
     ok,
     unknown,
 )
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 
 def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:

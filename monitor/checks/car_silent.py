@@ -20,8 +20,8 @@ from monitor.check import (
 )
 from monitor.inhibition import GRACE_S
 from monitor.signals import SIGNALS
+from monitor.snapshot import Snapshot
 from monitor.staleness import BRIDGE_WITHIN_S, FAST_HORIZON_S, silence
-from monitor.state import Snapshot
 
 
 def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:

@@ -26,9 +26,10 @@ from monitor.check import (
     threshold,
     unknown,
 )
+from monitor.reading import Reading
 from monitor.signals import SIGNALS
+from monitor.snapshot import Snapshot
 from monitor.stamps import JUMP_S
-from monitor.state import Reading, Snapshot
 
 TOLD_S = 10.0  # a jump is over at once; it is told for so long
 ANOTHER_TIME_S = 86_400.0

@@ -16,7 +16,7 @@ from monitor.check import (
     fault,
     ok,
 )
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 
 def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:

@@ -23,7 +23,7 @@ from monitor.check import (
     fault,
     ok,
 )
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 from monitor.values import Component
 
 OK_LEVEL, WARN, ERROR, STALE = 0, 1, 2, 3  # diagnostic_msgs/DiagnosticStatus

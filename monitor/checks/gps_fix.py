@@ -24,7 +24,7 @@ from monitor.check import (
     unknown,
 )
 from monitor.figures import beside
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 
 class FixLimits(Limits):

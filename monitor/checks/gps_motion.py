@@ -27,7 +27,7 @@ from monitor.check import (
 from monitor.figures import beside
 from monitor.gps_watch import FIXES
 from monitor.motion import STANDS_BELOW_MPS
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 SIGMA_UNKNOWN_M = 2.5  # of a receiver that does not say
 DRIFT_SIGMAS = 4.3

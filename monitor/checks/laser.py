@@ -25,7 +25,7 @@ from monitor.check import (
     unknown,
 )
 from monitor.corridor import Corridor, look
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 from monitor.values import LaserScan
 
 CORRIDOR = Corridor(half_width_m=1.2, wheelbase_m=2.62, laser_ahead_m=2.5)

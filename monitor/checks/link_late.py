@@ -21,7 +21,7 @@ from monitor.check import (
 )
 from monitor.inhibition import GRACE_S
 from monitor.motion import MOVES_ABOVE_MPS
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 QUIET_S = 2.0  # nothing for longer than this and the delay: that is silence, which has its own alarms
 HYSTERESIS = 0.7

@@ -18,7 +18,7 @@ from monitor.check import (
     unknown,
 )
 from monitor.inhibition import GRACE_S
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 
 def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:

@@ -15,7 +15,7 @@ from monitor.check import (
     fault,
     ok,
 )
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 
 class LogLimits(Limits):

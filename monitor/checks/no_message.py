@@ -19,7 +19,7 @@ from monitor.check import (
     unknown,
 )
 from monitor.inhibition import GRACE_S
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 WITHIN_S = 5.0
 

@@ -25,7 +25,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 COMMAND_HOLDS_S = 1.0
 

@@ -19,7 +19,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 
 class NotMovingLimits(Limits):

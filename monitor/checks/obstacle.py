@@ -26,7 +26,7 @@ from monitor.check import (
 from monitor.figures import beside
 from monitor.instruments import ObstacleLimits, stopping_m
 from monitor.obstacle_view import corridor_ahead, is_blind, look_ahead, tyre_angle_rad
-from monitor.state import NotFresh, Snapshot
+from monitor.snapshot import NotFresh, Snapshot
 
 CLOSING_AT_LEAST_MPS = 0.3  # slower is noise of two distances
 APPROACH_AT_MOST_MPS = 10.0  # what comes towards us faster is not on a test site

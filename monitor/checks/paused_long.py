@@ -19,7 +19,7 @@ from monitor.check import (
     ok,
     threshold,
 )
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 
 class PausedLimits(Limits):

@@ -19,7 +19,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 DEADBAND_PERCENT = 1.0  # a foot that rests on a pedal is less still than one quantum of the car's figures, 100/255
 

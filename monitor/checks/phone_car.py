@@ -27,7 +27,7 @@ from monitor.figures import beside
 from monitor.motion import MOVES_ABOVE_MPS
 from monitor.phone_words import why_words
 from monitor.phones import FIX_LIVES_S, NO_PHONE
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 FAULTS = 3  # of the newest five comparisons
 DEADBAND = 0.8  # it clears when they are nearer by a fifth

@@ -25,7 +25,7 @@ from monitor.check import (
 )
 from monitor.phone_words import why_words
 from monitor.phones import FIX_LIVES_S, NO_PHONE
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 
 class MissingLimits(Limits):

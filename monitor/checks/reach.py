@@ -23,7 +23,7 @@ from monitor.check import (
     unknown,
 )
 from monitor.motion import MOVES_ABOVE_MPS
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 RELOADED_S = 15.0  # a page is loaded anew and touched again within this
 

@@ -19,7 +19,7 @@ from monitor.check import (
     threshold,
     unknown,
 )
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 RECORDING = "Recording"
 TOLD_S = 10.0  # a drop is spoken of so long: the disk may refuse again at once

@@ -28,9 +28,10 @@ from monitor.check import (
 )
 from monitor.freeze_detection import Repeats
 from monitor.motion import MOVES_ABOVE_MPS
+from monitor.reading import Reading
 from monitor.signal_limits import GROUP, SignalLimits, SlowLimits
 from monitor.signals import SIGNALS, Signal
-from monitor.state import Reading, Snapshot
+from monitor.snapshot import Snapshot
 from monitor.values import GpsFix, LaserScan
 
 BY_MOTION = frozenset({"position", "odometry", "scan"})

@@ -22,7 +22,7 @@ from monitor.check import (
 )
 from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
 from monitor.signals import SIGNALS, Signal
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 DEADBAND_PERCENT = 3.0  # a rate at the very limit neither comes nor goes
 

@@ -23,8 +23,8 @@ from monitor.check import (
 from monitor.inhibition import GRACE_S
 from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
 from monitor.signals import SIGNALS, Signal
+from monitor.snapshot import Snapshot
 from monitor.staleness import FALTERS_AT, silence
-from monitor.state import Snapshot
 
 NEVER_AFTER_S = 5.0  # as long as the whole car is given for its first message
 

@@ -22,8 +22,8 @@ from monitor.check import (
 )
 from monitor.inhibition import GRACE_S
 from monitor.signals import SIGNALS, Signal
+from monitor.snapshot import Snapshot
 from monitor.staleness import CROWD, FAST_HORIZON_S
-from monitor.state import Snapshot
 
 AFTER_S = 1.0  # in a row: single odd messages are counted, not alarmed
 AT_LEAST = 2

@@ -28,7 +28,7 @@ from monitor.check import (
 )
 from monitor.motion import STANDS_BELOW_MPS
 from monitor.slow_proof import NOTHING_SHOWN, SHARE, SlowProof
-from monitor.state import Snapshot
+from monitor.snapshot import Snapshot
 
 TILE = "Slow-down"
 STANDS_ALREADY = "The car stood already: there is nothing to slow"

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from monitor.alarm import Alarm, AlarmState, Refused, Transition, advance, end
+from monitor.alarm import Alarm, AlarmState, Refused, Transition
+from monitor.alarm_life import advance, end
 from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
 from monitor.check import OK, Finding, Quantity, fault, unknown
 from monitor.response import acknowledge, shelve, unshelve

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from monitor.alarm import Alarm, AlarmState, Refused, Transition, advance
+from monitor.alarm import Alarm, AlarmState, Refused, Transition
+from monitor.alarm_life import advance
 from monitor.alarm_spec import AlarmSpec, Place, Priority, Sound
 from monitor.check import OK, Finding, Verdict, fault, unknown
 from monitor.response import acknowledge, shelve, unshelve

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from monitor.alarm import Alarm, AlarmState, Transition, advance
+from monitor.alarm import Alarm, AlarmState, Transition
+from monitor.alarm_life import advance
 from monitor.alarm_spec import AlarmSpec, Place, Priority, Sound
 from monitor.check import Finding, fault, ok
 from monitor.checks.phone_missing import CHECKS as PHONE_MISSING

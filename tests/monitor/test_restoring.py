@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from monitor.alarm import Alarm, AlarmState, Refused, Transition, advance, end
+from monitor.alarm import Alarm, AlarmState, Refused, Transition
+from monitor.alarm_life import advance, end
 from monitor.alarm_spec import AlarmSpec
 from monitor.check import OK, Finding, Quantity, fault, unknown
 from monitor.response import acknowledge, shelve

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from monitor.alarm import Alarm, AlarmState, advance
+from monitor.alarm import Alarm, AlarmState
+from monitor.alarm_life import advance
 from monitor.catalog import CHECKS
 from monitor.check import OK, fault
 from monitor.response import acknowledge

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from monitor.alarm import Alarm, advance
+from monitor.alarm import Alarm
+from monitor.alarm_life import advance
 from monitor.check import OK, Quantity, fault, unknown
 from server.protocol import serialize
 from tests.monitor.test_alarm import SPEC

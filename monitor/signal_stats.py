@@ -1,0 +1,77 @@
+"""What is kept of one signal between its messages: rate, repetitions, stamps and range."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from monitor.freeze_detection import COMPARED, RepeatFollower, Wheels
+from monitor.quick import maker
+from monitor.rates import RateMeter
+from monitor.reading import Reading
+from monitor.reading_history import ReadingHistory
+from monitor.signals import Signal
+from monitor.stamps import StampFollower
+
+_new_reading = maker(Reading)
+
+
+class SignalStats:
+    """The measurements of one signal since connecting."""
+
+    __slots__ = ("alone", "count", "headline", "highest", "history", "jump_s", "lowest", "meter", "repeats", "stamps")
+
+    def __init__(self, signal: Signal, set_hz: float | None, *, one_writer: bool) -> None:
+        """`set_hz`: the operator's rate; `one_writer`: whether its stamps are of one clock."""
+        self.alone = (signal.name,)
+        self.headline = signal.headline
+        self.lowest, self.highest = math.inf, -math.inf  # headline since connecting
+        self.history: ReadingHistory | None = None  # where a check needs an older reading
+        self.meter = RateMeter(signal.expected_hz, set_hz)
+        self.repeats = RepeatFollower()
+        self.stamps = StampFollower() if one_writer else None
+        self.count = 0
+        self.jump_s: float | None = None  # of the car's clock, where the newest message confirmed one
+
+    def read(
+        self, value: Any, received_s: float, stamp_s: float | None, delay_s: float, wheels: Wheels
+    ) -> Reading[Any]:
+        """Take one message of the signal; its reading."""
+        self.count += 1
+        meter, stamps = self.meter, self.stamps
+        meter.receive(received_s)
+        if stamp_s is None or stamps is None:
+            self.jump_s = stamp_change_s = None
+        else:
+            self.jump_s = stamps.receive(stamp_s, received_s)
+            stamp_change_s = stamps.change_s
+        reading = _new_reading(
+            value=value,
+            received_s=received_s,
+            stamp_s=stamp_s,
+            horizon_s=meter.horizon_s,
+            period_s=meter.period_s,
+            count=self.count,
+            delay_s=delay_s,
+            repeats=None
+            if stamp_s is None and type(value) not in COMPARED
+            else self.repeats.receive(value, stamp_s, received_s, wheels),
+            stamp_change_s=stamp_change_s,
+        )
+        if self.history is not None:
+            self.history.add(reading)
+        return reading
+
+    def restart(self) -> None:
+        """Measure anew: what comes now does not follow upon what came before."""
+        self.meter.restart()
+        self.repeats.restart()
+        if self.stamps is not None:
+            self.stamps.restart()
+
+    def widen(self, number: float) -> bool:
+        """Include a headline number in the range; whether that changed the range."""
+        if self.lowest <= number <= self.highest or not math.isfinite(number):
+            return False
+        self.lowest, self.highest = min(self.lowest, number), max(self.highest, number)
+        return True

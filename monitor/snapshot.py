@@ -1,0 +1,149 @@
+"""Everything known of a vehicle at one moment: the immutable input of every check."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, overload
+
+from monitor.gps_watch import GpsWatch
+from monitor.link import LinkFacts
+from monitor.phones import NO_PHONE, PhoneView
+from monitor.rates import Rate
+from monitor.reach import ReachFacts
+from monitor.reading import Extent, Reading
+from monitor.recorder import RecorderFacts
+from monitor.signals import SIGNALS
+from monitor.slow_proof import NOTHING_SHOWN, SlowProof
+from monitor.slowing import SlowingFacts
+from monitor.stamps import ClockJump
+from monitor.tracks import TrackPoint
+from monitor.unusable import Unusable
+from monitor.values import (
+    Acceleration,
+    Bearing,
+    Diagnostics,
+    Distance,
+    Effort,
+    GpsFix,
+    Heading,
+    LaserScan,
+    Level,
+    MotionCommand,
+    Odometry,
+    Steering,
+    Twist,
+)
+
+
+class NotFresh(Exception):
+    """A value is missing or too old to judge by; `short` is the reason in at most 8 letters."""
+
+    def __init__(self, why: str, short: str = "stale") -> None:
+        super().__init__(why)
+        self.why = why
+        self.short = short
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Snapshot:
+    """Everything known of a vehicle at one moment, immutable: any moment of a recording can be judged alone."""
+
+    now_s: float
+    readings: Mapping[str, Reading[Any]] = field(default_factory=dict)  # only signals that were ever heard or derived
+    link: LinkFacts = field(default_factory=LinkFacts)
+    rates: Mapping[str, Rate] = field(default_factory=dict)  # of every signal; up to 0.5 s old
+    paused: bool = False
+    paused_since_s: float | None = None
+    heard_s: float | None = None  # when any signal last came
+    unusable: Mapping[str, Unusable] = field(default_factory=dict)  # signals whose newest messages cannot be used
+    extents: Mapping[str, Extent] = field(default_factory=dict)  # where a headline number was ever heard
+    track: tuple[TrackPoint, ...] = ()  # where the car was, thinned and bounded, oldest first
+    track_m: float | None = None  # distance driven since connecting; None: never had a position
+    gps: GpsWatch = field(default_factory=GpsWatch)  # what the newest fixes tell of the receiver
+    phone: PhoneView = NO_PHONE  # the operator's phone beside the car
+    phones: tuple[PhoneView, ...] = ()  # every phone that tells where it is, in the order in which they came
+    scan_before: Reading[LaserScan] | None = None  # some 0.4 s before the newest
+    distance_before: Reading[Distance] | None = None
+    standing_since_s: float | None = None  # when the car came to rest by its wheels; None: it moves, or cannot be told
+    speed_slope_mps2: float | None = None  # how the wheels' speed changes, over 0.6 s; None: too little heard to tell
+    clock_jump: ClockJump | None = None  # the newest since connecting
+    recorder: RecorderFacts = field(default_factory=RecorderFacts)
+    reach: ReachFacts | None = None  # whom an alarm would reach; None: nobody is asked, as in a recording
+    slowing: SlowingFacts = field(default_factory=SlowingFacts)
+    slow_proof: SlowProof = NOTHING_SHOWN  # what the car's speed shows of the order
+
+    @overload
+    def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...
+    @overload
+    def get(self, signal: Literal["acceleration"]) -> Reading[Acceleration] | None: ...
+    @overload
+    def get(self, signal: Literal["brake", "accelerator"]) -> Reading[Effort] | None: ...
+    @overload
+    def get(self, signal: Literal["steering"]) -> Reading[Steering] | None: ...
+    @overload
+    def get(self, signal: Literal["distance"]) -> Reading[Distance] | None: ...
+    @overload
+    def get(self, signal: Literal["bearing"]) -> Reading[Bearing] | None: ...
+    @overload
+    def get(self, signal: Literal["position"]) -> Reading[GpsFix] | None: ...
+    @overload
+    def get(self, signal: Literal["odometry"]) -> Reading[Odometry] | None: ...
+    @overload
+    def get(self, signal: Literal["heading"]) -> Reading[Heading] | None: ...
+    @overload
+    def get(self, signal: Literal["scan"]) -> Reading[LaserScan] | None: ...
+    @overload
+    def get(self, signal: Literal["diagnostics"]) -> Reading[Diagnostics] | None: ...
+    @overload
+    def get(self, signal: Literal["command"]) -> Reading[MotionCommand] | None: ...
+    @overload
+    def get(self, signal: Literal["fuel"]) -> Reading[Level] | None: ...
+    @overload
+    def get(self, signal: str) -> Reading[Any] | None: ...
+    def get(self, signal: str) -> Reading[Any] | None:
+        """The newest reading whatever its age, None where there was none. To judge by a value use `need`."""
+        return self.readings.get(signal)
+
+    @overload
+    def need(self, signal: Literal["speed"]) -> Twist: ...
+    @overload
+    def need(self, signal: Literal["acceleration"]) -> Acceleration: ...
+    @overload
+    def need(self, signal: Literal["brake", "accelerator"]) -> Effort: ...
+    @overload
+    def need(self, signal: Literal["steering"]) -> Steering: ...
+    @overload
+    def need(self, signal: Literal["distance"]) -> Distance: ...
+    @overload
+    def need(self, signal: Literal["bearing"]) -> Bearing: ...
+    @overload
+    def need(self, signal: Literal["position"]) -> GpsFix: ...
+    @overload
+    def need(self, signal: Literal["odometry"]) -> Odometry: ...
+    @overload
+    def need(self, signal: Literal["heading"]) -> Heading: ...
+    @overload
+    def need(self, signal: Literal["scan"]) -> LaserScan: ...
+    @overload
+    def need(self, signal: Literal["diagnostics"]) -> Diagnostics: ...
+    @overload
+    def need(self, signal: Literal["command"]) -> MotionCommand: ...
+    @overload
+    def need(self, signal: Literal["fuel"]) -> Level: ...
+    @overload
+    def need(self, signal: str) -> Any: ...
+    def need(self, signal: str) -> Any:
+        """The value while it is fresh; raises `NotFresh`, which the runner turns into UNKNOWN, otherwise."""
+        reading = self.readings.get(signal)
+        label = SIGNALS[signal].label
+        unusable = self.unusable.get(signal)
+        if unusable is not None and (reading is None or not reading.is_fresh(self.now_s)):
+            raise NotFresh(f"{label}: {unusable.words}", "unusable")
+        if reading is None:
+            if signal in self.link.published:
+                raise NotFresh(f"{label}: nothing received yet", "no data")
+            raise NotFresh(f"{label} is not published", "no data")
+        if not reading.is_fresh(self.now_s):
+            raise NotFresh(f"{label} is {reading.age_s(self.now_s):.1f} s old", "stale")
+        return reading.value
