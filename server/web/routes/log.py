@@ -15,7 +15,7 @@ from fastapi.responses import Response, StreamingResponse
 from monitor.alarm_spec import Priority
 from server.bus.bus import LocalBus
 from server.bus.event_table import COLUMNS, event_row
-from server.web.routes.api import VehicleName, vehicle_of
+from server.web.routes.session_request import VehicleName, vehicle_of
 from server.web.services import services
 
 router = APIRouter()

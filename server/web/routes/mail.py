@@ -17,7 +17,7 @@ from server.mail.order import Format, Letter, Order, Recipient, State, TooLarge,
 from server.mail.settings import BadMailSetting, MailSettings, Security
 from server.mail.test_mail import Trial, TrialFailed, try_out
 from server.web.middleware.errors import Problem
-from server.web.routes.api import NAME_HEADER
+from server.web.routes.session_request import NAME_HEADER
 from server.web.services import services
 
 router = APIRouter(prefix="/api/mail", tags=["mail"])

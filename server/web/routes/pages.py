@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
-from fastapi import FastAPI, Request
+from fastapi import APIRouter, FastAPI, Request
 from fastapi.responses import HTMLResponse, Response
 from fastapi.templating import Jinja2Templates
 from markupsafe import Markup
@@ -24,7 +24,7 @@ from server.web.assets.manifest import manifest as manifest_of
 from server.web.assets.service_worker import OFFLINE, WORKER, Shell, build_of, shell_of, withdrawn
 from server.web.assets.static_files import StaticText, answer, packed
 from server.web.middleware.headers import policy_of
-from server.web.routes.api import vehicle_of
+from server.web.routes.session_request import vehicle_of
 from server.web.services import services
 
 log = logging.getLogger("catgraph.page")
@@ -45,6 +45,42 @@ def early_of(built: Built | None, static: Path) -> str:
     return built.early if built is not None else (static / "js" / EARLY).read_text(encoding="utf-8")
 
 
+class PageFiles:
+    """The page, its offline form and its worker, filled in from templates and the static folder."""
+
+    def __init__(self, static: Path, templates: Jinja2Templates) -> None:
+        self.static = static
+        self._templates = templates
+        self._templates.env.globals["asset"] = self.asset
+        self._digest = lru_cache(maxsize=512)(_digest)
+
+    def asset(self, name: str) -> str:
+        """The address of a static file, with the hash of its content so that no stale copy is ever used."""
+        path = self.static / name
+        return f"/static/{name}?v={self._digest(path, path.stat().st_mtime_ns)}"
+
+    def render(self, template: str, request: Request, built: Built | None, **context: object) -> bytes:
+        """A template as HTML; `built` None: with single modules."""
+        context |= parts_of(built, self.asset) | {"build": build_of(built), "icons": are_drawn(self.static)}
+        context["early"] = Markup(early_of(built, self.static))
+        return bytes(self._templates.TemplateResponse(request, template, context).body)
+
+    def response(self, body: bytes, request: Request, built: Built | None) -> Response:
+        """HTML with the policy that allows its early script, and nothing else of that kind."""
+        answered = answer(packed(body), request.headers, _HTML, "no-cache")
+        answered.headers["Content-Security-Policy"] = policy_of(early_of(built, self.static))
+        return answered
+
+    def shell(self, request: Request, built: Built) -> Shell:
+        """What a phone keeps of the page."""
+        return shell_of(self.static, built, self.asset, self.render("offline.html", request, built))
+
+
+def _digest(path: Path, changed_ns: int) -> str:
+    """The hash of a file's content; `changed_ns` makes a changed file another one for the cache."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+
+
 def install(app: FastAPI) -> None:
     """Serves `/`, `/static/…` and what installs the page on a phone.
 
@@ -52,69 +88,57 @@ def install(app: FastAPI) -> None:
     """
     check_vendor()
     static = static_dir()
-    templates = Jinja2Templates(directory=templates_dir())
-
-    @lru_cache(maxsize=512)
-    def digest(path: Path, changed_ns: int) -> str:
-        return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
-
-    def asset(name: str) -> str:
-        """The address of a static file, with the hash of its content so that no stale copy is ever used."""
-        path = static / name
-        return f"/static/{name}?v={digest(path, path.stat().st_mtime_ns)}"
-
-    templates.env.globals["asset"] = asset
+    files = PageFiles(static, Jinja2Templates(directory=templates_dir()))
     app.mount("/static", StaticText(directory=static), name="static")
-
     if not are_drawn(static):
         log.warning(WITHOUT)
+    app.include_router(_page_routes(files))
+    app.include_router(_install_routes(files))
 
-    def page_of(template: str, request: Request, built: Built | None, **context: object) -> bytes:
-        context |= parts_of(built, asset) | {"build": build_of(built), "icons": are_drawn(static)}
-        context["early"] = Markup(early_of(built, static))
-        return bytes(templates.TemplateResponse(request, template, context).body)
 
-    def sent(body: bytes, request: Request, built: Built | None) -> Response:
-        answered = answer(packed(body), request.headers, _HTML, "no-cache")
-        answered.headers["Content-Security-Policy"] = policy_of(early_of(built, static))
-        return answered
+def _page_routes(files: PageFiles) -> APIRouter:
+    router, static = APIRouter(include_in_schema=False), files.static
 
-    def shell(request: Request, built: Built) -> Shell:
-        return shell_of(static, built, asset, page_of("offline.html", request, built))
-
-    @app.get("/", response_class=HTMLResponse, include_in_schema=False)
+    @router.get("/", response_class=HTMLResponse)
     async def page(request: Request, vehicle: str | None = None) -> Response:
         one, built = services(request), find(static)
         access = "open" if one.access.is_open else "paired"
         context = {"version": one.version, "vehicle": vehicle_of(one, vehicle), "access": access}
-        body = page_of("page.html", request, built, worker=built is not None and one.keeps_shell, **context)
-        return sent(body, request, built)
+        body = files.render("page.html", request, built, worker=built is not None and one.keeps_shell, **context)
+        return files.response(body, request, built)
 
-    @app.get(OFFLINE, response_class=HTMLResponse, include_in_schema=False)
+    @router.get(OFFLINE, response_class=HTMLResponse)
     async def offline(request: Request, v: str | None = None) -> Response:
         """What a phone shows while the server does not answer; `v` names the shell it is to belong to."""
         built = find(static)
-        if v is not None and (built is None or shell(request, built).version != v):
+        if v is not None and (built is None or files.shell(request, built).version != v):
             raise HTTPException(404, "The page has changed since.")
-        return sent(page_of("offline.html", request, built), request, built)
+        return files.response(files.render("offline.html", request, built), request, built)
 
-    @app.get(WORKER, include_in_schema=False)
+    @router.get(WORKER)
     async def worker(request: Request) -> Response:
         """The worker that keeps the shell; with single modules, or where there shall be none, the one that goes."""
         built = find(static)
         is_kept = built is not None and services(request).keeps_shell
-        script = shell(request, built).worker(static) if built is not None and is_kept else withdrawn(static)
+        script = files.shell(request, built).worker(static) if built is not None and is_kept else withdrawn(static)
         answered = answer(packed(script.encode()), request.headers, "text/javascript; charset=utf-8", "no-cache")
         answered.headers["Service-Worker-Allowed"] = "/"
         return answered
 
-    @app.get("/manifest.webmanifest", include_in_schema=False)
+    return router
+
+
+def _install_routes(files: PageFiles) -> APIRouter:
+    """What a phone asks for when it installs the page."""
+    router, static = APIRouter(include_in_schema=False), files.static
+
+    @router.get("/manifest.webmanifest")
     async def manifest(request: Request) -> Response:
-        body = json.dumps(manifest_of(asset, are_drawn=are_drawn(static)), indent=1).encode()
+        body = json.dumps(manifest_of(files.asset, are_drawn=are_drawn(static)), indent=1).encode()
         return answer(packed(body), request.headers, "application/manifest+json", "no-cache")
 
-    @app.get("/favicon.ico", include_in_schema=False)
-    @app.get("/apple-touch-icon.png", include_in_schema=False)
+    @router.get("/favicon.ico")
+    @router.get("/apple-touch-icon.png")
     async def asked_by_name(request: Request) -> FileResponse:
         """Pictures that browsers ask for at these addresses, whatever a page says."""
         name = "favicon.png" if request.url.path == "/favicon.ico" else "apple-touch-icon.png"
@@ -122,3 +146,5 @@ def install(app: FastAPI) -> None:
         if not path.is_file():
             raise HTTPException(404, "This picture was not drawn when catgraph was installed.")
         return FileResponse(path, media_type="image/png", headers={"Cache-Control": "no-cache"})
+
+    return router

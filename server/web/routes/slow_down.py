@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from server.web.routes.api import Done, VehicleName, ask
+from server.web.routes.session_request import Done, VehicleName, ask
 
 router = APIRouter(tags=["slow-down"])
 

@@ -1,0 +1,26 @@
+"""The address of the page's socket."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, WebSocket
+
+from server.access.identity import who_of
+from server.replay import commands
+from server.web.services import services
+
+router = APIRouter()
+
+
+@router.websocket("/ws")
+async def page_socket(
+    socket: WebSocket, vehicle: str | None = None, replay: str | None = None, t: str | None = None
+) -> None:
+    """The page's socket; docs/protocol.md. `replay`: the recording it begins with, `t` seconds after its beginning."""
+    app = services(socket)
+    name = vehicle if vehicle is not None else next(iter(app.sessions))
+    if name not in app.sessions:
+        await socket.close(code=1008, reason="no such vehicle")
+        return
+    who = who_of(socket)
+    hello = app.hello(name) | {"who": {"id": who.id, "name": who.name, "role": who.role}}
+    await app.hub.serve(socket, name, hello, who=who, replay=commands.opening(replay, t))

@@ -1,0 +1,70 @@
+"""The settings of each vehicle over HTTP, as JSON and as a TOML file."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, HTTPException, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from server.web.routes.session_request import VehicleName, as_json, ask, vehicle_of
+from server.web.services import services
+
+router = APIRouter(tags=["settings"])
+
+
+class SettingsChange(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+    values: dict[str, float | None] = Field(
+        default_factory=dict,
+        examples=[{"speed_limit.max_mps": 9.0}],
+        description="In SI; null goes back to the default",
+    )
+    topics: dict[str, str | None] = Field(default_factory=dict, description="Signal → topic; null: as found")
+    profile: str | None = Field(None, description="A profile's name, or auto")
+    version: int | None = Field(None, description="Refused with 409 when the settings are no longer at this version")
+
+
+@router.get("/api/settings", summary="Settings in force, their defaults, ranges and units")
+async def settings(request: Request, vehicle: VehicleName = None) -> Response:
+    body = await ask(request, vehicle, {"kind": "settings"})
+    return as_json({name: value for name, value in body.items() if name != "toml"})
+
+
+@router.patch("/api/settings", summary="Change some settings; they count at once")
+async def change_settings(
+    request: Request, body: Annotated[SettingsChange, Body()], vehicle: VehicleName = None
+) -> Response:
+    await ask(request, vehicle, {"kind": "set", **body.model_dump()})
+    return await settings(request, vehicle)
+
+
+@router.get("/api/settings.toml", summary="What was changed, as a TOML file")
+async def export_settings(request: Request, vehicle: VehicleName = None) -> Response:
+    body = await ask(request, vehicle, {"kind": "settings"})
+    name = f"catgraph-{vehicle_of(services(request), vehicle)}.toml"
+    return Response(
+        body["toml"],
+        media_type="application/toml; charset=utf-8",
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
+@router.put("/api/settings.toml", summary="Take all settings from a TOML file")
+async def import_settings(request: Request, vehicle: VehicleName = None) -> Response:
+    try:
+        text = (await limited_body(request, 64 * 1024)).decode("utf-8")
+    except UnicodeDecodeError:
+        raise HTTPException(422, "This is not text in UTF-8.") from None
+    await ask(request, vehicle, {"kind": "import", "toml": text})
+    return await settings(request, vehicle)
+
+
+async def limited_body(request: Request, most: int) -> bytes:
+    """The body of a request, refused as soon as it is longer than `most` bytes."""
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > most:
+            raise HTTPException(413, f"At most {most // 1024} kB are taken.")
+    return body
