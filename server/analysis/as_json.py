@@ -14,92 +14,20 @@ from server.version import catgraph_version
 
 def as_json(report: Report) -> dict[str, Any]:
     """Plain values only; what is unknown is null."""
-    recording, run, when = report.recording, report.run, report.recorded
+    run = report.run
     found: dict[str, Any] = {
         "catgraph": catgraph_version(),
-        "recording": {
-            "files": list(report.files),
-            "ros_version": recording.ros_version,
-            "start_s": recording.start_s if recording.count else None,
-            "recorded": None if when is None else when.isoformat(),
-            "duration_s": _number(recording.duration_s),
-            "messages": recording.count,
-            "complete": run.broke_off is None and not run.damage,
-            "broke_off": run.broke_off,
-            "damage": list(run.damage),
-        },
-        "judged": {
-            "from_s": _number(run.from_s),
-            "to_s": _number(run.to_s),
-            "messages": run.messages,
-            "nothing_why": report.why_nothing,
-            "took_s": _number(report.took_s),
-            "times_real_time": _number(report.times_real, 1),
-        },
-        "settings": {
-            "file": run.wishes.name or None,
-            "profile": run.tuning.profile.name,
-            "changed": {name: value for name, _, value, _ in report.settings()},
-            "topics": dict(run.tuning.settings.topics),
-        },
-        "signals": [
-            {
-                "signal": row.name,
-                "label": row.label,
-                "topic": row.topic,
-                "type": row.type,
-                "note": row.note,
-                "count": row.count,
-                "rate_hz": _number(row.rate_hz, 2),
-                "expected_hz": _number(row.expected_hz, 2),
-                "rejected": row.rejected,
-                "rejected_why": row.why_rejected,
-                "lowest": _number(row.lowest),
-                "highest": _number(row.highest),
-                "unit": row.unit,
-            }
-            for row in report.signals()
-        ],
+        "recording": _recording(report),
+        "judged": _judged(report),
+        "settings": _settings(report),
+        "signals": _signals(report),
         "other_topics": dict(run.other_topics),
         "alarms": [episode_json(episode) for episode in run.episodes],
-        "slow_downs": [
-            {
-                "trigger": one.trigger,
-                "title": one.title,
-                "text": one.text,
-                "countdown_s": _number(one.countdown_s),
-                "at_s": _number(one.at_s),
-            }
-            for one in run.slowed
-        ],
-        "checks": [
-            {
-                "label": ribbon.label,
-                **{f"{verdict}_s": _number(ribbon.seconds(verdict), 1) for verdict in Verdict},
-                "not_checked_why": ribbon.why_not or None,
-            }
-            for ribbon in run.ribbons
-        ],
+        "slow_downs": _slow_downs(run),
+        "checks": _checks(run),
         "never_checked": [{"check": one.check_id, "label": one.label, "why": one.why} for one in run.unchecked],
-        "load": {
-            "announced": run.load.announced,
-            "in_10_min": _number(run.load.in_10_min, 2),
-            "most_in_10_min": run.load.most_in_10_min,
-            "chattering": list(run.load.chattering),
-            "standing_at_end": run.load.standing,
-            "verdict": run.load.verdict,
-        },
-        "transitions": [
-            {
-                "at_s": _number(one.at_s),
-                "alarm": one.alarm_id,
-                "occurrence": one.occurrence,
-                "change": one.change,
-                "text": one.text,
-                "announces": one.announces,
-            }
-            for one in run.transitions
-        ],
+        "load": _load(run),
+        "transitions": _transitions(run),
         "injected": [
             {"fault": one.name, "from_s": one.from_s, "to_s": one.to_s, "touched": one.touched} for one in run.faults
         ],
@@ -108,6 +36,121 @@ def as_json(report: Report) -> dict[str, Any]:
     if report.before is not None:
         found["compared"] = _compared(report, report.before)
     return found
+
+
+def _recording(report: Report) -> dict[str, Any]:
+    """What was read, and whether it was read to its end."""
+    recording, run, when = report.recording, report.run, report.recorded
+    return {
+        "files": list(report.files),
+        "ros_version": recording.ros_version,
+        "start_s": recording.start_s if recording.count else None,
+        "recorded": None if when is None else when.isoformat(),
+        "duration_s": _number(recording.duration_s),
+        "messages": recording.count,
+        "complete": run.broke_off is None and not run.damage,
+        "broke_off": run.broke_off,
+        "damage": list(run.damage),
+    }
+
+
+def _judged(report: Report) -> dict[str, Any]:
+    """Which part was judged, and how fast."""
+    run = report.run
+    return {
+        "from_s": _number(run.from_s),
+        "to_s": _number(run.to_s),
+        "messages": run.messages,
+        "nothing_why": report.why_nothing,
+        "took_s": _number(report.took_s),
+        "times_real_time": _number(report.times_real, 1),
+    }
+
+
+def _settings(report: Report) -> dict[str, Any]:
+    """By which settings it was judged."""
+    run = report.run
+    return {
+        "file": run.wishes.name or None,
+        "profile": run.tuning.profile.name,
+        "changed": {name: value for name, _, value, _ in report.settings()},
+        "topics": dict(run.tuning.settings.topics),
+    }
+
+
+def _signals(report: Report) -> list[dict[str, Any]]:
+    """Each signal with its topic, rate and range."""
+    return [
+        {
+            "signal": row.name,
+            "label": row.label,
+            "topic": row.topic,
+            "type": row.type,
+            "note": row.note,
+            "count": row.count,
+            "rate_hz": _number(row.rate_hz, 2),
+            "expected_hz": _number(row.expected_hz, 2),
+            "rejected": row.rejected,
+            "rejected_why": row.why_rejected,
+            "lowest": _number(row.lowest),
+            "highest": _number(row.highest),
+            "unit": row.unit,
+        }
+        for row in report.signals()
+    ]
+
+
+def _slow_downs(run: Rehearsed) -> list[dict[str, Any]]:
+    """When the car would have been slowed, by the settings."""
+    return [
+        {
+            "trigger": one.trigger,
+            "title": one.title,
+            "text": one.text,
+            "countdown_s": _number(one.countdown_s),
+            "at_s": _number(one.at_s),
+        }
+        for one in run.slowed
+    ]
+
+
+def _checks(run: Rehearsed) -> list[dict[str, Any]]:
+    """How long each check found what."""
+    return [
+        {
+            "label": ribbon.label,
+            **{f"{verdict}_s": _number(ribbon.seconds(verdict), 1) for verdict in Verdict},
+            "not_checked_why": ribbon.why_not or None,
+        }
+        for ribbon in run.ribbons
+    ]
+
+
+def _load(run: Rehearsed) -> dict[str, Any]:
+    """How many alarms an operator had."""
+    return {
+        "announced": run.load.announced,
+        "in_10_min": _number(run.load.in_10_min, 2),
+        "most_in_10_min": run.load.most_in_10_min,
+        "chattering": list(run.load.chattering),
+        "standing_at_end": run.load.standing,
+        "verdict": run.load.verdict,
+    }
+
+
+def _transitions(run: Rehearsed) -> list[dict[str, Any]]:
+    """Every step of every alarm."""
+    return [
+        {
+            "at_s": _number(one.at_s),
+            "alarm": one.alarm_id,
+            "occurrence": one.occurrence,
+            "change": one.change,
+            "text": one.text,
+            "announces": one.announces,
+        }
+        for one in run.transitions
+    ]
 
 
 def episode_json(episode: Episode) -> dict[str, Any]:

@@ -1,10 +1,8 @@
-"""From a ROS message, as rosbridge spells it, to a value of ours. The only place that looks into messages.
+"""From a ROS message, as rosbridge spells it, to a value of ours.
 
 Each function takes one message and gives one value, or raises Rejected with the reason in few words. Numbers that
-rosbridge
-had to flatten to null are NaN here; a value whose headline number is unknown is rejected, because a signal that
-says nothing
-must grow old and not look alive.
+rosbridge had to flatten to null are NaN here; a value whose headline number is unknown is rejected, because a signal
+that says nothing must grow old and not look alive.
 """
 
 from __future__ import annotations
@@ -13,10 +11,9 @@ import base64
 import binascii
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from monitor.quick import maker
 from monitor.values import (
@@ -35,7 +32,7 @@ from monitor.values import (
     Steering,
     Twist,
 )
-from server.system.clean_text import clean
+from server.judge.message_fields import Rejected, finite, inner, known, number, numbers, text
 
 Decode = Callable[[Any], Any]
 
@@ -51,86 +48,11 @@ HARDEST_MPS2 = 300.0  # a crash; what is beyond is another unit, or noise
 SIDEWAYS = 0.25  # of the way made: a car rolls forwards or backwards, and slips a little
 FARTHEST_SCAN_M = 10_000.0  # a range_max beyond is "no end", which drivers write as the largest float there is
 WIDEST_RAD = 4 * math.pi  # two turns: no laser sweeps more
-_REAL = (int, float, np.integer, np.floating)
 
 # What comes a hundred times a second is made quickly.
 _twist, _effort, _steering = maker(Twist), maker(Effort), maker(Steering)
 _distance, _bearing = maker(Distance), maker(Bearing)
 _fix, _odometry = maker(GpsFix), maker(Odometry)
-
-
-class Rejected(ValueError):
-    """Not a proper message; `str()` is the reason, short, the same for the same kind of fault."""
-
-
-def number(message: Any, *path: str) -> float:
-    """The number at a path of fields; NaN where it is null, and where it is infinite, which JSON says as null too: a
-    recording tells nothing that its replay would not tell. Raises Rejected for what is missing or is no number."""
-    value = message
-    try:
-        for name in path:
-            value = value[name]
-    except (KeyError, TypeError, IndexError):  # no such field, or this is nothing that has fields
-        raise Rejected(f"{'.'.join(path)} is missing") from None
-    if type(value) is float:  # nearly always
-        return value if math.isfinite(value) else math.nan
-    if value is None:
-        return math.nan
-    if isinstance(value, bool) or not isinstance(value, _REAL):
-        raise Rejected(f"{'.'.join(path)} is not a number")
-    try:
-        whole = float(value)
-    except OverflowError:
-        raise Rejected(f"{'.'.join(path)} is too large") from None
-    return whole if math.isfinite(whole) else math.nan
-
-
-def finite(message: Any, *path: str) -> float:
-    """As `number`, and known: null, NaN and infinities are rejected."""
-    try:  # the usual case, which most messages are, without a second call
-        found = message
-        for name in path:
-            found = found[name]
-        if type(found) is float and math.isfinite(found):
-            return found  # nearly always
-    except (KeyError, TypeError, IndexError):
-        pass  # `number` says what is wrong
-    value = number(message, *path)
-    if not math.isfinite(value):
-        raise Rejected(f"{'.'.join(path)} is not a number")
-    return value
-
-
-def known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def text(message: Any, *path: str, default: str = "") -> str:
-    value = message
-    for name in path:
-        value = value.get(name) if _has_fields(value) else None
-    return clean(value[:200]) if isinstance(value, str) else default
-
-
-def _has_fields(value: Any) -> TypeGuard[Mapping[str, Any]]:
-    return type(value) is dict or isinstance(value, Mapping)  # an abstract class takes its time
-
-
-def stamp_s(message: Any) -> float | None:
-    """The header's stamp in seconds, ROS 1 or ROS 2; None where there is none or it is zero or absurd."""
-    if type(message) is dict and "header" not in message:
-        return None
-    header = message.get("header") if _has_fields(message) else None
-    stamp = header.get("stamp") if _has_fields(header) else None
-    if not _has_fields(stamp):
-        return None
-    seconds = stamp.get("secs", stamp.get("sec"))
-    nanoseconds = stamp.get("nsecs", stamp.get("nanosec"))
-    if type(seconds) is not int or type(nanoseconds) is not int or not 0 <= seconds < 1e11:
-        return None
-    if not 0 <= nanoseconds < 10**9:
-        return None
-    return seconds + nanoseconds * 1e-9 or None
 
 
 def _speed(value: float) -> float:
@@ -151,14 +73,14 @@ def twist(message: Any) -> Twist:
 
 
 def twist_stamped(message: Any) -> Twist:
-    return twist(_inner(message, "twist"))
+    return twist(inner(message, "twist"))
 
 
 def twist_of_odometry(message: Any) -> Twist:
     """Speed of a nav_msgs/Odometry; its twist is in the body frame by definition, and in east and north as the
     CATVehicle's drivers and Gazebo fill it. The way made is the same in both; backwards is what points back and hardly
     aside."""
-    body = _inner(_inner(message, "twist"), "twist")
+    body = inner(inner(message, "twist"), "twist")
     x, y = finite(body, "linear", "x"), number(body, "linear", "y")
     y = 0.0 if math.isnan(y) else y
     speed = math.hypot(x, y)
@@ -252,8 +174,8 @@ def _spread(covariance: Any) -> tuple[float, float, float] | None:
 
 
 def odometry(message: Any) -> Odometry:
-    pose = _inner(_inner(message, "pose"), "pose")
-    body = _inner(_inner(message, "twist"), "twist")
+    pose = inner(inner(message, "pose"), "pose")
+    body = inner(inner(message, "twist"), "twist")
     x, y = number(body, "linear", "x"), number(body, "linear", "y")
     speed = math.hypot(x, 0.0 if math.isnan(y) else y)
     return _odometry(
@@ -334,12 +256,12 @@ def command(message: Any) -> MotionCommand:
 
 
 def command_stamped(message: Any) -> MotionCommand:
-    return command(_inner(message, "twist"))
+    return command(inner(message, "twist"))
 
 
 def laser_scan(message: Any) -> LaserScan:
     """Ranges in m in the order of the beams; null becomes NaN, and ±Inf are kept where the transport kept them."""
-    ranges = _numbers(message, "ranges")
+    ranges = numbers(message, "ranges")
     if ranges.size > MAX_BEAMS:
         raise Rejected(f"more than {MAX_BEAMS} beams")
     first, last, increment = (finite(message, f"angle_{name}") for name in ("min", "max", "increment"))
@@ -368,23 +290,6 @@ def laser_scan(message: Any) -> LaserScan:
 
 def _or_zero(value: float) -> float:
     return value if math.isfinite(value) and value > 0 else 0.0  # 0: not given
-
-
-def _numbers(message: Any, name: str) -> npt.NDArray[np.float32]:
-    """A list of numbers and nulls as float32, nulls as NaN."""
-    values = message.get(name) if isinstance(message, Mapping) else None
-    if isinstance(values, np.ndarray) and values.ndim == 1 and values.dtype.kind in "fiu":
-        with np.errstate(over="ignore"):
-            return values.astype(np.float32)
-    if not isinstance(values, (list, tuple)):
-        raise Rejected(f"{name} is missing" if values is None else f"{name} is not a list")
-    if not {type(value) for value in values} <= {float, int, type(None)}:
-        raise Rejected(f"{name} holds something that is not a number")
-    try:
-        with np.errstate(over="ignore"):  # 1e39 is infinitely far
-            return np.array(values, dtype=np.float32)
-    except (OverflowError, ValueError, TypeError):
-        raise Rejected(f"{name} holds something that is not a number") from None
 
 
 def diagnostics(message: Any) -> Diagnostics:
@@ -419,11 +324,4 @@ def _level(row: Any) -> int:
         value = value[0]
     if type(value) is not int or value not in (0, 1, 2, 3):
         raise Rejected("level is not one of OK, WARN, ERROR, STALE")
-    return value
-
-
-def _inner(message: Any, name: str) -> Any:
-    value = message.get(name) if isinstance(message, Mapping) else None
-    if not isinstance(value, Mapping):
-        raise Rejected(f"{name} is missing")
     return value

@@ -10,7 +10,7 @@ from monitor.state import State
 from monitor.transport import TransportDelay
 from monitor.values import Steering
 from server.judge.active_settings import PERCENT_A_RAD
-from server.judge.decoders import stamp_s
+from server.judge.message_fields import stamp_s
 from server.judge.profiles import Profile
 from server.judge.reception_stats import Reception
 from server.judge.topics import Source

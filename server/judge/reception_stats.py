@@ -6,8 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from server.judge import decoders
-from server.judge.decoders import Rejected
+from server.judge.message_fields import Rejected
 from server.judge.topics import Source
 
 MAX_REASONS = 20  # a hostile bridge must not fill the memory with reasons
@@ -70,6 +69,3 @@ class Reception:
     def junk(self, reason: str) -> None:
         self.frames.received += 1
         self.frames.reject(reason)
-
-
-stamp_s = decoders.stamp_s

@@ -39,27 +39,10 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
     host, port = address.host, address.port
     if isinstance(error, BadAddress):
         return of_bad_address(error)
-    if isinstance(error, socket.gaierror) and error.errno == socket.EAI_AGAIN:
-        return Problem(
-            code="no_lookup",
-            title=f"The name {host} cannot be looked up.",
-            hint="No name server answers here: use the car's IP address, or join its network.",
-            mark="no name server",
-        )
     if isinstance(error, socket.gaierror):
-        return Problem(
-            code="no_such_host",
-            title=f"There is no host named {host}.",
-            hint="Check the spelling, or use the car's IP address. Is this server on the car's network?",
-            mark="no such host",
-        )
+        return _of_name_error(error, host)
     if isinstance(error, ssl.SSLCertVerificationError):
-        return Problem(
-            code="tls_untrusted",
-            title=f"The certificate of {host} is not trusted here.",
-            hint=f"{_sentence(error.verify_message)} Install the bridge's certificate here, or try ws://{address.shown}.",
-            mark="not trusted",
-        )
+        return _of_tls_error(error, address)
     if isinstance(error, ConnectionRefusedError):
         return Problem(
             code="refused",
@@ -68,12 +51,7 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
             mark="refused",
         )
     if isinstance(error, ssl.SSLError) or (address.secure and isinstance(error, ConnectionError)):
-        return Problem(
-            code="tls",
-            title=f"{address.shown} does not speak TLS.",
-            hint=f"Try ws://{address.shown} instead of wss://.",
-            mark="no TLS",
-        )
+        return _of_tls_error(error, address)
     if isinstance(error, TimeoutError):
         return Problem(
             code="timeout",
@@ -81,6 +59,42 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
             hint="Is the car switched on, and this server on its network?",
             mark="no answer",
         )
+    return _of_system_error(error, address)
+
+
+def _of_name_error(error: socket.gaierror, host: str) -> Problem:
+    if error.errno == socket.EAI_AGAIN:
+        return Problem(
+            code="no_lookup",
+            title=f"The name {host} cannot be looked up.",
+            hint="No name server answers here: use the car's IP address, or join its network.",
+            mark="no name server",
+        )
+    return Problem(
+        code="no_such_host",
+        title=f"There is no host named {host}.",
+        hint="Check the spelling, or use the car's IP address. Is this server on the car's network?",
+        mark="no such host",
+    )
+
+
+def _of_tls_error(error: BaseException, address: Address) -> Problem:
+    if isinstance(error, ssl.SSLCertVerificationError):
+        return Problem(
+            code="tls_untrusted",
+            title=f"The certificate of {address.host} is not trusted here.",
+            hint=f"{_sentence(error.verify_message)} Install the bridge's certificate here, or try ws://{address.shown}.",
+            mark="not trusted",
+        )
+    return Problem(
+        code="tls",
+        title=f"{address.shown} does not speak TLS.",
+        hint=f"Try ws://{address.shown} instead of wss://.",
+        mark="no TLS",
+    )
+
+
+def _of_system_error(error: BaseException, address: Address) -> Problem:
     if isinstance(error, OSError) and error.errno in (errno.EACCES, errno.EPERM):
         return Problem(
             code="forbidden_here",
@@ -91,7 +105,7 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
     if isinstance(error, OSError) and error.errno in (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.EHOSTDOWN):
         return Problem(
             code="unreachable",
-            title=f"No way leads from this server to {host}.",
+            title=f"No way leads from this server to {address.host}.",
             hint="Join the car's network and try again.",
             mark="no route",
         )

@@ -7,8 +7,8 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from server.judge.decoders import stamp_s
 from server.judge.message import RosVersion
+from server.judge.message_fields import stamp_s
 from server.judge.topics import ros_version
 from server.recording.read.schemas import text_of_details
 from server.rosbridge.link import CallFailed, LinkDown

@@ -9,7 +9,7 @@ from typing import Any
 
 from monitor.values import Steering
 from server.judge.active_settings import PERCENT_A_RAD, Tuning
-from server.judge.decoders import stamp_s
+from server.judge.message_fields import stamp_s
 from server.judge.profiles import load as load_profiles
 from server.judge.reception_stats import Reception
 from server.judge.ros_names import BadName, canonical_name

@@ -34,8 +34,8 @@ from monitor.values import (
     Steering,
     Twist,
 )
-from server.judge import decoders
-from server.judge.decoders import Rejected
+from server.judge import decoders, message_fields
+from server.judge.message_fields import Rejected
 from server.judge.topics import TOPICS
 from server.rosbridge import codec
 
@@ -170,7 +170,7 @@ def test_every_type_that_is_accepted_has_a_real_message() -> None:
 @pytest.mark.parametrize("ros", [1, 2])
 @pytest.mark.parametrize("name", ["TwistStamped", "NavSatFix", "Odometry", "Imu", "LaserScan", "DiagnosticArray"])
 def test_the_stamp_of_either_ros(name: str, ros: int) -> None:
-    assert decoders.stamp_s(message(f"{name}.ros{ros}")) == pytest.approx(1464818234.3041979, abs=1e-6)
+    assert message_fields.stamp_s(message(f"{name}.ros{ros}")) == pytest.approx(1464818234.3041979, abs=1e-6)
 
 
 STAMPS: dict[str, Any] = {
@@ -195,7 +195,7 @@ STAMPS: dict[str, Any] = {
 
 @pytest.mark.parametrize("shape", STAMPS.values(), ids=STAMPS)
 def test_no_stamp_is_none(shape: Any) -> None:
-    assert decoders.stamp_s(shape) is None
+    assert message_fields.stamp_s(shape) is None
 
 
 # -- numbers ---------------------------------------------------------------------------------------------------------
@@ -710,7 +710,7 @@ def test_anything_at_all_is_a_proper_value_or_rejected(given_: Any) -> None:
 
 
 def refused_or_proper(read: Callable[[Any], Any], given_: Any) -> None:
-    decoders.stamp_s(given_)
+    message_fields.stamp_s(given_)
     try:
         value = read(given_)
     except Rejected as error:
