@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from server.mail.order import Mail, Recipient
-from server.mail.outbox import Outcome
+from server.mail.order import Mail, Outcome, Recipient
 from server.mail.replies import Trouble
 from server.mail.retry_backoff import MAX_ATTEMPTS
 from server.mail.smtp_connection import Reply

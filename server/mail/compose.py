@@ -7,11 +7,15 @@ import os
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from email import policy
+from email.headerregistry import Address
+from email.message import EmailMessage
 from pathlib import Path
 from typing import BinaryIO
 
-from server.mail import headers
 from server.mail.address import MailAddress
+from server.mail.header_text import file_name, one_line
 
 _LINE = 57  # bytes that make one line of 76 letters, RFC 2045 6.8
 _PIECE = _LINE * 4096  # some 230 kB at once
@@ -46,57 +50,47 @@ class Draft:
 
 
 def write(draft: Draft, path: Path, stop: threading.Event) -> int:
-    """Writes it, durably; its size. Raises OSError, Stopped; ValueError for what cannot stand in a head."""
+    """Write the mail durably and return its size. Raises OSError, Stopped; ValueError for what no header may hold."""
     with open(path, "xb") as file:
-        file.write(_head(draft))
         if draft.attachment is None:
-            file.write(_text_part(draft.text))
+            file.write(bytes(build(draft)))
         else:
-            edge = _edge(draft.message_id)
-            file.write(headers.line("Content-Type", f'multipart/mixed; boundary="{edge}"'))
-            file.write(f"\r\n--{edge}\r\n".encode())
-            file.write(_text_part(draft.text))
-            file.write(f"--{edge}\r\n".encode())
+            # `email.message` builds the mail around an empty attachment; its content never is in memory.
+            end = f"--{_boundary(draft.message_id)}--\r\n".encode()
+            around, found, _ = bytes(build(draft)).rpartition(b"\r\n" + end)
+            if not found:
+                raise ValueError("the mail does not end with its attachment")
+            file.write(around)
             _attach(draft.attachment, file, stop)
-            file.write(f"--{edge}--\r\n".encode())
+            file.write(end)
         file.flush()
         os.fsync(file.fileno())
         return file.tell()
 
 
-def _head(draft: Draft) -> bytes:
-    return b"".join(
-        (
-            headers.date_line(draft.at_ms),
-            headers.address_line("From", [draft.sender], draft.sender_name),
-            headers.address_line("To", draft.to),
-            headers.line("Message-ID", draft.message_id),
-            headers.text_line("Subject", draft.subject),
-            headers.line("MIME-Version", "1.0"),
-        )
-    )
+def build(draft: Draft) -> EmailMessage:
+    """Build the mail, with an empty attachment in the place of the one that is streamed."""
+    needs_utf8 = any(one.needs_utf8 for one in (draft.sender, *draft.to))
+    mail = EmailMessage(policy=policy.SMTPUTF8 if needs_utf8 else policy.SMTP)
+    mail["Date"] = datetime.fromtimestamp(draft.at_ms // 1000, UTC)
+    mail["From"] = Address(one_line(draft.sender_name), draft.sender.local, draft.sender.domain)
+    mail["To"] = [Address("", one.local, one.domain) for one in draft.to]
+    mail["Message-ID"] = one_line(draft.message_id)
+    mail["Subject"] = one_line(draft.subject)
+    mail.set_content(draft.text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n") + "\n", cte="base64")
+    if draft.attachment is not None:
+        name = file_name(draft.attachment.name)
+        mail.add_attachment(b"", maintype="application", subtype="octet-stream", filename=name, params={"name": name})
+        mail.set_boundary(_boundary(draft.message_id))
+    return mail
 
 
-def _edge(message_id: str) -> str:
-    """What separates the parts: `=_` can stand neither in base64 nor in a head of ours (RFC 2045 6.7)."""
+def _boundary(message_id: str) -> str:
+    """Return what separates the parts: `=_` can stand neither in base64 nor in a header (RFC 2045 6.7)."""
     return "=_" + "".join(letter for letter in message_id if letter.isalnum())[:60]
 
 
-def _text_part(text: str) -> bytes:
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
-    body = "\r\n".join(lines) + "\r\n"
-    head = headers.line("Content-Type", "text/plain; charset=utf-8") + headers.line(
-        "Content-Transfer-Encoding", "base64"
-    )
-    return head + b"\r\n" + _base64(body.encode())
-
-
 def _attach(attachment: Attachment, file: BinaryIO, stop: threading.Event) -> None:
-    name = headers.file_name(attachment.name)
-    file.write(headers.line("Content-Type", f'application/octet-stream; name="{name}"'))
-    file.write(headers.line("Content-Transfer-Encoding", "base64"))
-    file.write(headers.line("Content-Disposition", f'attachment; filename="{name}"'))
-    file.write(b"\r\n")
     left = attachment.length
     with open(attachment.path, "rb") as source:
         source.seek(attachment.start)

@@ -71,6 +71,39 @@ class Letter:
     mails: tuple[Mail, ...] = field(default=())
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Composed:
+    """One mail on the disk, before it is in the outbox."""
+
+    part: int
+    parts: int
+    message_id: str
+    file: str
+    size_bytes: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prepared:
+    """All mails of a letter."""
+
+    mails: tuple[Composed, ...]
+    sender: str
+    way: Way
+    size_bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What an attempt to send one mail came to."""
+
+    state: State
+    said: str
+    recipients: tuple[Recipient, ...]
+    next_ms: int | None = None
+    of_account: bool = False
+
+
 def state_of(mails: tuple[Mail, ...]) -> State:
     """The state of a letter whose mails are composed."""
     states = {mail.state for mail in mails}

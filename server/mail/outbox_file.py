@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import logging
 import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from server.mail.settings import sync_folder
@@ -67,6 +69,19 @@ def open_at(folder: Path) -> tuple[sqlite3.Connection, str | None]:
     waiting = sum(1 for _ in (folder / aside.name).glob("*.eml"))
     told = f"{waiting} composed mails lie there too" if waiting != 1 else "1 composed mail lies there too"
     return _open(path), f"The outbox was damaged and is begun anew; the old one is set aside as {aside.name}, {told}."
+
+
+@contextmanager
+def transaction(database: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
+    """A transaction: on the disk as a whole, or not at all."""
+    database.execute("BEGIN IMMEDIATE")
+    try:
+        yield database
+        database.execute("COMMIT")
+    except BaseException:
+        if database.in_transaction:
+            database.execute("ROLLBACK")
+        raise
 
 
 def _open(path: Path) -> sqlite3.Connection:

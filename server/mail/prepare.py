@@ -13,8 +13,7 @@ from typing import TypeVar
 from urllib.parse import quote
 
 from server.mail import address, compose, mail_text
-from server.mail.order import Letter, Way
-from server.mail.outbox import Composed, Prepared
+from server.mail.order import Composed, Letter, Prepared, Way
 from server.mail.pack import NoRoom, Pack, cut, need_room, pack
 from server.mail.settings import MailSettings, sync_folder
 from server.mail.source import Source

@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 import tomli_w
 
 from server.mail import address
-from server.mail.headers import is_one_line
+from server.mail.header_text import is_one_line
 from server.storage import bounded_toml
 from server.storage.set_aside import set_aside
 

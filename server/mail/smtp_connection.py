@@ -1,64 +1,28 @@
 """One connection to the SMTP server: dialled, encrypted, logged in, mails handed over piece by piece.
 
-The only file that knows aiosmtplib (written against 5.1). Its own way of sending takes a whole mail as bytes and works
-through it with expressions on the loop; here a mail is read off the loop and written as fast as the line takes it.
+aiosmtplib (written against 5.1) dials, encrypts, logs in and speaks. Its own way of sending takes a whole mail as bytes
+and works through it with expressions on the loop; here `smtp_stream` sends the text.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import ipaddress
-import socket
 import ssl
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
 
 import aiosmtplib
-from aiosmtplib.protocol import SMTPProtocol
 
 from server.mail.replies import Trouble, clean
-from server.mail.settings import MailSettings
-from server.rosbridge.address import BadAddress, refuse_forbidden
+from server.mail.smtp_dial import DIAL_S, Account, dial, own_name
+from server.mail.smtp_errors import in_words
+from server.mail.smtp_stream import next_piece, write
 
-DIAL_S = 20.0
 REPLY_S = 60.0  # RFC 5321 4.5.3.2 has minutes; a server that thinks so long is tried again
 END_S = 300.0  # for the reply to a whole mail, which a server may take apart and scan first
-_PIECE = 1 << 18
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Account:
-    """Whom to dial and how to log in."""
-
-    host: str
-    port: int
-    security: str  # starttls, tls, none
-    user: str
-    password: str
-    ca: str
-
-    def __repr__(self) -> str:  # no password in any log
-        return f"Account({self.shown})"
-
-    @classmethod
-    def of(cls, settings: MailSettings) -> Account:
-        """Whom these settings name."""
-        return cls(
-            host=settings.host,
-            port=settings.port,
-            security=settings.security,
-            user=settings.user,
-            password=settings.password,
-            ca=settings.ca,
-        )
-
-    @property
-    def shown(self) -> str:
-        return f"{self.host}:{self.port}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,10 +133,10 @@ class Connection:
                 sent = 0
                 is_line_start = True
                 while not answer.done():
-                    piece, is_line_start, length = await asyncio.to_thread(_next_piece, file, is_line_start)
+                    piece, is_line_start, length = await asyncio.to_thread(next_piece, file, is_line_start)
                     if not piece:
                         break
-                    await _write(protocol, piece, answer)
+                    await write(protocol, piece, answer)
                     sent += length
                     told(sent)
             if not answer.done():
@@ -224,11 +188,11 @@ async def connect(account: Account) -> Connection:
     """Dials, encrypts, logs in. Raises Trouble of the account."""
     context = await asyncio.to_thread(_context, account.ca) if account.security != "none" else None
     with in_words(account, ""):
-        dialled = await _dial(account)
+        dialled = await dial(account)
         smtp = aiosmtplib.SMTP(
             hostname=account.host,
             sock=dialled,
-            local_hostname=_own_name(dialled),
+            local_hostname=own_name(dialled),
             timeout=REPLY_S,
             use_tls=account.security == "tls",
             start_tls=False,
@@ -273,43 +237,6 @@ async def _log_in(smtp: aiosmtplib.SMTP, account: Account) -> None:
         ) from None
 
 
-async def _dial(account: Account) -> socket.socket:
-    """A socket connected to the first address of the host that answers and may be dialled."""
-    loop = asyncio.get_running_loop()
-    async with asyncio.timeout(DIAL_S):
-        try:
-            found = await loop.getaddrinfo(account.host, account.port, type=socket.SOCK_STREAM)
-        except socket.gaierror:
-            raise Trouble(f"No host named {account.host} is known here.", is_of_account=True) from None
-        last: OSError | None = None
-        for family, _, protocol, _, where in found:
-            try:
-                refuse_forbidden(str(where[0]))
-            except BadAddress as why:
-                raise Trouble(str(why), is_permanent=True, is_of_account=True) from None
-            one = socket.socket(family, socket.SOCK_STREAM, protocol)
-            try:
-                one.setblocking(False)
-                await loop.sock_connect(one, where)
-                return one
-            except OSError as error:
-                one.close()
-                last = error
-            except BaseException:
-                one.close()
-                raise
-    raise last or OSError("no address")
-
-
-def _own_name(dialled: socket.socket) -> str:
-    """How this machine calls itself: its full name, else its address (RFC 5321 4.1.3). No name is looked up."""
-    name = socket.gethostname()
-    if "." in name and name.isascii() and name.isprintable() and " " not in name:
-        return name
-    own = ipaddress.ip_address(str(dialled.getsockname()[0]).partition("%")[0])
-    return f"[IPv6:{own}]" if own.version == 6 else f"[{own}]"
-
-
 def _context(ca: str) -> ssl.SSLContext:
     """The system's own authorities, or only those given."""
     return ssl.create_default_context(cadata=ca or None)
@@ -317,81 +244,3 @@ def _context(ca: str) -> ssl.SSLContext:
 
 def _encoding(needs_utf8: bool) -> str:
     return "utf-8" if needs_utf8 else "ascii"
-
-
-def _next_piece(file: BinaryIO, is_line_start: bool) -> tuple[bytes, bool, int]:
-    """The next piece with its dots doubled (RFC 5321 4.5.2), whether it ends a line, and how long it was."""
-    piece = file.read(_PIECE)
-    told = piece.replace(b"\n.", b"\n..")
-    if is_line_start and piece.startswith(b"."):
-        told = b"." + told
-    return told, piece.endswith(b"\n"), len(piece)
-
-
-async def _write(protocol: SMTPProtocol, piece: bytes, answer: asyncio.Future[Any]) -> None:
-    """Writes, and waits until the line has taken most of it, the server answers, or nothing moves any more."""
-    protocol.write(piece)
-    drained: asyncio.Future[Any] = asyncio.ensure_future(protocol._drain_helper())
-    try:
-        done, _ = await asyncio.wait({drained, answer}, timeout=REPLY_S, return_when=asyncio.FIRST_COMPLETED)
-        if not done:
-            raise TimeoutError
-        if drained in done:
-            drained.result()
-    finally:
-        drained.cancel()
-        with contextlib.suppress(asyncio.CancelledError, OSError):
-            await drained
-
-
-@contextmanager
-def in_words(account: Account, when: str) -> Iterator[None]:
-    """Whatever a connection may fail with, as a Trouble with a sentence."""
-    is_dialling = not when
-    try:
-        yield
-    except Trouble:
-        raise
-    except aiosmtplib.SMTPResponseException as answer:
-        words = f"{answer.code} {clean(answer.message, account.password)}"
-        raise Trouble(
-            f"{account.shown} says{'' if is_dialling else f' {when}'}: {words}",
-            is_permanent=answer.code >= 500,
-            is_of_account=is_dialling,
-        ) from None
-    except (aiosmtplib.SMTPException, OSError, TimeoutError) as error:
-        trusted = _of_trust(error)
-        if trusted is not None:
-            raise Trouble(
-                f"{account.shown} does not prove who it is: {trusted}.", is_permanent=True, is_of_account=True
-            ) from None
-        raise Trouble(
-            f"{account.shown} {_how(error)}{'' if is_dialling else f' {when}'}.", is_of_account=is_dialling
-        ) from None
-
-
-def _of_trust(error: BaseException) -> str | None:
-    """Why a certificate is not believed, where that is what it was."""
-    one: BaseException | None = error
-    while one is not None:
-        if isinstance(one, ssl.SSLCertVerificationError):
-            return clean(one.verify_message or "its certificate is not trusted", "")
-        one = one.__cause__ or one.__context__
-    return None
-
-
-def _how(error: BaseException) -> str:
-    one: BaseException | None = error
-    while one is not None:
-        if isinstance(one, ConnectionRefusedError):
-            return "refuses the connection"
-        if isinstance(one, ssl.SSLError):
-            return "does not speak TLS as it should"
-        one = one.__cause__ or one.__context__
-    if isinstance(error, TimeoutError):
-        return "gave no answer in time"
-    if isinstance(error, (ConnectionError, aiosmtplib.SMTPServerDisconnected)):
-        return "closed the connection"
-    if isinstance(error, OSError) and error.strerror:
-        return f"cannot be reached ({error.strerror.lower()})"
-    return "did not answer as a mail server does"

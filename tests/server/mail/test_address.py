@@ -11,7 +11,7 @@ from aiosmtplib.email import quote_address
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.mail import address, headers
+from server.mail import address, compose
 from server.mail.address import BadAddress, MailAddress
 
 ATEXT = st.sampled_from("abcxyzABC019#$&'*+/=?^_{}~-äßñ中й")
@@ -127,10 +127,14 @@ def test_what_is_an_address_is_taken(local: str, labels: list[str]) -> None:
 @settings(deadline=None)  # beside other work a machine stops for longer than any limit
 @given(st.lists(st.builds(MailAddress, local=ATEXT, domain=LABEL), min_size=1, max_size=8))
 def test_a_line_of_addresses_holds_these_and_no_other(some: list[MailAddress]) -> None:
-    head = headers.address_line("To", some)
-    read = message_from_string(head.decode() + "\r\n", policy=policy.SMTPUTF8)
+    sender = address.parse("ann@example.org")
+    draft = compose.Draft(
+        sender=sender, sender_name="", to=some, subject="", at_ms=0, message_id="<a@example.org>", text=""
+    )
+    read = message_from_string(bytes(compose.build(draft)).decode(), policy=policy.SMTPUTF8)
     assert [one.addr_spec for one in read["To"].addresses] == [one.text for one in some]
-    assert read.keys() == ["To"]
+    assert [one.addr_spec for one in read["From"].addresses] == ["ann@example.org"]
+    assert read.keys()[:5] == ["Date", "From", "To", "Message-ID", "Subject"]
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from server.mail.mailer import Mailer, MailRefused
+from server.mail import retry_backoff
+from server.mail.mail_folder import MailRefused
 from server.mail.retry_backoff import pause_s
+from server.mail.sender import Sender
 from server.mail.settings import BadMailSetting, MailSettingsFile
 from server.recording.export import Made
 from tests.server.mail.mailing import START_MS, Clock, Shelf, mailing, order, over, settings, until
@@ -504,12 +506,10 @@ async def test_one_server_sends_from_a_folder(tmp_path: Path, shelf: Shelf) -> N
 async def test_a_disk_that_takes_nothing_is_told_and_what_was_sent_is_not_sent_again(
     tmp_path: Path, shelf: Shelf, post: Post, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from server.mail import mailer as module
-
-    monkeypatch.setattr(module, "_AGAIN_S", 0.05)
+    monkeypatch.setattr(retry_backoff, "AGAIN_S", 0.05)
     async with mailing(tmp_path / "mail", shelf) as mailer:
         await mailer.change(settings(post.port))
-        outbox = mailer._outbox
+        outbox = mailer._folder._outbox
         assert outbox is not None
         n = (await mailer.order("key-0001", order())).n
         await until(mailer, n, lambda letter: letter.is_ready)
@@ -536,18 +536,16 @@ async def test_a_disk_that_takes_nothing_is_told_and_what_was_sent_is_not_sent_a
 async def test_a_task_that_fails_is_begun_again(
     tmp_path: Path, shelf: Shelf, post: Post, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    from server.mail import mailer as module
-
-    monkeypatch.setattr(module, "_AGAIN_S", 0.01)
+    monkeypatch.setattr(retry_backoff, "AGAIN_S", 0.01)
     failures = iter([RuntimeError("a fault"), RuntimeError("another")])
-    whole = Mailer._send
+    whole = Sender._send
 
-    async def failing(self: Mailer, *given: object) -> object:
+    async def failing(self: Sender, *given: object) -> object:
         for fault in failures:
             raise fault
         return await whole(self, *given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Mailer, "_send", failing)
+    monkeypatch.setattr(Sender, "_send", failing)
     async with mailing(tmp_path / "mail", shelf) as mailer:
         await mailer.change(settings(post.port))
         assert (await over(mailer, (await mailer.order("key-0001", order())).n)).state == "sent"
@@ -557,18 +555,16 @@ async def test_a_task_that_fails_is_begun_again(
 async def test_a_mail_whose_sending_broke_in_the_midst_is_sent_all_the_same(
     tmp_path: Path, shelf: Shelf, post: Post, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from server.mail import mailer as module
-
-    monkeypatch.setattr(module, "_AGAIN_S", 0.01)
+    monkeypatch.setattr(retry_backoff, "AGAIN_S", 0.01)
     faults = iter([RuntimeError("a fault")])
-    whole = Mailer._finish
+    whole = Sender._finish
 
-    async def failing(self: Mailer, *given: object) -> object:
+    async def failing(self: Sender, *given: object) -> object:
         for fault in faults:
             raise fault
         return await whole(self, *given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Mailer, "_finish", failing)
+    monkeypatch.setattr(Sender, "_finish", failing)
     async with mailing(tmp_path / "mail", shelf) as mailer:
         await mailer.change(settings(post.port))
         letter = await over(mailer, (await mailer.order("key-0001", order())).n)

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from server.mail import outbox as outbox_module
-from server.mail.order import Letter, Recipient
-from server.mail.outbox import Composed, Outbox, OutboxFull, Outcome, Prepared, WrongState
+from server.mail.order import Composed, Letter, Outcome, Prepared, Recipient
+from server.mail.outbox import Outbox, OutboxFull, WrongState
 from tests.server.mail.mailing import START_MS as T
 from tests.server.mail.mailing import order
 
@@ -50,10 +50,10 @@ def found_by(outbox: Outbox, n: int) -> Letter:
 
 def send(outbox: Outbox, outcome: Outcome, now_ms: int = T) -> int:
     """An attempt of the mail that is due."""
-    mail = outbox.next_due(now_ms, HOUR_MS)
+    mail = outbox.queue.next_due(now_ms, HOUR_MS)
     assert mail is not None
-    assert outbox.begin(mail.n) is not None
-    outbox.settle(mail.n, outcome, now_ms)
+    assert outbox.queue.begin(mail.n) is not None
+    outbox.queue.settle(mail.n, outcome, now_ms)
     return mail.n
 
 
@@ -81,18 +81,18 @@ def test_it_is_durable(outbox: Outbox, tmp_path: Path) -> None:
 def test_a_letter_goes_from_ordered_to_sent(outbox: Outbox) -> None:
     letter = outbox.add("key", order(text="Grüße"), T)
     assert (letter.state, letter.is_ready, letter.order.text) == ("queued", False, "Grüße")
-    assert outbox.next_due(T, HOUR_MS) is None, "it is not made yet"
+    assert outbox.queue.next_due(T, HOUR_MS) is None, "it is not made yet"
     waiting = outbox.to_prepare()
     assert waiting is not None
     assert waiting.n == letter.n
     outbox.prepared(letter.n, composed(outbox))
     assert outbox.to_prepare() is None
-    mail = outbox.next_due(T, HOUR_MS)
+    mail = outbox.queue.next_due(T, HOUR_MS)
     assert mail is not None
-    assert outbox.begin(mail.n) is not None
+    assert outbox.queue.begin(mail.n) is not None
     assert outbox.letters()[0].state == "sending"
-    assert outbox.begin(mail.n) is None, "it is on its way already"
-    outbox.settle(mail.n, sent(), T)
+    assert outbox.queue.begin(mail.n) is None, "it is on its way already"
+    outbox.queue.settle(mail.n, sent(), T)
     done = outbox.letters()[0]
     assert (done.state, done.said) == ("sent", "250 OK")
     assert done.mails[0].recipients[0].state == "accepted"
@@ -108,18 +108,18 @@ def test_the_same_key_is_the_same_order(outbox: Outbox) -> None:
 def test_what_is_tried_later_waits_and_a_clock_set_back_does_not_hold_it(outbox: Outbox) -> None:
     ready(outbox)
     send(outbox, later(T + 30_000))
-    assert outbox.next_due(T + 29_999, HOUR_MS) is None
-    assert outbox.earliest_ms() == T + 30_000
-    assert outbox.next_due(T + 30_000, HOUR_MS) is not None
-    assert outbox.next_due(T - 100 * HOUR_MS, HOUR_MS) is not None, "no pause is so long: the clock was set back"
+    assert outbox.queue.next_due(T + 29_999, HOUR_MS) is None
+    assert outbox.queue.earliest_ms() == T + 30_000
+    assert outbox.queue.next_due(T + 30_000, HOUR_MS) is not None
+    assert outbox.queue.next_due(T - 100 * HOUR_MS, HOUR_MS) is not None, "no pause is so long: the clock was set back"
 
 
 def test_after_a_kill_what_was_on_its_way_waits_again(tmp_path: Path) -> None:
     first = Outbox(tmp_path)
     n = ready(first)
-    mail = first.next_due(T, HOUR_MS)
+    mail = first.queue.next_due(T, HOUR_MS)
     assert mail is not None
-    first.begin(mail.n)
+    first.queue.begin(mail.n)
     first._database.close()  # as a kill leaves it
     again = Outbox(tmp_path)
     again.recover()
@@ -127,7 +127,7 @@ def test_after_a_kill_what_was_on_its_way_waits_again(tmp_path: Path) -> None:
     assert letter is not None
     assert letter.state == "queued"
     assert "may arrive twice" in letter.said
-    same = again.next_due(T, HOUR_MS)
+    same = again.queue.next_due(T, HOUR_MS)
     assert same is not None
     assert (same.message_id, same.attempts) == (mail.message_id, 1)
     assert (again.files / same.file).is_file()
@@ -148,9 +148,9 @@ def test_after_a_kill_files_that_no_mail_needs_are_gone(tmp_path: Path) -> None:
 def test_a_cancelled_letter_is_not_sent_after_a_kill_either(tmp_path: Path) -> None:
     first = Outbox(tmp_path)
     n = ready(first)
-    mail = first.next_due(T, HOUR_MS)
+    mail = first.queue.next_due(T, HOUR_MS)
     assert mail is not None
-    first.begin(mail.n)
+    first.queue.begin(mail.n)
     assert first.cancel(n).state == "sending", "it is on its way until it is broken off"
     first._database.close()
     again = Outbox(tmp_path)
@@ -158,7 +158,7 @@ def test_a_cancelled_letter_is_not_sent_after_a_kill_either(tmp_path: Path) -> N
     letter = again.letter(n)
     assert letter is not None
     assert letter.state == "cancelled"
-    assert again.next_due(T, HOUR_MS) is None
+    assert again.queue.next_due(T, HOUR_MS) is None
     again.close()
 
 
@@ -186,7 +186,7 @@ def test_cancelling_ends_what_waits_and_keeps_what_was_sent(outbox: Outbox) -> N
     send(outbox, sent())
     letter = outbox.cancel(n)
     assert (letter.state, letter.said) == ("cancelled", "1 of 2 mails were sent before.")
-    assert outbox.next_due(T, HOUR_MS) is None
+    assert outbox.queue.next_due(T, HOUR_MS) is None
     assert list(outbox.files.iterdir()) == []
     with pytest.raises(WrongState, match="cancelled already"):
         outbox.cancel(n)
@@ -197,17 +197,17 @@ def test_a_letter_cancelled_while_it_is_made_is_not_sent(outbox: Outbox) -> None
     outbox.cancel(n)
     assert not outbox.prepared(n, composed(outbox))
     outbox.discard("key")
-    assert outbox.next_due(T, HOUR_MS) is None
+    assert outbox.queue.next_due(T, HOUR_MS) is None
     assert list(outbox.files.iterdir()) == []
 
 
 def test_a_mail_that_arrived_though_its_letter_was_cancelled_is_told_as_sent(outbox: Outbox) -> None:
     n = ready(outbox)
-    mail = outbox.next_due(T, HOUR_MS)
+    mail = outbox.queue.next_due(T, HOUR_MS)
     assert mail is not None
-    outbox.begin(mail.n)
+    outbox.queue.begin(mail.n)
     outbox.cancel(n)
-    outbox.settle(mail.n, sent(), T)
+    outbox.queue.settle(mail.n, sent(), T)
     letter = outbox.letter(n)
     assert letter is not None
     assert (letter.state, letter.said, letter.mails[0].state) == (
@@ -228,7 +228,7 @@ def test_resending_tries_only_what_has_not_arrived(outbox: Outbox) -> None:
     second = send(outbox, Outcome(state="failed", said="550", recipients=refused))
     letter = outbox.resend(n, "a@b", T + 5)
     assert (letter.state, letter.is_ready) == ("queued", True)
-    mail = outbox.next_due(T + 5, HOUR_MS)
+    mail = outbox.queue.next_due(T + 5, HOUR_MS)
     assert mail is not None
     assert (mail.n, mail.attempts) == (second, 0)
     assert [one.state for one in mail.recipients] == ["accepted", "waiting"]
@@ -241,9 +241,9 @@ def test_resending_what_was_sent_makes_the_same_mails_again(outbox: Outbox) -> N
     send(outbox, sent())
     assert outbox.resend(n, "a@b", T).is_ready is False, "its files are gone"
     outbox.prepared(n, composed(outbox, parts=2))
-    found = [outbox.next_due(T, HOUR_MS)]
+    found = [outbox.queue.next_due(T, HOUR_MS)]
     send(outbox, sent())
-    found.append(outbox.next_due(T, HOUR_MS))
+    found.append(outbox.queue.next_due(T, HOUR_MS))
     assert [mail.message_id for mail in found if mail] == ids
     assert all(one.state == "waiting" for mail in found if mail for one in mail.recipients)
 
@@ -279,9 +279,9 @@ def test_what_is_on_its_way_is_not_resent(outbox: Outbox) -> None:
     with pytest.raises(WrongState):
         outbox.resend(n, "a@b", T)
     outbox.prepared(n, composed(outbox))
-    mail = outbox.next_due(T, HOUR_MS)
+    mail = outbox.queue.next_due(T, HOUR_MS)
     assert mail is not None
-    outbox.begin(mail.n)
+    outbox.queue.begin(mail.n)
     with pytest.raises(WrongState):
         outbox.resend(n, "a@b", T)
     with pytest.raises(KeyError):
@@ -290,26 +290,26 @@ def test_what_is_on_its_way_is_not_resent(outbox: Outbox) -> None:
 
 def test_a_server_that_takes_nothing_holds_or_fails_all_that_waits(outbox: Outbox) -> None:
     first, second = ready(outbox, "one"), ready(outbox, "two")
-    outbox.hold("no answer", T + 10_000, HOUR_MS)
-    assert outbox.next_due(T, HOUR_MS) is None
-    outbox.refuse_all("535 login refused", T)
+    outbox.queue.hold("no answer", T + 10_000, HOUR_MS)
+    assert outbox.queue.next_due(T, HOUR_MS) is None
+    outbox.queue.refuse_all("535 login refused", T)
     assert [letter.state for letter in outbox.letters()] == ["failed", "failed"]
-    outbox.try_all_again("a@b", T)
+    outbox.queue.try_all_again("a@b", T)
     assert [letter.state for letter in outbox.letters()] == ["queued", "queued"]
-    assert outbox.next_due(T, HOUR_MS) is not None
+    assert outbox.queue.next_due(T, HOUR_MS) is not None
     assert first != second
 
 
 def test_new_settings_do_not_resend_what_was_refused_for_itself(outbox: Outbox) -> None:
     n = ready(outbox)
     send(outbox, failed())
-    outbox.try_all_again("a@b", T)
+    outbox.queue.try_all_again("a@b", T)
     assert found_by(outbox, n).state == "failed"
 
 
 def test_what_waits_is_made_anew_for_another_sender(outbox: Outbox) -> None:
     n = ready(outbox)
-    outbox.try_all_again("new@b", T)
+    outbox.queue.try_all_again("new@b", T)
     waiting = outbox.to_prepare()
     assert waiting is not None
     assert waiting.n == n

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from server.mail.settings import BadMailSetting, MailSettings, MailSettingsFile, checked
-from server.mail.smtp_connection import Account
+from server.mail.smtp_dial import Account
 from tests.server.mail.post import certificates
 
 GOOD: dict[str, Any] = {

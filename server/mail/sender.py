@@ -1,0 +1,217 @@
+"""Sends the mails of the outbox when they are due, over one connection, and keeps what became of each attempt."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from server.mail import address, attempt, retry_backoff
+from server.mail.mail_folder import MailFolder, MailRefused
+from server.mail.order import Mail, Outcome
+from server.mail.outbox import Outbox
+from server.mail.replies import Trouble
+from server.mail.settings import MailSettings
+from server.mail.smtp_connection import Connection, Envelope, connect
+from server.mail.smtp_dial import Account
+from server.mail.under_way import Underway, joined
+
+log = logging.getLogger("catgraph.mail")
+_LONGEST_MS = round(1000 * retry_backoff.LONGEST_S)
+
+
+class Sender:
+    """Takes mails from the outbox and hands them to the SMTP server."""
+
+    def __init__(
+        self,
+        folder: MailFolder,
+        settings: Callable[[], MailSettings],
+        wall_ms: Callable[[], int],
+        pause_s: Callable[[int], float],
+    ) -> None:
+        self.under_way: Underway | None = None
+        self._folder = folder
+        self._settings = settings
+        self._wall_ms = wall_ms
+        self._pause_s = pause_s
+        self._due = asyncio.Event()
+        self._failures = 0  # of the account, one after the other
+        self._held: tuple[int, str] | None = None  # until when the server is not asked again [ms], and why
+
+    def look(self) -> None:
+        """Something may be due: a clock was moved, or mail was ordered."""
+        self._due.set()
+
+    def release(self) -> None:
+        """Ask the server again at once, whatever it said before."""
+        self._held = None
+
+    def forget_failures(self) -> None:
+        """The account is another: its pauses begin anew."""
+        self._failures = 0
+        self._held = None
+
+    async def run(self) -> None:
+        """Sends what is due, until it is cancelled. Raises MailRefused for what the disk does."""
+        connection: Connection | None = None
+        await self._folder.ask(lambda outbox: outbox.queue.requeue())
+        try:
+            while True:
+                self._due.clear()
+                mail = await self._folder.ask(partial(_next_due, now_ms=self._wall_ms()))
+                if mail is None:
+                    if connection is not None:
+                        await connection.close()
+                        connection = None
+                    await self._wait()
+                    continue
+                if self._is_held():
+                    await self._hold()
+                    continue
+                connection = await self._send(mail, connection)
+        finally:
+            if connection is not None:
+                connection.drop()
+
+    async def _wait(self) -> None:
+        """Until something is due, or somebody calls."""
+        earliest = await self._folder.ask(lambda outbox: outbox.queue.earliest_ms())
+        timeout = None if earliest is None else max(0.0, (earliest - self._wall_ms()) / 1000)
+        if timeout is not None:
+            timeout = min(timeout, retry_backoff.LONGEST_S)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(timeout):  # wait_for of Python 3.11 may swallow the end of the task
+                await self._due.wait()
+
+    async def _send(self, mail: Mail, connection: Connection | None) -> Connection | None:
+        """One attempt, and what came of it on the disk; the connection where it can be used again."""
+        refused = self._refusal(mail)
+        if refused is not None:
+            await self._settle(mail, Outcome(state="failed", said=refused, recipients=mail.recipients))
+            return connection
+        begun = await self._folder.ask(lambda outbox: outbox.queue.begin(mail.n))
+        if begun is None:
+            return connection  # it was cancelled
+        under_way = Underway(letter=mail.letter, connection=connection)
+        under_way.task = asyncio.ensure_future(self._hand_over(begun, under_way))
+        self.under_way = under_way
+        try:
+            return await self._finish(begun, under_way)
+        except BaseException:
+            if under_way.connection is not None:
+                under_way.connection.drop()
+            raise
+        finally:
+            self.under_way = None
+            under_way.over.set()
+
+    async def _finish(self, mail: Mail, under_way: Underway) -> Connection | None:
+        """Waits for an attempt and keeps what came of it, though the server be ended meanwhile."""
+        is_ended = False
+        try:
+            await joined(under_way.task)
+        except asyncio.CancelledError:
+            is_ended = True
+        task, trouble = under_way.task, None
+        if task.cancelled():
+            if is_ended:
+                raise asyncio.CancelledError  # it is sent again at the next start
+            outcome = Outcome(state="cancelled", said="", recipients=mail.recipients)
+        elif (error := task.exception()) is None:
+            answers, of_mail = task.result()
+            outcome = attempt.answered(mail, answers, of_mail, self._wall_ms(), self._pause_s)
+            self._failures = 0
+        else:
+            trouble = error if isinstance(error, Trouble) else self._fault(mail, error)
+            outcome = self._troubled(mail, trouble, under_way)
+        await asyncio.shield(self._settle(mail, outcome))
+        if is_ended:
+            raise asyncio.CancelledError
+        if trouble is not None and trouble.is_of_account:
+            await self._account_refused(trouble)
+        connection = under_way.connection
+        if connection is not None and (trouble is not None or task.cancelled() or not connection.is_open):
+            connection.drop()
+            return None
+        return connection
+
+    def _fault(self, mail: Mail, error: BaseException) -> Trouble:
+        """A fault of ours must not keep a mail "sending" for ever."""
+        log.error("mail %d could not be sent", mail.letter, exc_info=error)
+        return Trouble(f"The server made a mistake ({type(error).__name__}), which is in its log.")
+
+    def _troubled(self, mail: Mail, trouble: Trouble, under_way: Underway) -> Outcome:
+        is_doubtful = under_way.connection is not None and under_way.connection.is_doubtful
+        return attempt.troubled(mail, trouble, is_doubtful=is_doubtful, now_ms=self._wall_ms(), pause_s=self._pause_s)
+
+    async def _hand_over(self, mail: Mail, under_way: Underway) -> Any:
+        if under_way.connection is None or not under_way.connection.is_open:
+            under_way.connection = await connect(Account.of(self._settings()))
+        path = self._folder.files / mail.file
+        waiting = [one.address for one in mail.recipients if one.state == "waiting"]
+        envelope = Envelope(
+            sender=self._settings().sender,
+            to=waiting,
+            file=path,
+            size_bytes=mail.size_bytes,
+            needs_utf8=not all(
+                one.isascii() for one in (self._settings().sender, *(r.address for r in mail.recipients))
+            ),
+        )
+
+        def told(sent: int) -> None:
+            under_way.share = sent / max(1, mail.size_bytes)
+
+        try:
+            return await under_way.connection.hand_over(envelope, told)
+        except FileNotFoundError:
+            raise Trouble("Its file is gone from the outbox: send it again.", is_permanent=True) from None
+
+    def _refusal(self, mail: Mail) -> str | None:
+        """Why it may not be sent any more."""
+        if not self._settings().is_complete:
+            return "Mail is not set up: give SMTP host and sender in Settings, E-mail."
+        for one in mail.recipients:
+            if one.state == "waiting" and not address.is_allowed(address.parse(one.address), self._settings().allowed):
+                return f"{one.address} is not among the allowed recipients."
+        return None
+
+    async def _account_refused(self, trouble: Trouble) -> None:
+        """What holds for one mail holds for all: the server is not asked once for each."""
+        if trouble.is_permanent:
+            await self._folder.ask(lambda outbox: outbox.queue.refuse_all(str(trouble), self._wall_ms()))
+            return
+        self._failures += 1
+        self._held = self._wall_ms() + round(1000 * self._pause_s(self._failures)), str(trouble)
+        await self._hold()
+
+    async def _hold(self) -> None:
+        if self._held is not None:
+            until_ms, why = self._held
+            await self._folder.ask(lambda outbox: outbox.queue.hold(why, until_ms, _LONGEST_MS))
+
+    def _is_held(self) -> bool:
+        """The server was asked in vain a short while ago: what was ordered since waits with the others."""
+        if self._held is None:
+            return False
+        left_ms = self._held[0] - self._wall_ms()
+        return 0 < left_ms <= _LONGEST_MS  # more: the clock was set back
+
+    async def _settle(self, mail: Mail, outcome: Outcome) -> None:
+        """Keeps what came of an attempt, however long the disk takes: forgetting it would send the mail again."""
+        log.info("mail %d part %d of %d: %s. %s", mail.letter, mail.part, mail.parts, outcome.state, outcome.said)
+        while True:
+            try:
+                await self._folder.ask(lambda outbox: outbox.queue.settle(mail.n, outcome, self._wall_ms()))
+                return
+            except MailRefused as why:
+                log.error("what became of mail %d is not kept yet: %s", mail.letter, why)
+                await asyncio.sleep(retry_backoff.AGAIN_S)
+
+
+def _next_due(outbox: Outbox, now_ms: int) -> Mail | None:
+    return outbox.queue.next_due(now_ms, _LONGEST_MS)

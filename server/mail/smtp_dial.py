@@ -1,0 +1,82 @@
+"""Which SMTP server an account names, and a socket to it."""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import socket
+from dataclasses import dataclass
+
+from server.mail.replies import Trouble
+from server.mail.settings import MailSettings
+from server.rosbridge.address import BadAddress, refuse_forbidden
+
+DIAL_S = 20.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Account:
+    """Whom to dial and how to log in."""
+
+    host: str
+    port: int
+    security: str  # starttls, tls, none
+    user: str
+    password: str
+    ca: str
+
+    def __repr__(self) -> str:  # no password in any log
+        return f"Account({self.shown})"
+
+    @classmethod
+    def of(cls, settings: MailSettings) -> Account:
+        """Whom these settings name."""
+        return cls(
+            host=settings.host,
+            port=settings.port,
+            security=settings.security,
+            user=settings.user,
+            password=settings.password,
+            ca=settings.ca,
+        )
+
+    @property
+    def shown(self) -> str:
+        return f"{self.host}:{self.port}"
+
+
+async def dial(account: Account) -> socket.socket:
+    """A socket connected to the first address of the host that answers and may be dialled."""
+    loop = asyncio.get_running_loop()
+    async with asyncio.timeout(DIAL_S):
+        try:
+            found = await loop.getaddrinfo(account.host, account.port, type=socket.SOCK_STREAM)
+        except socket.gaierror:
+            raise Trouble(f"No host named {account.host} is known here.", is_of_account=True) from None
+        last: OSError | None = None
+        for family, _, protocol, _, where in found:
+            try:
+                refuse_forbidden(str(where[0]))
+            except BadAddress as why:
+                raise Trouble(str(why), is_permanent=True, is_of_account=True) from None
+            one = socket.socket(family, socket.SOCK_STREAM, protocol)
+            try:
+                one.setblocking(False)
+                await loop.sock_connect(one, where)
+                return one
+            except OSError as error:
+                one.close()
+                last = error
+            except BaseException:
+                one.close()
+                raise
+    raise last or OSError("no address")
+
+
+def own_name(dialled: socket.socket) -> str:
+    """How this machine calls itself: its full name, else its address (RFC 5321 4.1.3). No name is looked up."""
+    name = socket.gethostname()
+    if "." in name and name.isascii() and name.isprintable() and " " not in name:
+        return name
+    own = ipaddress.ip_address(str(dialled.getsockname()[0]).partition("%")[0])
+    return f"[IPv6:{own}]" if own.version == 6 else f"[{own}]"

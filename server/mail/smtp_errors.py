@@ -1,0 +1,65 @@
+"""What a connection to an SMTP server fails with, as a sentence for the operator."""
+
+from __future__ import annotations
+
+import ssl
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import aiosmtplib
+
+from server.mail.replies import Trouble, clean
+from server.mail.smtp_dial import Account
+
+
+@contextmanager
+def in_words(account: Account, when: str) -> Iterator[None]:
+    """Whatever a connection may fail with, as a Trouble with a sentence."""
+    is_dialling = not when
+    try:
+        yield
+    except Trouble:
+        raise
+    except aiosmtplib.SMTPResponseException as answer:
+        words = f"{answer.code} {clean(answer.message, account.password)}"
+        raise Trouble(
+            f"{account.shown} says{'' if is_dialling else f' {when}'}: {words}",
+            is_permanent=answer.code >= 500,
+            is_of_account=is_dialling,
+        ) from None
+    except (aiosmtplib.SMTPException, OSError, TimeoutError) as error:
+        trusted = _of_trust(error)
+        if trusted is not None:
+            raise Trouble(
+                f"{account.shown} does not prove who it is: {trusted}.", is_permanent=True, is_of_account=True
+            ) from None
+        raise Trouble(
+            f"{account.shown} {_how(error)}{'' if is_dialling else f' {when}'}.", is_of_account=is_dialling
+        ) from None
+
+
+def _of_trust(error: BaseException) -> str | None:
+    """Why a certificate is not believed, where that is what it was."""
+    one: BaseException | None = error
+    while one is not None:
+        if isinstance(one, ssl.SSLCertVerificationError):
+            return clean(one.verify_message or "its certificate is not trusted", "")
+        one = one.__cause__ or one.__context__
+    return None
+
+
+def _how(error: BaseException) -> str:
+    one: BaseException | None = error
+    while one is not None:
+        if isinstance(one, ConnectionRefusedError):
+            return "refuses the connection"
+        if isinstance(one, ssl.SSLError):
+            return "does not speak TLS as it should"
+        one = one.__cause__ or one.__context__
+    if isinstance(error, TimeoutError):
+        return "gave no answer in time"
+    if isinstance(error, (ConnectionError, aiosmtplib.SMTPServerDisconnected)):
+        return "closed the connection"
+    if isinstance(error, OSError) and error.strerror:
+        return f"cannot be reached ({error.strerror.lower()})"
+    return "did not answer as a mail server does"

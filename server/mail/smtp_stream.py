@@ -1,0 +1,37 @@
+"""The text of a mail, from its file to the line: read off the loop, written as fast as the line takes it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from typing import Any, BinaryIO
+
+from aiosmtplib.protocol import SMTPProtocol
+
+STALL_S = 60.0  # without a byte taken; RFC 5321 4.5.3.2 has minutes
+_PIECE = 1 << 18
+
+
+def next_piece(file: BinaryIO, is_line_start: bool) -> tuple[bytes, bool, int]:
+    """The next piece with its dots doubled (RFC 5321 4.5.2), whether it ends a line, and how long it was."""
+    piece = file.read(_PIECE)
+    told = piece.replace(b"\n.", b"\n..")
+    if is_line_start and piece.startswith(b"."):
+        told = b"." + told
+    return told, piece.endswith(b"\n"), len(piece)
+
+
+async def write(protocol: SMTPProtocol, piece: bytes, answer: asyncio.Future[Any]) -> None:
+    """Writes, and waits until the line has taken most of it, the server answers, or nothing moves any more."""
+    protocol.write(piece)
+    drained: asyncio.Future[Any] = asyncio.ensure_future(protocol._drain_helper())
+    try:
+        done, _ = await asyncio.wait({drained, answer}, timeout=STALL_S, return_when=asyncio.FIRST_COMPLETED)
+        if not done:
+            raise TimeoutError
+        if drained in done:
+            drained.result()
+    finally:
+        drained.cancel()
+        with contextlib.suppress(asyncio.CancelledError, OSError):
+            await drained
