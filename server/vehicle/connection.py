@@ -15,7 +15,7 @@ from server.rosbridge.connection_errors import Problem
 from server.rosbridge.link import Marks, RosLink
 from server.rosbridge.raw_frame import RawFrame
 from server.system.supervision import Supervisor
-from server.vehicle.subscriptions import Conversation
+from server.vehicle.subscriptions import Subscriptions
 
 log = logging.getLogger("catgraph.connection")
 
@@ -60,7 +60,7 @@ class Connection:
         name: str,
         observer: ConnectionObserver,
         messages: MessageHandler,
-        subscriptions: Callable[[RosLink | None], Conversation],
+        subscriptions: Callable[[RosLink | None], Subscriptions],
         supervisor: Supervisor,
         *,
         now: Callable[[], float],
@@ -132,7 +132,7 @@ class Connection:
             self._supervisor.keep("proof", partial(self._demand_proof, link), may_end=True)
         if self.is_proved:
             self._reopened(link)
-        self._supervisor.keep("subscriptions", self.subscriptions.go_on, may_end=True)
+        self._supervisor.keep("subscriptions", self.subscriptions.run, may_end=True)
 
     def link_closed(self, problem: Problem) -> None:
         now_s = self._now()

@@ -65,7 +65,7 @@ class MessageIntake:
         topics = connection.subscriptions
         if frame.topic not in topics.others:
             return False
-        topics.heard(frame.topic)
+        topics.received(frame.topic)
         if self._recording.is_on:
             self._record(connection, frame.topic, frame, self._now(), len(frame.payload))
         return True
@@ -77,7 +77,7 @@ class MessageIntake:
             return
         now_s = self._now()
         topics = connection.subscriptions
-        topics.heard(topic)
+        topics.received(topic)
         if self._recording.is_on and connection.link is not None:
             self._record(connection, topic, message, now_s, connection.link.frame_bytes)
         if self._slow_down.heard(topic, message) or topics.took(topic, message):

@@ -23,7 +23,7 @@ from server.vehicle.judgement import Judgement
 from server.vehicle.message_intake import MessageIntake
 from server.vehicle.pause import Pause
 from server.vehicle.state_publisher import StatePublisher
-from server.vehicle.subscriptions import Conversation
+from server.vehicle.subscriptions import Subscriptions
 from server.vehicle.tick_parts import TickParts
 
 
@@ -97,17 +97,13 @@ def session_parts(
     )
     event_log = Logbook(vehicle, bus, settings, wall_ms=wall_ms, also=recording.events)
     slow_down = Slowing(
-        event_log.note,
-        now=now,
-        wall_ms=wall_ms,
-        snapshot=judgement.snapshot,
-        record=lambda sent: recording.own("commands", sent),
-        number=bus.last_event(vehicle),
-    )
+        event_log.note, now=now, wall_ms=wall_ms, snapshot=judgement.snapshot,
+        record=lambda sent: recording.own("commands", sent), number=bus.last_event(vehicle),
+    )  # fmt: skip
     intake = MessageIntake(vehicle, bus, judgement, recording, slow_down, attempts, now=now)
 
-    def subscriptions(link: RosLink | None) -> Conversation:
-        return Conversation(
+    def subscriptions(link: RosLink | None) -> Subscriptions:
+        return Subscriptions(
             link,
             settings,
             now=now,

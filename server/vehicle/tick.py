@@ -138,7 +138,7 @@ class Tick:
         monitor = parts.judgement.monitor
         target = way_of(phase=parts.connection.phase, sources=topics.sources, offered=topics.offered)
         slow_down.limits = monitor.limits.slow_down
-        slow_down.rivals = topics.publishers
+        slow_down.rivals = topics.ros.publishers
         slow_down.is_steering_known = monitor.limits.steering.tyre_rad_per_unit != 0.0
         slow_down.watch_operators(parts.authorization.heard_s())
         is_paused = parts.pause.since_s is not None

@@ -31,7 +31,7 @@ from server.slowdown.publisher import Mouth
 from server.slowdown.sender import Slowing
 from server.slowdown.twist import message
 from server.vehicle import discovery
-from server.vehicle.subscriptions import Conversation
+from server.vehicle.subscriptions import Subscriptions
 from tests.server.ear import Ear
 from tests.tree import RECORDINGS
 
@@ -351,7 +351,7 @@ def test_whatever_a_bridge_offers_nothing_harmful_is_asked_of_it(
     async def run() -> list[bytes]:
         link, wire = wired(answer)
         tuning = Tuning(SettingsFile(None))
-        talk = Conversation(link, tuning, now=time.monotonic, proved=lambda: None, recognised=lambda title: None)
+        talk = Subscriptions(link, tuning, now=time.monotonic, proved=lambda: None, recognised=lambda title: None)
         talk.record(also)
         await talk._look(link, link)
         await talk._look(link, link)

@@ -1,0 +1,103 @@
+"""Asks rosapi about the topics from which nothing comes: who publishes them, and whether the bridge passes them on."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection, Mapping
+
+from server.judge.topics import plain_type
+from server.recording import recorded_topics
+from server.rosbridge.connection_errors import Problem
+from server.rosbridge.rosapi_client import Asks
+from server.vehicle import discovery
+from server.vehicle.delivery import Delivery
+from server.vehicle.undelivered import CLIENT_COUNT, Passing
+
+MOST_NAMED = 20
+
+
+class MissingWatch:
+    """Of one car's connection. `now` is a monotonic clock in seconds.
+
+    `renew(topic)` subscribes anew, `remap()` follows a change of what is published, `resubscribe()` one of what the
+    watch itself needs, `noted(text)` logs.
+    """
+
+    def __init__(
+        self,
+        *,
+        now: Callable[[], float],
+        renew: Callable[[str], None],
+        remap: Callable[[], None],
+        resubscribe: Callable[[], None],
+        noted: Callable[[str], None],
+        type_of: Callable[[str], str | None],
+    ) -> None:
+        self._now = now
+        self._renew = renew
+        self._remap = remap
+        self._resubscribe = resubscribe
+        self._noted = noted
+        self._type_of = type_of
+        self._named: set[str] = set()
+        self._undelivered = Passing()
+        self.delivery = Delivery()
+        self.not_received: Mapping[str, tuple[str, ...]] = {}  # topic → its publishers, of what does not come
+
+    def opened(self) -> None:
+        """The connection opens, for the first time or again."""
+        self.delivery.opened(self._now())
+        self._undelivered.opened()
+
+    @property
+    def needs_client_count(self) -> bool:
+        """Whether CLIENT_COUNT has to be subscribed to."""
+        return self._undelivered.needs_clients
+
+    def client_count(self, message: object) -> None:
+        """A message of CLIENT_COUNT."""
+        self._undelivered.counted(message)
+
+    def problem(self, now_s: float) -> Problem | None:
+        """What keeps topics from us; None: nothing is known to."""
+        return self._undelivered.problem(now_s)
+
+    async def look(self, asks: Asks, candidates: Collection[str], *, is_current: Callable[[], bool]) -> None:
+        """Asks who publishes what does not come; where somebody does, subscribes anew. `candidates`: topics that could
+        carry a signal. Nothing is done once `is_current()` is false. Raises LinkDown."""
+        topics = self.delivery.to_ask(self._now(), candidates)
+        answers = await asyncio.gather(
+            *(discovery.ask_publishers(asks, topic, and_bridge=True) for topic in topics), return_exceptions=True
+        )
+        if not is_current():
+            return
+        before = set(self.delivery.unpublished)
+        for topic, nodes in zip(topics, answers, strict=True):
+            if isinstance(nodes, BaseException):
+                raise nodes
+            if self.delivery.answered(topic, nodes, self._now()):
+                self._renew(topic)
+        if self.delivery.unpublished != before:
+            self._remap()
+        missing = {
+            topic: nodes
+            for topic, nodes in self.delivery.not_received(self._now()).items()
+            if plain_type(self._type_of(topic) or "") not in recorded_topics.EVENTS
+        }
+        news = [f"{topic} ({', '.join(missing[topic][:3])})" for topic in missing if topic not in self._named]
+        self.not_received = missing
+        if news:
+            self._named |= set(missing)
+            self._noted(f"No message comes from topics that have a publisher: {', '.join(news[:MOST_NAMED])}.")
+
+    async def look_behind(self, asks: Asks) -> None:
+        """Of a signal's topic that has a publisher and does not come: did the bridge subscribe? Raises LinkDown."""
+        needed = self._undelivered.needs_clients
+        self._undelivered.follow(self.delivery.never_came(self._now()), self._now())
+        if self._undelivered.needs_clients != needed:
+            self._resubscribe()
+        if self._undelivered.needs_clients and not self._undelivered.bridges:
+            nodes = await discovery.ask_publishers(asks, CLIENT_COUNT, and_bridge=True)
+            self._undelivered.bridges = frozenset(nodes or ())
+        for topic in self._undelivered.to_ask(self._now()):
+            self._undelivered.answered(topic, await discovery.ask_subscribers(asks, topic), self._now())

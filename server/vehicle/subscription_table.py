@@ -1,0 +1,128 @@
+"""The subscriptions of one car's link: made of what is mapped and offered, kept at the bridge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+
+from server.judge.topics import Source
+from server.recording.recorded_topics import Also
+from server.rosbridge.link import RosLink, Subscription
+from server.vehicle import wanted_topics
+from server.vehicle.cbor_use import CborUse
+from server.vehicle.delivery import Delivery
+from server.vehicle.large_topics import LargeTopics
+from server.vehicle.link_load import LinkLoad
+from server.vehicle.type_definitions import TypeDefinitions
+from server.vehicle.undelivered import CLIENT_COUNT
+
+BY_NAME_AGAIN_S, BY_NAME_LAST_S = 5.0, 60.0  # each attempt without rosapi costs the bridge a line in its log a name
+
+
+class SubscriptionTable:
+    """`link` None: no car is dialled. `now` is a monotonic clock in seconds."""
+
+    def __init__(
+        self,
+        link: RosLink | None,
+        definitions: TypeDefinitions,
+        delivery: Delivery,
+        *,
+        now: Callable[[], float],
+    ) -> None:
+        self._link = link
+        self._definitions = definitions
+        self._delivery = delivery
+        self._now = now
+        self._by_name_s: float | None = None  # when the names were last subscribed to without rosapi
+        self._by_name_pause_s = BY_NAME_AGAIN_S
+        self.cbor = CborUse()
+        self.large = LargeTopics()
+        self.load = LinkLoad()
+        self.guard: str | None = None  # a topic that is subscribed to besides
+        self.also: Also = "none"  # what is to be recorded beyond the signals
+        self.recorded = wanted_topics.Recorded(topics={}, left_out=())
+        self.judged = 0  # topics that are subscribed to for their signals
+
+    @property
+    def rows(self) -> tuple[Subscription, ...]:
+        return () if self._link is None else tuple(self._link.subscriptions)
+
+    def end(self) -> None:
+        """Nothing is subscribed to any more."""
+        self._link = None
+
+    def opened(self) -> None:
+        """The connection opens, and the link sends its rows."""
+        self._by_name_s, self._by_name_pause_s = self._now(), BY_NAME_AGAIN_S
+
+    def subscribe(
+        self,
+        by_topic: Mapping[str, tuple[Source, ...]],
+        offered: Mapping[str, str] | None,
+        *,
+        needs_client_count: bool,
+    ) -> None:
+        """Brings the link's rows to what is wanted now. `offered` None: the bridge does not say what there is."""
+        known, too_large, compression = self._definitions, self.large.left, self.cbor.compression
+        wanted = wanted_topics.judged(
+            by_topic, self.load, without=too_large, asked=known.asked, fit=known.fit, compression=compression
+        )
+        self.judged = len(wanted)
+        if offered is not None:
+            without = {*wanted, *too_large}
+            self.recorded = wanted_topics.recorded(
+                offered, self.load, without=without, also=self.also, asked=known.asked
+            )
+            wanted |= wanted_topics.rows_of(self.recorded, fit=known.fit, compression=compression)
+            if needs_client_count and CLIENT_COUNT in offered:
+                kind = offered[CLIENT_COUNT] or None
+                wanted.setdefault(CLIENT_COUNT, Subscription(topic=CLIENT_COUNT, type=kind, queue_length=1))
+        if self.guard is not None:
+            wanted.setdefault(self.guard, Subscription(topic=self.guard, type="std_msgs/String", queue_length=1))
+        self._apply(wanted, [topic for topic in wanted if topic in by_topic], [*self.recorded.topics])
+
+    def subscribe_by_name(self, picked: Mapping[str, str]) -> Mapping[str, tuple[Source, ...]]:
+        """Without rosapi, by the names that are known; the signals that each topic would fill."""
+        by_topic, wanted = wanted_topics.by_name(picked, self.load)
+        self.judged = len(by_topic)
+        self._apply(wanted, [*by_topic], [])
+        return by_topic
+
+    def renew_by_name(self) -> None:
+        """A bridge forgets a subscription without a type where nobody publishes the topic yet."""
+        now_s = self._now()
+        if self._by_name_s is None or now_s - self._by_name_s < self._by_name_pause_s:
+            return
+        self._by_name_s, self._by_name_pause_s = now_s, min(self._by_name_pause_s * 2, BY_NAME_LAST_S)
+        for row in self.rows:
+            if row.type is None and self._delivery.never_heard(row.topic):
+                self._renew(row.topic)
+
+    def renew(self, topic: str) -> bool:
+        """A subscription that another client spoilt comes alive; one as CBOR is to be made as JSON: then `subscribe` is
+        still to be called, and the answer is true."""
+        if any(row.topic == topic and row.compression == "cbor" for row in self.rows):
+            self.cbor.did_not_arrive(topic)
+            return True
+        self._renew(topic)
+        return False
+
+    def renew_all(self) -> None:
+        """A new roscore does not know the old subscriptions."""
+        for row in self.rows:
+            self._renew(row.topic)
+
+    def _apply(self, wanted: Mapping[str, Subscription], judged: Collection[str], recorded: Collection[str]) -> None:
+        link = self._link
+        if link is None:
+            return
+        for row in self.rows:
+            if row.topic not in wanted:
+                link.unsubscribe(row.topic)
+        for subscription in wanted.values():
+            link.subscribe(subscription)
+        self._delivery.follow(judged, recorded, now_s=self._now())
+
+    def _renew(self, topic: str) -> None:
+        if self._link is not None:
+            self._link.renew(topic)

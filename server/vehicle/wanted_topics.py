@@ -1,0 +1,99 @@
+"""Which topics are to be subscribed to, and how: from what is offered, what is judged and what the link bears. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+
+from server.judge.topics import BY_SIGNAL, TOPICS, Source
+from server.recording import recorded_topics
+from server.recording.recorded_topics import Also
+from server.rosbridge.link import Subscription
+from server.vehicle.link_load import LinkLoad
+
+Compression = Callable[[str, bool], str]  # topic and whether its type is fit for CBOR → "cbor" or "none"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recorded:
+    """Of the topics that carry no signal."""
+
+    topics: Mapping[str, str]  # topic → type of what is subscribed to only to be recorded
+    left_out: tuple[str, ...]  # not recorded, for they are bulky or there are too many
+
+
+def judged(
+    by_topic: Mapping[str, tuple[Source, ...]],
+    load: LinkLoad,
+    *,
+    without: Collection[str],
+    asked: Collection[str],
+    fit: Collection[str],
+    compression: Compression,
+) -> dict[str, Subscription]:
+    """The subscriptions that signals need. `asked`: types whose definitions are known; `fit`: those fit for CBOR."""
+    wanted: dict[str, Subscription] = {}
+    for topic, sources in by_topic.items():
+        rows = [BY_SIGNAL[source.signal] for source in sources if source.decode is not None]
+        if rows and topic not in without:
+            kind = sources[0].type
+            is_fit = rows[0].compression == "cbor" and (kind not in asked or kind in fit)
+            wanted[topic] = Subscription(
+                topic=topic,
+                type=kind,
+                compression=compression(topic, is_fit),
+                throttle_ms=min(load.throttle_ms(row.signal) for row in rows),
+                queue_length=1 if load.step else min(row.queue_length for row in rows),
+            )
+    return wanted
+
+
+def recorded(
+    offered: Mapping[str, str],
+    load: LinkLoad,
+    *,
+    without: Collection[str],
+    also: Also,
+    asked: Collection[str],
+) -> Recorded:
+    """What is to be recorded beside; none over a link that is too slow for it."""
+    others, left_out = recorded_topics.choose(offered, without=without, also=also, asked=asked)
+    if not load.level.records_others:
+        return Recorded(topics={}, left_out=tuple(sorted({*left_out, *others})))
+    return Recorded(topics=others, left_out=left_out)
+
+
+def rows_of(found: Recorded, *, fit: Collection[str], compression: Compression) -> dict[str, Subscription]:
+    """The subscriptions of what is recorded beside."""
+    return {
+        topic: Subscription(
+            topic=topic,
+            type=kind or None,
+            compression=compression(topic, kind in fit),
+            queue_length=recorded_topics.QUEUE_LENGTH,
+        )
+        for topic, kind in found.topics.items()
+    }
+
+
+def by_name(picked: Mapping[str, str], load: LinkLoad) -> tuple[dict[str, tuple[Source, ...]], dict[str, Subscription]]:
+    """Without rosapi: what the operator picked, else every name of the table, its type left to the bridge."""
+    by_topic: dict[str, tuple[Source, ...]] = {}
+    wanted: dict[str, Subscription] = {}
+    for row in TOPICS:
+        for name in (picked[row.signal],) if row.signal in picked else row.names:
+            source = Source(
+                signal=row.signal,
+                topic=name,
+                type=None,
+                decode=row.types[row.expected_type],
+                note="subscribed by name: the bridge has no rosapi",
+            )
+            by_topic[name] = (*by_topic.get(name, ()), source)
+            wanted[name] = Subscription(
+                topic=name,
+                type=None,
+                throttle_ms=load.throttle_ms(row.signal),
+                queue_length=1 if load.step else row.queue_length,
+            )
+    return by_topic, wanted
