@@ -11,7 +11,7 @@ import contextlib
 import math
 import uuid
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from server.judge.active_settings import Tuning
 from server.judge.message import RosVersion
 from server.protocol import serialize
 from server.recording import space
+from server.recording.delay import DelayWriter, LinkDelay
 from server.recording.folder import RecordingsFolder, id_of, part_id
 from server.recording.own import Own
 from server.recording.recorded_topics import Also, Missing
@@ -34,6 +35,7 @@ from server.version import catgraph_version
 NOWHERE = "This server keeps nothing: it was started without a folder for data."
 EARLY_AT_MOST = 200  # own words kept while no part is open: those of a gap stand at the beginning of the next part
 EARLY_S = 10.0  # and those from before a session began, if it was not long before: how it came to be connected
+NOTE_EVERY_S = 2.0  # at most: what is missing in a part, written into it
 BEGIN_AFTER_S = 2.0  # a car that says nothing is recorded all the same: that it said nothing
 SETTLE_S = 5.0  # a disk that takes longer is not waited for when the server ends
 GB = 1e9
@@ -52,6 +54,9 @@ class _Tape:
     is_open: bool = False  # the part is being written
     lost_s: float | None = None  # since when it is held
     due_s: float | None = None  # a part is to begin with the next message, or at this moment
+    noted: Missing | None = None  # what the part says already of what is missing in it
+    noted_s: float = -math.inf
+    delays: DelayWriter = field(default_factory=DelayWriter)  # of the part
 
     @property
     def newest(self) -> int:
@@ -212,6 +217,14 @@ class SessionRecording:
         else:
             self.own("operator", {"by": by, "ok": reason is None, "reason": reason} | said)
 
+    def delays(self, delays: Mapping[str, float], link: LinkDelay) -> None:
+        """How old what comes is, once a tick: whoever judges the recording must know it."""
+        tape = self._tape
+        if tape is not None and tape.is_open and self._recorder is not None:
+            row = tape.delays.row(delays, link)
+            if row is not None:
+                self._recorder.own("delay", row, self._ns(self._now()))
+
     def events(self, numbered: list[dict[str, Any]]) -> None:
         """Numbered events of the log."""
         for event in numbered:
@@ -261,6 +274,9 @@ class SessionRecording:
             self._tape = None
         if self._recorder is not None:
             self._recorder.allowance = self._allowance()
+            if tape.is_open and self.missing != (tape.noted or Missing()) and now_s - tape.noted_s >= NOTE_EVERY_S:
+                tape.noted, tape.noted_s = self.missing, now_s
+                self._recorder.note(**self.missing.as_metadata())
 
     async def stop(self) -> None:
         """Completes what is being written; for the end of the server."""
@@ -398,7 +414,8 @@ class SessionRecording:
         self.prepare()
         assert self._recorder is not None
         self._recorder.allowance = self._allowance()
-        tape.begun = part
+        tape.delays = DelayWriter()
+        tape.begun, tape.noted, tape.noted_s = part, None, -math.inf
         self._recorder.begin(part)
         if self._definitions:
             self._recorder.learn(self._definitions)

@@ -62,12 +62,21 @@ class MissingWatch:
         """What keeps topics from us; None: nothing is known to."""
         return self._undelivered.problem(now_s)
 
-    async def look(self, asks: Asks, candidates: Collection[str], *, is_current: Callable[[], bool]) -> None:
+    async def look(
+        self,
+        asks: Asks,
+        candidates: Collection[str],
+        *,
+        commanded: Collection[str | None],
+        is_current: Callable[[], bool],
+    ) -> None:
         """Asks who publishes what does not come; where somebody does, subscribes anew. `candidates`: topics that could
-        carry a signal. Nothing is done once `is_current()` is false. Raises LinkDown."""
+        carry a signal. `commanded`: where the car is commanded; there the bridge is a publisher once the slow-down is
+        armed, and nothing need come. Nothing is done once `is_current()` is false. Raises LinkDown."""
         topics = self.delivery.to_ask(self._now(), candidates)
         answers = await asyncio.gather(
-            *(discovery.ask_publishers(asks, topic, and_bridge=True) for topic in topics), return_exceptions=True
+            *(discovery.ask_publishers(asks, topic, and_bridge=topic not in commanded) for topic in topics),
+            return_exceptions=True,
         )
         if not is_current():
             return

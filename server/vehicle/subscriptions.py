@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 from server.judge import pipeline
 from server.judge.active_settings import Tuning
-from server.judge.topics import Source, could_carry, map_signals
+from server.judge.topics import COMMAND, Source, could_carry, map_signals
 from server.recording.recorded_topics import Also, Missing
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.link import LinkDown, RosLink
@@ -85,7 +85,11 @@ class Subscriptions:
                 alive = await ros.ask(asks)
                 if self._offer is not None:
                     candidates = could_carry(self._offer.topics, self._tuning.settings.topics)
-                    await self._missing.look(asks, candidates, is_current=lambda: link is self._link)
+                    source = self.sources.get(COMMAND)
+                    commanded = {ros.commanded_on, source.topic if source is not None else None}
+                    await self._missing.look(
+                        asks, candidates, commanded=commanded, is_current=lambda: link is self._link
+                    )
                 await self._missing.look_behind(asks)
             except LinkDown:
                 return

@@ -7,7 +7,9 @@ import logging
 from collections.abc import Callable
 from functools import partial
 
+from monitor.state import LinkFacts
 from server.bus.bus import LocalBus
+from server.recording.delay import LinkDelay
 from server.judge.pipeline import TICK_S
 from server.slowdown.command_target import GUARD_STATE, way_of
 from server.vehicle import facts
@@ -106,8 +108,10 @@ class Tick:
         self._attempts.attempt("checks", partial(self._parts.judgement.judge, now_s))
 
     def watch_link(self, now_s: float) -> None:
-        found = facts.link_facts(self._parts, now_s, wall_ms=self._wall_ms(), log_trouble=self.log_trouble)
-        self._parts.judgement.state.link(found)
+        self._parts.judgement.state.link(self._link_facts(now_s))
+
+    def _link_facts(self, now_s: float) -> LinkFacts:
+        return facts.link_facts(self._parts, now_s, wall_ms=self._wall_ms(), log_trouble=self.log_trouble)
 
     def watch_load(self, now_s: float) -> None:
         """Over a slow link less is subscribed to before what is judged grows old."""
@@ -123,6 +127,10 @@ class Tick:
         recording.ros_version = topics.ros_version
         recording.missing = topics.missing
         recording.tick(now_s)
+        if self._parts.connection.phase == "monitoring":
+            found = self._link_facts(now_s)
+            link = LinkDelay(now_s, found.late_s, found.throttled, found.reduced)
+            recording.delays(self._parts.judgement.transport.delays(), link)
         topics.record(recording.also)
         self._parts.judgement.state.recorder(recording.facts(now_s))
 
