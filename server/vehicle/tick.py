@@ -9,8 +9,8 @@ from functools import partial
 
 from monitor.state import LinkFacts
 from server.bus.bus import LocalBus
-from server.recording.delay import LinkDelay
 from server.judge.pipeline import TICK_S
+from server.recording.delay import LinkDelay
 from server.slowdown.command_target import GUARD_STATE, way_of
 from server.vehicle import facts
 from server.vehicle.link_load import RESTORE_BELOW_S

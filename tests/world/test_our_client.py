@@ -55,14 +55,18 @@ class Watched(Session):
         self.junk: list[str] = []
         self.named: set[str] = set()
         super().__init__(*what, **more)
+        intake = self._parts.intake
+        take, take_junk = intake.message_received, intake.junk_received
 
-    def message_received(self, topic: str, message: Any, note: str | None) -> None:
-        self.messages.append((topic, message))
-        super().message_received(topic, message, note)
+        def message_received(topic: str, message: Any, note: str | None) -> None:
+            self.messages.append((topic, message))
+            take(topic, message, note)
 
-    def junk_received(self, why: str) -> None:
-        self.junk.append(why)
-        super().junk_received(why)
+        def junk_received(why: str) -> None:
+            self.junk.append(why)
+            take_junk(why)
+
+        intake.message_received, intake.junk_received = message_received, junk_received  # type: ignore[method-assign]
 
     def look(self) -> dict[str, Any]:
         state = json.loads(orjson.dumps(self.frame()))
