@@ -12,6 +12,7 @@ from monitor.catalog import AnyCheck
 from server.app.build import build
 from server.app.config import Config
 from server.app.lifespan import lifespan
+from server.system import preload  # noqa: F401
 from server.web.middleware import errors
 from server.web.middleware.access_guard import Guard
 from server.web.middleware.headers import SecurityHeaders
