@@ -92,7 +92,8 @@ def test_the_container_gets_every_file_that_the_build_reads() -> None:
 
 
 def test_the_commands_of_the_readme_exist(capsys: pytest.CaptureFixture[str]) -> None:
-    readme = (PROJECT / "README.md").read_text(encoding="utf-8")
+    pages = [PROJECT / "README.md", PROJECT / "CONTRIBUTING.md", *sorted((PROJECT / "docs/guide").glob("*.md"))]
+    readme = "\n".join(page.read_text(encoding="utf-8") for page in pages)
     makefile = (PROJECT / "Makefile").read_text(encoding="utf-8")
     for target in set(re.findall(r"make ([a-z]+)`|^make ([a-z]+)$", readme, re.M)):
         assert re.search(rf"^{''.join(target)}:", makefile, re.M), target
@@ -103,11 +104,11 @@ def test_the_commands_of_the_readme_exist(capsys: pytest.CaptureFixture[str]) ->
         assert re.search(rf"^ +{command} ", commands, re.M), command
 
 
-def test_the_check_of_the_readme_works() -> None:
-    example = re.search(r"```python\n(.*?)```", (PROJECT / "README.md").read_text(encoding="utf-8"), re.S)
+def test_the_check_of_the_recipe_works() -> None:
+    example = re.search(r"```python\n(.*?)```", (PROJECT / "docs/extending.md").read_text(encoding="utf-8"), re.S)
     assert example
     module: dict[str, Any] = {"__name__": "example"}
-    exec(compile(example[1], "README.md", "exec", dont_inherit=True), module)
+    exec(compile(example[1], "docs/extending.md", "exec", dont_inherit=True), module)
     (check,) = module["CHECKS"]
     assert isinstance(check, Check)
     assert check.limits().max_percent == 80.0
