@@ -71,8 +71,11 @@ async function run() {
     try {
       stop(); // values that look alive, on a page that could not ask for anybody, would be a lie
     } finally {
-      undrawn?.show();
-      giveUp();
+      try {
+        giveUp(); // first: a dialog that is closed and not removed would take that for an acknowledgement
+      } finally {
+        undrawn?.show();
+      }
     }
   }
 }
