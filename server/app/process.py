@@ -67,7 +67,7 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
         "--site-image",
         type=Path,
         metavar="FILE",
-        help="a picture of the site to draw above the maps; its corners stand in FILE.toml beside it, see docs/guide/map.md",
+        help="a picture of the site to draw above the maps; its corners stand in FILE.toml (docs/guide/map.md)",
     )
     map_options.add_arguments(parser)
     parser.add_argument(

@@ -137,6 +137,8 @@ class Connection:
     def link_closed(self, problem: Problem) -> None:
         now_s = self._now()
         self._observer.connection_closed()
+        if problem.code == connection_errors.BRIDGE_SILENT:
+            self.subscriptions.fell_silent()
         if self.is_proved:
             self.problem = problem
             if self.phase != "lost":

@@ -12,6 +12,7 @@ from server.vehicle.cbor_use import CborUse
 from server.vehicle.delivery import Delivery
 from server.vehicle.large_topics import LargeTopics
 from server.vehicle.link_load import LinkLoad
+from server.vehicle.probation import Probation
 from server.vehicle.type_definitions import TypeDefinitions
 from server.vehicle.undelivered import CLIENT_COUNT
 
@@ -38,6 +39,7 @@ class SubscriptionTable:
         self.cbor = CborUse()
         self.large = LargeTopics()
         self.load = LinkLoad()
+        self.probation = Probation()
         self.guard: str | None = None  # a topic that is subscribed to besides
         self.also: Also = "none"  # what is to be recorded beyond the signals
         self.recorded = wanted_topics.Recorded(topics={}, left_out=())
@@ -54,6 +56,7 @@ class SubscriptionTable:
     def opened(self) -> None:
         """The connection opens, and the link sends its rows."""
         self._by_name_s, self._by_name_pause_s = self._now(), BY_NAME_AGAIN_S
+        self.probation.opened(self._now())
 
     def subscribe(
         self,
@@ -71,7 +74,7 @@ class SubscriptionTable:
         if offered is not None:
             without = {*wanted, *too_large}
             self.recorded = wanted_topics.recorded(
-                offered, self.load, without=without, also=self.also, asked=known.asked
+                offered, self.load, without=without, held=self.probation.held, also=self.also, asked=known.asked
             )
             wanted |= wanted_topics.rows_of(self.recorded, fit=known.fit, compression=compression)
             if needs_client_count and CLIENT_COUNT in offered:
@@ -106,6 +109,29 @@ class SubscriptionTable:
             return True
         self._renew(topic)
         return False
+
+    def tries_another(self) -> bool:
+        """Whether a topic on probation is to be subscribed to now; then `subscribe` is still to be called."""
+        return self.load.level.records_others and self.probation.look(self._now())
+
+    def look_at_load(self, late_s: float) -> tuple[bool, list[str]]:
+        """Whether less or more is to be subscribed to now, and the topics that are left because of it."""
+        before = self.load.step
+        if not self.load.look(late_s, self._now()):
+            return False, []
+        if self.load.step == 0:
+            self.probation.opened(self._now())
+        return True, self.probation.silent(()) if before == 0 else []
+
+    def fell_silent(self) -> tuple[bool, list[str]]:
+        """The link was given up because the bridge did not answer; it may be busy with what is only recorded. Whether
+        topics are suspected of it, and those that are left now."""
+        suspects = [
+            topic
+            for topic, kind in self.recorded.topics.items()
+            if kind in self._definitions.may_be_large and topic not in self._delivery.delivered
+        ]
+        return bool(suspects), self.probation.silent(suspects)
 
     def renew_all(self) -> None:
         """A new roscore does not know the old subscriptions."""

@@ -7,15 +7,15 @@ from collections.abc import Callable, Mapping
 
 from server.judge import pipeline
 from server.judge.active_settings import Tuning
-from server.judge.topics import COMMAND, Source, could_carry, map_signals
+from server.judge.topics import Source, could_carry
 from server.recording.recorded_topics import Also, Missing
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.link import LinkDown, RosLink
 from server.rosbridge.rosapi_client import Asks
 from server.vehicle import discovery
-from server.vehicle.link_load import LinkLoad
 from server.vehicle.missing_watch import MissingWatch
 from server.vehicle.ros_watch import RosWatch
+from server.vehicle.signal_map import SignalMap
 from server.vehicle.subscription_table import SubscriptionTable
 from server.vehicle.type_definitions import TypeDefinitions
 from server.vehicle.undelivered import CLIENT_COUNT
@@ -62,11 +62,9 @@ class Subscriptions:
             noted=noted,
             type_of=self.type_of,
         )
-        self._table = SubscriptionTable(link, self._definitions, self._missing.delivery, now=now)
-        self.sources: Mapping[str, Source] = {}  # by signal
+        self.table = SubscriptionTable(link, self._definitions, self._missing.delivery, now=now)
+        self.signals = SignalMap()
         self.by_topic: Mapping[str, tuple[Source, ...]] = {}
-        self.unmapped: Mapping[str, str] = {}  # topic → type of what carries no signal
-        self.offers_nothing = False
         self.ros = RosWatch(link, now=now, timed=timed)
         self.ros_version: int | None = None
 
@@ -76,17 +74,18 @@ class Subscriptions:
         looked_s = -LOOK_AGAIN_S
         self._missing.opened()
         ros.diagnosis.opened()
-        self._table.opened()
+        self.table.opened()
         while link is not None and asks is not None and link is self._link and link.is_open:
             try:
-                if self._look_soon or self._now() - looked_s >= (LOOK_AGAIN_S if self.sources else 1.0):
+                if self._look_soon or self._now() - looked_s >= (LOOK_AGAIN_S if self.signals.sources else 1.0):
                     looked_s, self._look_soon = self._now(), False
                     await self._look(link, asks)
                 alive = await ros.ask(asks)
+                if self.table.tries_another():
+                    self._subscribe()
                 if self._offer is not None:
                     candidates = could_carry(self._offer.topics, self._tuning.settings.topics)
-                    source = self.sources.get(COMMAND)
-                    commanded = {ros.commanded_on, source.topic if source is not None else None}
+                    commanded = {ros.commanded_on, self.signals.command_topic}
                     await self._missing.look(
                         asks, candidates, commanded=commanded, is_current=lambda: link is self._link
                     )
@@ -98,7 +97,7 @@ class Subscriptions:
             if ros.diagnosis.is_rosbridge:
                 self._proved()
             if ros.diagnosis.master_came_back():
-                self._table.renew_all()
+                self.table.renew_all()
             ros.answered(alive)
             await asyncio.sleep(ros.pause_s)
 
@@ -107,7 +106,7 @@ class Subscriptions:
         self._link = None
         self.ros.end()
         self._definitions.end()
-        self._table.end()
+        self.table.end()
 
     # -- what is known -----------------------------------------------------------------------------------------------
 
@@ -119,32 +118,22 @@ class Subscriptions:
     @property
     def others(self) -> Mapping[str, str]:
         """Topic → type of what is subscribed to only to be recorded."""
-        return self._table.recorded.topics
-
-    @property
-    def judged(self) -> int:
-        """How many topics are subscribed to for their signals."""
-        return self._table.judged
-
-    @property
-    def load(self) -> LinkLoad:
-        """How much is subscribed to while the link is slow."""
-        return self._table.load
+        return self.table.recorded.topics
 
     @property
     def missing(self) -> Missing:
         """What is offered and does not come to be recorded."""
         return Missing(
-            left_out=self._table.recorded.left_out,
+            left_out=self.table.recorded.left_out,
             not_received=self._missing.not_received,
-            too_large=self._table.large.left,
+            too_large=self.table.large.left,
         )
 
     def published(self) -> frozenset[str]:
         """The signals that the car has in a form that can be read; not yet one whose publisher has only just come."""
         now_s, delivery = self._now(), self._missing.delivery
         return pipeline.published(
-            source for source in self.sources.values() if not delivery.has_its_time(source.topic, now_s)
+            source for source in self.signals.sources.values() if not delivery.has_its_time(source.topic, now_s)
         )
 
     def type_of(self, topic: str) -> str | None:
@@ -162,14 +151,16 @@ class Subscriptions:
     def watch_commands(self, topic: str | None, *, guard: str | None) -> None:
         """From now on rosapi is asked who publishes there; None: nobody commands the car. `guard`: a topic besides."""
         self.ros.watch_commands(topic)
-        if guard != self._table.guard:
-            self._table.guard = guard
+        if guard != self.table.guard:
+            self.table.guard = guard
             if self._offer is not None:
                 self._subscribe()
 
     def watch_load(self, late_s: float) -> bool:
         """Subscribes to less where the link is late, and to more once it is in time; True where that changed."""
-        if not self.load.look(late_s, self._now()):
+        changed, left = self.table.look_at_load(late_s)
+        self._note_left(left)
+        if not changed:
             return False
         if self._offer is not None:
             self._subscribe()
@@ -179,8 +170,8 @@ class Subscriptions:
 
     def record(self, also: Also) -> None:
         """Which topics are to be recorded beyond those that carry signals; nobody judges them."""
-        if also != self._table.also:
-            self._table.also, self._look_soon = also, True
+        if also != self.table.also:
+            self.table.also, self._look_soon = also, True
             if self._offer is not None:
                 self._subscribe()
 
@@ -195,6 +186,7 @@ class Subscriptions:
 
     def received(self, topic: str) -> None:
         """A message came on a topic."""
+        self.table.probation.heard(topic)
         if self._missing.delivery.heard(topic, self._now()):
             self._look_soon = True  # it has a publisher now: it may carry a signal
 
@@ -209,21 +201,32 @@ class Subscriptions:
         """A message that was too large to be read. A topic that the message does not name is found where only one can
         be it."""
         topic = self._missing.delivery.only_silent() if topic is None else topic
-        if topic is not None and self._link is not None and self._table.large.skipped(topic, size):
+        if topic is not None and self._link is not None and self.table.large.skipped(topic, size):
             if self._offer is not None:
                 self._subscribe()
             else:
                 self._link.unsubscribe(topic)
-            self._noted(self._table.large.sentence(topic))
+            self._noted(self.table.large.sentence(topic))
+
+    def fell_silent(self) -> None:
+        """The link was given up because the bridge did not answer."""
+        is_suspected, left = self.table.fell_silent()
+        self._note_left(left)
+        if is_suspected and self._offer is not None:
+            self._subscribe()  # before the link sends its rows again
+
+    def _note_left(self, topics: list[str]) -> None:
+        for topic in topics:
+            self._noted(f"{topic} is not received any more: while it is asked for, the bridge does not answer in time.")
 
     def bridge_complains(self, text: str) -> None:
         """An error the bridge states."""
-        if self._table.cbor.bridge_complains(text):
+        if self.table.cbor.bridge_complains(text):
             self._subscribe()
 
     def binary_noise(self) -> None:
         """A binary frame that could not be read, where no scan ever could."""
-        if self._table.cbor.binary_noise():
+        if self.table.cbor.binary_noise():
             self._subscribe()
 
     # -- subscribing -------------------------------------------------------------------------------------------------
@@ -233,10 +236,10 @@ class Subscriptions:
         if link is not self._link:
             return
         if offer is None:
-            if not self._looked and not self.sources:
+            if not self._looked and not self.signals.sources:
                 self._subscribe_by_name()  # no rosapi: try the names we know
             elif self._offer is None:
-                self._table.renew_by_name()
+                self.table.renew_by_name()
             else:
                 self._learn(asks, self._offer)  # rosapi may have ended since it named them
             return
@@ -250,29 +253,22 @@ class Subscriptions:
         self._learn(asks, offer)
 
     def _learn(self, asks: Asks, offer: discovery.Offer) -> None:
-        if self._table.also != "none":
+        if self.table.also != "none":
             self._definitions.learn(asks, offer.topics, self.ros_version)
 
     def _map(self, offer: discovery.Offer) -> None:
         """Chooses the topic of each signal and subscribes to them."""
-        sources = map_signals(offer.topics, self._tuning.settings.topics, self._missing.delivery.unpublished)
-        gone = {
-            s: source for s, source in self.sources.items() if s not in sources and source.topic not in offer.topics
-        }
-        self.sources = gone | sources  # a topic that vanished stays subscribed: it may come back
-        mapped = {source.topic for source in self.sources.values()}
-        self.unmapped = {name: kind for name, kind in offer.topics.items() if name not in mapped}
-        self.offers_nothing = not any(source.decode for source in self.sources.values())
+        self.signals.update(offer.topics, self._tuning.settings.topics, self._missing.delivery.unpublished)
         self._subscribe()
 
     def _subscribe(self) -> None:
         if self._link is not None:
-            self.by_topic = pipeline.by_topic(self.sources.values())
-            self._table.subscribe(self.by_topic, self.offered, needs_client_count=self._missing.needs_client_count)
+            self.by_topic = pipeline.by_topic(self.signals.sources.values())
+            self.table.subscribe(self.by_topic, self.offered, needs_client_count=self._missing.needs_client_count)
 
     def _subscribe_anew(self, topic: str) -> None:
-        if self._table.renew(topic):
+        if self.table.renew(topic):
             self._subscribe()
 
     def _subscribe_by_name(self) -> None:
-        self.by_topic = self._table.subscribe_by_name(self._tuning.settings.topics)
+        self.by_topic = self.table.subscribe_by_name(self._tuning.settings.topics)

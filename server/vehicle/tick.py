@@ -119,7 +119,9 @@ class Tick:
         if self._parts.connection.phase == "monitoring" and topics.watch_load(transport.queued_s(now_s)):
             late_s = transport.late_s(now_s)
             why = f"The link is slow, {late_s:.1f} s late" if late_s > RESTORE_BELOW_S else "The link is in time"
-            self._parts.event_log.note("reduced", f"{why}. {topics.load.level.words}.", step=topics.load.step)
+            self._parts.event_log.note(
+                "reduced", f"{why}. {topics.table.load.level.words}.", step=topics.table.load.step
+            )
 
     def watch_recording(self, now_s: float) -> None:
         """The recorder learns what the subscriptions know, and the other way round."""
@@ -144,7 +146,7 @@ class Tick:
         """What slows the car learns what the judge knows, and the other way round."""
         parts, topics, slow_down = self._parts, self._parts.connection.subscriptions, self._parts.slow_down
         monitor = parts.judgement.monitor
-        target = way_of(phase=parts.connection.phase, sources=topics.sources, offered=topics.offered)
+        target = way_of(phase=parts.connection.phase, sources=topics.signals.sources, offered=topics.offered)
         slow_down.limits = monitor.limits.slow_down
         slow_down.rivals = topics.ros.publishers
         slow_down.is_steering_known = monitor.limits.steering.tyre_rad_per_unit != 0.0

@@ -32,6 +32,7 @@ class TypeDefinitions:
         self._ended = False
         self.asked: set[str] = set()  # types whose definitions the bridge was asked for
         self.fit: set[str] = set()  # of those, the ones that arrive as CBOR
+        self.may_be_large: set[str] = set()  # types that have arrays without a bound
 
     def learn(self, asks: Asks, topics: Mapping[str, str], ros_version: int | None) -> None:
         """Begins to ask for what is not known yet of the types of these topics; does nothing while it asks."""
@@ -69,6 +70,7 @@ class TypeDefinitions:
         if not self._ended:
             self.asked |= types
             self.fit |= fit
+            self.may_be_large |= {kind for kind in types if kind not in found or "[]" in found[kind]}
             if found:
                 self._learned(found)
             self._changed()

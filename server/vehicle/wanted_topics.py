@@ -53,11 +53,14 @@ def recorded(
     load: LinkLoad,
     *,
     without: Collection[str],
+    held: Collection[str],
     also: Also,
     asked: Collection[str],
 ) -> Recorded:
-    """What is to be recorded beside; none over a link that is too slow for it."""
-    others, left_out = recorded_topics.choose(offered, without=without, also=also, asked=asked)
+    """What is to be recorded beside; none over a link that is too slow for it. `held`: they silence the bridge."""
+    found, left_out = recorded_topics.choose(offered, without=without, also=also, asked=asked)
+    left_out = tuple(sorted({*left_out, *(topic for topic in found if topic in held)}))
+    others = {topic: kind for topic, kind in found.items() if topic not in held}
     if not load.level.records_others:
         return Recorded(topics={}, left_out=tuple(sorted({*left_out, *others})))
     return Recorded(topics=others, left_out=left_out)

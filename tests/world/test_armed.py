@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.vehicle import delivery
+from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.rosbridge_server.conftest import bridging

@@ -355,8 +355,8 @@ def test_whatever_a_bridge_offers_nothing_harmful_is_asked_of_it(
         talk.record(also)
         await talk._look(link, link)
         await talk._look(link, link)
-        if talk._learning is not None:
-            await asyncio.gather(talk._learning, return_exceptions=True)
+        if (learning := talk._definitions._task) is not None:
+            await asyncio.gather(learning, return_exceptions=True)
         for topic in topics:
             await discovery.ask_publishers(link, topic)
             link.subscribe(Subscription(topic=topic, type=types[0] if types else None))

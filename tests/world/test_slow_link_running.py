@@ -11,11 +11,12 @@ from typing import Any
 
 import pytest
 
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.recording.read.read import open_recording
 from server.rosbridge.link import RosLink, Subscription
 from server.rosbridge_server.server import RosBridge
 from server.vehicle import link_load
+from server.vehicle.vehicle import Vehicle
 from tests.server.cars import ZERO, scan
 from tests.server.conftest import serving
 from tests.server.rosbridge_server.conftest import bridging

@@ -9,12 +9,13 @@ from typing import Any
 import pytest
 
 from server.analysis.rehearse import rehearse
-from server.app.config import Config, Vehicle
+from server.app.config import Config
 from server.recording.delay import DelayWriter, LinkDelay, RecordedDelay
 from server.recording.read.read import open_recording
 from server.replay.recorded_events import read_told
 from server.replay.run import Drive, Run
 from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.slow_proxy import slow_proxy
