@@ -23,7 +23,6 @@ FOLDERS = ("server", "monitor", "vehicle", "static/js")
 # Of import circles the entry counts the modules of a package that are part of one.
 ALLOWED: dict[str, int] = {
     "file server/analysis/html/report.js": 688,
-    "file server/recording/catalog/catalog.py": 457,
     "file server/recording/controller.py": 463,
     "file server/recording/recorder.py": 422,
     "file server/replay/run.py": 390,
@@ -32,7 +31,6 @@ ALLOWED: dict[str, int] = {
     "file server/web/page_socket.py": 468,
     "file static/js/core/store.js": 519,
     "file static/js/files/files-sheet.js": 367,
-    "class server/recording/catalog/catalog.py Catalog": 401,
     "class server/recording/controller.py SessionRecording": 402,
     "class server/recording/recorder.py Recorder": 331,
     "class server/replay/run.py Run": 276,

@@ -13,8 +13,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from server.recording.catalog import sketch
 from server.recording.catalog.annotations import BadRemark
-from server.recording.catalog.catalog import MAX_ROWS, Catalog, NotThere, Refused
+from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.catalog_db import Which
+from server.recording.catalog.errors import NotThere, Refused
+from server.recording.catalog.rows import MAX_ROWS
 from server.web.middleware.errors import Problem
 from server.web.middleware.ranges import file_answer
 from server.web.services import services
