@@ -26,7 +26,9 @@ from server.recording.delay import DelayWriter, LinkDelay
 from server.recording.folder import RecordingsFolder, id_of, part_id
 from server.recording.own import Own
 from server.recording.recorded_topics import Also, Missing
-from server.recording.recorder import Part, Recorder, Status
+from server.recording.recorder import Recorder
+from server.recording.recorder_queue import Part
+from server.recording.recorder_thread import Status
 from server.recording.space import Allowance
 from server.recording.standing import Stood
 from server.rosbridge.address import without_login
@@ -375,7 +377,7 @@ class SessionRecording:
         self._trouble = None
         now_s = self._now()
         if self._recorder is not None:
-            self._recorder.dropped, self._recorder.dropped_at_s = 0, None
+            self._recorder.forget_dropped()
         id = self._folder.first_id(self._vehicle, self._wall_ms())  # made unique by the thread, which may ask the disk
         self._tape = _Tape(id=id, session=str(uuid.uuid4()), by=by, began_s=now_s, due_s=now_s + BEGIN_AFTER_S)
 

@@ -12,10 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from server.recording import recorder as recorder_module
+from server.recording import space_watch, unfinished
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
 from server.recording.recover import recover, recover_all
+from server.recording.space import Allowance
 from server.rosbridge_server.server import RosBridge
 from tests.server.cars import driving
 from tests.server.recording.mcap.test_write import written
@@ -60,7 +61,7 @@ def fill(disk: Path, *, leave: int = 0) -> Path:
 async def test_a_disk_that_fills_up_ends_the_recording_and_it_is_completed_when_there_is_room_again(
     disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_module, "TRY_AGAIN_S", 0.2)
+    monkeypatch.setattr(unfinished, "TRY_AGAIN_S", 0.2)
     desk = Desk(disk)
     part = desk.part()
     desk.recorder.begin(part)
@@ -94,9 +95,9 @@ async def test_a_disk_that_fills_up_ends_the_recording_and_it_is_completed_when_
 
 async def test_with_a_little_room_left_it_is_closed_as_any_other(disk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit that is left free is what the index needs."""
-    monkeypatch.setattr(recorder_module, "LOOK_S", 0.05)
+    monkeypatch.setattr(space_watch, "LOOK_S", 0.05)
     desk = Desk(disk)
-    desk.recorder.allowance = recorder_module.Allowance(quota=0, min_free=100_000)
+    desk.recorder.allowance = Allowance(quota=0, min_free=100_000)
     desk.recorder.begin(desk.part())
     desk.say(0)
     await desk.until(lambda: desk.recorder.status.messages == 1)

@@ -13,10 +13,11 @@ from typing import Any
 import pytest
 
 from server.judge.message import RosVersion
-from server.recording import recorder as recorder_module
+from server.recording import recorder_queue, space_watch
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
-from server.recording.recorder import Part, Recorder
+from server.recording.recorder import Recorder
+from server.recording.recorder_queue import Part
 from server.recording.space import Allowance, amount
 
 AT_NS = 1_700_000_000_000_000_000
@@ -136,7 +137,7 @@ async def test_it_is_on_the_disk_within_half_a_second_without_being_asked(tmp_pa
 async def test_what_does_not_fit_the_queue_is_dropped_and_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_module, "MAX_QUEUED", 10)
+    monkeypatch.setattr(recorder_queue, "MAX_QUEUED", 10)
     desk = Desk(tmp_path)
     for n in range(15):  # nobody takes from the queue yet: the disk of a thread that hangs looks the same
         desk.say(n)
@@ -146,7 +147,7 @@ async def test_what_does_not_fit_the_queue_is_dropped_and_counted(
 
 
 async def test_large_messages_fill_the_queue_by_their_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recorder_module, "MAX_QUEUED_BYTES", 350)
+    monkeypatch.setattr(recorder_queue, "MAX_QUEUED_BYTES", 350)
     desk = Desk(tmp_path)
     for n in range(6):
         desk.say(n)
@@ -182,7 +183,7 @@ async def test_where_there_is_no_room_nothing_is_begun(tmp_path: Path, allowance
 async def test_at_the_limit_it_stops_and_what_was_recorded_is_saved(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_module, "LOOK_S", 0.1)
+    monkeypatch.setattr(space_watch, "LOOK_S", 0.1)
     desk = Desk(tmp_path)
     desk.recorder.begin(desk.part())
     desk.say(1)
@@ -219,7 +220,7 @@ async def test_a_folder_that_is_none_is_said(tmp_path: Path) -> None:
 async def test_a_file_that_is_taken_away_while_it_is_written_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_module, "LOOK_S", 0.1)
+    monkeypatch.setattr(space_watch, "LOOK_S", 0.1)
     desk = Desk(tmp_path)
     part = desk.part()
     desk.recorder.begin(part)
