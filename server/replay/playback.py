@@ -13,8 +13,10 @@ from typing import Any
 
 from server.protocol import serialize
 from server.recording.read.read import Recording, RecordingUnreadable
+from server.replay import replay_frames
+from server.replay.drive import Drive
 from server.replay.recorded_events import read_told
-from server.replay.run import Drive, Run
+from server.replay.run import Run
 from server.replay.timeline import Index
 from server.vehicle import queries
 
@@ -183,7 +185,7 @@ class Playback:
 
     def frame(self, **names: Any) -> dict[str, Any]:
         """The state at the moment that has been reached, without `server`, `replay` and `live`."""
-        return self._run.frame(track_number=self.seeks, **names)
+        return replay_frames.frame(self._run, track_number=self.seeks, **names)
 
     def position(self) -> dict[str, Any]:
         """Where the replay stands, as docs/protocol.md has it."""
@@ -217,7 +219,7 @@ class Playback:
         return {"kind": "timeline"} | self.index.as_json() | {"notes": list(dict.fromkeys(said))[:20]}
 
     def scan_bytes(self) -> bytes | None:
-        return self._run.scan_bytes()
+        return replay_frames.scan_bytes(self._run)
 
     def answer(self, message: dict[str, Any]) -> dict[str, Any]:
         """What a page asks beside the state: `track_points` and `trends`, as the session answers them."""

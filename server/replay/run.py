@@ -2,117 +2,28 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
 
-from monitor.alarm import Alarm, Transition
-from monitor.check import Verdict
-from monitor.load import RecentLoad
+from monitor.alarm import Transition
 from monitor.phones import PhoneWord
 from monitor.restoring import restore
 from monitor.runner import Monitor
 from monitor.signal_limits import expected_rates
 from monitor.state import LinkFacts, State
 from monitor.trends import Trends
-from server.analysis.thresholds import Wishes, tuning_for
 from server.judge import pipeline
-from server.judge.active_settings import Tuning
 from server.judge.message import Message
 from server.judge.pipeline import TICK_S
-from server.judge.reception_stats import Reception
-from server.judge.ros_names import BadName, canonical_name
-from server.judge.settings import BadSetting, from_toml
-from server.judge.topics import Source, map_signals
-from server.protocol import serialize
-from server.recording.delay import LinkDelay, RecordedDelay
+from server.recording.delay import LinkDelay
 from server.recording.read.read import Recording
-from server.replay.recorded_events import NewSettings, Pause, Told
-from server.replay.recorded_slowdown import SlowDownTold, Slowed
-from server.vehicle.scan_feed import judged
-from server.vehicle.state_frame import Facts, state_frame
+from server.replay.drive import Drive, Ways
+from server.replay.recorded_events import NewSettings, Pause
+from server.replay.recorded_slowdown import SlowDownTold
+from server.replay.run_state import Known
 
 SILENCE_S = 600.0  # after so long without a message nothing new can be said: the judge is not stepped through the rest
 LOOK_EVERY = 24  # steps between two looks at the clock: some 2 ms
-TRENDS_A_FRAME = 4
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Ways:
-    """How a recording is judged under one version of the settings."""
-
-    tuning: Tuning
-    sources: Mapping[str, Source]  # by signal
-    listeners: Mapping[str, tuple[Source, ...]]  # by topic as the recording spells it
-
-    @property
-    def published(self) -> frozenset[str]:
-        return pipeline.published(self.sources.values())
-
-
-@dataclass(slots=True, kw_only=True)
-class Known:
-    """All that a run has made of what it read: with it, it goes on from there."""
-
-    state: State
-    monitor: Monitor
-    trends: Trends
-    opened_s: float
-    at_s: float
-    told: dict[str, Alarm]  # as the recording tells them
-    reception: Reception = field(default_factory=Reception)
-    load: RecentLoad = field(default_factory=RecentLoad)
-    heard: set[str] = field(default_factory=set)
-    ticks: int = 0  # done
-    words: int = 0  # of the recording's own, taken
-    ways: int = 0  # how many changes of the settings have come
-    scans: int = 0
-    kinds_kept: bool = True
-    last_message_s: float | None = None
-    paused_s: float | None = None
-    paused_by: str | None = None
-    slowed: Slowed = field(default_factory=Slowed)
-
-
-class Drive:
-    """What does not change while a recording is run through, however often: its topics, its words, its settings."""
-
-    def __init__(self, recording: Recording, told: Told, settings: str) -> None:
-        """`settings`: the file of all settings that count where the recording does not say which were in force."""
-        self.told = told
-        self.start_s = recording.start_s
-        self.length_s = recording.duration_s
-        self.ros_version = recording.ros_version
-        self.notes: list[str] = [*recording.notes, *told.notes]
-        delay = RecordedDelay(recording)
-        self.delay = delay if delay.is_known else None
-        self._names: dict[str, str] = {}  # as the recording spells a topic → as a bridge would offer it
-        for topic in recording.topics:
-            with contextlib.suppress(BadName):
-                self._names[topic] = canonical_name(topic)
-        self._offered = {name: recording.topics[topic].type for topic, name in self._names.items()}
-        self.settings_from_recording = told.settings is not None
-        self.ways: list[Ways] = [self._ways(told.settings if told.settings is not None else settings)]
-        self.ways += [self._ways(word.toml) for _, word in told.words if isinstance(word, NewSettings)]
-        self.topics = frozenset(topic for ways in self.ways for topic in ways.listeners)
-
-    def _ways(self, toml: str) -> Ways:
-        try:
-            read = from_toml(toml)
-            wishes = Wishes(values=read.values, topics=read.topics, profile=read.profile)
-            tuning = tuning_for(wishes, self._offered, self.ros_version)
-        except BadSetting as why:
-            self.notes.append(f"The settings cannot be used, so the defaults are: {why}")
-            tuning = tuning_for(Wishes(), self._offered, self.ros_version)
-        sources = map_signals(self._offered, tuning.settings.topics)
-        by_topic = pipeline.by_topic(sources.values())
-        found = {topic: by_topic.get(name, ()) for topic, name in self._names.items()}
-        listeners = {
-            topic: sources for topic, sources in found.items() if any(source.decode is not None for source in sources)
-        }
-        return Ways(tuning=tuning, sources=sources, listeners=listeners)
 
 
 class Run:
@@ -138,7 +49,6 @@ class Run:
         is_new = known is None
         self.known = self._begin(from_s) if known is None else known
         self._ways = drive.ways[self.known.ways]
-        self._teller = Monitor(limits=self._ways.tuning.limits)  # sorts what the recording tells, and judges nothing
         self._messages = self._read()
         self._next: Message | None = next(self._messages, None)
         if is_new:
@@ -156,6 +66,11 @@ class Run:
             at_s=from_s,
             told=Monitor(limits=limits).alarms,
         )
+
+    @property
+    def ways(self) -> Ways:
+        """How it is judged now."""
+        return self._ways
 
     @property
     def at_s(self) -> float:
@@ -312,87 +227,4 @@ class Run:
             last_message_s=known.last_message_s,
             published=self._ways.published,
             wall_zero_s=self.drive.start_s,
-        )
-
-    # -- what is shown -----------------------------------------------------------------------------------------------
-
-    def frame(self, *, vehicle: str, name: str, settings_version: int, track_number: int) -> dict[str, Any]:
-        """The state of docs/protocol.md at this moment, without `server`, `replay` and `live`. Looking changes nothing
-        of what is judged later."""
-        known, ways = self.known, self._ways
-        now_s = known.at_s
-        wall_ms = round((self.drive.start_s + now_s) * 1000)
-        facts = Facts(
-            vehicle=vehicle,
-            server={},
-            now_s=now_s,
-            wall_ms=wall_ms,
-            phase="monitoring",
-            address=None,
-            ros_version=self.drive.ros_version,
-            connected_s=0.0,
-            paused_since_s=known.paused_s,
-            paused_by=known.paused_by,
-            held=None,
-            load=known.load.at(now_s),
-            log_trouble=None,
-            profile=ways.tuning.profile.title,
-            settings_version=settings_version,
-            since_s=0.0,
-            dialled_s=0.0,
-            problem=None,
-            link=None,
-            last_message_s=known.last_message_s,
-            ros_answered_s=now_s,
-            ros_alive=True,
-            behind=None,
-            offers_nothing=False,
-            bridge_answers=True,
-            reception=known.reception,
-            sources=ways.sources,
-            topics_heard=len(known.heard),
-            trends=known.trends.piece(now_s, at_most=TRENDS_A_FRAME),
-            track_number=track_number,
-        )
-        frame = state_frame(facts, known.state.glance(now_s), known.monitor)
-        del frame["server"]
-        frame["session"]["name"] = name
-        # Whatever is not in the file is nobody's silence: the band tells of it, and each value keeps its age.
-        frame["link"] |= {"cut": None, "since_ms": None, "problem": None, "topics_subscribed": len(ways.published)}
-        frame["decelerate"] = known.slowed.as_json(now_s, self.drive.start_s, ways.tuning.limits.slow_down)
-        if self.drive.told.has_alarms:
-            frame["alarms"] = [serialize.alarm(alarm, now_s, wall_ms) for alarm in self._told_standing()]
-        return frame
-
-    def _told_standing(self) -> list[Alarm]:
-        """The alarms as they were told then, each with what its check says when it is asked anew."""
-        findings = self.known.monitor.findings
-        self._teller.alarms = self.known.told
-        shown = self._teller.standing()
-        return [
-            replace(alarm, finding=findings[alarm.id])
-            if alarm.active and alarm.id in findings and findings[alarm.id].verdict is Verdict.FAULT
-            else alarm
-            for alarm in shown
-        ]
-
-    def scan_bytes(self) -> bytes | None:
-        """The newest scan as the page gets it; None before the first."""
-        known = self.known
-        snapshot = known.state.glance(known.at_s)
-        reading = snapshot.get("scan")
-        if reading is None:
-            return None
-        obstacle = known.monitor.alarms.get("obstacle")
-        return serialize.scan_frame(
-            reading.value,
-            number=known.scans,
-            age_s=reading.age_s(known.at_s),
-            kinds_kept=known.kinds_kept,
-            judged=judged(
-                reading.value,
-                snapshot,
-                known.monitor.limits.obstacle,
-                was_active=obstacle is not None and obstacle.active,
-            ),
         )

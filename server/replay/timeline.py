@@ -17,7 +17,9 @@ from monitor.state import State
 from server.protocol import serialize
 from server.recording.read.read import Recording
 from server.replay.checkpoint import freeze, thaw
-from server.replay.run import Drive, Known, Run
+from server.replay.drive import Drive
+from server.replay.run import Run
+from server.replay.run_state import Known
 
 BUCKETS = 360  # of the speed: two pixels each on a phone
 LEAST_BUCKET_S = 0.5
