@@ -29,7 +29,6 @@ ALLOWED: dict[str, int] = {
     "file static/js/core/store.js": 519,
     "file static/js/files/files-sheet.js": 367,
     "class server/rosbridge/link.py RosLink": 359,
-    "class server/simulator/car.py SimulatedCar": 257,
     "class server/slowdown/sender.py Slowing": 479,
     "class server/web/page_socket.py Page": 347,
     "class static/js/core/store.js Store": 464,
