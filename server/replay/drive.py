@@ -18,7 +18,7 @@ from server.replay.recorded_events import NewSettings, Told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ways:
+class SettingsEpoch:
     """How a recording is judged under one version of the settings."""
 
     tuning: Tuning
@@ -48,11 +48,11 @@ class Drive:
                 self._names[topic] = canonical_name(topic)
         self._offered = {name: recording.topics[topic].type for topic, name in self._names.items()}
         self.settings_from_recording = told.settings is not None
-        self.ways: list[Ways] = [self._ways(told.settings if told.settings is not None else settings)]
-        self.ways += [self._ways(word.toml) for _, word in told.words if isinstance(word, NewSettings)]
-        self.topics = frozenset(topic for ways in self.ways for topic in ways.listeners)
+        self.epochs: list[SettingsEpoch] = [self._epoch(told.settings if told.settings is not None else settings)]
+        self.epochs += [self._epoch(word.toml) for _, word in told.words if isinstance(word, NewSettings)]
+        self.topics = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
 
-    def _ways(self, toml: str) -> Ways:
+    def _epoch(self, toml: str) -> SettingsEpoch:
         try:
             read = from_toml(toml)
             wishes = Wishes(values=read.values, topics=read.topics, profile=read.profile)
@@ -66,4 +66,4 @@ class Drive:
         listeners = {
             topic: sources for topic, sources in found.items() if any(source.decode is not None for source in sources)
         }
-        return Ways(tuning=tuning, sources=sources, listeners=listeners)
+        return SettingsEpoch(tuning=tuning, sources=sources, listeners=listeners)

@@ -20,7 +20,7 @@ TRENDS_A_FRAME = 4
 def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_number: int) -> dict[str, Any]:
     """The state of docs/protocol.md at this moment, without `server`, `replay` and `live`. Looking changes nothing
     of what is judged later."""
-    known, ways = run.known, run.ways
+    known, epoch = run.known, run.epoch
     now_s = known.at_s
     wall_ms = round((run.drive.start_s + now_s) * 1000)
     facts = Facts(
@@ -37,7 +37,7 @@ def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_num
         held=None,
         load=known.load.at(now_s),
         log_trouble=None,
-        profile=ways.tuning.profile.title,
+        profile=epoch.tuning.profile.title,
         settings_version=settings_version,
         since_s=0.0,
         dialled_s=0.0,
@@ -50,7 +50,7 @@ def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_num
         offers_nothing=False,
         bridge_answers=True,
         reception=known.reception,
-        sources=ways.sources,
+        sources=epoch.sources,
         topics_heard=len(known.heard),
         trends=known.trends.piece(now_s, at_most=TRENDS_A_FRAME),
         track_number=track_number,
@@ -59,8 +59,8 @@ def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_num
     del shown["server"]
     shown["session"]["name"] = name
     # Whatever is not in the file is nobody's silence: the band tells of it, and each value keeps its age.
-    shown["link"] |= {"cut": None, "since_ms": None, "problem": None, "topics_subscribed": len(ways.published)}
-    shown["decelerate"] = known.slowed.as_json(now_s, run.drive.start_s, ways.tuning.limits.slow_down)
+    shown["link"] |= {"cut": None, "since_ms": None, "problem": None, "topics_subscribed": len(epoch.published)}
+    shown["decelerate"] = known.slowed.as_json(now_s, run.drive.start_s, epoch.tuning.limits.slow_down)
     if run.drive.told.has_alarms:
         shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms) for alarm in _told_standing(known)]
     return shown

@@ -17,7 +17,7 @@ from server.judge.message import Message
 from server.judge.pipeline import TICK_S
 from server.recording.delay import LinkDelay
 from server.recording.read.read import Recording
-from server.replay.drive import Drive, Ways
+from server.replay.drive import Drive, SettingsEpoch
 from server.replay.recorded_events import NewSettings, Pause
 from server.replay.recorded_slowdown import SlowDownTold
 from server.replay.run_state import Known
@@ -48,15 +48,15 @@ class Run:
         self._on_told, self._on_judged, self._on_changed, self._on_message = on_told, on_judged, on_changed, on_message
         is_new = known is None
         self.known = self._begin(from_s) if known is None else known
-        self._ways = drive.ways[self.known.ways]
+        self._epoch = drive.epochs[self.known.epoch]
         self._messages = self._read()
         self._next: Message | None = next(self._messages, None)
         if is_new:
             self._skip_words(from_s)
 
     def _begin(self, from_s: float) -> Known:
-        ways = self.drive.ways[0]
-        limits = ways.tuning.limits
+        epoch = self.drive.epochs[0]
+        limits = epoch.tuning.limits
         monitor = Monitor(limits=limits)
         return Known(
             state=State(expected_rates(limits)),
@@ -68,9 +68,9 @@ class Run:
         )
 
     @property
-    def ways(self) -> Ways:
+    def epoch(self) -> SettingsEpoch:
         """How it is judged now."""
-        return self._ways
+        return self._epoch
 
     @property
     def at_s(self) -> float:
@@ -134,7 +134,7 @@ class Run:
 
     def _receive(self, message: Message, now_s: float) -> None:
         known = self.known
-        sources = self._ways.listeners.get(message.topic)
+        sources = self._epoch.listeners.get(message.topic)
         self._on_message(now_s)
         if sources is None:
             return
@@ -147,8 +147,8 @@ class Run:
             None,
             reception=known.reception,
             state=known.state,
-            profile=self._ways.tuning.profile,
-            tyre_rad_per_unit=self._ways.tuning.limits.steering.tyre_rad_per_unit,
+            profile=self._epoch.tuning.profile,
+            tyre_rad_per_unit=self._epoch.tuning.limits.steering.tyre_rad_per_unit,
             transport=self.drive.delay,
         )
         if changed:
@@ -162,7 +162,7 @@ class Run:
     def _judge(self, now_s: float, changed: tuple[str, ...] | None) -> None:
         known = self.known
         known.state.link(self._link(now_s))
-        known.state.slow(known.slowed.facts(now_s, self._ways.tuning.limits.slow_down))
+        known.state.slow(known.slowed.facts(now_s, self._epoch.tuning.limits.slow_down))
         self._tell(pipeline.judge(known.monitor, known.state, now_s, changed))
 
     def _tell(self, transitions: tuple[Transition, ...]) -> None:
@@ -186,9 +186,9 @@ class Run:
             case PhoneWord():
                 known.state.hear_phone(word, now_s)
             case NewSettings():
-                known.ways += 1
-                self._ways = self.drive.ways[known.ways]
-                limits = self._ways.tuning.limits
+                known.epoch += 1
+                self._epoch = self.drive.epochs[known.epoch]
+                limits = self._epoch.tuning.limits
                 known.monitor.limits = limits
                 known.state.expect(expected_rates(limits))
 
@@ -222,9 +222,9 @@ class Run:
             since_s=known.opened_s,
             bridge_heard_s=now_s,
             bridge_answers=True,
-            topics_subscribed=len(self._ways.published),
+            topics_subscribed=len(self._epoch.published),
             connected_s=known.opened_s,
             last_message_s=known.last_message_s,
-            published=self._ways.published,
+            published=self._epoch.published,
             wall_zero_s=self.drive.start_s,
         )

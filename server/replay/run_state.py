@@ -28,7 +28,7 @@ class Known:
     heard: set[str] = field(default_factory=set)
     ticks: int = 0  # done
     words: int = 0  # of the recording's own, taken
-    ways: int = 0  # how many changes of the settings have come
+    epoch: int = 0  # how many changes of the settings have come
     scans: int = 0
     kinds_kept: bool = True
     last_message_s: float | None = None
