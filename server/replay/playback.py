@@ -162,7 +162,7 @@ class Playback:
         if is_ahead and (kept is None or kept[0] <= here_s) and target_s - here_s <= REACH_S:
             pass  # what is known already leads there soonest
         elif kept is not None and target_s - kept[0] <= max(WARM_UP_S, 2 * self.index.every_s):
-            self._run = Run(self._recording, self.drive, known=kept[1]())
+            self._run = Run(self._recording, self.drive, run_state=kept[1]())
             self.is_settled = True
         else:
             from_s = max(0.0, target_s - WARM_UP_S)
@@ -189,8 +189,8 @@ class Playback:
 
     def position(self) -> dict[str, Any]:
         """Where the replay stands, as docs/protocol.md has it."""
-        known = self._run.known
-        silent_s = None if known.last_message_s is None else max(0.0, known.at_s - known.last_message_s)
+        run_state = self._run.run_state
+        silent_s = None if run_state.last_message_s is None else max(0.0, run_state.at_s - run_state.last_message_s)
         return {
             "at_s": round(self.at_s, 3),
             "at_ms": round((self.drive.start_s + self.at_s) * 1000),
@@ -223,10 +223,10 @@ class Playback:
 
     def answer(self, message: dict[str, Any]) -> dict[str, Any]:
         """What a page asks beside the state: `track_points` and `trends`, as the session answers them."""
-        known = self._run.known
+        run_state = self._run.run_state
         after = message.get("after")
         if message.get("kind") == "trends":
-            return serialize.trends(known.trends.piece(known.at_s, after=after))
+            return serialize.trends(run_state.trends.piece(run_state.at_s, after=after))
         return queries.track_points(
-            known.state.glance(known.at_s), number=self.seeks, after=after if isinstance(after, int) else 0
+            run_state.state.glance(run_state.at_s), number=self.seeks, after=after if isinstance(after, int) else 0
         )

@@ -10,7 +10,7 @@ from monitor.alarm_order import standing
 from monitor.check import Verdict
 from server.protocol import serialize
 from server.replay.run import Run
-from server.replay.run_state import Known
+from server.replay.run_state import RunState
 from server.vehicle.scan_feed import judged
 from server.vehicle.state_frame import Facts, state_frame
 
@@ -20,8 +20,8 @@ TRENDS_A_FRAME = 4
 def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_number: int) -> dict[str, Any]:
     """The state of docs/protocol.md at this moment, without `server`, `replay` and `live`. Looking changes nothing
     of what is judged later."""
-    known, epoch = run.known, run.epoch
-    now_s = known.at_s
+    run_state, epoch = run.run_state, run.epoch
+    now_s = run_state.at_s
     wall_ms = round((run.drive.start_s + now_s) * 1000)
     facts = Facts(
         vehicle=vehicle,
@@ -32,10 +32,10 @@ def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_num
         address=None,
         ros_version=run.drive.ros_version,
         connected_s=0.0,
-        paused_since_s=known.paused_s,
-        paused_by=known.paused_by,
+        paused_since_s=run_state.paused_s,
+        paused_by=run_state.paused_by,
         held=None,
-        load=known.load.at(now_s),
+        load=run_state.load.at(now_s),
         log_trouble=None,
         profile=epoch.tuning.profile.title,
         settings_version=settings_version,
@@ -43,57 +43,57 @@ def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_num
         dialled_s=0.0,
         problem=None,
         link=None,
-        last_message_s=known.last_message_s,
+        last_message_s=run_state.last_message_s,
         ros_answered_s=now_s,
         ros_alive=True,
         behind=None,
         offers_nothing=False,
         bridge_answers=True,
-        reception=known.reception,
+        reception=run_state.reception,
         sources=epoch.sources,
-        topics_heard=len(known.heard),
-        trends=known.trends.piece(now_s, at_most=TRENDS_A_FRAME),
+        topics_heard=len(run_state.heard),
+        trends=run_state.trends.piece(now_s, at_most=TRENDS_A_FRAME),
         track_number=track_number,
     )
-    shown = state_frame(facts, known.state.glance(now_s), known.monitor)
+    shown = state_frame(facts, run_state.state.glance(now_s), run_state.monitor)
     del shown["server"]
     shown["session"]["name"] = name
     # Whatever is not in the file is nobody's silence: the band tells of it, and each value keeps its age.
     shown["link"] |= {"cut": None, "since_ms": None, "problem": None, "topics_subscribed": len(epoch.published)}
-    shown["decelerate"] = known.slowed.as_json(now_s, run.drive.start_s, epoch.tuning.limits.slow_down)
+    shown["decelerate"] = run_state.slowed.as_json(now_s, run.drive.start_s, epoch.tuning.limits.slow_down)
     if run.drive.told.has_alarms:
-        shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms) for alarm in _told_standing(known)]
+        shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms) for alarm in _told_standing(run_state)]
     return shown
 
 
 def scan_bytes(run: Run) -> bytes | None:
     """The newest scan as the page gets it; None before the first."""
-    known = run.known
-    snapshot = known.state.glance(known.at_s)
+    run_state = run.run_state
+    snapshot = run_state.state.glance(run_state.at_s)
     reading = snapshot.get("scan")
     if reading is None:
         return None
-    obstacle = known.monitor.alarms.get("obstacle")
+    obstacle = run_state.monitor.alarms.get("obstacle")
     return serialize.scan_frame(
         reading.value,
-        number=known.scans,
-        age_s=reading.age_s(known.at_s),
-        kinds_kept=known.kinds_kept,
+        number=run_state.scans,
+        age_s=reading.age_s(run_state.at_s),
+        kinds_kept=run_state.kinds_kept,
         judged=judged(
             reading.value,
             snapshot,
-            known.monitor.limits.obstacle,
+            run_state.monitor.limits.obstacle,
             was_active=obstacle is not None and obstacle.active,
         ),
     )
 
 
-def _told_standing(known: Known) -> list[Alarm]:
+def _told_standing(run_state: RunState) -> list[Alarm]:
     """The alarms as they were told then, each with what its check says when it is asked anew."""
-    findings = known.monitor.findings
+    findings = run_state.monitor.findings
     return [
         replace(alarm, finding=findings[alarm.id])
         if alarm.active and alarm.id in findings and findings[alarm.id].verdict is Verdict.FAULT
         else alarm
-        for alarm in standing(known.told.values())
+        for alarm in standing(run_state.told.values())
     ]

@@ -14,7 +14,7 @@ from server.replay.recorded_slowdown import Slowed
 
 
 @dataclass(slots=True, kw_only=True)
-class Known:
+class RunState:
     """All that a run has made of what it read: with it, it goes on from there."""
 
     state: State

@@ -19,7 +19,7 @@ from server.recording.read.read import Recording
 from server.replay.checkpoint import freeze, thaw
 from server.replay.drive import Drive
 from server.replay.run import Run
-from server.replay.run_state import Known
+from server.replay.run_state import RunState
 
 BUCKETS = 360  # of the speed: two pixels each on a phone
 LEAST_BUCKET_S = 0.5
@@ -78,7 +78,7 @@ class Index:
                 return
             if due_s <= self._drive.length_s:
                 self._kept_s.append(due_s)
-                self._kept.append(freeze(self._run.known))
+                self._kept.append(freeze(self._run.run_state))
             else:
                 self.finish()
 
@@ -88,7 +88,7 @@ class Index:
             self.is_done = True
             self._message(self._drive.length_s)
 
-    def before(self, at_s: float) -> tuple[float, Callable[[], Known]] | None:
+    def before(self, at_s: float) -> tuple[float, Callable[[], RunState]] | None:
         """The newest moment kept that is not later, and how to get what was known then."""
         place = bisect_right(self._kept_s, at_s) - 1
         return (self._kept_s[place], lambda: thaw(self._kept[place])) if place >= 0 else None
