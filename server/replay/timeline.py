@@ -16,7 +16,7 @@ from monitor.runner import IMPAIRED, IMPAIRED_SPEC
 from monitor.state import State
 from server.protocol import serialize
 from server.recording.read.read import Recording
-from server.replay.checkpoint import freeze, thaw
+from server.replay.checkpoint import save, restore
 from server.replay.drive import Drive
 from server.replay.run import Run
 from server.replay.run_state import RunState
@@ -78,7 +78,7 @@ class Index:
                 return
             if due_s <= self._drive.length_s:
                 self._kept_s.append(due_s)
-                self._kept.append(freeze(self._run.run_state))
+                self._kept.append(save(self._run.run_state))
             else:
                 self.finish()
 
@@ -91,7 +91,7 @@ class Index:
     def before(self, at_s: float) -> tuple[float, Callable[[], RunState]] | None:
         """The newest moment kept that is not later, and how to get what was known then."""
         place = bisect_right(self._kept_s, at_s) - 1
-        return (self._kept_s[place], lambda: thaw(self._kept[place])) if place >= 0 else None
+        return (self._kept_s[place], lambda: restore(self._kept[place])) if place >= 0 else None
 
     def as_json(self) -> dict[str, Any]:
         """What docs/protocol.md calls the time line; without what only its session knows."""
