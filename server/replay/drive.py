@@ -14,7 +14,7 @@ from server.judge.settings import BadSetting, from_toml
 from server.judge.topics import Source, map_signals
 from server.recording.delay import RecordedDelay
 from server.recording.read.read import Recording
-from server.replay.recorded_events import NewSettings, Told
+from server.replay.recorded_events import NewSettings, RecordedEvents
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,13 +33,13 @@ class SettingsEpoch:
 class Drive:
     """What does not change while a recording is run through, however often: its topics, its words, its settings."""
 
-    def __init__(self, recording: Recording, told: Told, settings: str) -> None:
+    def __init__(self, recording: Recording, recorded: RecordedEvents, settings: str) -> None:
         """`settings`: the file of all settings that count where the recording does not say which were in force."""
-        self.told = told
+        self.recorded = recorded
         self.start_s = recording.start_s
         self.length_s = recording.duration_s
         self.ros_version = recording.ros_version
-        self.notes: list[str] = [*recording.notes, *told.notes]
+        self.notes: list[str] = [*recording.notes, *recorded.notes]
         delay = RecordedDelay(recording)
         self.delay = delay if delay.is_known else None
         self._names: dict[str, str] = {}  # as the recording spells a topic → as a bridge would offer it
@@ -47,9 +47,11 @@ class Drive:
             with contextlib.suppress(BadName):
                 self._names[topic] = canonical_name(topic)
         self._offered = {name: recording.topics[topic].type for topic, name in self._names.items()}
-        self.settings_from_recording = told.settings is not None
-        self.epochs: list[SettingsEpoch] = [self._epoch(told.settings if told.settings is not None else settings)]
-        self.epochs += [self._epoch(word.toml) for _, word in told.words if isinstance(word, NewSettings)]
+        self.settings_from_recording = recorded.settings is not None
+        self.epochs: list[SettingsEpoch] = [
+            self._epoch(recorded.settings if recorded.settings is not None else settings)
+        ]
+        self.epochs += [self._epoch(word.toml) for _, word in recorded.words if isinstance(word, NewSettings)]
         self.topics = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
 
     def _epoch(self, toml: str) -> SettingsEpoch:

@@ -15,7 +15,7 @@ from server.protocol import serialize
 from server.recording.read.read import Recording, RecordingUnreadable
 from server.replay import replay_frames
 from server.replay.drive import Drive
-from server.replay.recorded_events import read_told
+from server.replay.recorded_events import read_recorded_events
 from server.replay.run import Run
 from server.replay.timeline import Index
 from server.vehicle import queries
@@ -42,7 +42,7 @@ class Playback:
         at_s: float = 0.0,
     ) -> None:
         self._recording = recording
-        self.drive = Drive(recording, read_told(recording), settings)
+        self.drive = Drive(recording, read_recorded_events(recording), settings)
         self._index_recording = open_again()
         self.index = Index(self._index_recording, self.drive)
         self._run = Run(recording, self.drive)
@@ -204,7 +204,7 @@ class Playback:
             "is_settled": self.is_settled,
             "silent_s": round(silent_s, 2) if silent_s is not None else None,
             "seek": self.seeks,
-            "alarms_from": "recording" if self.drive.told.has_alarms else "judged",
+            "alarms_from": "recording" if self.drive.recorded.has_alarms else "judged",
             "settings_from": "recording" if self.drive.settings_from_recording else "now",
         }
 

@@ -61,7 +61,7 @@ def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_num
     # Whatever is not in the file is nobody's silence: the band tells of it, and each value keeps its age.
     shown["link"] |= {"cut": None, "since_ms": None, "problem": None, "topics_subscribed": len(epoch.published)}
     shown["decelerate"] = run_state.slowed.as_json(now_s, run.drive.start_s, epoch.tuning.limits.slow_down)
-    if run.drive.told.has_alarms:
+    if run.drive.recorded.has_alarms:
         shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms) for alarm in _told_standing(run_state)]
     return shown
 
@@ -95,5 +95,5 @@ def _told_standing(run_state: RunState) -> list[Alarm]:
         replace(alarm, finding=findings[alarm.id])
         if alarm.active and alarm.id in findings and findings[alarm.id].verdict is Verdict.FAULT
         else alarm
-        for alarm in standing(run_state.told.values())
+        for alarm in standing(run_state.recorded_alarms.values())
     ]

@@ -64,7 +64,7 @@ class Run:
             trends=Trends(from_s),
             opened_s=from_s,
             at_s=from_s,
-            told=Monitor(limits=limits).alarms,
+            recorded_alarms=Monitor(limits=limits).alarms,
         )
 
     @property
@@ -86,7 +86,7 @@ class Run:
 
         Raises RecordingUnreadable.
         """
-        run_state, words = self.run_state, self.drive.told.words
+        run_state, words = self.run_state, self.drive.recorded.words
         steps = 0
         while True:
             message = self._next
@@ -167,7 +167,7 @@ class Run:
 
     def _tell(self, transitions: tuple[Transition, ...]) -> None:
         if transitions:
-            if not self.drive.told.has_alarms:
+            if not self.drive.recorded.has_alarms:
                 self.run_state.load.add(transitions)
             self._on_judged(transitions)
 
@@ -193,11 +193,11 @@ class Run:
                 run_state.state.expect(expected_rates(limits))
 
     def _restore(self, transitions: Sequence[Transition]) -> None:
-        self.run_state.told = restore(self.run_state.told, transitions)
+        self.run_state.recorded_alarms = restore(self.run_state.recorded_alarms, transitions)
 
     def _skip_words(self, from_s: float) -> None:
         """A run that begins in the middle knows what was told before: what stood, who paused, which settings."""
-        words, run_state = self.drive.told.words, self.run_state
+        words, run_state = self.drive.recorded.words, self.run_state
         before: list[Transition] = []
         while run_state.words < len(words) and words[run_state.words][0] < from_s:
             at_s, word = words[run_state.words]

@@ -22,7 +22,7 @@ class RunState:
     trends: Trends
     opened_s: float
     at_s: float
-    told: dict[str, Alarm]  # as the recording tells them
+    recorded_alarms: dict[str, Alarm]  # as they were told then
     reception: Reception = field(default_factory=Reception)
     load: RecentLoad = field(default_factory=RecentLoad)
     heard: set[str] = field(default_factory=set)

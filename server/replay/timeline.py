@@ -16,7 +16,7 @@ from monitor.runner import IMPAIRED, IMPAIRED_SPEC
 from monitor.state import State
 from server.protocol import serialize
 from server.recording.read.read import Recording
-from server.replay.checkpoint import save, restore
+from server.replay.checkpoint import restore, save
 from server.replay.drive import Drive
 from server.replay.run import Run
 from server.replay.run_state import RunState
@@ -45,10 +45,10 @@ class Index:
         self._kept: list[bytes] = []
         self.is_done = False
         self.broke_off: str | None = None  # why the recording could not be read to its end
-        told = drive.told.has_alarms
+        told = drive.recorded.has_alarms
         self._specs = {check.id: check.alarm for check in CHECKS} | {IMPAIRED: IMPAIRED_SPEC}
         if told:
-            for at_s, word in drive.told.words:
+            for at_s, word in drive.recorded.words:
                 if isinstance(word, Transition):
                     self._mark(word, at_s)
         self._run = Run(
