@@ -181,7 +181,7 @@ class ReplayClient:
                 waiting.set_exception(NoReplay(self.failed or "This replay is over."))
 
 
-class Desk:
+class ReplayManager:
     """Opens replays and knows them by their tokens. `path_of` may look at the disk."""
 
     def __init__(self, path_of: Callable[[str], Path | None], *, now: Callable[[], float]) -> None:

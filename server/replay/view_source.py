@@ -11,7 +11,7 @@ import orjson
 
 from server.bus.bus import Frame, LocalBus, NotServed
 from server.replay import commands
-from server.replay.manager import Desk, NoReplay, ReplayClient, summary
+from server.replay.manager import NoReplay, ReplayClient, ReplayManager, summary
 
 KINDS = ("state", "scan")
 REPLAY_KINDS = (*KINDS, "timeline")
@@ -25,7 +25,7 @@ class Seat:
         self,
         bus: LocalBus,
         vehicle: str,
-        desk: Desk,
+        replays: ReplayManager,
         *,
         server: Callable[[], Mapping[str, Any]],
         on_new: Callable[[str], None],
@@ -34,7 +34,7 @@ class Seat:
         """`server`: what a state tells of the server."""
         self._bus = bus
         self._vehicle = vehicle
-        self._desk = desk
+        self._replays = replays
         self._server = server
         self._on_new, self._on_turned = on_new, on_turned
         self._client: ReplayClient | None = None
@@ -103,7 +103,7 @@ class Seat:
             "settings": settings.get("toml", ""),
             "settings_version": settings.get("version", 0),
         }
-        client = await self._desk.open(order.recording, opening, on_new=self._on_new)
+        client = await self._replays.open(order.recording, opening, on_new=self._on_new)
         await self._turn_to(client)
 
     async def leave(self) -> None:
@@ -127,4 +127,4 @@ class Seat:
         self.watch_scan(wanted)
         self._on_turned()
         if before is not None:
-            await asyncio.shield(self._desk.close(before))
+            await asyncio.shield(self._replays.close(before))

@@ -25,7 +25,7 @@ from server.control import display_name
 from server.protocol import commands
 from server.protocol.rate_limit import MAX_DEPTH, SLOW_DOWN, Allowance, Limits, nests_deeper
 from server.replay import commands as orders
-from server.replay.manager import Desk, NoReplay
+from server.replay.manager import NoReplay, ReplayManager
 from server.replay.view_source import Seat
 from server.web.fair_wakeup import Turns
 
@@ -56,7 +56,7 @@ class Page:
         *,
         hello: Mapping[str, Any],
         who: Who,
-        desk: Desk,
+        replays: ReplayManager,
         server: Callable[[], Mapping[str, Any]],
         limits: Limits,
         now: Callable[[], float],
@@ -70,7 +70,7 @@ class Page:
         self._hello = hello
         self._who = who
         self._wake = asyncio.Event()
-        self._seat = Seat(bus, vehicle, desk, server=server, on_new=self._something_replayed, on_turned=self._turned)
+        self._seat = Seat(bus, vehicle, replays, server=server, on_new=self._something_replayed, on_turned=self._turned)
         self._begins_with = replay
         self._opening: asyncio.Task[None] | None = None
         self._sent = dict.fromkeys(self._seat.kinds, 0)  # number of the newest frame of a kind this page got
@@ -406,7 +406,7 @@ class Hub:
         self,
         bus: LocalBus,
         *,
-        desk: Desk,
+        replays: ReplayManager,
         server: Callable[[], Mapping[str, Any]],
         limits: Limits,
         now: Callable[[], float],
@@ -415,7 +415,7 @@ class Hub:
         self._bus = bus
         self._limits = limits
         self._now = now
-        self._desk = desk
+        self._replays = replays
         self._server = server
         self._pages: set[Page] = set()
         self._turns = Turns()
@@ -449,7 +449,7 @@ class Hub:
             vehicle,
             hello=hello,
             who=who,
-            desk=self._desk,
+            replays=self._replays,
             server=self._server,
             limits=self._limits,
             now=self._now,
