@@ -17,7 +17,7 @@ KINDS = ("state", "scan")
 REPLAY_KINDS = (*KINDS, "timeline")
 
 
-class Seat:
+class ViewSource:
     """Gives a page the newest of what it looks at. `on_new(kind)` is called when a replay has something new, and
     `on_turned()` when the page looks at something else from now on."""
 
