@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from server.recording.catalog import annotations as remarks
+from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog_db import Which
 from server.recording.catalog.entries import Entries
 from server.recording.catalog.errors import Refused
@@ -124,19 +124,19 @@ class Catalog:
 
     # -- what people do with it ----------------------------------------------------------------------------------------
 
-    def remark(
+    def annotate(
         self, id: str, *, title: str | None = None, note: str | None = None, tags: Sequence[str] | None = None
     ) -> dict[str, Any]:
-        """Another title, note or tags; None leaves it. Raises NotThere, Refused, BadRemark."""
+        """Another title, note or tags; None leaves it. Raises NotThere, Refused, BadAnnotation."""
         with self._entries.lock:
             entry = self._listing.need(id)
-            new = remarks.changed(entry.remarks, title=title, note=note, tags=tags)
+            new = annotation_store.changed(entry.annotations, title=title, note=note, tags=tags)
             try:
-                remarks.write(self.folder / entry.path, new)
+                annotation_store.write(self.folder / entry.path, new)
             except OSError as why:
                 raise Refused(f"It cannot be kept: {(why.strerror or str(why)).lower()}.") from None
-            self._entries.put([replace(entry, remarks=new)])
-            return row_of(replace(entry, remarks=new))
+            self._entries.put([replace(entry, annotations=new)])
+            return row_of(replace(entry, annotations=new))
 
     def delete(self, id: str) -> dict[str, Any]:
         """Into the trash, where it stays until somebody empties it. Raises NotThere, Refused."""

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
-from server.recording.catalog import annotations as remarks
+from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog_db import Entry
 from server.recording.catalog.discovery import TRASH, files_below, id_of, shape_of, started_ms_of, vehicle_of
 from server.recording.catalog.entries import Entries
@@ -102,7 +102,7 @@ class FolderListing:
             size=stat.st_size,
             changed_ns=stat.st_mtime_ns,
             found=found,
-            remarks=remarks.read(path),
+            annotations=annotation_store.read(path),
         )
 
     def list_fresh(self) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from server.recording.catalog import annotations as remarks
+from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import catalog_db
 from server.recording.catalog.catalog_db import Entry, Which
 from server.recording.catalog.entries import Entries
@@ -64,9 +64,9 @@ def row_of(entry: Entry) -> dict[str, Any]:
         "distance_m": found.get("distance_m"),
         "top_speed_mps": found.get("top_speed_mps"),
         "alarms": found.get("alarms"),
-        "title": entry.remarks.title,
-        "note": entry.remarks.note,
-        "tags": list(entry.remarks.tags),
+        "title": entry.annotations.title,
+        "note": entry.annotations.note,
+        "tags": list(entry.annotations.tags),
         "state": "waiting" if entry.found is None else "unreadable" if problem else "read",
         "problem": problem,
         "damage": found.get("damage", []),
@@ -79,7 +79,7 @@ def row_of(entry: Entry) -> dict[str, Any]:
         "ended_why": found.get("ended_why"),
         "is_clip": found.get("is_clip", False),
         "clip_of": found.get("clip_of"),
-        "file": remarks.line(name),
+        "file": annotation_store.line(name),
         "format": "mcap" if name.endswith((FINISHED, DAMAGED)) else Path(name).suffix[1:],
         "sha256": found.get("sha256"),
         "thumbnail": f"/api/recordings/{entry.id}/track.svg",

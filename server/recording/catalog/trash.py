@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from server.recording.catalog import annotations as remarks
+from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import atomic_move
 from server.recording.catalog.catalog_db import Entry
 from server.recording.catalog.discovery import TRASH
@@ -61,7 +61,7 @@ class Trash:
                 for entry in chosen:
                     path = self._folder / entry.path
                     path.unlink(missing_ok=True)
-                    remarks.beside(path).unlink(missing_ok=True)
+                    annotation_store.beside(path).unlink(missing_ok=True)
                     gone.append(entry)
             except OSError as why:
                 raise Refused(f"It cannot be deleted: {(why.strerror or str(why)).lower()}.") from None

@@ -17,9 +17,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.recording.catalog import annotations as remarks
+from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import catalog_db
-from server.recording.catalog.annotations import Remarks
+from server.recording.catalog.annotations import Annotations
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.catalog_db import Entry, Which
 from server.recording.catalog.discovery import id_of
@@ -57,7 +57,9 @@ def some(root: Path) -> Path:
     record(folder / "red" / "red_20260921T171320Z_clip_1.mcap", began_ms=BEGAN_MS + 3 * HOUR_MS, clip_of="red_x")
     (folder / "red" / "notes.mcap").write_text("hello")
     (folder / "blue" / "blue_20260921T171320Z.mcap.damaged").write_bytes(b"\x89MCAP0\r\n")
-    remarks.write(folder / "blue" / "blue_20260921T141320Z.mcap", Remarks(title="Wet lot", tags=("wet", "lot 3")))
+    annotation_store.write(
+        folder / "blue" / "blue_20260921T141320Z.mcap", Annotations(title="Wet lot", tags=("wet", "lot 3"))
+    )
     return folder
 
 
@@ -91,7 +93,7 @@ async def test_what_is_in_the_folder_is_listed_newest_first(tmp_path: Path) -> N
 async def test_a_lost_database_is_made_anew_to_the_same_rows(tmp_path: Path) -> None:
     some(tmp_path)
     async with catalog(tmp_path) as one:
-        one.remark("red_20260921T161320Z", title="No sky", note="under the roof\nall the way", tags=["roof"])
+        one.annotate("red_20260921T161320Z", title="No sky", note="under the roof\nall the way", tags=["roof"])
         one.delete("blue_20260921T151320Z")
         before, trash = one.rows().rows, one.rows(Which(is_trashed=True)).rows
     assert len(before) == 5
@@ -118,8 +120,8 @@ async def test_a_database_that_cannot_be_written_is_one_in_memory(tmp_path: Path
     (tmp_path / "recordings.sqlite").mkdir()
     async with catalog(tmp_path) as one:
         assert len(one.rows().rows) == 6
-        assert one.remark("red_20260921T161320Z", title="Kept all the same")["title"] == "Kept all the same"
-    assert remarks.read(tmp_path / "recordings/red/red_20260921T161320Z.mcap").title == "Kept all the same"
+        assert one.annotate("red_20260921T161320Z", title="Kept all the same")["title"] == "Kept all the same"
+    assert annotation_store.read(tmp_path / "recordings/red/red_20260921T161320Z.mcap").title == "Kept all the same"
 
 
 async def test_what_is_known_is_not_read_again_and_what_changed_is(tmp_path: Path) -> None:
@@ -187,7 +189,7 @@ async def test_an_unchanged_folder_is_not_walked_again(tmp_path: Path, monkeypat
     for change, seen in (
         (lambda: None, 12),  # each once while walking, and once more where it is new
         (lambda: None, 0),
-        (lambda: remarks.write(folder / "red" / "notes.mcap", Remarks(title="New")), 7),
+        (lambda: annotation_store.write(folder / "red" / "notes.mcap", Annotations(title="New")), 7),
         (lambda: (folder / "red" / "notes.mcap").write_text("it grows while it is copied"), 0),
         (lambda: os.utime(folder / "red" / "notes.mcap", ns=(1, NOW_MS * 1_000_000)), 0),
         (lambda: (folder / "red" / "more.mcap").write_text("x"), 9),
@@ -391,7 +393,7 @@ async def test_a_folder_that_may_not_be_written_says_so(tmp_path: Path, monkeypa
         with pytest.raises(Refused, match="It cannot be moved: read-only file system"):
             one.delete(id)
         with pytest.raises(Refused, match="It cannot be kept: read-only file system"):
-            one.remark(id, title="New")
+            one.annotate(id, title="New")
         assert one.row(id)["title"] == "Wet lot"  # type: ignore[index]
 
 
@@ -427,7 +429,7 @@ async def test_a_disk_that_is_full_leaves_a_list_in_memory(tmp_path: Path) -> No
     some(tmp_path)
     async with catalog(tmp_path) as one:
         one._entries._database.execute("PRAGMA query_only=ON")  # as a disk that takes nothing more
-        assert one.remark("red_20260921T161320Z", title="Still")["title"] == "Still"
+        assert one.annotate("red_20260921T161320Z", title="Still")["title"] == "Still"
         assert len(one.rows().rows) == 6
         assert one.row("red_20260921T161320Z")["title"] == "Still"  # type: ignore[index]
 
