@@ -95,7 +95,7 @@ class RecorderThread:
 
     def _run(self) -> None:
         while True:
-            self._queue.wake.wait(DRAIN_S if self._writer is not None else self._unfinished.wait_s)
+            self._queue.wake.wait(self._wait_s())
             self._queue.wake.clear()
             try:
                 if self._drain():
@@ -106,6 +106,12 @@ class RecorderThread:
             except Exception:  # the one net: a fault of ours must not end the recording of whatever comes next
                 log.exception("the recorder stumbled")
                 self._give_up("Recording stopped: catgraph itself stumbled; its log says how.")
+
+    def _wait_s(self) -> float | None:
+        """Until the queue is looked at again; None: until something wakes the thread."""
+        if self._writer is not None or self.status.state == "stopped":  # one that stopped is handed messages still
+            return DRAIN_S
+        return self._unfinished.wait_s
 
     # -- what waits --------------------------------------------------------------------------------------------------
 

@@ -208,6 +208,19 @@ async def test_at_the_limit_it_stops_and_what_was_recorded_is_saved(
         assert [m.message["linear"]["x"] for m in recording.messages()] == [3.0]
 
 
+async def test_after_it_stopped_by_itself_nothing_piles_up(tmp_path: Path) -> None:
+    """The loop hands over what comes until somebody ends the part."""
+    user = RecorderUser(tmp_path, Allowance(quota=0, min_free=1 << 62))
+    user.recorder.begin(user.part())
+    await user.until(lambda: user.recorder.status.state == "stopped" and user.recorder.queued == 0)
+    await asyncio.sleep(0.1)  # the thread waits again
+    for n in range(100):
+        user.say(n)
+    await user.until(lambda: user.recorder.queued == 0)
+    assert user.recorder.dropped == 0
+    await user.stop()
+
+
 async def test_a_folder_that_is_none_is_said(tmp_path: Path) -> None:
     (tmp_path / "recordings").write_text("a file")
     user = RecorderUser(tmp_path / "recordings")
