@@ -18,7 +18,7 @@ from server.mail.recorded import Recorded
 from server.recording.catalog.catalog import Catalog
 from server.recording.export.jobs import Exports
 from server.recording.folder import RecordingsFolder
-from server.replay.manager import Desk
+from server.replay.manager import ReplayManager
 from server.storage.data_folder import DataFolder
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
@@ -37,14 +37,14 @@ def build(
     folder = DataFolder(config.data) if config.data is not None else None
     journal = Journal(config.data / "events.sqlite" if config.data is not None else None)
     bus = LocalBus(journal, now=now)
-    desk = Desk(lambda id: _recording(running, id), now=now)
+    replays = ReplayManager(lambda id: _recording(running, id), now=now)
     running = Services(
         is_open=config.is_open,
         keeps_shell=config.worker,
         found=config.found,
         folder=folder,
         bus=bus,
-        hub=Hub(bus, desk=desk, server=lambda: running.server_facts(), limits=config.limits, now=now),
+        hub=Hub(bus, replays=replays, server=lambda: running.server_facts(), limits=config.limits, now=now),
         access=_access(config, now=now, wall_ms=wall_ms),
         sessions={},
         now=now,
@@ -54,7 +54,7 @@ def build(
         started_s=now(),
         ground=ground,
         mailer=_mailer(config.data, lambda id: _recording(running, id), wall_ms=wall_ms),
-        desk=desk,
+        replays=replays,
         recordings=_catalog(config.data, now=now, wall_ms=wall_ms),
     )
     if running.recordings is not None and config.data is not None:

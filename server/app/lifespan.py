@@ -49,7 +49,7 @@ async def _start(running: Services) -> asyncio.Task[None] | None:
 
 async def _stop(running: Services) -> None:
     """Stop all parts: first what records and judges, then what works on recordings."""
-    await running.desk.close_all()
+    await running.replays.close_all()
     await asyncio.gather(*(session.stop() for session in running.sessions.values()))
     if running.mailer is not None:
         await running.mailer.stop()

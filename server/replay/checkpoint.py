@@ -9,22 +9,22 @@ from types import MappingProxyType
 from typing import Any, cast
 
 from monitor.catalog import CHECKS
-from server.replay.run import Known
+from server.replay.run_state import RunState
 
 _BY_ID = {check.id: check for check in CHECKS}
 _IDS = {id(check): check.id for check in CHECKS}
 
 
-def freeze(known: Known) -> bytes:
+def save(run_state: RunState) -> bytes:
     """A copy that later steps do not change; some 20 kB."""
     out = io.BytesIO()
-    _Packer(out, protocol=5).dump(known)
+    _Packer(out, protocol=5).dump(run_state)
     return zlib.compress(out.getvalue(), 1)
 
 
-def thaw(frozen: bytes) -> Known:
-    """What was known, anew each time. Only for bytes that this very process has frozen."""
-    return cast(Known, _Unpacker(io.BytesIO(zlib.decompress(frozen))).load())
+def restore(saved: bytes) -> RunState:
+    """The state of a run, anew each time. Only for bytes that this very process has saved."""
+    return cast(RunState, _Unpacker(io.BytesIO(zlib.decompress(saved))).load())
 
 
 class _Packer(pickle.Pickler):

@@ -32,7 +32,7 @@ class NoReplay(Exception):
     """It cannot be replayed; `str()` is one sentence for a person."""
 
 
-class Look:
+class ReplayClient:
     """One page's replay: what its process last told, and the way to tell it something."""
 
     def __init__(self, recording: str, *, now: Callable[[], float], on_new: Callable[[str], None]) -> None:
@@ -181,47 +181,47 @@ class Look:
                 waiting.set_exception(NoReplay(self.failed or "This replay is over."))
 
 
-class Desk:
+class ReplayManager:
     """Opens replays and knows them by their tokens. `path_of` may look at the disk."""
 
     def __init__(self, path_of: Callable[[str], Path | None], *, now: Callable[[], float]) -> None:
         self._path_of = path_of
         self._now = now
-        self._looks: dict[str, Look] = {}
+        self._clients: dict[str, ReplayClient] = {}
 
     @property
     def count(self) -> int:
-        return len(self._looks)
+        return len(self._clients)
 
-    async def open(self, recording: str, opening: Mapping[str, Any], *, on_new: Callable[[str], None]) -> Look:
+    async def open(self, recording: str, opening: Mapping[str, Any], *, on_new: Callable[[str], None]) -> ReplayClient:
         """A replay that is ready to be shown. Raises NoReplay."""
-        if len(self._looks) >= MOST_REPLAYS:
+        if len(self._clients) >= MOST_REPLAYS:
             raise NoReplay(f"{MOST_REPLAYS} replays run already: somebody has to leave one first.")
-        look = Look(recording, now=self._now, on_new=on_new)
-        self._looks[look.token] = look
+        client = ReplayClient(recording, now=self._now, on_new=on_new)
+        self._clients[client.token] = client
         try:
             path = await asyncio.to_thread(self._path_of, recording)
             if path is None:
                 raise NoReplay(f"There is no recording named {_seen(recording)}.")
-            await look.open(path, opening)
+            await client.open(path, opening)
         except BaseException:
-            await self.close(look)
+            await self.close(client)
             raise
-        return look
+        return client
 
-    async def close(self, look: Look) -> None:
-        self._looks.pop(look.token, None)
-        await look.close()
+    async def close(self, client: ReplayClient) -> None:
+        self._clients.pop(client.token, None)
+        await client.close()
 
     async def close_all(self) -> None:
-        await asyncio.gather(*(self.close(look) for look in list(self._looks.values())))
+        await asyncio.gather(*(self.close(client) for client in list(self._clients.values())))
 
-    def by_token(self, token: str) -> Look:
+    def by_token(self, token: str) -> ReplayClient:
         """Raises NoReplay."""
-        look = self._looks.get(token)
-        if look is None:
+        client = self._clients.get(token)
+        if client is None:
             raise NoReplay("This replay is over.")
-        return look
+        return client
 
 
 def summary(state: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,8 +13,10 @@ from typing import Any
 
 from server.protocol import serialize
 from server.recording.read.read import Recording, RecordingUnreadable
-from server.replay.recorded_events import read_told
-from server.replay.run import Drive, Run
+from server.replay import replay_frames
+from server.replay.drive import Drive
+from server.replay.recorded_events import read_recorded_events
+from server.replay.run import Run
 from server.replay.timeline import Index
 from server.vehicle import queries
 
@@ -40,7 +42,7 @@ class Playback:
         at_s: float = 0.0,
     ) -> None:
         self._recording = recording
-        self.drive = Drive(recording, read_told(recording), settings)
+        self.drive = Drive(recording, read_recorded_events(recording), settings)
         self._index_recording = open_again()
         self.index = Index(self._index_recording, self.drive)
         self._run = Run(recording, self.drive)
@@ -160,7 +162,7 @@ class Playback:
         if is_ahead and (kept is None or kept[0] <= here_s) and target_s - here_s <= REACH_S:
             pass  # what is known already leads there soonest
         elif kept is not None and target_s - kept[0] <= max(WARM_UP_S, 2 * self.index.every_s):
-            self._run = Run(self._recording, self.drive, known=kept[1]())
+            self._run = Run(self._recording, self.drive, run_state=kept[1]())
             self.is_settled = True
         else:
             from_s = max(0.0, target_s - WARM_UP_S)
@@ -183,12 +185,12 @@ class Playback:
 
     def frame(self, **names: Any) -> dict[str, Any]:
         """The state at the moment that has been reached, without `server`, `replay` and `live`."""
-        return self._run.frame(track_number=self.seeks, **names)
+        return replay_frames.frame(self._run, track_number=self.seeks, **names)
 
     def position(self) -> dict[str, Any]:
         """Where the replay stands, as docs/protocol.md has it."""
-        known = self._run.known
-        silent_s = None if known.last_message_s is None else max(0.0, known.at_s - known.last_message_s)
+        run_state = self._run.run_state
+        silent_s = None if run_state.last_message_s is None else max(0.0, run_state.at_s - run_state.last_message_s)
         return {
             "at_s": round(self.at_s, 3),
             "at_ms": round((self.drive.start_s + self.at_s) * 1000),
@@ -202,7 +204,7 @@ class Playback:
             "is_settled": self.is_settled,
             "silent_s": round(silent_s, 2) if silent_s is not None else None,
             "seek": self.seeks,
-            "alarms_from": "recording" if self.drive.told.has_alarms else "judged",
+            "alarms_from": "recording" if self.drive.recorded.has_alarms else "judged",
             "settings_from": "recording" if self.drive.settings_from_recording else "now",
         }
 
@@ -217,14 +219,14 @@ class Playback:
         return {"kind": "timeline"} | self.index.as_json() | {"notes": list(dict.fromkeys(said))[:20]}
 
     def scan_bytes(self) -> bytes | None:
-        return self._run.scan_bytes()
+        return replay_frames.scan_bytes(self._run)
 
     def answer(self, message: dict[str, Any]) -> dict[str, Any]:
         """What a page asks beside the state: `track_points` and `trends`, as the session answers them."""
-        known = self._run.known
+        run_state = self._run.run_state
         after = message.get("after")
         if message.get("kind") == "trends":
-            return serialize.trends(known.trends.piece(known.at_s, after=after))
+            return serialize.trends(run_state.trends.piece(run_state.at_s, after=after))
         return queries.track_points(
-            known.state.glance(known.at_s), number=self.seeks, after=after if isinstance(after, int) else 0
+            run_state.state.glance(run_state.at_s), number=self.seeks, after=after if isinstance(after, int) else 0
         )

@@ -43,7 +43,7 @@ Word = Transition | Pause | NewSettings | PhoneWord | SlowDownTold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class RecordedEvents:
     """Everything of one recording, in the order of time. Times are seconds since its beginning."""
 
     words: tuple[tuple[float, Word], ...] = ()
@@ -52,7 +52,7 @@ class Told:
     notes: tuple[str, ...] = field(default=())
 
 
-def read_told(recording: Recording) -> Told:
+def read_recorded_events(recording: Recording) -> RecordedEvents:
     """Reads the recording's own channels. What makes no sense in them is left out, and said."""
     words: list[tuple[float, Word]] = []
     left_out = changes = 0
@@ -83,7 +83,7 @@ def read_told(recording: Recording) -> Told:
     words.sort(key=lambda word: word[0])  # stable: of one moment, each channel keeps its order
     notes = (f"{left_out} entries of catgraph's own make no sense and are left out.",) if left_out else ()
     has_alarms = bool(events) or "session" in metadata
-    return Told(words=tuple(words), has_alarms=has_alarms, settings=at_first, notes=notes)
+    return RecordedEvents(words=tuple(words), has_alarms=has_alarms, settings=at_first, notes=notes)
 
 
 def _rows(recording: Recording, topic: str) -> Iterator[tuple[float, Mapping[str, Any]]]:

@@ -16,8 +16,10 @@ from monitor.runner import IMPAIRED, IMPAIRED_SPEC
 from monitor.state import State
 from server.protocol import serialize
 from server.recording.read.read import Recording
-from server.replay.checkpoint import freeze, thaw
-from server.replay.run import Drive, Known, Run
+from server.replay.checkpoint import restore, save
+from server.replay.drive import Drive
+from server.replay.run import Run
+from server.replay.run_state import RunState
 
 BUCKETS = 360  # of the speed: two pixels each on a phone
 LEAST_BUCKET_S = 0.5
@@ -43,10 +45,10 @@ class Index:
         self._kept: list[bytes] = []
         self.is_done = False
         self.broke_off: str | None = None  # why the recording could not be read to its end
-        told = drive.told.has_alarms
+        told = drive.recorded.has_alarms
         self._specs = {check.id: check.alarm for check in CHECKS} | {IMPAIRED: IMPAIRED_SPEC}
         if told:
-            for at_s, word in drive.told.words:
+            for at_s, word in drive.recorded.words:
                 if isinstance(word, Transition):
                     self._mark(word, at_s)
         self._run = Run(
@@ -76,7 +78,7 @@ class Index:
                 return
             if due_s <= self._drive.length_s:
                 self._kept_s.append(due_s)
-                self._kept.append(freeze(self._run.known))
+                self._kept.append(save(self._run.run_state))
             else:
                 self.finish()
 
@@ -86,10 +88,10 @@ class Index:
             self.is_done = True
             self._message(self._drive.length_s)
 
-    def before(self, at_s: float) -> tuple[float, Callable[[], Known]] | None:
+    def before(self, at_s: float) -> tuple[float, Callable[[], RunState]] | None:
         """The newest moment kept that is not later, and how to get what was known then."""
         place = bisect_right(self._kept_s, at_s) - 1
-        return (self._kept_s[place], lambda: thaw(self._kept[place])) if place >= 0 else None
+        return (self._kept_s[place], lambda: restore(self._kept[place])) if place >= 0 else None
 
     def as_json(self) -> dict[str, Any]:
         """What docs/protocol.md calls the time line; without what only its session knows."""

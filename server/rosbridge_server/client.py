@@ -6,7 +6,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 
@@ -20,11 +20,9 @@ from server.rosbridge_server.encoding import Encoding, Outgoing, json_frame
 from server.rosbridge_server.fields import Refused
 from server.rosbridge_server.fragments import Fragments
 from server.rosbridge_server.graph import Topic
+from server.rosbridge_server.interface import ClientHost
 from server.rosbridge_server.outbox import Outbox
 from server.rosbridge_server.subscription import Subscription, Wish
-
-if TYPE_CHECKING:
-    from server.rosbridge_server.server import RosBridge
 
 _log = logging.getLogger("catgraph.bridge")
 
@@ -43,9 +41,9 @@ NOT_OURS = {
 
 
 class Client:
-    """Lives as long as its connection; `RosBridge` keeps the topics, the client what it asked of them."""
+    """Lives as long as its connection; the bridge keeps the topics, the client what it asked of them."""
 
-    def __init__(self, bridge: RosBridge, connection: Connection) -> None:
+    def __init__(self, bridge: ClientHost, connection: Connection) -> None:
         self._bridge = bridge
         self._connection = connection
         self._outbox = Outbox(connection, bridge.counters, limit_bytes=BACKLOG_BYTES)

@@ -5,25 +5,33 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from websockets.asyncio.server import Server, ServerConnection
 from websockets.frames import Frame, Opcode
 from websockets.protocol import State
 from websockets.server import ServerProtocol
 
-if TYPE_CHECKING:
-    from server.rosbridge_server.listener import Listener
-
 HANDSHAKE_S = 10.0  # a socket that has not become a WebSocket by then is closed
 LARGEST_BUFFER = 4_000_000  # bytes of pongs: beyond, the peer floods us with pings and does not read
 KEEPALIVE_S = 30  # TCP's own probe finds peers that vanished; rosbridge itself sends no pings
 
 
+class Admission(Protocol):
+    """The listener, as a connection that came from it needs it."""
+
+    close_answer: Callable[[bytes], bytes] | None
+    is_frozen: bool
+
+    def admit(self, connection: Connection, /) -> bool: ...
+
+    def forget(self, connection: Connection, /) -> None: ...
+
+
 class Connection(ServerConnection):
     """While frozen it neither reads nor answers anything, pings and handshakes included, as a stopped process would."""
 
-    def __init__(self, listener: Listener, protocol: ServerProtocol, server: Server, **options: Any) -> None:
+    def __init__(self, listener: Admission, protocol: ServerProtocol, server: Server, **options: Any) -> None:
         super().__init__(protocol, server, **options)
         self._listener = listener
         if listener.close_answer is not None:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from server.judge.ros_names import canonical_name
 from server.rosbridge_server.encoding import Outgoing
-
-if TYPE_CHECKING:
-    from server.rosbridge_server.client import Client
 
 SOURCE = "source"  # the recording or the car behind the bridge, as a publisher
 
@@ -21,7 +18,7 @@ class Subscriber(Protocol):
 
 
 class Owner(Protocol):
-    """Whoever a subscriber belongs to."""
+    """Whoever a subscriber belongs to, and who may publish besides."""
 
     def type_became(self, topic: Topic, subscription: Any, /) -> None: ...
 
@@ -34,7 +31,7 @@ class Topic:
     type: str | None  # canonical; None: only subscribed to, by clients that named no type
     latches: bool = False
     latched: Outgoing | None = None  # the newest message, for those who come later
-    publishers: set[Client | str] = field(default_factory=set)
+    publishers: set[Owner | str] = field(default_factory=set)
     subscribers: dict[Subscriber, Owner] = field(default_factory=dict)
 
     def distribute(self, message: Outgoing) -> None:

@@ -6,7 +6,7 @@ import fnmatch
 import json
 import re
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosbags.typesys import get_types_from_msg
 
@@ -14,18 +14,16 @@ from server.judge.message import Json
 from server.judge.ros_names import canonical_type
 from server.rosbridge_server.completion import stamp
 from server.rosbridge_server.graph import SOURCE, Topic
+from server.rosbridge_server.interface import RosapiHost
 from server.rosbridge_server.real.loader import Malformed, Unknown, load
 from server.rosbridge_server.typedefs import TIME_TYPEDEF, Undescribable, describe
-
-if TYPE_CHECKING:
-    from server.rosbridge_server.server import RosBridge
 
 _WIDE = re.compile(r"^\s*wstring\b", re.MULTILINE)  # the real rosapi of ROS 2 ends on it
 BRIDGE_NODE = "/rosbridge_websocket"
 ROSAPI_NODE = "/rosapi"
 
 
-def add_rosapi(bridge: RosBridge) -> None:
+def add_rosapi(bridge: RosapiHost) -> None:
     """Adds the services of rosapi to a bridge, with the names of their fields as rosapi has them."""
     api = _Rosapi(bridge)
     package = "rosapi" if bridge.ros_version == 1 else "rosapi_msgs"
@@ -74,7 +72,7 @@ def add_rosapi(bridge: RosBridge) -> None:
 
 
 class _Rosapi:
-    def __init__(self, bridge: RosBridge) -> None:
+    def __init__(self, bridge: RosapiHost) -> None:
         self._bridge = bridge
         self._version = bridge.ros_version
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
-from typing import Literal
 
 from server.judge.message import Json, RosVersion
 from server.judge.ros_names import canonical_name, canonical_type
@@ -13,6 +12,7 @@ from server.rosbridge_server.client import Client
 from server.rosbridge_server.connection import Connection
 from server.rosbridge_server.encoding import Outgoing
 from server.rosbridge_server.graph import SOURCE, Graph, Topic
+from server.rosbridge_server.interface import Like
 from server.rosbridge_server.listener import CannotListen, Listener
 from server.rosbridge_server.outbox import Counters
 from server.rosbridge_server.real.client import RealClient
@@ -27,7 +27,6 @@ from server.rosbridge_server.types import MessageTypes
 
 __all__ = ["CannotListen", "Like", "RealOptions", "RosBridge", "ServiceFailed"]
 
-Like = Literal["helpful", "real"]
 _CLOSE_ANSWERS: dict[int, Callable[[bytes], bytes]] = {1: lambda _: b"\x03\xe8", 2: lambda data: data[:2]}
 _SERVERS = {1: "AutobahnPython/22.7.1", 2: "TornadoServer/6.6.1"}
 

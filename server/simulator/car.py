@@ -13,7 +13,7 @@ from server.judge.message import Json, Message, RosVersion
 from server.simulator import place
 from server.simulator.beams import DENSE_HZ, INTERLACED, SICK_HZ, Beams, dense
 from server.simulator.driver import Driver, Order
-from server.simulator.lap import LENGTH_M, lap
+from server.simulator.lap import lap
 from server.simulator.laser import Laser, nearest
 from server.simulator.messages import (
     ACCELERATOR,
@@ -30,10 +30,11 @@ from server.simulator.messages import (
 )
 from server.simulator.running import Scenarios
 from server.simulator.scenarios import BridgeFault, Planned, Scenario
-from server.simulator.scenery import Scenery, box
+from server.simulator.scenery import Scenery
 from server.simulator.sensors import GpsError, effort_percent, steering_percent, wheel_speed_mps
 from server.simulator.stack import Stack
-from server.simulator.vehicle import LASER_AHEAD_M, Motion, MotionCommand, drive, pedals
+from server.simulator.stage import Stage
+from server.simulator.vehicle import Motion, MotionCommand, drive, pedals
 
 START_S = 1_790_000_000.0  # seconds since 1970, when nobody says otherwise
 START_STATION_M = 300.0  # half a minute before the bends and the stop
@@ -47,13 +48,6 @@ GPS_LATENCY_S = 0.02
 
 # A client's command holds until it has been silent this long; then the lap's driver takes the wheel again.
 CLIENT_HOLDS_S = 0.5
-
-# A driver in a hurry has had enough after so long above the operator's usual limit, or when a bend ends it before: one
-# hurry is one alarm.
-LIMIT_MPS, HURRY_FOR_S, LEAST_HURRY_S = 11.0, 8.0, 0.3
-
-# What pulls across the way stands so far ahead of the laser that the driver can stop, and the alarm has time to tell.
-BLOCKER_LENGTH_M, BLOCKER_WIDTH_M = 4.4, 1.8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,15 +86,14 @@ class SimulatedCar:
         self._clock_s = start_s
         self._elapsed_s = 0.0
         self._steps_done = 0
-        self._scenery = Scenery()
+        scenery = Scenery()
+        self._stage = Stage(scenery, self.scenarios)
         self._driver = Driver(START_STATION_M, driver_rng)
         self._stack = Stack(has_stopper=has_stopper)
         self._gives_way = gives_way
         self._insists_on: MotionCommand | None = None
         self._client_until_s = -math.inf
-        self._blocked_at_m: float | None = None
-        self._hurried_s = 0.0
-        self._laser = Laser(self._scenery, laser_rng)
+        self._laser = Laser(scenery, laser_rng)
         self._dense = None if scan_beams is None else dense(scan_beams)
         self._turns = 0
         self._gps_error = GpsError(gps_rng)
@@ -199,8 +192,7 @@ class SimulatedCar:
         while (self._steps_done + 1) / STEP_HZ <= until_s:
             self.motion = drive(self.motion, self._stack.passed(self._steps_done / STEP_HZ), 1 / STEP_HZ)
             self._steps_done += 1
-            if self.motion.speed_mps > LIMIT_MPS:
-                self._hurried_s += 1 / STEP_HZ
+            self._stage.moved(self.motion, 1 / STEP_HZ)
         self._elapsed_s = until_s
         self.scenarios.advance(until_s)
 
@@ -246,8 +238,8 @@ class SimulatedCar:
             if self._elapsed_s >= self._client_until_s > -math.inf:
                 self._driver.resume(now)
                 self._client_until_s = -math.inf
-            self._set_the_stage(now, orders)
-            command = self._driver.command(now, self._elapsed_s, 1 / CONTROL_HZ, orders, self._blocked_at_m)
+            self._stage.set(now, self._driver.station_m, orders)
+            command = self._driver.command(now, self._elapsed_s, 1 / CONTROL_HZ, orders, self._stage.blocked_at_m)
             self._stack.hear(command, self._elapsed_s)
             self._insists_on = command
             messages.append(writer.twist(CMD_VEL, at_s, command.speed_mps, command.tyre_rad))
@@ -260,25 +252,6 @@ class SimulatedCar:
             return ()
         self._stack.hear(command, self._elapsed_s)
         return (self._writer.twist(CMD_VEL, self.now_s, command.speed_mps, command.tyre_rad),)
-
-    def _set_the_stage(self, now: Motion, orders: set[Order]) -> None:
-        """Lets the obstacle come and go, and ends a hurry that has shown what it should."""
-        if Order.HURRY not in orders:
-            self._hurried_s = 0.0
-        elif self._hurried_s >= (HURRY_FOR_S if now.speed_mps > LIMIT_MPS else LEAST_HURRY_S):
-            self.scenarios.stop("speeding")
-        if Order.YIELD not in orders:
-            if self._blocked_at_m is not None:
-                self._blocked_at_m = None
-                self._scenery.put(None)
-        elif self._blocked_at_m is None:
-            speed_mps = now.speed_mps
-            ahead_m = LASER_AHEAD_M + 4.5 + 0.6 * speed_mps + speed_mps**2 / 6
-            middle = lap().at(self._driver.station_m + ahead_m + BLOCKER_WIDTH_M / 2)
-            self._scenery.put(
-                box(middle.x_m, middle.y_m, middle.yaw_rad + math.pi / 2, BLOCKER_LENGTH_M, BLOCKER_WIDTH_M)
-            )
-            self._blocked_at_m = (self._driver.station_m + ahead_m) % LENGTH_M
 
     def _next_turn(self) -> Beams:
         self._turns += 1

@@ -25,8 +25,8 @@ from server.control import display_name
 from server.protocol import commands
 from server.protocol.rate_limit import MAX_DEPTH, SLOW_DOWN, Allowance, Limits, nests_deeper
 from server.replay import commands as orders
-from server.replay.manager import Desk, NoReplay
-from server.replay.view_source import Seat
+from server.replay.manager import NoReplay, ReplayManager
+from server.replay.view_source import ViewSource
 from server.web.fair_wakeup import Turns
 
 log = logging.getLogger("catgraph.hub")
@@ -56,7 +56,7 @@ class Page:
         *,
         hello: Mapping[str, Any],
         who: Who,
-        desk: Desk,
+        replays: ReplayManager,
         server: Callable[[], Mapping[str, Any]],
         limits: Limits,
         now: Callable[[], float],
@@ -70,10 +70,10 @@ class Page:
         self._hello = hello
         self._who = who
         self._wake = asyncio.Event()
-        self._seat = Seat(bus, vehicle, desk, server=server, on_new=self._something_replayed, on_turned=self._turned)
+        self._view = ViewSource(bus, vehicle, replays, server=server, on_new=self._on_replay, on_turned=self._turned)
         self._begins_with = replay
         self._opening: asyncio.Task[None] | None = None
-        self._sent = dict.fromkeys(self._seat.kinds, 0)  # number of the newest frame of a kind this page got
+        self._sent = dict.fromkeys(self._view.kinds, 0)  # number of the newest frame of a kind this page got
         self._watches_scan = False
         self._seq = 0
         self._offered = False  # an offer stands unanswered
@@ -122,7 +122,7 @@ class Page:
             with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError, OSError):
                 await writer
             self._watch_scan(False)
-            await self._seat.leave()
+            await self._view.leave()
 
     def _writer_ended(self, writer: asyncio.Task[None], reader: asyncio.Task[None]) -> None:
         """A page that gets nothing more is no page: it is closed, so that it connects again."""
@@ -139,7 +139,7 @@ class Page:
         if kind == "events":
             self._events_due = True
             self._turns.queue(self._wake, is_urgent=True)
-        elif kind == "scan" and self._seat.is_replaying:
+        elif kind == "scan" and self._view.is_replaying:
             return
         elif self._offered or (kind == "scan" and not self._watches_scan):
             if kind == "state":
@@ -147,13 +147,13 @@ class Page:
         else:
             self._turns.queue(self._wake)
 
-    def _something_replayed(self, kind: str) -> None:
+    def _on_replay(self, kind: str) -> None:
         if kind == "failed" or not self._offered:
             self._wake.set()
 
     def _turned(self) -> None:
         """Another thing is looked at: none of its frames was sent."""
-        self._sent = dict.fromkeys(self._seat.kinds, 0)
+        self._sent = dict.fromkeys(self._view.kinds, 0)
         self._wake.set()
 
     # -- from the page -----------------------------------------------------------------------------------------------
@@ -236,7 +236,7 @@ class Page:
         if not allowance.takes(self._now()):
             self._reply(identity, {"ok": False, "reason": TOO_MANY})
             return
-        if self._seat.is_replaying and message.get("kind") not in FROM_A_REPLAY:
+        if self._view.is_replaying and message.get("kind") not in FROM_A_REPLAY:
             self._reply(identity, {"ok": False, "reason": NOT_FROM_A_REPLAY})
             return
         try:
@@ -264,7 +264,7 @@ class Page:
             "by": self._name if self._who is LOCAL else self._who.name,
             "who": self._who.id,
             "page": self._page,
-            "replaying": self._seat.is_replaying,
+            "replaying": self._view.is_replaying,
             "console": False,
         }
 
@@ -287,15 +287,15 @@ class Page:
             case orders.Open():  # it takes a second; meanwhile this page goes on taking what is live
                 self._opening = asyncio.create_task(self._open(identity, order), name="open a replay")
             case orders.Leave():
-                await self._seat.leave()
+                await self._view.leave()
                 self._reply(identity, {"ok": True})
             case _:
-                self._reply(identity, await self._seat.ask(order))
+                self._reply(identity, await self._view.ask(order))
 
     async def _open(self, identity: str | None, order: orders.Open) -> None:
         """`identity` None: it was asked for by the address, and only a refusal is answered."""
         try:
-            await self._seat.open(order)
+            await self._view.open(order)
             if identity is not None:
                 self._reply(identity, {"ok": True})
         except NoReplay as why:
@@ -324,7 +324,7 @@ class Page:
     def _watch_scan(self, wanted: bool) -> None:
         if wanted != self._watches_scan:
             self._watches_scan = wanted
-            self._seat.watch_scan(wanted)
+            self._view.watch_scan(wanted)
 
     # -- to the page -------------------------------------------------------------------------------------------------
 
@@ -344,9 +344,9 @@ class Page:
             return  # the reader notices the same end
 
     async def _write_round(self) -> None:
-        if self._seat.ended is not None:
-            self._replies.append({"kind": "replay", "ended": self._seat.ended})
-            await self._seat.leave()
+        if self._view.ended is not None:
+            self._replies.append({"kind": "replay", "ended": self._view.ended})
+            await self._view.leave()
         replies, self._replies = self._replies, []
         for reply in replies:
             await self._send(reply)
@@ -354,7 +354,7 @@ class Page:
             await self._send_events()
         if self._take:
             self._take = False
-            for kind in self._seat.kinds:
+            for kind in self._view.kinds:
                 if self._is_new(kind):
                     await self._send_newest(kind)
         if not self._offered:
@@ -369,7 +369,7 @@ class Page:
             await self._send({"kind": "events", "events": events, "last": self._bus.last_event(self._vehicle)})
 
     async def _offer(self) -> None:
-        fresh = [kind for kind in self._seat.kinds if self._is_new(kind)]
+        fresh = [kind for kind in self._view.kinds if self._is_new(kind)]
         if fresh:
             self._seq += 1
             self._offered = True
@@ -378,10 +378,10 @@ class Page:
     def _is_new(self, kind: str) -> bool:
         if kind == "scan" and not self._watches_scan:
             return False
-        return self._seat.number(kind) > self._sent[kind]
+        return self._view.number(kind) > self._sent[kind]
 
     async def _send_newest(self, kind: str, *, unasked: bool = False) -> None:
-        frame = self._seat.newest(kind)
+        frame = self._view.newest(kind)
         if frame is None or (frame.number <= self._sent[kind] and not unasked):
             return
         self._sent[kind] = frame.number
@@ -406,7 +406,7 @@ class Hub:
         self,
         bus: LocalBus,
         *,
-        desk: Desk,
+        replays: ReplayManager,
         server: Callable[[], Mapping[str, Any]],
         limits: Limits,
         now: Callable[[], float],
@@ -415,7 +415,7 @@ class Hub:
         self._bus = bus
         self._limits = limits
         self._now = now
-        self._desk = desk
+        self._replays = replays
         self._server = server
         self._pages: set[Page] = set()
         self._turns = Turns()
@@ -449,7 +449,7 @@ class Hub:
             vehicle,
             hello=hello,
             who=who,
-            desk=self._desk,
+            replays=self._replays,
             server=self._server,
             limits=self._limits,
             now=self._now,

@@ -13,7 +13,7 @@ from server.bus.bus import LocalBus
 from server.mail.mailer import Mailer
 from server.recording.catalog.catalog import Catalog
 from server.recording.export.jobs import Exports
-from server.replay.manager import Desk
+from server.replay.manager import ReplayManager
 from server.storage.data_folder import DataFolder
 from server.system.page_files import static_dir
 from server.vehicle.session import Session
@@ -45,7 +45,7 @@ class Services:
     ground: Ground
     mailer: Mailer | None  # None: nothing is kept, so nothing is mailed
     recordings: Catalog | None  # None: nothing is kept, so nothing is recorded
-    desk: Desk
+    replays: ReplayManager
     exports: Exports | None = None  # None: nothing is kept, so nothing is exported
 
     def server_facts(self) -> dict[str, Any]:

@@ -14,8 +14,8 @@ import pytest_asyncio
 from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import Locator, expect
 
-from server.recording.catalog import annotations as remarks
-from server.recording.catalog.annotations import Remarks
+from server.recording.catalog import annotations as annotation_store
+from server.recording.catalog.annotations import Annotations
 from tests.page.conftest import Phone
 from tests.page.drives import steady
 from tests.page.processes import Process, replay, running, server
@@ -40,7 +40,7 @@ def fill(data: Path) -> None:
         folder / f"{name_of(5)}.mcap", seconds=30.0, began_ms=BEGAN_MS + 5 * HOUR_MS, ended="recovered",
         alarms=[(5.0, "warning"), (9.0, "critical"), (20.0, "critical")],
     )  # fmt: skip
-    remarks.write(loud, Remarks(title=HOSTILE, note="two\nlines", tags=("wet",)))
+    annotation_store.write(loud, Annotations(title=HOSTILE, note="two\nlines", tags=("wet",)))
     record(folder / f"{name_of(6)}.mcap", seconds=8.0, began_ms=BEGAN_MS + 6 * HOUR_MS, at=None)
     (folder / "notes.mcap").write_text("hello")
 

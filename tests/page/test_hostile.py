@@ -11,8 +11,8 @@ import httpx
 from playwright.async_api import expect
 
 from server.app.config import Config
-from server.recording.catalog import annotations as remarks
-from server.recording.catalog.annotations import Remarks
+from server.recording.catalog import annotations as annotation_store
+from server.recording.catalog.annotations import Annotations
 from server.rosbridge_server.graph import SOURCE, Topic
 from server.vehicle.vehicle import Vehicle
 from tests.page.conftest import Phone
@@ -104,7 +104,9 @@ async def test_a_recording_that_means_harm_is_only_listed(phone: Phone, tmp_path
     """Its title, note and tags, and the subject of a mail, which somebody else wrote."""
     await phone.page.add_init_script(NOTE_VIOLATIONS)
     drive = record(tmp_path / "data" / "recordings" / "car" / f"{ID}.mcap", seconds=6.0)
-    remarks.write(drive, Remarks(title=SCRIPT[:110] + BIDI, note=SCRIPT + NUL.replace("\0", ""), tags=(SCRIPT[:39],)))
+    annotation_store.write(
+        drive, Annotations(title=SCRIPT[:110] + BIDI, note=SCRIPT + NUL.replace("\0", ""), tags=(SCRIPT[:39],))
+    )
     async with contextlib.AsyncExitStack() as stack:
         car = await stack.enter_async_context(roaming())
         config = Config(vehicles=(Vehicle(name="car", address=car.address),), data=tmp_path / "data")

@@ -23,7 +23,7 @@ _UNSEEN = frozenset("\u200b\u200e\u200f\u061c\ufeff\u2028\u2029\u00ad")
 _TURNING = range(0x202A, 0x202F), range(0x2066, 0x206A)
 
 
-class BadRemark(ValueError):
+class BadAnnotation(ValueError):
     """What was said cannot be kept; the text is one sentence for a person, `field` is what it is about."""
 
     def __init__(self, field: str, sentence: str) -> None:
@@ -32,7 +32,7 @@ class BadRemark(ValueError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Remarks:
+class Annotations:
     """Of one recording; without any it is called by its time."""
 
     title: str = ""
@@ -40,15 +40,15 @@ class Remarks:
     tags: tuple[str, ...] = ()
 
 
-NONE = Remarks()
+NONE = Annotations()
 
 
 def beside(recording: Path) -> Path:
-    """The file of a recording's remarks: copied with it, they go with it."""
+    """The file of a recording's annotations: copied with it, they go with it."""
     return recording.with_name(recording.name + ".json")
 
 
-def read(recording: Path) -> Remarks:
+def read(recording: Path) -> Annotations:
     """Those beside a recording; none where there is no such file, or one that is not ours. Bounded and cleaned."""
     try:
         with beside(recording).open("rb") as file:
@@ -59,22 +59,22 @@ def read(recording: Path) -> Remarks:
     if not isinstance(body, dict):
         return NONE
     tags = body.get("tags")
-    return Remarks(
+    return Annotations(
         title=line(body.get("title"))[:MAX_TITLE].strip(),
         note=text(body.get("note"))[:MAX_NOTE].strip(),
         tags=_unique([line(tag)[:MAX_TAG].strip() for tag in tags] if isinstance(tags, list) else [])[:MAX_TAGS],
     )
 
 
-def write(recording: Path, remarks: Remarks) -> None:
+def write(recording: Path, annotations: Annotations) -> None:
     """Keeps them, whole or not at all; with none the file goes. Raises OSError."""
     path = beside(recording)
-    if remarks == NONE:
+    if annotations == NONE:
         path.unlink(missing_ok=True)
         return
     if path.exists() and not _is_ours(path):  # somebody else's: it is not lost
         path.rename(path.with_name(f"{path.name}.other"))
-    body = orjson.dumps(asdict(remarks), option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+    body = orjson.dumps(asdict(annotations), option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
     number, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:100]}.", suffix=".new")
     try:
         with os.fdopen(number, "wb") as file:
@@ -90,10 +90,10 @@ def write(recording: Path, remarks: Remarks) -> None:
 
 
 def changed(
-    old: Remarks, *, title: str | None = None, note: str | None = None, tags: Sequence[str] | None = None
-) -> Remarks:
-    """With what is given in place of the old; None leaves it. Raises BadRemark."""
-    return Remarks(
+    old: Annotations, *, title: str | None = None, note: str | None = None, tags: Sequence[str] | None = None
+) -> Annotations:
+    """With what is given in place of the old; None leaves it. Raises BadAnnotation."""
+    return Annotations(
         title=old.title if title is None else _fitting("title", "A title", line(title), MAX_TITLE),
         note=old.note if note is None else _fitting("note", "A note", text(note), MAX_NOTE),
         tags=old.tags if tags is None else _tags(tags),
@@ -103,13 +103,13 @@ def changed(
 def _tags(tags: Sequence[str]) -> tuple[str, ...]:
     found = _unique([_fitting("tags", "A tag", line(tag), MAX_TAG) for tag in tags])
     if len(found) > MAX_TAGS:
-        raise BadRemark("tags", f"A recording has at most {MAX_TAGS} tags.")
+        raise BadAnnotation("tags", f"A recording has at most {MAX_TAGS} tags.")
     return found
 
 
 def _fitting(field: str, what: str, words: str, most: int) -> str:
     if len(words) > most:
-        raise BadRemark(field, f"{what} has at most {most} letters; this has {len(words)}.")
+        raise BadAnnotation(field, f"{what} has at most {most} letters; this has {len(words)}.")
     return words
 
 

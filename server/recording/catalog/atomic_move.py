@@ -7,13 +7,16 @@ import os
 import shutil
 from pathlib import Path
 
-from server.recording.catalog import annotations as remarks
+from server.recording.catalog import annotations as annotation_store
 
 
 def move(source: Path, target: Path) -> None:
-    """Copies the remarks, renames the file, and only then forgets the copy: whenever the server is killed meanwhile,
-    the recording has its remarks beside it. Raises OSError, and then nothing was moved."""
-    said, there = remarks.beside(source), remarks.beside(target)
+    """Copies the annotations, renames the file, and only then removes the first copy of the annotations.
+
+    Whenever the server is killed meanwhile, the recording has its annotations beside it. Raises OSError, and then
+    nothing was moved.
+    """
+    said, there = annotation_store.beside(source), annotation_store.beside(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         there.unlink(missing_ok=True)  # what an earlier kill left there is not of this one

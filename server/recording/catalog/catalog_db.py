@@ -13,7 +13,7 @@ from typing import Any
 
 import orjson
 
-from server.recording.catalog.annotations import NONE, Remarks
+from server.recording.catalog.annotations import NONE, Annotations
 
 log = logging.getLogger("catgraph.catalog")
 
@@ -51,7 +51,7 @@ class Entry:
     size: int  # bytes
     changed_ns: int
     found: dict[str, Any] | None = None  # by the survey; None: it has not been read yet
-    remarks: Remarks = NONE
+    annotations: Annotations = NONE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +111,7 @@ def entry(row: Sequence[Any]) -> Entry:
         size=size,
         changed_ns=changed_ns,
         found=orjson.loads(found) if found is not None else None,
-        remarks=Remarks(title=title, note=note, tags=tuple(orjson.loads(tags))),
+        annotations=Annotations(title=title, note=note, tags=tuple(orjson.loads(tags))),
     )
 
 
@@ -121,7 +121,7 @@ def put(database: sqlite3.Connection, entries: Iterable[Entry]) -> None:
         (
             *(os.fsencode(e.path), e.id, e.trashed_ms, e.vehicle, e.started_ms, e.size, e.changed_ns),
             None if e.found is None else orjson.dumps(e.found).decode(),
-            *(e.remarks.title, e.remarks.note, orjson.dumps(e.remarks.tags).decode(), _words(e)),
+            *(e.annotations.title, e.annotations.note, orjson.dumps(e.annotations.tags).decode(), _words(e)),
         )
         for e in entries
     ]
@@ -141,8 +141,8 @@ def forget(database: sqlite3.Connection, paths: Iterable[str]) -> None:
 
 def _words(e: Entry) -> str:
     """What a search looks through; each tag stands between lines of its own, so that whole ones can be asked for."""
-    tags = "".join(f"\n#{tag}\n" for tag in e.remarks.tags)
-    return f"{e.remarks.title}\n{e.remarks.note}\n{e.vehicle}\n{e.id}{tags}".casefold()
+    tags = "".join(f"\n#{tag}\n" for tag in e.annotations.tags)
+    return f"{e.annotations.title}\n{e.annotations.note}\n{e.vehicle}\n{e.id}{tags}".casefold()
 
 
 def condition(which: Which) -> tuple[str, list[Any]]:

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from server.recording.catalog import annotations as remarks
+from server.recording.catalog import annotations as annotation_store
 from server.recording.folder import DAMAGED, FINISHED, is_id
 
 TRASH = ".trash"
@@ -36,7 +36,7 @@ def id_of(inside: str) -> str:
 def vehicle_of(found: dict[str, Any] | None, origin: str) -> str:
     told = (found or {}).get("vehicle")
     folder = Path(origin).parts[0] if len(Path(origin).parts) > 1 else ""
-    return remarks.line(told or folder)[:40]
+    return annotation_store.line(told or folder)[:40]
 
 
 def started_ms_of(found: dict[str, Any] | None, name: str, changed_ns: int) -> int:

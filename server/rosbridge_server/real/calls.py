@@ -5,18 +5,16 @@ from __future__ import annotations
 import asyncio
 import inspect
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosbags.typesys import get_types_from_msg
 
 from server.judge.ros_names import BadName
 from server.rosbridge_server.completion import zero
+from server.rosbridge_server.interface import ServiceHost
 from server.rosbridge_server.real.convert import Converter, Poison, Unfit
 from server.rosbridge_server.real.shape import fields
 from server.rosbridge_server.services import Service
-
-if TYPE_CHECKING:
-    from server.rosbridge_server.server import RosBridge
 
 _ROS2_NAME = re.compile(r"[A-Za-z0-9_~{}/]+", re.ASCII)
 _RCL = "at /project/src/rcl/expand_topic_name.c:73"
@@ -30,7 +28,7 @@ class NoAnswer(Exception):
     """The service's node has died with the call: the caller waits for ever."""
 
 
-async def call(bridge: RosBridge, name: str, args: Any) -> Any:
+async def call(bridge: ServiceHost, name: str, args: Any) -> Any:
     """The answer's values. Raises Failure and NoAnswer."""
     if bridge.down is not None:
         raise Failure(bridge.down)
@@ -59,7 +57,7 @@ async def call(bridge: RosBridge, name: str, args: Any) -> Any:
         raise Failure(f"service [{full}] responded with an error: {told!r}") from None
 
 
-def _resolved(bridge: RosBridge, name: str) -> str:
+def _resolved(bridge: ServiceHost, name: str) -> str:
     full = name if name.startswith("/") else f"/{name}"
     if bridge.ros_version == 1:
         return full.rstrip("/") or "/"
@@ -75,7 +73,7 @@ def _resolved(bridge: RosBridge, name: str) -> str:
     return full
 
 
-def _request(bridge: RosBridge, service: Service, args: Any) -> dict[str, Any]:
+def _request(bridge: ServiceHost, service: Service, args: Any) -> dict[str, Any]:
     given = dict(zip(service.arguments, args, strict=False)) if isinstance(args, list) else args
     given = given if isinstance(given, dict) else {}
     if service.request is None:

@@ -3,48 +3,44 @@
 from __future__ import annotations
 
 import asyncio
-import fnmatch
 import json
 import logging
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from websockets.exceptions import ConnectionClosed
 
 from server.rosbridge_server.connection import Connection
 from server.rosbridge_server.encoding import binary_frame, text_frame
-from server.rosbridge_server.outbox import Lane, Outbox
+from server.rosbridge_server.interface import ServiceHost, TopicHost
+from server.rosbridge_server.outbox import Counters, Lane, Outbox
+from server.rosbridge_server.real import client_topics
 from server.rosbridge_server.real import text as writing
 from server.rosbridge_server.real.calls import Failure, NoAnswer, call
+from server.rosbridge_server.real.client_topics import ClientTopics
+from server.rosbridge_server.real.fragments import RealFragments
 from server.rosbridge_server.real.intake import Deaf, Intake
+from server.rosbridge_server.real.operation_fields import CALL, check
+from server.rosbridge_server.real.options import is_open
 from server.rosbridge_server.real.provider import Providers
 from server.rosbridge_server.real.shape import Lost
-from server.rosbridge_server.real.subscription import Asked, RealSubscription
-
-if TYPE_CHECKING:
-    from server.rosbridge_server.server import RosBridge
 
 BACKLOG_BYTES = 64_000_000
 DEFAULT_BYTES = 10_000_000  # ROS 2: the longest frame that comes in, and that goes out in one piece
 _log = logging.getLogger("catgraph.bridge.real")
 
-TOPIC = (True, "topic", str)
-SUBSCRIBE = (
-    TOPIC, (False, "type", str), (False, "throttle_rate", int), (False, "fragment_size", int),
-    (False, "queue_length", int), (False, "compression", str),
-)  # fmt: skip
-ADVERTISE = (TOPIC, (True, "type", str))
-CALL = ((True, "service", str), (False, "fragment_size", (int, type(None))), (False, "compression", str))
 
+class Host(client_topics.Host, TopicHost, ServiceHost, Protocol):
+    """What serves a client."""
 
-class Wrong(Exception):
-    """An operation that the real bridge refuses in its own log."""
+    counters: Counters
+    fragments: RealFragments
 
 
 class RealClient:
     """Lives as long as its connection."""
 
-    def __init__(self, bridge: RosBridge, connection: Connection) -> None:
+    def __init__(self, bridge: Host, connection: Connection) -> None:
         self._bridge = bridge
         self._connection = connection
         self._outbox = Outbox(connection, bridge.counters, limit_bytes=BACKLOG_BYTES)
@@ -52,19 +48,17 @@ class RealClient:
         self._intake = Intake()
         self._is_deaf = False
         self._fragment_size: Any = bridge.real.max_message_bytes or (DEFAULT_BYTES if bridge.ros_version == 2 else None)
-        self._subscriptions: dict[str, RealSubscription] = {}
-        self._advertised: dict[str, set[object]] = {}
-        self._published: set[str] = set()
+        self._topics = ClientTopics(bridge, self.send)
         self._providers = Providers(bridge, self.send)
         self._calls: set[asyncio.Task[None]] = set()
         self._blocking: asyncio.Task[None] | None = None  # ROS 2: the call that all else waits for
         self._waiting: list[str] = []  # frames that came meanwhile
         self._operations: dict[str, Callable[[dict[str, Any], Any], None]] = {
-            "subscribe": self._subscribe,
-            "unsubscribe": self._unsubscribe,
-            "advertise": self._advertise,
-            "unadvertise": self._unadvertise,
-            "publish": self._publish,
+            "subscribe": self._topics.subscribe,
+            "unsubscribe": self._topics.unsubscribe,
+            "advertise": self._topics.advertise,
+            "unadvertise": self._topics.unadvertise,
+            "publish": self._topics.publish,
             "call_service": self._call,
             "fragment": self._fragment,
             "advertise_service": self._providers.advertise,
@@ -153,10 +147,7 @@ class RealClient:
         self._outbox.close()
         for task in self._calls:
             task.cancel()
-        for spelling in list(self._subscriptions):
-            self._end(spelling)
-        for spelling in (*self._advertised, *self._published):
-            self._bridge.publishers.unregister(self, spelling)
+        self._topics.close()
         self._providers.close()
 
     def _write(self, text: str) -> None:
@@ -190,93 +181,11 @@ class RealClient:
             self._connection.close_without_code()
         return not is_auth
 
-    def _is_open(self, name: str, globs: tuple[str, ...]) -> bool:
-        return not globs or any(fnmatch.fnmatch(name, glob) for glob in globs)
-
-    def _subscribe(self, operation: dict[str, Any], id: Any) -> None:
-        _check(operation, SUBSCRIBE)
-        spelling = operation["topic"]
-        if not self._is_open(spelling, self._bridge.real.topics_glob):
-            return
-        subscription = self._subscriptions.get(spelling)
-        if subscription is None:
-            subscription = RealSubscription(spelling, self._bridge.ros_version, self.send)
-            self._subscriptions[spelling] = subscription
-        compression = operation.get("compression", "none")
-        subscription.asked[id] = Asked(
-            throttle_s=operation.get("throttle_rate", 0) / 1000.0,
-            queue_length=operation.get("queue_length", 0),
-            compression=compression,
-        )
-        subscription.settle()
-        is_raw = compression == "cbor-raw"
-        self._bridge.subscribers.subscribe(spelling, subscription, operation.get("type"), is_raw=is_raw)
-        self._bridge.subscribed(spelling)
-
-    def _unsubscribe(self, operation: dict[str, Any], id: Any) -> None:
-        _check(operation, (TOPIC,))
-        spelling = operation["topic"]
-        subscription = self._subscriptions.get(spelling)
-        if subscription is None:
-            return
-        if id is None:
-            subscription.asked.clear()
-        else:
-            subscription.asked.pop(id, None)
-        if subscription.asked:
-            subscription.settle()
-        else:
-            self._bridge.subscribers.unsubscribe(spelling, subscription)
-            subscription.close()
-            del self._subscriptions[spelling]
-
-    def _end(self, spelling: str) -> None:
-        subscription = self._subscriptions.pop(spelling)
-        subscription.close()
-        try:
-            self._bridge.subscribers.unsubscribe(spelling, subscription)
-        except KeyError:
-            return
-
-    def _advertise(self, operation: dict[str, Any], id: Any) -> None:
-        _check(operation, ADVERTISE)
-        spelling = operation["topic"]
-        if not self._is_open(spelling, self._bridge.real.topics_glob):
-            return
-        ids = self._advertised.setdefault(spelling, set())
-        latches = operation.get("latch") is True
-        self._bridge.publishers.register(self, spelling, operation["type"], latches=latches)
-        ids.add(id)
-
-    def _unadvertise(self, operation: dict[str, Any], id: Any) -> None:
-        _check(operation, (TOPIC,))
-        spelling = operation["topic"]
-        ids = self._advertised.get(spelling)
-        if ids is None or not self._is_open(spelling, self._bridge.real.topics_glob):
-            return
-        if id is None:
-            ids.clear()
-        else:
-            ids.discard(id)
-        if not ids:
-            del self._advertised[spelling]
-            self._bridge.publishers.unregister(self, spelling)
-
-    def _publish(self, operation: dict[str, Any], id: Any) -> None:
-        _check(operation, (TOPIC,))
-        spelling = operation["topic"]
-        if not self._is_open(spelling, self._bridge.real.topics_glob):
-            return
-        latches = operation.get("latch") is True
-        self._bridge.publishers.register(self, spelling, None, latches=latches)
-        self._published.add(spelling)
-        self._bridge.publishers.publish(self, spelling, operation.get("msg", {}), latches=latches)
-
     def _call(self, operation: dict[str, Any], id: Any) -> None:
-        _check(operation, CALL)
+        check(operation, CALL)
         service = operation["service"]
         globs = self._bridge.real.services_glob
-        if globs and not self._is_open(service, (*globs, "/rosapi/*")):
+        if globs and not is_open(service, (*globs, "/rosapi/*")):
             return
         name, _, tail = service.partition("#")
         task = asyncio.ensure_future(
@@ -308,12 +217,3 @@ class RealClient:
         whole = self._bridge.fragments.add(operation)
         if whole is not None:
             self.incoming(whole)
-
-
-def _check(operation: dict[str, Any], wanted: tuple[tuple[bool, str, Any], ...]) -> None:
-    for is_needed, name, kinds in wanted:
-        if name not in operation:
-            if is_needed:
-                raise Wrong(f"Expected a {name} field but none was found.")
-        elif not isinstance(operation[name], kinds):
-            raise Wrong(f"Expected field {name} to be one of {kinds}. Invalid value: {operation[name]}")

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from server.judge.ros_names import BadName, canonical_type
-
-if TYPE_CHECKING:
-    from server.rosbridge_server.server import RosBridge
+from server.rosbridge_server.interface import TypeSource
 
 
 class Malformed(Exception):
@@ -18,7 +14,7 @@ class Unknown(Exception):
     """A package or a type that is not installed."""
 
 
-def load(bridge: RosBridge, name: str) -> str:
+def load(bridge: TypeSource, name: str) -> str:
     """The type as the graph has it. Raises Malformed and Unknown, with the real texts."""
     try:
         type = canonical_type(name, bridge.ros_version)

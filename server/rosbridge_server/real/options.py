@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 from dataclasses import dataclass
 
 BOUND_BYTES = 64_000_000  # where the real one takes anything
@@ -19,3 +20,8 @@ class RealOptions:
     authenticate: bool = False  # ROS 1 only; there is no rosauth node, so nobody gets in
     max_message_bytes: int | None = None  # None: no limit in ROS 1, 10 MB in ROS 2
     distro: str | None = "humble"  # ROS_DISTRO of ROS 2's rosapi; without it get_ros_version ends rosapi
+
+
+def is_open(name: str, globs: tuple[str, ...]) -> bool:
+    """Whether a client may use what is so named."""
+    return not globs or any(fnmatch.fnmatch(name, glob) for glob in globs)

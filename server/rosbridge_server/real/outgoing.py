@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from server.judge.message import Json
 from server.rosbridge.message_bytes import json_bytes
 from server.rosbridge_server.encoding import Outgoing
+from server.rosbridge_server.interface import RosContext
 from server.rosbridge_server.real import cbor, text
 from server.rosbridge_server.real.raw import raw_bytes
 from server.rosbridge_server.real.shape import Lost
 from server.rosbridge_server.real.values import Values
-
-if TYPE_CHECKING:
-    from server.rosbridge_server.server import RosBridge
 
 
 class RealOutgoing(Outgoing):
@@ -23,7 +21,7 @@ class RealOutgoing(Outgoing):
 
     __slots__ = ("_bridge", "_forms", "type")
 
-    def __init__(self, bridge: RosBridge, type: str, message: Json) -> None:
+    def __init__(self, bridge: RosContext, type: str, message: Json) -> None:
         super().__init__(message)
         self._bridge = bridge
         self.type = type

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from server.judge.message import Json
+from server.rosbridge_server.interface import ServiceHost
 from server.rosbridge_server.services import Service
-
-if TYPE_CHECKING:
-    from server.rosbridge_server.server import RosBridge
 
 
 class Providers:
     """The services of one client. `send` takes an object for that client."""
 
-    def __init__(self, bridge: RosBridge, send: Callable[[Any], None]) -> None:
+    def __init__(self, bridge: ServiceHost, send: Callable[[Any], None]) -> None:
         self._bridge = bridge
         self._send = send
         self._counts: dict[str, int] = {}

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from server.judge.ros_names import canonical_name
 from server.rosbridge_server.graph import Topic
+from server.rosbridge_server.interface import TopicHost
 from server.rosbridge_server.real.convert import Converter, Poison
 from server.rosbridge_server.real.loader import load
 from server.rosbridge_server.real.subscribers import Conflict
-
-if TYPE_CHECKING:
-    from server.rosbridge_server.server import RosBridge
 
 KEPT_S = 10.0  # after the last client of a publisher has gone
 BRIDGE = "bridge"  # as a publisher in the graph
@@ -33,7 +31,7 @@ class RosPublisher:
 class Publishers:
     """All ROS publishers of one bridge."""
 
-    def __init__(self, bridge: RosBridge) -> None:
+    def __init__(self, bridge: TopicHost) -> None:
         self._bridge = bridge
         self._found: dict[str, RosPublisher] = {}
         self._timers: dict[str, asyncio.TimerHandle] = {}

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from server.judge.ros_names import canonical_name
 from server.rosbridge_server.encoding import Outgoing
 from server.rosbridge_server.graph import Topic
+from server.rosbridge_server.interface import TopicHost
 from server.rosbridge_server.real.loader import load
 from server.rosbridge_server.real.outgoing import RealOutgoing
 from server.rosbridge_server.real.shape import Lost
-
-if TYPE_CHECKING:
-    from server.rosbridge_server.server import RosBridge
 
 
 class Listening(Protocol):
@@ -49,7 +47,7 @@ class RosSubscriber:
 class Subscribers:
     """All ROS subscribers of one bridge."""
 
-    def __init__(self, bridge: RosBridge) -> None:
+    def __init__(self, bridge: TopicHost) -> None:
         self._bridge = bridge
         self._found: dict[str, RosSubscriber] = {}
 

@@ -12,9 +12,11 @@ from fastapi import Path as InPath
 from pydantic import BaseModel, ConfigDict, Field
 
 from server.recording.catalog import sketch
-from server.recording.catalog.annotations import BadRemark
-from server.recording.catalog.catalog import MAX_ROWS, Catalog, NotThere, Refused
+from server.recording.catalog.annotations import BadAnnotation
+from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.catalog_db import Which
+from server.recording.catalog.errors import NotThere, Refused
+from server.recording.catalog.rows import MAX_ROWS
 from server.web.middleware.errors import Problem
 from server.web.middleware.ranges import file_answer
 from server.web.services import services
@@ -28,7 +30,7 @@ _TYPES = {"mcap": "application/x-mcap", "bag": "application/x-rosbag", "db3": "a
 T = TypeVar("T")
 
 
-class Remarks(BaseModel):
+class AnnotationsChange(BaseModel):
     """What is left out stays as it is."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
@@ -51,7 +53,7 @@ def _asked(what: Callable[[], T]) -> T:
         return what()
     except NotThere as why:
         raise HTTPException(404, str(why)) from None
-    except BadRemark as why:
+    except BadAnnotation as why:
         raise Problem(422, str(why), field=why.field) from None
     except Refused as why:
         raise HTTPException(409, str(why)) from None
@@ -115,9 +117,9 @@ def one(request: Request, id: Id) -> Response:
 
 
 @router.patch("/api/recordings/{id}", summary="Give it another title, note or tags")
-def remark(request: Request, id: Id, body: Annotated[Remarks, Body()]) -> Response:
+def annotate(request: Request, id: Id, body: Annotated[AnnotationsChange, Body()]) -> Response:
     recordings = catalog(request)
-    return _json(request, _asked(lambda: recordings.remark(id, title=body.title, note=body.note, tags=body.tags)))
+    return _json(request, _asked(lambda: recordings.annotate(id, title=body.title, note=body.note, tags=body.tags)))
 
 
 @router.delete("/api/recordings/{id}", summary="Into the trash; it stays there until the trash is emptied")

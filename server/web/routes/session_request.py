@@ -72,7 +72,7 @@ async def ask_either(
     if replay is None:
         return await ask(request, vehicle, message)
     try:
-        return await services(request).desk.by_token(replay).ask(message)
+        return await services(request).replays.by_token(replay).ask(message)
     except NoReplay as why:
         raise HTTPException(404, str(why)) from None
 

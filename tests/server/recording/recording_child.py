@@ -10,7 +10,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from server.recording.folder import RecordingsFolder
-from server.recording.recorder import Part, Recorder
+from server.recording.recorder import Recorder
+from server.recording.recorder_queue import Part
 from server.recording.space import Allowance
 from server.simulator.car import SimulatedCar
 

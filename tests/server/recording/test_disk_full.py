@@ -12,15 +12,16 @@ from pathlib import Path
 
 import pytest
 
-from server.recording import recorder as recorder_module
+from server.recording import space_watch, unfinished
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
 from server.recording.recover import recover, recover_all
+from server.recording.space import Allowance
 from server.rosbridge_server.server import RosBridge
 from tests.server.cars import driving
 from tests.server.recording.mcap.test_write import written
 from tests.server.recording.test_controller import watched
-from tests.server.recording.test_recorder import Desk
+from tests.server.recording.test_recorder import RecorderUser
 
 SIZE = 2_000_000
 
@@ -60,20 +61,20 @@ def fill(disk: Path, *, leave: int = 0) -> Path:
 async def test_a_disk_that_fills_up_ends_the_recording_and_it_is_completed_when_there_is_room_again(
     disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_module, "TRY_AGAIN_S", 0.2)
-    desk = Desk(disk)
-    part = desk.part()
-    desk.recorder.begin(part)
+    monkeypatch.setattr(unfinished, "TRY_AGAIN_S", 0.2)
+    user = RecorderUser(disk)
+    part = user.part()
+    user.recorder.begin(part)
     for n in range(500):
-        desk.say(n)
-    await desk.until(lambda: desk.recorder.status.messages == 500)
+        user.say(n)
+    await user.until(lambda: user.recorder.status.messages == 500)
     other = fill(disk)
     n = 500
-    while desk.recorder.status.state == "recording":
-        desk.say(n)
+    while user.recorder.status.state == "recording":
+        user.say(n)
         n += 1
         await asyncio.sleep(0.001)
-    status = desk.recorder.status
+    status = user.recorder.status
     assert status.state == "stopped"
     assert status.trouble == "Recording stopped: the disk is full."
     left = part.path.with_name(f"{part.id}.mcap.writing")
@@ -83,33 +84,33 @@ async def test_a_disk_that_fills_up_ends_the_recording_and_it_is_completed_when_
         assert [m.message["linear"]["x"] for m in recording.messages()] == [float(i) for i in range(kept)]
     assert kept >= 500
     other.unlink()
-    await desk.until(lambda: bool(desk.finished))
-    assert desk.finished == [part.path]
+    await user.until(lambda: bool(user.finished))
+    assert user.finished == [part.path]
     with open_recording([part.path]) as recording:
         assert recording.count == kept
         assert recording.metadata["ended"] == "recovered"
     assert not left.exists()
-    await desk.stop()
+    await user.stop()
 
 
 async def test_with_a_little_room_left_it_is_closed_as_any_other(disk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit that is left free is what the index needs."""
-    monkeypatch.setattr(recorder_module, "LOOK_S", 0.05)
-    desk = Desk(disk)
-    desk.recorder.allowance = recorder_module.Allowance(quota=0, min_free=100_000)
-    desk.recorder.begin(desk.part())
-    desk.say(0)
-    await desk.until(lambda: desk.recorder.status.messages == 1)
+    monkeypatch.setattr(space_watch, "LOOK_S", 0.05)
+    user = RecorderUser(disk)
+    user.recorder.allowance = Allowance(quota=0, min_free=100_000)
+    user.recorder.begin(user.part())
+    user.say(0)
+    await user.until(lambda: user.recorder.status.messages == 1)
     fill(disk, leave=90_000)
-    await desk.until(lambda: desk.recorder.status.state == "stopped")
-    trouble = desk.recorder.status.trouble or ""
+    await user.until(lambda: user.recorder.status.state == "stopped")
+    trouble = user.recorder.status.trouble or ""
     assert trouble.startswith("The disk has ")
     assert trouble.endswith("left, and recording stops at 100 kB. What was recorded is saved.")
-    await desk.until(lambda: bool(desk.finished))
-    with open_recording(desk.finished) as recording:
+    await user.until(lambda: bool(user.finished))
+    with open_recording(user.finished) as recording:
         assert recording.metadata["ended"] == "closed"
         assert recording.count == 1
-    await desk.stop()
+    await user.stop()
 
 
 def test_what_was_left_waits_for_room_to_be_recovered(disk: Path) -> None:

@@ -13,10 +13,11 @@ from typing import Any
 import pytest
 
 from server.judge.message import RosVersion
-from server.recording import recorder as recorder_module
+from server.recording import recorder_queue, space_watch
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
-from server.recording.recorder import Part, Recorder
+from server.recording.recorder import Recorder
+from server.recording.recorder_queue import Part
 from server.recording.space import Allowance, amount
 
 AT_NS = 1_700_000_000_000_000_000
@@ -24,8 +25,8 @@ PLENTY = Allowance(quota=0, min_free=0)
 V = {"x": 1.0, "y": 0.0, "z": 0.0}
 
 
-class Desk:
-    """The loop's side of a recorder."""
+class RecorderUser:
+    """The loop, as a recorder is used by it."""
 
     def __init__(self, root: Path, allowance: Allowance = PLENTY) -> None:
         self.folder = RecordingsFolder(root)
@@ -62,21 +63,21 @@ class Desk:
 
 
 async def test_what_was_handed_over_before_the_end_is_in_the_file(tmp_path: Path) -> None:
-    desk = Desk(tmp_path / "recordings")
-    desk.recorder.begin(desk.part())
+    user = RecorderUser(tmp_path / "recordings")
+    user.recorder.begin(user.part())
     for n in range(1000):
-        desk.say(n)
+        user.say(n)
         if n % 100 == 0:
-            desk.recorder.own("alarms", {"n": n}, AT_NS + n * 1_000_000)
-    desk.say(1000, "/odd", "his_msgs/Odd", {"a": [None, "é"]})
-    desk.say(1001, "/vel", "geometry_msgs/Twist", {"linear": "no vector"})
-    desk.say(1002, "/untyped", None, {"b": 1})
-    await desk.end(ended="closed", why="enough")
-    (path,) = desk.finished
-    assert desk.recorder.status.state == "off"
-    assert desk.recorder.status.misfits == 3  # two of types that nobody knows, and one that is not of its type
-    assert desk.recorder.status.messages == 1003
-    assert desk.recorder.dropped == 0
+            user.recorder.own("alarms", {"n": n}, AT_NS + n * 1_000_000)
+    user.say(1000, "/odd", "his_msgs/Odd", {"a": [None, "é"]})
+    user.say(1001, "/vel", "geometry_msgs/Twist", {"linear": "no vector"})
+    user.say(1002, "/untyped", None, {"b": 1})
+    await user.end(ended="closed", why="enough")
+    (path,) = user.finished
+    assert user.recorder.status.state == "off"
+    assert user.recorder.status.misfits == 3  # two of types that nobody knows, and one that is not of its type
+    assert user.recorder.status.messages == 1003
+    assert user.recorder.dropped == 0
     with open_recording([path]) as recording:
         assert recording.metadata == {"part": "1", "ended": "closed", "why": "enough"}
         messages = list(recording.messages())
@@ -88,74 +89,74 @@ async def test_what_was_handed_over_before_the_end_is_in_the_file(tmp_path: Path
         ]
         own = list(recording.own("/catgraph/alarms"))
         assert [said for _, said in own] == [{"time_ms": AT_NS // 1_000_000 + n, "n": n} for n in range(0, 1000, 100)]
-    await desk.stop()
+    await user.stop()
 
 
 async def test_parts_follow_each_other_and_share_nothing(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
+    user = RecorderUser(tmp_path)
     for n in (1, 2):
-        desk.recorder.begin(desk.part(n))
+        user.recorder.begin(user.part(n))
         for i in range(n * 10):
-            desk.say(i)
-        desk.recorder.end(ended="closed")
-        desk.say(99)  # between two parts nothing is recorded
-    await desk.stop()
-    assert [path.name for path in desk.finished] == ["car_20231114T221321Z.mcap", "car_20231114T221322Z.mcap"]
-    for n, path in enumerate(desk.finished, 1):
+            user.say(i)
+        user.recorder.end(ended="closed")
+        user.say(99)  # between two parts nothing is recorded
+    await user.stop()
+    assert [path.name for path in user.finished] == ["car_20231114T221321Z.mcap", "car_20231114T221322Z.mcap"]
+    for n, path in enumerate(user.finished, 1):
         with open_recording([path]) as recording:
             assert (recording.metadata["part"], recording.count) == (str(n), n * 10)
 
 
 async def test_a_definition_that_the_bridge_gave_counts_from_then_on(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
-    desk.recorder.begin(desk.part())
-    desk.say(1, "/a", "my_msgs/A", {"x": 1.5})
-    desk.recorder.learn({"my_msgs/A": "float32 x\n"})
-    desk.say(2, "/a", "my_msgs/A", {"x": 2.5})
-    await desk.stop()
-    with open_recording(desk.finished) as recording:
+    user = RecorderUser(tmp_path)
+    user.recorder.begin(user.part())
+    user.say(1, "/a", "my_msgs/A", {"x": 1.5})
+    user.recorder.learn({"my_msgs/A": "float32 x\n"})
+    user.say(2, "/a", "my_msgs/A", {"x": 2.5})
+    await user.stop()
+    with open_recording(user.finished) as recording:
         assert recording.topics["/a"].definition == "float32 x\n"
         assert [m.message for m in recording.messages()] == [{"x": 1.5}, {"x": 2.5}]
 
 
 async def test_it_is_on_the_disk_within_half_a_second_without_being_asked(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
-    part = desk.part()
-    desk.recorder.begin(part)
-    desk.say(1)
-    await desk.until(lambda: desk.recorder.status.state == "recording")
-    desk.say(2)
+    user = RecorderUser(tmp_path)
+    part = user.part()
+    user.recorder.begin(part)
+    user.say(1)
+    await user.until(lambda: user.recorder.status.state == "recording")
+    user.say(2)
     handed_s = time.monotonic()
-    await desk.until(lambda: desk.recorder.status.messages == 2)
+    await user.until(lambda: user.recorder.status.messages == 2)
     assert time.monotonic() - handed_s < 0.5
     with open_recording([part.path.with_name(f"{part.id}.mcap.writing")]) as recording:
         assert recording.count == 2
-    await desk.stop()
+    await user.stop()
 
 
 async def test_what_does_not_fit_the_queue_is_dropped_and_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_module, "MAX_QUEUED", 10)
-    desk = Desk(tmp_path)
+    monkeypatch.setattr(recorder_queue, "MAX_QUEUED", 10)
+    user = RecorderUser(tmp_path)
     for n in range(15):  # nobody takes from the queue yet: the disk of a thread that hangs looks the same
-        desk.say(n)
-    assert (desk.recorder.queued, desk.recorder.dropped, desk.recorder.dropped_at_s) == (10, 5, 0.014)
-    desk.recorder.own("alarms", {"n": 1}, AT_NS)
-    assert (desk.recorder.queued, desk.recorder.dropped) == (11, 5), "there is room left for what is ours"
+        user.say(n)
+    assert (user.recorder.queued, user.recorder.dropped, user.recorder.dropped_at_s) == (10, 5, 0.014)
+    user.recorder.own("alarms", {"n": 1}, AT_NS)
+    assert (user.recorder.queued, user.recorder.dropped) == (11, 5), "there is room left for what is ours"
 
 
 async def test_large_messages_fill_the_queue_by_their_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recorder_module, "MAX_QUEUED_BYTES", 350)
-    desk = Desk(tmp_path)
+    monkeypatch.setattr(recorder_queue, "MAX_QUEUED_BYTES", 350)
+    user = RecorderUser(tmp_path)
     for n in range(6):
-        desk.say(n)
-    assert (desk.recorder.queued, desk.recorder.dropped) == (4, 2)
-    desk.recorder.begin(desk.part())
-    await desk.until(lambda: desk.recorder.queued == 0)
-    desk.say(7)
-    assert desk.recorder.dropped == 2, "what was taken from it is no load any more"
-    await desk.stop()
+        user.say(n)
+    assert (user.recorder.queued, user.recorder.dropped) == (4, 2)
+    user.recorder.begin(user.part())
+    await user.until(lambda: user.recorder.queued == 0)
+    user.say(7)
+    assert user.recorder.dropped == 2, "what was taken from it is no load any more"
+    await user.stop()
 
 
 @pytest.mark.parametrize(
@@ -168,67 +169,80 @@ async def test_large_messages_fill_the_queue_by_their_bytes(tmp_path: Path, monk
 async def test_where_there_is_no_room_nothing_is_begun(tmp_path: Path, allowance: Allowance, why: str) -> None:
     (tmp_path / "bus").mkdir()
     (tmp_path / "bus" / "old.mcap").write_bytes(bytes(1500))
-    desk = Desk(tmp_path, allowance)
-    desk.recorder.begin(desk.part())
-    desk.say(1)
-    await desk.until(lambda: desk.recorder.status.state == "stopped")
-    assert desk.recorder.status.trouble is not None
-    assert re.fullmatch(why, desk.recorder.status.trouble)
-    await desk.stop()
-    assert desk.finished == []
+    user = RecorderUser(tmp_path, allowance)
+    user.recorder.begin(user.part())
+    user.say(1)
+    await user.until(lambda: user.recorder.status.state == "stopped")
+    assert user.recorder.status.trouble is not None
+    assert re.fullmatch(why, user.recorder.status.trouble)
+    await user.stop()
+    assert user.finished == []
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["bus", "old.mcap"], "and nothing is deleted for it"
 
 
 async def test_at_the_limit_it_stops_and_what_was_recorded_is_saved(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_module, "LOOK_S", 0.1)
-    desk = Desk(tmp_path)
-    desk.recorder.begin(desk.part())
-    desk.say(1)
-    await desk.until(lambda: desk.recorder.status.messages == 1)
-    assert desk.finished == []
-    desk.recorder.allowance = Allowance(quota=1, min_free=0)
-    await desk.until(lambda: bool(desk.finished))
-    status = desk.recorder.status
+    monkeypatch.setattr(space_watch, "LOOK_S", 0.1)
+    user = RecorderUser(tmp_path)
+    user.recorder.begin(user.part())
+    user.say(1)
+    await user.until(lambda: user.recorder.status.messages == 1)
+    assert user.finished == []
+    user.recorder.allowance = Allowance(quota=1, min_free=0)
+    await user.until(lambda: bool(user.finished))
+    status = user.recorder.status
     assert status.state == "stopped"
     assert status.trouble is not None
     assert status.trouble.startswith("Recordings take ")
     assert status.trouble.endswith("What was recorded is saved.")
-    desk.say(2)
-    desk.recorder.allowance = PLENTY
-    desk.recorder.begin(desk.part(2))
-    desk.say(3)
-    await desk.stop()
-    with open_recording([desk.finished[0]]) as recording:
+    user.say(2)
+    user.recorder.allowance = PLENTY
+    user.recorder.begin(user.part(2))
+    user.say(3)
+    await user.stop()
+    with open_recording([user.finished[0]]) as recording:
         assert recording.count == 1
         assert recording.metadata["why"] == status.trouble
-    with open_recording([desk.finished[1]]) as recording:
+    with open_recording([user.finished[1]]) as recording:
         assert [m.message["linear"]["x"] for m in recording.messages()] == [3.0]
+
+
+async def test_after_it_stopped_by_itself_nothing_piles_up(tmp_path: Path) -> None:
+    """The loop hands over what comes until somebody ends the part."""
+    user = RecorderUser(tmp_path, Allowance(quota=0, min_free=1 << 62))
+    user.recorder.begin(user.part())
+    await user.until(lambda: user.recorder.status.state == "stopped" and user.recorder.queued == 0)
+    await asyncio.sleep(0.1)  # the thread waits again
+    for n in range(100):
+        user.say(n)
+    await user.until(lambda: user.recorder.queued == 0)
+    assert user.recorder.dropped == 0
+    await user.stop()
 
 
 async def test_a_folder_that_is_none_is_said(tmp_path: Path) -> None:
     (tmp_path / "recordings").write_text("a file")
-    desk = Desk(tmp_path / "recordings")
-    desk.recorder.begin(replace(desk.part(), path=tmp_path / "recordings" / "car" / "a.mcap"))
-    await desk.until(lambda: desk.recorder.status.state == "stopped")
-    assert desk.recorder.status.trouble == "Recording cannot begin: the folder for recordings is no folder."
-    await desk.stop()
+    user = RecorderUser(tmp_path / "recordings")
+    user.recorder.begin(replace(user.part(), path=tmp_path / "recordings" / "car" / "a.mcap"))
+    await user.until(lambda: user.recorder.status.state == "stopped")
+    assert user.recorder.status.trouble == "Recording cannot begin: the folder for recordings is no folder."
+    await user.stop()
 
 
 async def test_a_file_that_is_taken_away_while_it_is_written_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_module, "LOOK_S", 0.1)
-    desk = Desk(tmp_path)
-    part = desk.part()
-    desk.recorder.begin(part)
-    await desk.until(lambda: desk.recorder.status.state == "recording")
+    monkeypatch.setattr(space_watch, "LOOK_S", 0.1)
+    user = RecorderUser(tmp_path)
+    part = user.part()
+    user.recorder.begin(part)
+    await user.until(lambda: user.recorder.status.state == "recording")
     part.path.with_name(f"{part.id}.mcap.writing").unlink()
-    await desk.until(lambda: desk.recorder.status.state == "stopped")
-    assert desk.recorder.status.trouble == "Recording stopped: the folder or the file was taken away."
-    assert desk.finished == []
-    await desk.stop()
+    await user.until(lambda: user.recorder.status.state == "stopped")
+    assert user.recorder.status.trouble == "Recording stopped: the folder or the file was taken away."
+    assert user.finished == []
+    await user.stop()
 
 
 @pytest.mark.parametrize(

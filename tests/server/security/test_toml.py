@@ -17,7 +17,7 @@ from server.app.config import Config
 from server.judge.settings import BadSetting, SettingsFile, from_toml, salvage
 from server.mail.settings import MailSettingsFile
 from server.recording.catalog.survey import _chosen
-from server.replay.recorded_events import MOST_SETTINGS, read_told
+from server.replay.recorded_events import MOST_SETTINGS, read_recorded_events
 from server.storage.bounded_toml import MAX_BYTES, MAX_ENTRIES, MAX_LINE, MAX_NESTING, MAX_PARTS, BadToml, loads
 from server.web.maps.mbtiles import MapRefused
 from server.web.maps.site_image import site_image
@@ -230,7 +230,7 @@ class ManySettings:
 
 
 def test_a_recordings_settings_are_read_so_many_times_and_the_rest_is_named() -> None:
-    told = read_told(ManySettings())  # type: ignore[arg-type]
+    told = read_recorded_events(ManySettings())  # type: ignore[arg-type]
     assert len(told.words) == MOST_SETTINGS
     assert told.notes == (f"{5000 - 1 - MOST_SETTINGS} entries of catgraph's own make no sense and are left out.",)
 

@@ -10,8 +10,16 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from server.recording.catalog import annotations as remarks
-from server.recording.catalog.annotations import MAX_NOTE, MAX_TAG, MAX_TAGS, MAX_TITLE, BadRemark, Remarks, changed
+from server.recording.catalog import annotations as annotation_store
+from server.recording.catalog.annotations import (
+    MAX_NOTE,
+    MAX_TAG,
+    MAX_TAGS,
+    MAX_TITLE,
+    Annotations,
+    BadAnnotation,
+    changed,
+)
 
 
 @pytest.mark.parametrize(
@@ -31,16 +39,16 @@ from server.recording.catalog.annotations import MAX_NOTE, MAX_TAG, MAX_TAGS, MA
     ],
 )
 def test_a_title_is_one_line_of_letters_that_are_seen(given: str, kept: str) -> None:
-    assert changed(Remarks(), title=given).title == kept
+    assert changed(Annotations(), title=given).title == kept
 
 
 def test_a_note_keeps_its_lines() -> None:
-    assert changed(Remarks(), note=" one \r\n\r\n two\u202e\x00 \n").note == "one\n\n two"
+    assert changed(Annotations(), note=" one \r\n\r\n two\u202e\x00 \n").note == "one\n\n two"
 
 
 def test_each_tag_stands_once_and_empty_ones_not_at_all() -> None:
-    assert changed(Remarks(), tags=["Wet", " ", "wet", "night ", "WET"]).tags == ("Wet", "night")
-    assert changed(Remarks(tags=("a",)), tags=[]).tags == ()
+    assert changed(Annotations(), tags=["Wet", " ", "wet", "night ", "WET"]).tags == ("Wet", "night")
+    assert changed(Annotations(tags=("a",)), tags=[]).tags == ()
 
 
 @pytest.mark.parametrize(
@@ -54,13 +62,13 @@ def test_each_tag_stands_once_and_empty_ones_not_at_all() -> None:
     ],
 )
 def test_what_is_too_long_is_refused_not_cut(field: str, given: object, words: str) -> None:
-    with pytest.raises(BadRemark, match=words) as caught:
-        changed(Remarks(), **{field: given})  # type: ignore[arg-type]
+    with pytest.raises(BadAnnotation, match=words) as caught:
+        changed(Annotations(), **{field: given})  # type: ignore[arg-type]
     assert caught.value.field == field
 
 
 def test_what_fits_exactly_is_taken() -> None:
-    assert len(changed(Remarks(), title="x" * MAX_TITLE, note="y" * MAX_NOTE).note) == MAX_NOTE
+    assert len(changed(Annotations(), title="x" * MAX_TITLE, note="y" * MAX_NOTE).note) == MAX_NOTE
 
 
 words = st.text(max_size=60)
@@ -71,20 +79,20 @@ words = st.text(max_size=60)
 def test_whatever_is_said_comes_back_as_it_was_kept(
     tmp_path_factory: pytest.TempPathFactory, title: str, note: str, tags: list[str]
 ) -> None:
-    said = changed(Remarks(), title=title, note=note, tags=tags)
+    said = changed(Annotations(), title=title, note=note, tags=tags)
     for letter in said.title + "".join(said.tags):
         assert unicodedata.category(letter) not in ("Cc", "Cs", "Zl", "Zp")
         assert unicodedata.bidirectional(letter) not in ("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI")
     assert changed(said, title=said.title, note=said.note, tags=said.tags) == said
     path = tmp_path_factory.mktemp("said") / "car_1.mcap"
-    remarks.write(path, said)
-    assert remarks.read(path) == said
+    annotation_store.write(path, said)
+    assert annotation_store.read(path) == said
 
 
 def test_nothing_said_leaves_no_file(tmp_path: Path) -> None:
     path = tmp_path / "car_1.mcap"
-    remarks.write(path, Remarks(title="a"))
-    remarks.write(path, Remarks())
+    annotation_store.write(path, Annotations(title="a"))
+    annotation_store.write(path, Annotations())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -94,23 +102,23 @@ def test_nothing_said_leaves_no_file(tmp_path: Path) -> None:
 )
 def test_a_file_of_somebody_elses_says_nothing(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "car_1.mcap"
-    remarks.beside(path).write_bytes(content)
-    assert remarks.read(path) == Remarks()
+    annotation_store.beside(path).write_bytes(content)
+    assert annotation_store.read(path) == Annotations()
 
 
 def test_a_file_of_somebody_elses_is_not_lost(tmp_path: Path) -> None:
     path = tmp_path / "car_1.mcap"
-    remarks.beside(path).write_bytes(b"not ours")
-    remarks.write(path, Remarks(title="ours"))
+    annotation_store.beside(path).write_bytes(b"not ours")
+    annotation_store.write(path, Annotations(title="ours"))
     assert (tmp_path / "car_1.mcap.json.other").read_bytes() == b"not ours"
-    assert remarks.read(path).title == "ours"
+    assert annotation_store.read(path).title == "ours"
 
 
 def test_hostile_remarks_in_a_file_that_was_copied_in_are_cleaned_and_cut(tmp_path: Path) -> None:
     path = tmp_path / "car_1.mcap"
     body = {"title": "\u202e" + "t" * 9000, "note": "n" * 9000, "tags": ["a" * 99, 7, *map(str, range(99))]}
-    remarks.beside(path).write_bytes(orjson.dumps(body))
-    said = remarks.read(path)
+    annotation_store.beside(path).write_bytes(orjson.dumps(body))
+    said = annotation_store.read(path)
     assert said.title == "t" * MAX_TITLE
     assert len(said.note) == MAX_NOTE
     assert len(said.tags) == MAX_TAGS
@@ -119,13 +127,13 @@ def test_hostile_remarks_in_a_file_that_was_copied_in_are_cleaned_and_cut(tmp_pa
 
 def test_a_disk_that_takes_nothing_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "car_1.mcap"
-    remarks.write(path, Remarks(title="before"))
+    annotation_store.write(path, Annotations(title="before"))
 
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OSError, match="No space"):
-        remarks.write(path, Remarks(title="after"))
-    assert remarks.read(path).title == "before"
+        annotation_store.write(path, Annotations(title="after"))
+    assert annotation_store.read(path).title == "before"
     assert [one.name for one in tmp_path.iterdir()] == ["car_1.mcap.json"]

@@ -17,12 +17,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.recording.catalog import annotations as remarks
+from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import catalog_db
-from server.recording.catalog.annotations import Remarks
-from server.recording.catalog.catalog import Catalog, NotThere, Refused
+from server.recording.catalog.annotations import Annotations
+from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.catalog_db import Entry, Which
 from server.recording.catalog.discovery import id_of
+from server.recording.catalog.errors import NotThere, Refused
 from server.recording.folder import is_id
 from tests.server.recording.made import BEGAN_MS, record
 
@@ -56,7 +57,9 @@ def some(root: Path) -> Path:
     record(folder / "red" / "red_20260921T171320Z_clip_1.mcap", began_ms=BEGAN_MS + 3 * HOUR_MS, clip_of="red_x")
     (folder / "red" / "notes.mcap").write_text("hello")
     (folder / "blue" / "blue_20260921T171320Z.mcap.damaged").write_bytes(b"\x89MCAP0\r\n")
-    remarks.write(folder / "blue" / "blue_20260921T141320Z.mcap", Remarks(title="Wet lot", tags=("wet", "lot 3")))
+    annotation_store.write(
+        folder / "blue" / "blue_20260921T141320Z.mcap", Annotations(title="Wet lot", tags=("wet", "lot 3"))
+    )
     return folder
 
 
@@ -90,7 +93,7 @@ async def test_what_is_in_the_folder_is_listed_newest_first(tmp_path: Path) -> N
 async def test_a_lost_database_is_made_anew_to_the_same_rows(tmp_path: Path) -> None:
     some(tmp_path)
     async with catalog(tmp_path) as one:
-        one.remark("red_20260921T161320Z", title="No sky", note="under the roof\nall the way", tags=["roof"])
+        one.annotate("red_20260921T161320Z", title="No sky", note="under the roof\nall the way", tags=["roof"])
         one.delete("blue_20260921T151320Z")
         before, trash = one.rows().rows, one.rows(Which(is_trashed=True)).rows
     assert len(before) == 5
@@ -117,8 +120,8 @@ async def test_a_database_that_cannot_be_written_is_one_in_memory(tmp_path: Path
     (tmp_path / "recordings.sqlite").mkdir()
     async with catalog(tmp_path) as one:
         assert len(one.rows().rows) == 6
-        assert one.remark("red_20260921T161320Z", title="Kept all the same")["title"] == "Kept all the same"
-    assert remarks.read(tmp_path / "recordings/red/red_20260921T161320Z.mcap").title == "Kept all the same"
+        assert one.annotate("red_20260921T161320Z", title="Kept all the same")["title"] == "Kept all the same"
+    assert annotation_store.read(tmp_path / "recordings/red/red_20260921T161320Z.mcap").title == "Kept all the same"
 
 
 async def test_what_is_known_is_not_read_again_and_what_changed_is(tmp_path: Path) -> None:
@@ -162,7 +165,7 @@ async def test_files_copied_in_by_hand_are_found_once_a_list_is_asked_for(tmp_pa
         shutil.copytree(tmp_path / "recordings" / "blue", tmp_path / "recordings" / "copy of blue")
         one.look_again()  # that was done a moment ago
         assert len(one.rows().rows) == 6
-        one._walked_s = -1000.0
+        one._survey._walked_s = -1000.0
         one.look_again()
         async with asyncio.timeout(30):
             while len(rows := one.rows().rows) < 9:
@@ -180,12 +183,13 @@ async def test_an_unchanged_folder_is_not_walked_again(tmp_path: Path, monkeypat
         os.utime(path, ns=(1, NOW_MS * 1_000_000 - 10**12))
     looked: list[Path] = []
     one = made(tmp_path)
-    look = one._look
-    monkeypatch.setattr(one, "_look", lambda path, known: looked.append(path) or look(path, known))
+    listing = one._listing
+    look = listing.look
+    monkeypatch.setattr(listing, "look", lambda path, known: looked.append(path) or look(path, known))
     for change, seen in (
         (lambda: None, 12),  # each once while walking, and once more where it is new
         (lambda: None, 0),
-        (lambda: remarks.write(folder / "red" / "notes.mcap", Remarks(title="New")), 7),
+        (lambda: annotation_store.write(folder / "red" / "notes.mcap", Annotations(title="New")), 7),
         (lambda: (folder / "red" / "notes.mcap").write_text("it grows while it is copied"), 0),
         (lambda: os.utime(folder / "red" / "notes.mcap", ns=(1, NOW_MS * 1_000_000)), 0),
         (lambda: (folder / "red" / "more.mcap").write_text("x"), 9),
@@ -193,7 +197,7 @@ async def test_an_unchanged_folder_is_not_walked_again(tmp_path: Path, monkeypat
     ):
         looked.clear()
         change()
-        one._walk_if_changed()
+        listing.walk_if_changed()
         assert len(looked) == seen
     await one.stop()
 
@@ -262,7 +266,7 @@ async def test_filters(tmp_path: Path, which: Which, expected: int) -> None:
 async def test_pages_follow_each_other_without_a_gap_or_a_double(tmp_path: Path) -> None:
     one = made(tmp_path)
     catalog_db.put(
-        one._database,
+        one._entries._database,
         [
             Entry(
                 path=f"car/car_{n}.mcap", id=f"car_{n}", trashed_ms=None, vehicle="car",
@@ -347,8 +351,8 @@ def test_a_kill_while_it_is_moved_costs_neither_the_recording_nor_its_name(
     found = [row for is_trashed in (False, True) for row in again.rows(Which(is_trashed=is_trashed)).rows]
     assert [row["title"] for row in found if row["id"] == id] == ["Wet lot"]
     assert len(found) == 6
-    one._database.close()
-    again._database.close()
+    one._entries._database.close()
+    again._entries._database.close()
 
 
 async def test_what_is_being_recorded_is_not_deleted(tmp_path: Path) -> None:
@@ -389,7 +393,7 @@ async def test_a_folder_that_may_not_be_written_says_so(tmp_path: Path, monkeypa
         with pytest.raises(Refused, match="It cannot be moved: read-only file system"):
             one.delete(id)
         with pytest.raises(Refused, match="It cannot be kept: read-only file system"):
-            one.remark(id, title="New")
+            one.annotate(id, title="New")
         assert one.row(id)["title"] == "Wet lot"  # type: ignore[index]
 
 
@@ -398,19 +402,20 @@ async def test_a_file_that_kills_its_reader_is_told_and_the_next_one_is_read(
 ) -> None:
     some(tmp_path)
     async with catalog(tmp_path, settle=False) as one:
-        ask = one._surveyor.ask
+        surveyor = one._survey._surveyor
+        ask = surveyor.ask
 
         async def ask_and_kill(path: Path) -> dict[str, Any]:
             if path.name == "red_20260921T161320Z.mcap":
-                (await one._surveyor._running()).send_signal(signal.SIGSTOP)  # so that it does not answer before
+                (await surveyor._running()).send_signal(signal.SIGSTOP)  # so that it does not answer before
                 asyncio.get_running_loop().call_later(0.1, kill)
             return await ask(path)
 
         def kill() -> None:
-            assert one._surveyor._starting is not None
-            one._surveyor._starting.result().kill()
+            assert surveyor._starting is not None
+            surveyor._starting.result().kill()
 
-        monkeypatch.setattr(one._surveyor, "ask", ask_and_kill)
+        monkeypatch.setattr(surveyor, "ask", ask_and_kill)
         one.rebuild()
         async with asyncio.timeout(60):
             await one.settled()
@@ -423,8 +428,8 @@ async def test_a_file_that_kills_its_reader_is_told_and_the_next_one_is_read(
 async def test_a_disk_that_is_full_leaves_a_list_in_memory(tmp_path: Path) -> None:
     some(tmp_path)
     async with catalog(tmp_path) as one:
-        one._database.execute("PRAGMA query_only=ON")  # as a disk that takes nothing more
-        assert one.remark("red_20260921T161320Z", title="Still")["title"] == "Still"
+        one._entries._database.execute("PRAGMA query_only=ON")  # as a disk that takes nothing more
+        assert one.annotate("red_20260921T161320Z", title="Still")["title"] == "Still"
         assert len(one.rows().rows) == 6
         assert one.row("red_20260921T161320Z")["title"] == "Still"  # type: ignore[index]
 
@@ -452,7 +457,7 @@ def test_no_id_leads_out_of_the_folder(id: str) -> None:
         if id:
             with pytest.raises(NotThere):
                 wish(id)
-    one._database.close()
+    one._entries._database.close()
 
 
 async def test_a_thousand_recordings_are_listed_fast(tmp_path: Path) -> None:
@@ -466,9 +471,9 @@ async def test_a_thousand_recordings_are_listed_fast(tmp_path: Path) -> None:
     one.walk()
     walked_s = time.perf_counter() - began
     sketched = {"lines": [[1.5] * 80], "start": [1, 2], "marks": []}
-    with one._lock:
-        entries = one._entries("", [])
-        catalog_db.put(one._database, [_found(entry, sketched) for entry in entries])
+    with one._entries.lock:
+        entries = one._entries.select("", [])
+        catalog_db.put(one._entries._database, [_found(entry, sketched) for entry in entries])
     began = time.perf_counter()
     page = one.rows(limit=50)
     listed_s = time.perf_counter() - began

@@ -1,0 +1,103 @@
+"""What is known of each file, shared by the threads that list, read, move and show recordings."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import sqlite3
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from server.recording.catalog import catalog_db
+from server.recording.catalog.catalog_db import COLUMNS, Entry, Which
+
+log = logging.getLogger("catgraph.catalog")
+
+
+class Entries:
+    """Of one folder. Its methods may be called from any thread; after `close` it has no entries and takes none.
+
+    Hold `lock` over steps that must see the same entries.
+    """
+
+    def __init__(self, database: Path | None) -> None:
+        """`database` None: in memory."""
+        self.lock = threading.RLock()
+        self._database = catalog_db.open_at(database)
+        self._is_closed = False
+
+    def close(self) -> None:
+        with self.lock:
+            self._is_closed = True
+            self._database.close()
+
+    def select(self, how: str, values: Sequence[Any]) -> list[Entry]:
+        """The entries that a SQL clause chooses."""
+        with self.lock:
+            if self._is_closed:
+                return []
+            return [
+                catalog_db.entry(row)
+                for row in self._database.execute(f"SELECT {COLUMNS} FROM recording {how}", values)
+            ]
+
+    def by_id(self, id: str, *, is_trashed: bool = False) -> Entry | None:
+        """The recording; of those in the trash the one that was deleted last."""
+        kept = "IS NOT NULL ORDER BY trashed_ms DESC" if is_trashed else "IS NULL"
+        return next(iter(self.select(f"WHERE id = ? AND trashed_ms {kept}", [id])), None)
+
+    def put(self, entries: Sequence[Entry]) -> None:
+        """Keeps them in place of what there was of the same files."""
+        with self.lock:
+            if entries and not self._is_closed:
+                self._write(lambda database: catalog_db.put(database, entries))
+
+    def forget(self, paths: Sequence[str]) -> None:
+        with self.lock:
+            if paths and not self._is_closed:
+                self._write(lambda database: catalog_db.forget(database, paths))
+
+    def totals(self, which: Which | None = None) -> dict[str, int]:
+        """How many recordings there are of some kind, and how large together."""
+        where, values = catalog_db.condition(which or Which())
+        with self.lock:
+            count, size = self._database.execute(
+                f"SELECT COUNT(*), COALESCE(SUM(size), 0) FROM recording WHERE {where}", values
+            ).fetchone()
+        return {"count": count, "bytes": size}
+
+    @property
+    def waiting(self) -> int:
+        """Files that are yet to be read."""
+        with self.lock:
+            return int(self._database.execute("SELECT COUNT(*) FROM recording WHERE found IS NULL").fetchone()[0])
+
+    @property
+    def unreadable(self) -> int:
+        with self.lock:
+            query = "SELECT COUNT(*) FROM recording WHERE trashed_ms IS NULL AND found ->> 'problem' IS NOT NULL"
+            return int(self._database.execute(query).fetchone()[0])
+
+    def names(self) -> dict[str, list[str]]:
+        """The vehicles and tags that recordings have, to choose among."""
+        with self.lock:
+            vehicles = [row[0] for row in self._database.execute("SELECT DISTINCT vehicle FROM recording ORDER BY 1")]
+            query = (
+                "SELECT DISTINCT value FROM recording, json_each(tags) WHERE trashed_ms IS NULL ORDER BY 1 LIMIT 200"
+            )
+            tags = [row[0] for row in self._database.execute(query)]
+        return {"vehicles": [vehicle for vehicle in vehicles if vehicle], "tags": tags}
+
+    def _write(self, how: Callable[[sqlite3.Connection], None]) -> None:
+        """A disk that takes nothing more leaves a catalog in memory: the files are the truth."""
+        try:
+            how(self._database)
+        except sqlite3.Error as why:
+            log.warning("the catalog of recordings goes on in memory: %s", why)
+            old, self._database = self._database, catalog_db.open_at(None)
+            with contextlib.suppress(sqlite3.Error):
+                old.backup(self._database)
+            old.close()
+            how(self._database)

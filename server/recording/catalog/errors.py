@@ -1,0 +1,9 @@
+"""Why the catalog refuses what somebody asks of it."""
+
+
+class NotThere(Exception):
+    """No such recording. The text is one sentence."""
+
+
+class Refused(Exception):
+    """It cannot be done now. The text is one sentence."""

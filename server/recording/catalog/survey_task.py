@@ -1,0 +1,110 @@
+"""Keeps the catalog up to date while a server runs: walks the folder when asked, and has each new file surveyed."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from server.recording.catalog.catalog_db import Entry
+from server.recording.catalog.discovery import started_ms_of, vehicle_of
+from server.recording.catalog.entries import Entries
+from server.recording.catalog.folder_listing import FolderListing
+from server.recording.catalog.survey import VERSION
+from server.recording.catalog.survey_worker import Surveyor
+from server.system.supervision import Supervisor
+
+log = logging.getLogger("catgraph.catalog")
+
+LOOK_AGAIN_S = 20.0  # at most so often the folder is walked because a list is asked for
+
+
+class SurveyTask:
+    """Of one folder. `rouse` and `look_again` may be called from any thread, the others belong on the loop."""
+
+    def __init__(self, folder: Path, entries: Entries, listing: FolderListing, *, now: Callable[[], float]) -> None:
+        self._folder = folder
+        self._entries = entries
+        self._listing = listing
+        self._now = now
+        self._surveyor = Surveyor()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._wake = asyncio.Event()
+        self._supervisor = Supervisor("catalog of recordings")
+        self._walk_is_due = True
+        self._walked_s: float | None = None
+
+    async def start(self) -> None:
+        """Begins to look through the folder and to read what is new in it."""
+        self._loop = asyncio.get_running_loop()
+        self._supervisor.keep("survey", self._work)
+
+    async def stop(self) -> None:
+        await self._supervisor.stop()
+        await self._surveyor.rest()
+
+    def problems(self) -> list[str]:
+        """What is wrong with its task, a sentence each."""
+        return self._supervisor.problems()
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the folder was walked and all that is listed has been read."""
+        is_walked = self._walked_s is not None and not self._walk_is_due
+        return is_walked and not self._listing.has_fresh and not self._entries.waiting
+
+    def look_again(self) -> None:
+        """Has the folder walked for what was copied into it by hand, if that was not done just now."""
+        if self._walked_s is None or self._now() - self._walked_s > LOOK_AGAIN_S:
+            self._walked_s = self._now()
+            self.rouse(walk=True)
+
+    def rouse(self, *, walk: bool = False) -> None:
+        """There is something new to read; `walk`: somewhere in the folder."""
+        if walk:
+            self._walk_is_due = True
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._wake.set)
+
+    async def _work(self) -> None:
+        while True:
+            self._wake.clear()
+            try:
+                if self._walk_is_due:
+                    self._walk_is_due = False
+                    await asyncio.to_thread(self._listing.walk_if_changed)
+                    self._walked_s = self._now()
+                await asyncio.to_thread(self._listing.list_fresh)
+                while (entry := await asyncio.to_thread(self._next)) is not None:
+                    found = await self._surveyor.ask(self._folder / entry.path)
+                    await asyncio.to_thread(self._keep, entry, found)
+                    await asyncio.to_thread(self._listing.list_fresh)
+            except Exception:  # whatever a disk does, the next call finds a catalog at work
+                log.exception("the catalog of recordings stumbled")
+            await self._surveyor.rest()
+            await self._wake.wait()
+
+    def _next(self) -> Entry | None:
+        """The newest file that has not been read: what was just recorded is looked at first."""
+        found = self._entries.select("WHERE found IS NULL ORDER BY trashed_ms IS NOT NULL, started_ms DESC LIMIT 1", [])
+        return found[0] if found else None
+
+    def _keep(self, entry: Entry, found: dict[str, Any]) -> None:
+        """What the survey found, unless the file was moved or changed meanwhile."""
+        with self._entries.lock:
+            now = next(iter(self._entries.select("WHERE path = ?", [os.fsencode(entry.path)])), None)
+            if now is None or (now.size, now.changed_ns) != (entry.size, entry.changed_ns):
+                return
+            found = {**found, "survey": VERSION}
+            origin = entry.path.split("/", 2)[2] if entry.trashed_ms is not None else entry.path
+            new = replace(
+                now,
+                found=found,
+                vehicle=vehicle_of(found, origin),
+                started_ms=started_ms_of(found, Path(entry.path).name, entry.changed_ns),
+            )
+            self._entries.put([new])

@@ -1,0 +1,86 @@
+"""Deletes recordings, takes them back and destroys them: files and entries together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from server.recording.catalog import annotations as annotation_store
+from server.recording.catalog import atomic_move
+from server.recording.catalog.catalog_db import Entry
+from server.recording.catalog.discovery import TRASH
+from server.recording.catalog.entries import Entries
+from server.recording.catalog.errors import NotThere, Refused
+from server.recording.catalog.folder_listing import FolderListing
+from server.recording.folder import WRITING, is_id
+
+
+class Trash:
+    """Of one folder. Its methods may be called from any thread."""
+
+    def __init__(self, folder: Path, entries: Entries, listing: FolderListing, *, wall_ms: Callable[[], int]) -> None:
+        self._folder = folder
+        self._entries = entries
+        self._listing = listing
+        self._wall_ms = wall_ms
+
+    def delete(self, id: str) -> Entry:
+        """Into the trash, where it stays until somebody empties it. Raises NotThere, Refused."""
+        with self._entries.lock:
+            if is_id(id) and any(self._folder.glob(f"*/{id}{WRITING}")):
+                raise Refused("It is being recorded now: stop recording first.")
+            entry = self._listing.need(id)
+            now_ms = max(self._wall_ms(), 1)
+            while (self._folder / TRASH / str(now_ms) / entry.path).exists():
+                now_ms += 1
+            moved = replace(entry, path=f"{TRASH}/{now_ms}/{entry.path}", trashed_ms=now_ms)
+            self._move(entry, moved)
+            return moved
+
+    def restore(self, id: str) -> Entry:
+        """Out of the trash, to where it was. Raises NotThere, Refused."""
+        with self._entries.lock:
+            entry = self._listing.need(id, is_trashed=True)
+            back = replace(entry, path=entry.path.split("/", 2)[2], trashed_ms=None)
+            if (self._folder / back.path).exists():
+                raise Refused("There is another recording of that name again: rename its file first.")
+            self._move(entry, back)
+            return back
+
+    def destroy(self, id: str | None) -> dict[str, int]:
+        """For good: one of the trash, or with None all of it; how many and how large. Raises NotThere, Refused."""
+        with self._entries.lock:
+            chosen = (
+                [self._listing.need(id, is_trashed=True)]
+                if id
+                else self._entries.select("WHERE trashed_ms IS NOT NULL", [])
+            )
+            gone: list[Entry] = []
+            try:
+                for entry in chosen:
+                    path = self._folder / entry.path
+                    path.unlink(missing_ok=True)
+                    annotation_store.beside(path).unlink(missing_ok=True)
+                    gone.append(entry)
+            except OSError as why:
+                raise Refused(f"It cannot be deleted: {(why.strerror or str(why)).lower()}.") from None
+            finally:
+                self._entries.forget([entry.path for entry in gone])
+                for entry in gone:
+                    atomic_move.tidy(self._folder / entry.path, self._folder / TRASH)
+            return {"count": len(gone), "bytes": sum(entry.size for entry in gone)}
+
+    def _move(self, old: Entry, new: Entry) -> None:
+        source, target = self._folder / old.path, self._folder / new.path
+        try:
+            atomic_move.move(source, target)
+        except OSError as why:
+            raise Refused(f"It cannot be moved: {(why.strerror or str(why)).lower()}.") from None
+        if not target.exists():
+            self._entries.forget([old.path])
+            raise NotThere("That recording is not there any more.")
+        self._entries.forget([old.path])
+        self._entries.put([new])
+        if old.trashed_ms is not None:
+            atomic_move.tidy(source, self._folder / TRASH)

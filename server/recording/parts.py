@@ -1,0 +1,219 @@
+"""Begins and ends the parts of a recording, and hands what belongs into them to the recorder."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import uuid
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from server.judge.message import RosVersion
+from server.recording.delay import DelayWriter, LinkDelay
+from server.recording.early_entries import EarlyEntries
+from server.recording.folder import RecordingsFolder, id_of, part_id
+from server.recording.own import Own
+from server.recording.recorded_topics import Missing
+from server.recording.recorder import Recorder
+from server.recording.recorder_queue import Part
+from server.recording.recorder_thread import Status
+from server.recording.recording_session import ControllerState, RecordingSession
+from server.recording.recording_settings import RecordingSettings
+from server.version import catgraph_version
+
+EARLY_S = 10.0  # entries from before a session began are kept, if it was not long before: how it came to be connected
+NOTE_EVERY_S = 2.0  # at most: what is missing in a part, written into it
+BEGIN_AFTER_S = 2.0  # a car that says nothing is recorded all the same: that it said nothing
+SETTLE_S = 5.0  # a disk that takes longer is not waited for when the server ends
+
+
+class RecordingParts:
+    """One vehicle's. `folder` None: nothing is ever recorded."""
+
+    def __init__(
+        self,
+        vehicle: str,
+        folder: RecordingsFolder | None,
+        settings: RecordingSettings,
+        state: ControllerState,
+        *,
+        now: Callable[[], float],
+        wall_ms: Callable[[], int],
+        on_finished: Callable[[Path], None],
+        on_unreadable: Callable[[str], None],
+    ) -> None:
+        self.recorder: Recorder | None = None
+        self.early = EarlyEntries()
+        self._vehicle = vehicle
+        self._folder = folder
+        self._settings = settings
+        self._state = state
+        self._now = now
+        self._wall_ms = wall_ms
+        self._on_finished = on_finished
+        self._on_unreadable = on_unreadable
+        self._definitions: dict[str, str] = {}
+        self._anchor = (0.0, 0)  # a moment of `now`, and the time of day then [ns]: spacing stays true in a part
+        self._ended_ms = 0
+
+    @property
+    def status(self) -> Status:
+        """What the recorder's thread last said of itself."""
+        return self.recorder.status if self.recorder is not None else Status()
+
+    def is_current(self, session: RecordingSession) -> bool:
+        """Whether the thread speaks of the newest part of this session."""
+        return session.begun is not None and self.status.part is session.begun
+
+    def prepare(self) -> None:
+        """Gets ready to record, so that the first message finds all that it needs."""
+        if self.recorder is None and self._folder is not None:
+            self.recorder = Recorder(
+                self._folder,
+                call=asyncio.get_running_loop().call_soon_threadsafe,
+                on_finished=self._finished,
+                on_unreadable=self._on_unreadable,
+                allowance=self._settings.allowance(),
+            )
+            self.recorder.prepare()
+
+    def start(self, *, by: str | None) -> RecordingSession:
+        """A session begins; its first part with the next message, or soon."""
+        assert self._folder is not None
+        now_s = self._now()
+        if self.recorder is not None:
+            self.recorder.forget_dropped()
+        id = self._folder.first_id(self._vehicle, self._wall_ms())  # made unique by the thread, which may ask the disk
+        session = RecordingSession(id=id, session=str(uuid.uuid4()), by=by, began_s=now_s, due_s=now_s + BEGIN_AFTER_S)
+        self._state.session = session
+        return session
+
+    def resume(self, session: RecordingSession, now_s: float) -> None:
+        """The link returned: the next part begins with the next message, or soon."""
+        session.lost_s, session.due_s, session.begun = None, now_s + BEGIN_AFTER_S, None
+
+    def begin(self, session: RecordingSession) -> None:
+        """Begins the next part."""
+        session.due_s = None
+        session.part += 1
+        session.is_open = True
+        self._state.saved = None
+        wall_ms = self._wall_ms()
+        self._anchor = self._now(), wall_ms * 1_000_000
+        settings = self._settings.as_entry()
+        early = self.early.take(session.began_s - EARLY_S if session.part == 1 else -math.inf)
+        part = self._part(session, wall_ms, settings)
+        self.prepare()
+        assert self.recorder is not None
+        self.recorder.allowance = self._settings.allowance()
+        session.delays = DelayWriter()
+        session.begun, session.noted, session.noted_s = part, None, -math.inf
+        self.recorder.begin(part)
+        if self._definitions:
+            self.recorder.learn(self._definitions)
+        self.own("settings", settings)
+        for channel, said in early:
+            self.own(channel, said)
+
+    def close(self, why: str) -> None:
+        """Ends the part that is open, if one is."""
+        session = self._state.session
+        if session is not None and session.is_open and self.recorder is not None:
+            session.is_open = False
+            self._ended_ms = self._wall_ms()
+            self._state.completing += 1
+            self.recorder.end(ended="closed", why=why, then=self._completed, **self._state.missing.as_metadata())
+
+    def take(self, topic: str, type: str | None, message: Any, now_s: float, size: int) -> None:
+        """A message of the car, or the RawFrame that holds it."""
+        session = self._state.session
+        if session is None:
+            return
+        if session.due_s is not None:
+            self.begin(session)
+        if session.is_open and self.recorder is not None:
+            self.recorder.take(topic, type, message, self._ns(now_s), size, now_s)
+
+    def own(self, channel: Own, said: Mapping[str, Any]) -> None:
+        """An entry of one of our own channels."""
+        session = self._state.session
+        if session is not None and session.is_open and self.recorder is not None:
+            self.recorder.own(channel, said, self._ns(self._now()))
+            self.early.note(channel, said)
+        elif self._folder is not None:
+            self.early.hold(self._now(), channel, {"time_ms": self._wall_ms(), **said})
+
+    def delays(self, delays: Mapping[str, float], link: LinkDelay) -> None:
+        """How old what comes is, once a tick: whoever judges the recording must know it."""
+        session = self._state.session
+        if session is not None and session.is_open and self.recorder is not None:
+            row = session.delays.row(delays, link)
+            if row is not None:
+                self.recorder.own("delay", row, self._ns(self._now()))
+
+    def tick(self, session: RecordingSession, now_s: float) -> None:
+        """The settings of the disk's room hold at once; what is missing in the part is written into it."""
+        if self.recorder is None:
+            return
+        self.recorder.allowance = self._settings.allowance()
+        missing = self._state.missing
+        is_due = now_s - session.noted_s >= NOTE_EVERY_S
+        if session.is_open and missing != (session.noted or Missing()) and is_due:
+            session.noted, session.noted_s = missing, now_s
+            self.recorder.note(**missing.as_metadata())
+
+    def learn(self, definitions: Mapping[str, str]) -> None:
+        """Definitions of types, in .msg text, as the bridge has them."""
+        self._definitions |= definitions
+        session = self._state.session
+        if session is not None and session.is_open and self.recorder is not None:
+            self.recorder.learn(definitions)
+
+    def forget(self) -> None:
+        """The car is another one from now on: nothing that was learnt or held is of it."""
+        self.early.clear()
+        self._definitions.clear()
+
+    async def stop(self) -> None:
+        """Completes what is being written; for the end of the server."""
+        recorder, self.recorder = self.recorder, None
+        self._state.session = None
+        if recorder is not None:
+            done = asyncio.Event()
+            recorder.stop(then=done.set)
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(SETTLE_S):
+                    await done.wait()
+
+    def _part(self, session: RecordingSession, wall_ms: int, settings: Mapping[str, Any]) -> Part:
+        assert self._folder is not None
+        version: RosVersion = 2 if self._state.ros_version == 2 else 1
+        return Part(
+            path=self._folder.place(self._vehicle, part_id(session.id, session.part)),
+            version=version,
+            metadata={
+                "vehicle": self._vehicle,
+                "address": self._state.address or "",
+                "session": session.session,
+                "part": str(session.part),
+                "version": catgraph_version(),
+                "started_ms": str(wall_ms),
+                "started_by": session.by or "",
+                "profile": str(settings["profile"]),
+                "settings": str(settings["toml"]),
+                **self.early.standing(),
+            },
+        )
+
+    def _completed(self) -> None:
+        self._state.completing -= 1
+
+    def _finished(self, path: Path) -> None:
+        self._state.saved = id_of(path), self._ended_ms or self._wall_ms()
+        self._on_finished(path)
+
+    def _ns(self, now_s: float) -> int:
+        since_s, since_ns = self._anchor
+        return since_ns + round((now_s - since_s) * 1e9)

@@ -1,0 +1,266 @@
+"""The thread that writes one vehicle's parts, and a second one that has the disk keep what was written."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from server.recording import space
+from server.recording.folder import FINISHED, RecordingsFolder, writing_path
+from server.recording.mcap.write import PartFile
+from server.recording.part_writer import PartWriter
+from server.recording.read.schemas import TypeBook, standard
+from server.recording.recorder_queue import (
+    Begin,
+    CarMessage,
+    End,
+    Item,
+    Learn,
+    Note,
+    OwnEntry,
+    Part,
+    Prepare,
+    RecorderQueue,
+    Stop,
+)
+from server.recording.space import Allowance, Space
+from server.recording.space_watch import SpaceWatch
+from server.recording.unfinished import UnfinishedParts
+from server.rosbridge.codec import Unreadable
+
+log = logging.getLogger("catgraph.recorder")
+
+DRAIN_S = 0.05  # the thread works in small portions: a long one would keep the loop waiting for the interpreter
+PORTION = 64  # messages between two chances for others to run
+FLUSH_S = 0.2  # and with the portion before it a message is at most 0.25 s old when the system has it
+SYNC_S = 1.0
+
+Writing = Literal["off", "recording", "saving", "stopped"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Status:
+    """What the thread last said of itself; replaced as a whole."""
+
+    state: Writing = "off"
+    part: Part | None = None  # the one being written, or the last one
+    path: Path | None = None  # what it is called: another name than was asked for, where that was taken
+    size: int = 0
+    messages: int = 0  # of the car, in this part
+    misfits: int = 0  # of them, kept as JSON: not of their type, or of a type that nobody knows
+    space: Space | None = None
+    trouble: str | None = None  # why it stopped by itself, as a sentence
+
+
+class RecorderThread:
+    """Empties the queue into files. `call(function, *arguments)` runs something on the loop soon.
+
+    `status` and `is_ready` are read, and `allowance` is set, by the loop; everything else is the threads' own.
+    """
+
+    def __init__(
+        self,
+        folder: RecordingsFolder,
+        queue: RecorderQueue,
+        *,
+        call: Callable[..., Any],
+        on_finished: Callable[[Path], None],
+        on_unreadable: Callable[[str], None],
+        allowance: Allowance,
+    ) -> None:
+        self.allowance = allowance
+        self.status = Status()
+        self.is_ready = False  # the types are
+        self._folder = folder
+        self._queue = queue
+        self._call = call
+        self._on_finished = on_finished
+        self._on_unreadable = on_unreadable
+        self._ended = threading.Event()
+        self._writer: PartWriter | None = None
+        self._book: TypeBook | None = None
+        self._space = SpaceWatch(folder.root)
+        self._unfinished = UnfinishedParts()
+        self._stumbled = False
+        self._flushed_s = 0.0
+
+    def start(self) -> None:
+        threading.Thread(target=self._run, name="recorder", daemon=True).start()
+        threading.Thread(target=self._sync_forever, name="recorder sync", daemon=True).start()
+
+    def _run(self) -> None:
+        while True:
+            self._queue.wake.wait(self._wait_s())
+            self._queue.wake.clear()
+            try:
+                if self._drain():
+                    return
+                self._keep_house(time.monotonic())
+            except OSError as error:
+                self._give_up(f"Recording stopped: {space.why(error)}.")
+            except Exception:  # the one net: a fault of ours must not end the recording of whatever comes next
+                log.exception("the recorder stumbled")
+                self._give_up("Recording stopped: catgraph itself stumbled; its log says how.")
+
+    def _wait_s(self) -> float | None:
+        """Until the queue is looked at again; None: until something wakes the thread."""
+        if self._writer is not None or self.status.state == "stopped":  # one that stopped is handed messages still
+            return DRAIN_S
+        return self._unfinished.wait_s
+
+    # -- what waits --------------------------------------------------------------------------------------------------
+
+    def _drain(self) -> bool:
+        """Writes what waits; True when it is to stop."""
+        done = 0
+        while (item := self._queue.next()) is not None:
+            if isinstance(item, Stop):
+                self._ended.set()
+                self._call(item.then)
+                return True
+            self._do(item)
+            done += 1
+            if done % PORTION == 0:
+                time.sleep(0)  # the loop may have waited for the interpreter meanwhile
+                self._flush_if_due(time.monotonic())
+        return False
+
+    def _do(self, item: Item) -> None:
+        match item:
+            case CarMessage():
+                if self._writer is not None:
+                    self._write(self._writer, item)
+            case OwnEntry():
+                if self._writer is not None:
+                    self._writer.own(item.channel, item.at_ns, item.said)
+            case Begin():
+                self._open(item.part)
+            case Prepare():
+                standard(1)
+                standard(2)
+                self.is_ready = True
+            case Learn():
+                self._learn(item.definitions)
+            case Note():
+                if self._writer is not None:
+                    self._writer.file.note(**item.more)
+            case End():
+                self._close(item.ended)
+                if item.then is not None:
+                    self._call(item.then)
+
+    def _write(self, writer: PartWriter, item: CarMessage) -> None:
+        try:
+            writer.message(item.topic, item.type, item.at_ns, item.message)
+        except Unreadable as why:
+            self._call(self._on_unreadable, str(why))
+        except Exception:  # nothing is known that does it; it may cost its message and not the recording
+            self._queue.drop(item.now_s)
+            if not self._stumbled:
+                self._stumbled = True
+                log.exception("a message of %s could not be written, told once", item.topic)
+
+    def _learn(self, definitions: Mapping[str, str]) -> None:
+        if self._book is not None:
+            self._book.learn(definitions)
+            if self._writer is not None:
+                self._writer.types_changed()
+
+    # -- one part after the other ------------------------------------------------------------------------------------
+
+    def _open(self, part: Part) -> None:
+        if self._writer is not None:
+            self._close({"ended": "closed"})
+        if self._book is None or self._book.version != part.version:
+            self._book = TypeBook(part.version)
+        now_s = time.monotonic()
+        try:
+            self._space.count_up()
+            found = self._space.look(now_s, 0)
+            path = part.path.with_name(self._folder.free_id(part.id) + FINISHED)
+            if (exhausted := found.exhausted(self.allowance)) is None:
+                file = PartFile(path, profile=f"ros{part.version}", metadata=part.metadata)
+                self._writer = PartWriter(file, self._book)
+        except OSError as error:
+            log.error("a recording cannot begin: %s", error)
+            trouble = f"Recording cannot begin: {space.why(error)}."
+            self.status = Status(state="stopped", part=part, trouble=trouble)
+            return
+        if exhausted is not None:
+            log.warning("%s", exhausted)
+            self.status = Status(state="stopped", part=part, space=found, trouble=exhausted)
+            return
+        self._flushed_s = now_s
+        self.status = Status(state="recording", part=part, path=path, space=found)
+
+    def _close(self, ended: Mapping[str, str], *, state: Writing = "off", trouble: str | None = None) -> None:
+        writer, self._writer = self._writer, None
+        if writer is None:
+            if self.status.state != "stopped":
+                self.status = replace(self.status, state=state)
+            return
+        self.status = replace(self.status, state="saving", messages=writer.messages, misfits=writer.misfits)
+        try:
+            path = writer.file.close(**ended)
+        except Exception as error:  # one of the library too: what the disk has is of use in any case
+            said = space.why(error) if isinstance(error, OSError) else type(error).__name__
+            log.error("a recording could not be completed: %s", said)
+            self._unfinished.add(writing_path(writer.file.path), time.monotonic())
+            failed = f"The recording could not be completed: {said}. What the disk took is kept."
+            self.status = replace(self.status, state="stopped", trouble=trouble or failed)
+            return
+        self.status = replace(self.status, state=state, size=writer.file.size, trouble=trouble)
+        self._call(self._on_finished, path)
+
+    def _give_up(self, sentence: str) -> None:
+        """The disk refused. What it took is completed if it can be, and nothing more is written until it is begun."""
+        log.error("%s", sentence)
+        if self._writer is None:
+            self.status = replace(self.status, state="stopped", trouble=sentence)
+        else:
+            self._close({"ended": "closed", "why": sentence}, state="stopped", trouble=sentence)
+
+    # -- between the portions ----------------------------------------------------------------------------------------
+
+    def _keep_house(self, now_s: float) -> None:
+        writer = self._writer
+        if writer is None:
+            for path in self._unfinished.complete(now_s):
+                self._call(self._on_finished, path)
+            return
+        self._flush_if_due(now_s)
+        if self._space.is_due(now_s):
+            found = self._space.look(now_s, writer.file.size)
+            writer.file.demand_place()
+            exhausted = found.exhausted(self.allowance)
+            if exhausted is not None:
+                self._give_up(f"{exhausted} What was recorded is saved.")
+
+    def _flush_if_due(self, now_s: float) -> None:
+        writer = self._writer
+        if writer is not None and now_s - self._flushed_s >= FLUSH_S:
+            self._flushed_s = now_s
+            writer.file.flush()
+            size = writer.file.size
+            self.status = replace(
+                self.status,
+                size=size,
+                messages=writer.messages,
+                misfits=writer.misfits,
+                space=self._space.now(size),
+            )
+
+    def _sync_forever(self) -> None:
+        while not self._ended.wait(SYNC_S):
+            writer = self._writer
+            if writer is not None:
+                try:
+                    writer.file.sync()
+                except OSError as error:
+                    log.error("the disk does not keep what is recorded: %s", error)
+                    writer.file.failed = error

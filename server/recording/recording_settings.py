@@ -1,0 +1,36 @@
+"""The settings that recording goes by, as they are in force now, and all settings as a recording keeps them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from monitor.check import Limits
+from server.judge.active_settings import Tuning
+from server.recording.space import Allowance
+
+GB = 1e9
+
+
+class RecordingSettings:
+    """Read anew each time: settings change while a car is recorded."""
+
+    def __init__(self, tuning: Tuning) -> None:
+        self._tuning = tuning
+
+    def value(self, name: str) -> float:
+        """One setting of recording, in SI."""
+        limits: Limits = self._tuning.limits.recording
+        return float(getattr(limits, name))
+
+    def allowance(self) -> Allowance:
+        """What recordings may take of the disk."""
+        return Allowance(quota=round(self.value("quota_gb") * GB), min_free=round(self.value("min_free_gb") * GB))
+
+    def as_entry(self) -> dict[str, Any]:
+        """All settings in force, for the channel of settings."""
+        return {
+            "version": self._tuning.settings.version,
+            "profile": self._tuning.profile.name,
+            "toml": self._tuning.as_toml(),
+            "in_force": self._tuning.in_force(),
+        }

@@ -1,0 +1,99 @@
+"""What a page sees of a run through a recording: the state and the scan at the moment it has come to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from monitor.alarm import Alarm
+from monitor.alarm_order import standing
+from monitor.check import Verdict
+from server.protocol import serialize
+from server.replay.run import Run
+from server.replay.run_state import RunState
+from server.vehicle.scan_feed import judged
+from server.vehicle.state_frame import Facts, state_frame
+
+TRENDS_A_FRAME = 4
+
+
+def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_number: int) -> dict[str, Any]:
+    """The state of docs/protocol.md at this moment, without `server`, `replay` and `live`. Looking changes nothing
+    of what is judged later."""
+    run_state, epoch = run.run_state, run.epoch
+    now_s = run_state.at_s
+    wall_ms = round((run.drive.start_s + now_s) * 1000)
+    facts = Facts(
+        vehicle=vehicle,
+        server={},
+        now_s=now_s,
+        wall_ms=wall_ms,
+        phase="monitoring",
+        address=None,
+        ros_version=run.drive.ros_version,
+        connected_s=0.0,
+        paused_since_s=run_state.paused_s,
+        paused_by=run_state.paused_by,
+        held=None,
+        load=run_state.load.at(now_s),
+        log_trouble=None,
+        profile=epoch.tuning.profile.title,
+        settings_version=settings_version,
+        since_s=0.0,
+        dialled_s=0.0,
+        problem=None,
+        link=None,
+        last_message_s=run_state.last_message_s,
+        ros_answered_s=now_s,
+        ros_alive=True,
+        behind=None,
+        offers_nothing=False,
+        bridge_answers=True,
+        reception=run_state.reception,
+        sources=epoch.sources,
+        topics_heard=len(run_state.heard),
+        trends=run_state.trends.piece(now_s, at_most=TRENDS_A_FRAME),
+        track_number=track_number,
+    )
+    shown = state_frame(facts, run_state.state.glance(now_s), run_state.monitor)
+    del shown["server"]
+    shown["session"]["name"] = name
+    # Whatever is not in the file is nobody's silence: the band tells of it, and each value keeps its age.
+    shown["link"] |= {"cut": None, "since_ms": None, "problem": None, "topics_subscribed": len(epoch.published)}
+    shown["decelerate"] = run_state.slowed.as_json(now_s, run.drive.start_s, epoch.tuning.limits.slow_down)
+    if run.drive.recorded.has_alarms:
+        shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms) for alarm in _told_standing(run_state)]
+    return shown
+
+
+def scan_bytes(run: Run) -> bytes | None:
+    """The newest scan as the page gets it; None before the first."""
+    run_state = run.run_state
+    snapshot = run_state.state.glance(run_state.at_s)
+    reading = snapshot.get("scan")
+    if reading is None:
+        return None
+    obstacle = run_state.monitor.alarms.get("obstacle")
+    return serialize.scan_frame(
+        reading.value,
+        number=run_state.scans,
+        age_s=reading.age_s(run_state.at_s),
+        kinds_kept=run_state.kinds_kept,
+        judged=judged(
+            reading.value,
+            snapshot,
+            run_state.monitor.limits.obstacle,
+            was_active=obstacle is not None and obstacle.active,
+        ),
+    )
+
+
+def _told_standing(run_state: RunState) -> list[Alarm]:
+    """The alarms as they were told then, each with what its check says when it is asked anew."""
+    findings = run_state.monitor.findings
+    return [
+        replace(alarm, finding=findings[alarm.id])
+        if alarm.active and alarm.id in findings and findings[alarm.id].verdict is Verdict.FAULT
+        else alarm
+        for alarm in standing(run_state.recorded_alarms.values())
+    ]
