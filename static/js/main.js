@@ -10,20 +10,17 @@ import { deviceName, keptHere } from './control/device-name.js';
 import { breath, field, listen, need, show } from './core/dom.js';
 import { gapWords } from './core/event-log.js';
 import { takeEarly } from './boot/early-socket.js';
-import { FilesTab } from './shell/files-tab.js';
+import { LazyTab } from './shell/lazy-tab.js';
 import { forgetWork } from './boot/forget.js';
 import { giveUp } from './boot/give-up.js';
 import { Handset } from './phone/device-status.js';
 import { holdTaps } from './boot/held-taps.js';
-import { MapTab } from './shell/map-tab.js';
 import { notices } from './shell/notice.js';
 import { ownName } from './control/own-name.js';
 import { Page } from './shell/router.js';
 import { Phone } from './phone/phone.js';
 import { Presence } from './control/presence.js';
-import { ScanTab } from './shell/scan-tab.js';
 import { Screens } from './shell/screens.js';
-import { SettingsTab } from './shell/settings-tab.js';
 import { closeSheet, mountSheets } from './shell/sheet.js';
 import { Store } from './core/store.js';
 import { Tabs } from './shell/tabs.js';
@@ -139,10 +136,7 @@ async function begin() {
   await breath();
   mountStart(need(document, '#start'), store);
   mountConnect(need(document, '#connect'), store, page, arming);
-  const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
-  const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null, say);
-  const files = new FilesTab(need(monitor, '[data-panel="files"]'), store, say, () => page.isMonitorShown && tabs.shows('files') && screens.open === null);
-  const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
+  const contents = lazyTabs(monitor, store, say, (name) => page.isMonitorShown && tabs.shows(name) && screens.open === null);
   const screens = new Screens(monitor, store, () => front());
   mountSheets();
   mountInstall(say);
@@ -170,13 +164,9 @@ async function begin() {
     }
   }
 
-  /** The scan is sent and drawn only while its tab is in front and nothing lies over it; Settings is loaded once it is. */
   front = () => {
     queueMicrotask(() => {
-      scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null);
-      map.look();
-      files.look();
-      settings.look();
+      for (const content of contents) content.look();
     });
   };
 
@@ -265,6 +255,47 @@ async function begin() {
   function prefetch() {
     for (const load of [() => import('./slowdown/slow-sheet.js'), () => import('./alarms/log.js'), () => import('./home/signals.js'), () => import('./scan/scan.js'), () => import('./home/chart.js')]) load().catch(() => {});
   }
+}
+
+/**
+ * The tabs whose content is fetched when they first come to the front.
+ * @param {HTMLElement} monitor
+ * @param {Store} store
+ * @param {ReturnType<typeof notices>} say
+ * @param {(name: string) => boolean} isFront
+ */
+function lazyTabs(monitor, store, say, isFront) {
+  const panel = (/** @type {string} */ name) => need(monitor, `[data-panel="${name}"]`);
+  const shown = (/** @type {string} */ name) => () => isFront(name);
+  return [
+    new LazyTab(panel('scan'), {
+      what: 'The scan', state: 'none-words', isShown: shown('scan'), fetch: () => import('./scan/scan.js'),
+      mount: ({ mount }) => {
+        const scan = mount(panel('scan'), store);
+        const look = () => scan.setFront(isFront('scan')); // sent and drawn only while it is in front
+        look();
+        return { look };
+      },
+    }),
+    new LazyTab(panel('map'), {
+      what: 'The map', state: 'none-words', isShown: shown('map'), isNear: true, fetch: () => import('./map/map.js'),
+      mount: ({ mount }) => {
+        mount(panel('map'), store, shown('map'), say);
+        return {};
+      },
+    }),
+    new LazyTab(panel('files'), {
+      what: 'The recordings', state: 'files-state', isShown: shown('files'), fetch: () => import('./files/files.js'),
+      mount: ({ mount }) => mount(panel('files'), store, say, shown('files')),
+    }),
+    new LazyTab(panel('settings'), {
+      what: 'The settings', state: 'settings-state', isShown: shown('settings'), fetch: () => import('./settings/settings.js'),
+      mount: ({ mount }) => {
+        mount(panel('settings'), store, say, shown('settings'));
+        return {};
+      },
+    }),
+  ];
 }
 
 /**
