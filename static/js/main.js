@@ -88,7 +88,7 @@ async function begin() {
   let name = ''; // one, also where nothing can be kept
   const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), () => (name ||= deviceName(navigator.userAgent, keptHere())), ownName);
   const voice = new Voice();
-  store.undrawn = undrawn = new Undrawn(() => store.frame, () => voice.say('high'));
+  store.painter.undrawn = undrawn = new Undrawn(() => store.frame, () => voice.say('high'));
   stop = () => {
     store.stop();
     voice.say(null);
@@ -119,7 +119,7 @@ async function begin() {
   for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
   store.start();
   await glanced(store);
-  store.greet();
+  store.sync.greet();
 
   // What asks for the operator, and what acts on the car.
   store.on('beat', speak);
@@ -203,7 +203,7 @@ async function begin() {
     isViewed = true;
     import('./control/viewer.js').then(({ mountViewer }) => mountViewer(store, say)).catch(() => {}); // the server refuses it all the same
   }
-  store.whenOpen(greet);
+  store.sync.whenOpen(greet);
 
   function draw() {
     page.draw();
@@ -211,7 +211,7 @@ async function begin() {
   }
 
   function speak() {
-    if (store.drawing.isFailed) return; // undrawn.js sounds
+    if (store.painter.drawing.isFailed) return; // undrawn.js sounds
     const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
     voice.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
   }
@@ -237,7 +237,7 @@ async function begin() {
   const then = thenOf(asked.get('then'));
   const recording = asked.get('replay');
   let isAsked = false;
-  store.whenOpen(() => {
+  store.sync.whenOpen(() => {
     if (isAsked) return;
     isAsked = true;
     if (asked.has('then')) history.replaceState(history.state, '', location.pathname);

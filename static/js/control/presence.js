@@ -21,7 +21,7 @@ export class Presence {
     const look = () => this.#look();
     store.on('tick', look);
     store.on('beat', look); // while the page is hidden frames come and its timers hardly run
-    store.whenOpen(() => {
+    store.sync.whenOpen(() => {
       this.#told_ms = -Infinity;
       look();
     });
@@ -34,7 +34,7 @@ export class Presence {
     const { voice, arms } = this.arming;
     return {
       visible: !document.hidden,
-      draws: !this.store.drawing.isFailed,
+      draws: !this.store.painter.drawing.isFailed,
       sound: voice.isInterrupted ? 'interrupted' : arms.sound,
       awake: arms.screen,
       vibrates: this.handset.vibrates,

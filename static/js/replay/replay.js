@@ -42,7 +42,7 @@ export async function openReplay(id, store, say, at_s = 0) {
     return false;
   }
   current?.unmount();
-  store.turn(true);
+  store.replaying = true;
   current = new Replay(id, store, say);
   for (const note of document.querySelectorAll('.snack.note')) note.remove();
   return true;
@@ -129,7 +129,7 @@ class Replay {
       }
     }
     this.unmount();
-    this.store.turn(false);
+    this.store.replaying = false;
     const url = new URL(location.href);
     url.searchParams.delete('replay');
     url.searchParams.delete('t');

@@ -78,7 +78,7 @@ export function mount(store, page) {
     }));
     // Some browsers close without asking; what is not acknowledged comes back with the next frame.
     stops.push(listen(sheet, 'close', () => {
-      if (standing && sheets[standing.kind] === sheet && !store.drawing.isFailed) answer();
+      if (standing && sheets[standing.kind] === sheet && !store.painter.drawing.isFailed) answer();
     }));
   }
   on(sheets.alarm, 'acknowledge', answer);
@@ -110,7 +110,7 @@ export function mount(store, page) {
   function judge() {
     const key = lossKey(store.frame, store.isSilent);
     if (page.answered !== null && page.answered !== key && key === 'none') page.answered = null;
-    standing = store.drawing.isFailed ? null : dialogOf({ // else undrawn.js names the alarms
+    standing = store.painter.drawing.isFailed ? null : dialogOf({ // else undrawn.js names the alarms
       frame: page.unclosed(store.frame), isSilent: store.isSilent, silence_s: store.silence_s,
       isChoosing: page.isChoosing, isAnswered: page.answered === key,
     });
