@@ -4,7 +4,7 @@ import { ServerClock } from './clock.js';
 import { DeadMan } from './dead-man.js';
 import { Emitter } from './emitter.js';
 import { EventLog } from './event-log.js';
-import { inkOf } from './freshness.js';
+import { freshnessStyle } from './freshness.js';
 import { chainOf } from './link.js';
 import { controlOf, fenceOf, liveOf } from './live-car.js';
 import { LogSync } from './log-sync.js';
@@ -177,7 +177,7 @@ export class Store {
 
   /** How much ink a signal deserves now. @param {string} name */
   ink(name) {
-    return inkOf(this.signal(name), this.lag_s);
+    return freshnessStyle(this.signal(name), this.lag_s);
   }
 
   /** A limit of the newest frame, or null. @param {string} name */
