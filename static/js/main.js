@@ -13,7 +13,7 @@ import { takeEarly } from './boot/early-socket.js';
 import { LazyTab } from './shell/lazy-tab.js';
 import { forgetWork } from './boot/forget.js';
 import { giveUp } from './boot/give-up.js';
-import { Handset } from './phone/device-status.js';
+import { DeviceStatus } from './phone/device-status.js';
 import { holdTaps } from './boot/held-taps.js';
 import { notices } from './shell/notice.js';
 import { ownName } from './control/own-name.js';
@@ -131,8 +131,8 @@ async function begin() {
   mountControl(monitor, field(document, 'snacks'), store, control);
   await breath();
   const arming = new Arming(voice, new Phone(store));
-  const handset = new Handset();
-  new Presence(store, arming, handset);
+  const deviceStatus = new DeviceStatus();
+  new Presence(store, arming, deviceStatus);
   await breath();
   mountStart(need(document, '#start'), store);
   mountConnect(need(document, '#connect'), store, page, arming);
@@ -172,7 +172,7 @@ async function begin() {
 
   /** What this phone can do is looked at seldom. */
   function openPhone() {
-    import('./phone/this-phone.js').then(({ openThisPhone }) => openThisPhone(store, arming, handset)).catch(() => say('What shows this phone could not be fetched.', 'Not opened'));
+    import('./phone/this-phone.js').then(({ openThisPhone }) => openThisPhone(store, arming, deviceStatus)).catch(() => say('What shows this phone could not be fetched.', 'Not opened'));
   }
 
   /** This device is not paired, or was removed just now. @param {import('./pairing/admission.js').Refusal} why */

@@ -12,12 +12,12 @@ export class Presence {
   /**
    * @param {import('../core/store.js').Store} store
    * @param {import('../boot/arming.js').Arming} arming
-   * @param {import('../phone/device-status.js').Handset} handset
+   * @param {import('../phone/device-status.js').DeviceStatus} deviceStatus
    */
-  constructor(store, arming, handset) {
+  constructor(store, arming, deviceStatus) {
     this.store = store;
     this.arming = arming;
-    this.handset = handset;
+    this.deviceStatus = deviceStatus;
     const look = () => this.#look();
     store.on('tick', look);
     store.on('beat', look); // while the page is hidden frames come and its timers hardly run
@@ -37,9 +37,9 @@ export class Presence {
       draws: !this.store.painter.drawing.isFailed,
       sound: voice.isInterrupted ? 'interrupted' : arms.sound,
       awake: arms.screen,
-      vibrates: this.handset.vibrates,
-      battery: this.handset.battery,
-      charging: this.handset.charging,
+      vibrates: this.deviceStatus.vibrates,
+      battery: this.deviceStatus.battery,
+      charging: this.deviceStatus.charging,
     };
   }
 

@@ -9,9 +9,9 @@ const SAID = { sounding: 'That was an alarm’s sound. Not heard? Turn the media
 /**
  * @param {import('../core/store.js').Store} store
  * @param {import('../boot/arming.js').Arming} arming
- * @param {import('./device-status.js').Handset} handset
+ * @param {import('./device-status.js').DeviceStatus} deviceStatus
  */
-export function openThisPhone(store, arming, handset) {
+export function openThisPhone(store, arming, deviceStatus) {
   const verdict = html('p', { class: 'sub', id: 'this-phone-words', role: 'status' });
   const list = html('ul', { class: 'arm' });
   const arm = html('button', { type: 'button', class: 'key solid wide', 'data-f': 'arm' }, 'Arm this phone');
@@ -27,8 +27,8 @@ export function openThisPhone(store, arming, handset) {
     const mine = (store.frame?.phones ?? []).find((one) => one.id === store.page);
     return {
       ...arms, sound: voice.isInterrupted ? /** @type {const} */ ('interrupted') : arms.sound, positionSays: mine?.why_text ? `${mine.why_text}.` : '', rides: mine?.chosen === true,
-      vibrates: handset.vibrates, battery: handset.battery, charging: handset.charging, isOnline: handset.isOnline, network: handset.network, lag_s: store.lag_s,
-      isApple: handset.isApple, isSecure: window.isSecureContext, isReplaying: store.replaying,
+      vibrates: deviceStatus.vibrates, battery: deviceStatus.battery, charging: deviceStatus.charging, isOnline: deviceStatus.isOnline, network: deviceStatus.network, lag_s: store.lag_s,
+      isApple: deviceStatus.isApple, isSecure: window.isSecureContext, isReplaying: store.replaying,
     };
   }
 
