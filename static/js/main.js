@@ -1,4 +1,4 @@
-// The page's beginning: one store, one voice, every panel at its place.
+// The page's beginning: one store, one alarm sound, every panel at its place.
 
 import './boot/trusted-types.js';
 import { thenOf } from './boot/pairing-token.js';
@@ -25,7 +25,7 @@ import { closeSheet, mountSheets } from './shell/sheet.js';
 import { Store } from './core/store.js';
 import { Tabs } from './shell/tabs.js';
 import { Undrawn } from './shell/undrawn.js';
-import { Voice } from './alarms/alarm-sound.js';
+import { AlarmSound } from './alarms/alarm-sound.js';
 import { lossKey, mount as mountDialogs } from './shell/dialogs.js';
 import { mount as mountBadge } from './shell/badge.js';
 import { mount as mountChecks } from './alarms/checks.js';
@@ -87,11 +87,11 @@ async function begin() {
   const admission = document.documentElement.dataset['access'] === 'paired' ? new Admission(address, shut) : null;
   let name = ''; // one, also where nothing can be kept
   const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), () => (name ||= deviceName(navigator.userAgent, keptHere())), ownName);
-  const voice = new Voice();
-  store.painter.undrawn = undrawn = new Undrawn(() => store.frame, () => voice.say('high'));
+  const alarmSound = new AlarmSound();
+  store.painter.undrawn = undrawn = new Undrawn(() => store.frame, () => alarmSound.say('high'));
   stop = () => {
     store.stop();
-    voice.say(null);
+    alarmSound.say(null);
   };
   const monitor = need(document, '#monitor');
   const tell = notices(field(document, 'snacks'));
@@ -116,7 +116,7 @@ async function begin() {
   mountPosition(need(monitor, '[data-part="position"]'), store);
   mountRail(monitor, store, page);
   // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
-  for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
+  for (const type of ['pointerup', 'keydown']) listen(document, type, () => alarmSound.isRunning || alarmSound.arm(), { capture: true });
   store.start();
   await glanced(store);
   store.sync.greet();
@@ -130,7 +130,7 @@ async function begin() {
   await breath();
   mountControl(monitor, field(document, 'snacks'), store, control);
   await breath();
-  const arming = new Arming(voice, new Phone(store));
+  const arming = new Arming(alarmSound, new Phone(store));
   const deviceStatus = new DeviceStatus();
   new Presence(store, arming, deviceStatus);
   await breath();
@@ -140,7 +140,7 @@ async function begin() {
   const screens = new Screens(monitor, store, () => front());
   mountSheets();
   mountInstall(say);
-  mountPreferences(voice);
+  mountPreferences(alarmSound);
   await breath();
   mountReach(need(monitor, '[data-part="reach"]'), store, openPhone);
   mountChecks(need(monitor, '[data-part="checks"]'), store);
@@ -207,13 +207,13 @@ async function begin() {
 
   function draw() {
     page.draw();
-    show(field(monitor, 'sound-off'), voice.isPossible ? !voice.isRunning : false);
+    show(field(monitor, 'sound-off'), alarmSound.isPossible ? !alarmSound.isRunning : false);
   }
 
   function speak() {
     if (store.painter.drawing.isFailed) return; // undrawn.js sounds
     const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
-    voice.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
+    alarmSound.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
   }
 
   store.on('refused', (answer) => {

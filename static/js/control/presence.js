@@ -31,11 +31,11 @@ export class Presence {
   }
 
   #word() {
-    const { voice, arms } = this.arming;
+    const { alarmSound, arms } = this.arming;
     return {
       visible: !document.hidden,
       draws: !this.store.painter.drawing.isFailed,
-      sound: voice.isInterrupted ? 'interrupted' : arms.sound,
+      sound: alarmSound.isInterrupted ? 'interrupted' : arms.sound,
       awake: arms.screen,
       vibrates: this.deviceStatus.vibrates,
       battery: this.deviceStatus.battery,

@@ -23,10 +23,10 @@ export function openThisPhone(store, arming, deviceStatus) {
   let said = '';
 
   function factsNow() {
-    const { voice, arms } = arming;
+    const { alarmSound, arms } = arming;
     const mine = (store.frame?.phones ?? []).find((one) => one.id === store.page);
     return {
-      ...arms, sound: voice.isInterrupted ? /** @type {const} */ ('interrupted') : arms.sound, positionSays: mine?.why_text ? `${mine.why_text}.` : '', rides: mine?.chosen === true,
+      ...arms, sound: alarmSound.isInterrupted ? /** @type {const} */ ('interrupted') : arms.sound, positionSays: mine?.why_text ? `${mine.why_text}.` : '', rides: mine?.chosen === true,
       vibrates: deviceStatus.vibrates, battery: deviceStatus.battery, charging: deviceStatus.charging, isOnline: deviceStatus.isOnline, network: deviceStatus.network, lag_s: store.lag_s,
       isApple: deviceStatus.isApple, isSecure: window.isSecureContext, isReplaying: store.replaying,
     };
@@ -49,7 +49,7 @@ export function openThisPhone(store, arming, deviceStatus) {
     draw();
   });
   test.addEventListener('click', async () => {
-    said = SAID[await arming.voice.test('medium')];
+    said = SAID[await arming.alarmSound.test('medium')];
     draw();
   });
   const stops = [store.on('draw', draw), store.on('tick', draw), addSheet(sheet)];
