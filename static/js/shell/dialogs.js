@@ -78,6 +78,7 @@ export function mount(store, page) {
     }));
     // Some browsers close without asking; what is not acknowledged comes back with the next frame.
     stops.push(listen(sheet, 'close', () => {
+      if (!sheet.isConnected) return; // the page gave up and took it away: nobody answered
       if (standing && sheets[standing.kind] === sheet && !store.painter.drawing.isFailed) answer();
     }));
   }
