@@ -55,6 +55,6 @@ export class Presence {
 
   /** @param {object} word */
   #send(word) {
-    return this.store.wire.send({ kind: 'present', ...word, lag_s: Math.min(MOST_LAG_S, this.store.lag_s) });
+    return this.store.socket.send({ kind: 'present', ...word, lag_s: Math.min(MOST_LAG_S, this.store.lag_s) });
   }
 }

@@ -13,7 +13,7 @@ import { DRAW_EVERY_MS, Painter } from './painter.js';
 import { readMessage } from './protocol.js';
 import { Requests } from './requests.js';
 import { ScanFeed } from './scan-feed.js';
-import { Wire } from './socket.js';
+import { PageSocket } from './socket.js';
 
 /**
  * @typedef {import('./protocol.js').State} State
@@ -49,14 +49,14 @@ export class Store {
   /** @type {Emitter<Topic>} */
   #emitter = new Emitter((error) => this.painter.failed(error));
   painter = new Painter(this.#emitter);
-  #send = (/** @type {object} */ message) => this.wire.send(message);
+  #send = (/** @type {object} */ message) => this.socket.send(message);
   #requests = new Requests(this.#send, (answer) => this.#emitter.emit('refused', answer));
   scans = new ScanFeed(this.#send);
   sync = new LogSync(this.log, this.#send, this.#emitter);
   #watch = new PageWatch({
     look: () => this.#emitter.guard(() => this.#look()),
     slept: (isBack, isRestored) => this.#emitter.guard(() => this.#slept(isBack, isRestored)),
-    online: () => this.wire.hurry(),
+    online: () => this.socket.hurry(),
   });
 
   #nameOf;
@@ -70,7 +70,7 @@ export class Store {
   constructor(dial, name = () => '', page = () => '') {
     this.#nameOf = name;
     this.#pageOf = page;
-    this.wire = new Wire(
+    this.socket = new PageSocket(
       {
         opened: () => this.#emitter.guard(() => {
           this.#granted = null;
@@ -102,13 +102,13 @@ export class Store {
   start() {
     this.#started_ms = this.now();
     this.#watch.start(DRAW_EVERY_MS);
-    this.wire.look(this.now());
+    this.socket.look(this.now());
   }
 
   stop() {
     this.#watch.stop();
     this.#emitter.clear(); // a picture may be under way
-    this.wire.stop();
+    this.socket.stop();
   }
 
   /** Monotonic time [ms]. */
@@ -237,7 +237,7 @@ export class Store {
   /** @param {State} frame @param {number} now_ms when it came */
   #state(frame, now_ms) {
     if ((frame.replay !== undefined) !== this.replaying) {
-      this.wire.proof(now_ms);
+      this.socket.proof(now_ms);
       return; // under way while the page turned, or while a recording is opened again
     }
     const delay_ms = this.#clock.note(frame.server.time_ms, now_ms);
@@ -246,7 +246,7 @@ export class Store {
     this.frame = frame;
     this.#delay_ms = delay_ms;
     this.heard_ms = Date.now() - (this.now() - now_ms);
-    this.wire.proof(now_ms);
+    this.socket.proof(now_ms);
     this.#emitter.emit('beat');
     this.painter.frame(frame, now_ms, isFirst);
   }
@@ -262,7 +262,7 @@ export class Store {
     const now_ms = this.now();
     if (this.#watch.slept_ms(now_ms) > 2000 && this.frame) this.deadMan.cover();
     this.deadMan.look(now_ms);
-    this.wire.look(now_ms);
+    this.socket.look(now_ms);
     if (!document.hidden) this.painter.keepUp(now_ms, this.deadMan.heard_ms);
     this.#emitter.emit('tick');
   }
@@ -270,7 +270,7 @@ export class Store {
   /** Hidden, frozen or back: the veil comes first, whatever the clocks say. @param {boolean} isBack @param {boolean} isRestored */
   #slept(isBack, isRestored) {
     if (this.frame && (!isRestored || this.silence_s > 1)) this.deadMan.cover();
-    if (isBack) this.wire.hurry();
+    if (isBack) this.socket.hurry();
     if (this.frame) this.painter.draw(); // before, there is nothing to cover
   }
 }

@@ -72,7 +72,7 @@ export class Page {
   }
 
   async retry() {
-    if (this.store.isSilent) this.store.wire.hurry();
+    if (this.store.isSilent) this.store.socket.hurry();
     else if (!this.store.frame?.session.address) this.choose(); // what was typed is no address: there is nothing to dial
     else await this.#ask('retry', 'Not tried again');
   }
