@@ -17,7 +17,7 @@ import { DeviceStatus } from './phone/device-status.js';
 import { holdTaps } from './boot/held-taps.js';
 import { notices } from './shell/notice.js';
 import { ownName } from './control/own-name.js';
-import { Page } from './shell/router.js';
+import { Router } from './shell/router.js';
 import { Phone } from './phone/phone.js';
 import { Presence } from './control/presence.js';
 import { Screens } from './shell/screens.js';
@@ -37,7 +37,7 @@ import { mount as mountNearest } from './home/nearest.js';
 import { mount as mountPedals } from './home/pedals.js';
 import { mount as mountPosition } from './home/position.js';
 import { mount as mountPreferences } from './shell/preferences.js';
-import { mount as mountRail } from './shell/action-bar.js';
+import { mount as mountActionBar } from './shell/action-bar.js';
 import { mount as mountReach } from './control/alarm-reach.js';
 import { mount as mountSlowing } from './slowdown/slowing.js';
 import { mount as mountSnackbar } from './shell/snackbar.js';
@@ -98,11 +98,11 @@ async function begin() {
   const control = new Control(store, tell, openPhone);
   /** What was refused because another is in control is said with a key that helps. @type {typeof tell} */
   const say = (sentence, title, way) => tell(sentence, title, way ?? control.wayOf(sentence));
-  const page = new Page(store, say);
+  const router = new Router(store, say);
   /** Called when another tab or screen came in front; the tabs' contents come later. */
   let front = () => {};
   const tabs = new Tabs(monitor, () => front());
-  page.onShown = () => {
+  router.onShown = () => {
     tabs.place();
     front();
   };
@@ -114,7 +114,7 @@ async function begin() {
   mountNearest(need(monitor, '[data-part="nearest"]'), store);
   mountPedals(need(monitor, '[data-part="pedals"]'), store);
   mountPosition(need(monitor, '[data-part="position"]'), store);
-  mountRail(monitor, store, page);
+  mountActionBar(monitor, store, router);
   // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
   for (const type of ['pointerup', 'keydown']) listen(document, type, () => alarmSound.isRunning || alarmSound.arm(), { capture: true });
   store.start();
@@ -124,7 +124,7 @@ async function begin() {
   // What asks for the operator, and what acts on the car.
   store.on('beat', speak);
   store.on('tick', speak);
-  mountDialogs(store, page);
+  mountDialogs(store, router);
   mountSnackbar(field(document, 'snacks'), store, say);
   mountSlowing(monitor, store, control, say); // after the dialogs: its count-down lies over them
   await breath();
@@ -135,8 +135,8 @@ async function begin() {
   new Presence(store, arming, deviceStatus);
   await breath();
   mountStart(need(document, '#start'), store);
-  mountConnect(need(document, '#connect'), store, page, arming);
-  const contents = lazyTabs(monitor, store, say, (name) => page.isMonitorShown && tabs.shows(name) && screens.open === null);
+  mountConnect(need(document, '#connect'), store, router, arming);
+  const contents = lazyTabs(monitor, store, say, (name) => router.isMonitorShown && tabs.shows(name) && screens.open === null);
   const screens = new Screens(monitor, store, () => front());
   mountSheets();
   mountInstall(say);
@@ -148,7 +148,7 @@ async function begin() {
   mountTrends(need(monitor, '[data-part="trends"]'), store);
   await breath();
   mountBadge(store);
-  page.onShown = () => {
+  router.onShown = () => {
     tabs.place();
     front();
     unfold();
@@ -156,7 +156,7 @@ async function begin() {
 
   /** What lies under the fold of Home comes after what is seen first, a part at a time. */
   async function unfold() {
-    if (!page.isMonitorShown) return;
+    if (!router.isMonitorShown) return;
     for (const part of monitor.querySelectorAll('[data-late][hidden]')) {
       await new Promise((resolve) => { requestAnimationFrame(resolve); });
       await breath();
@@ -183,14 +183,14 @@ async function begin() {
       location.reload(); // nothing of the car stays on a page that may not look any more; the screen then says the reason
       return;
     }
-    page.isShut = true;
-    page.draw();
+    router.isShut = true;
+    router.draw();
     import('./pairing/pairing.js').then(({ openPairing }) => openPairing(need(document, '#pairing'), {
       why,
       name: store.name,
       onPaired: () => {
-        page.isShut = false;
-        page.draw();
+        router.isShut = false;
+        router.draw();
         admission?.admit();
       },
     })).catch(() => say('The screen for pairing could not be fetched from the server. Load the page again.', 'Not paired'));
@@ -206,14 +206,14 @@ async function begin() {
   store.sync.whenOpen(greet);
 
   function draw() {
-    page.draw();
+    router.draw();
     show(field(monitor, 'sound-off'), alarmSound.isPossible ? !alarmSound.isRunning : false);
   }
 
   function speak() {
     if (store.painter.drawing.isFailed) return; // undrawn.js sounds
     const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
-    alarmSound.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
+    alarmSound.say(soundOf(router.unclosed(store.heeded), { isServerLost, isLossAcknowledged: router.answered === lossKey(store.frame, store.isSilent) }));
   }
 
   store.on('refused', (answer) => {
@@ -229,7 +229,7 @@ async function begin() {
   listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
   listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
   listen(field(need(document, '#connect'), 'saved'), 'click', () => {
-    import('./files/files-board.js').then(({ openSaved }) => openSaved(store, say, page)).catch(() => say('The recordings could not be fetched from the server. Try again.', 'Not opened'));
+    import('./files/files-board.js').then(({ openSaved }) => openSaved(store, say, router)).catch(() => say('The recordings could not be fetched from the server. Try again.', 'Not opened'));
   });
 
   // A link may lead to a moment of a recording.

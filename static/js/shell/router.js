@@ -4,7 +4,7 @@ import { need, setAttribute, show } from '../core/dom.js';
 
 /** @typedef {import('../core/store.js').Store} Store */
 
-export class Page {
+export class Router {
   /** The operator went back to the connect screen while the server may go on. */
   isChoosing = false;
   /** This device is not paired with the server: only the pairing screen is shown. */
