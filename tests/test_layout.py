@@ -23,16 +23,12 @@ FOLDERS = ("server", "monitor", "vehicle", "static/js")
 # Of import circles the entry counts the modules of a package that are part of one.
 ALLOWED: dict[str, int] = {
     "file server/analysis/html/report.js": 688,
-    "file server/rosbridge/link.py": 734,
+    "file server/rosbridge/link.py": 754,
     "file server/slowdown/sender.py": 542,
     "file server/web/page_socket.py": 468,
-    "file static/js/core/store.js": 519,
-    "file static/js/files/files-sheet.js": 367,
-    "class server/rosbridge/link.py RosLink": 359,
+    "class server/rosbridge/link.py RosLink": 378,
     "class server/slowdown/sender.py Slowing": 479,
     "class server/web/page_socket.py Page": 347,
-    "class static/js/core/store.js Store": 464,
-    "class static/js/files/files-sheet.js FileSheet": 335,
     "class static/js/home/chart.js Chart": 262,
     "class static/js/scan/scan-plot.js ScanPlot": 268,
     "function server/analysis/html/report.js mountTrack": 68,

@@ -1,4 +1,4 @@
-// The page's beginning: one store, one voice, every panel at its place.
+// The page's beginning: one store, one alarm sound, every panel at its place.
 
 import './boot/trusted-types.js';
 import { thenOf } from './boot/pairing-token.js';
@@ -10,25 +10,22 @@ import { deviceName, keptHere } from './control/device-name.js';
 import { breath, field, listen, need, show } from './core/dom.js';
 import { gapWords } from './core/event-log.js';
 import { takeEarly } from './boot/early-socket.js';
-import { FilesTab } from './shell/files-tab.js';
+import { LazyTab } from './shell/lazy-tab.js';
 import { forgetWork } from './boot/forget.js';
 import { giveUp } from './boot/give-up.js';
-import { Handset } from './phone/device-status.js';
+import { DeviceStatus } from './phone/device-status.js';
 import { holdTaps } from './boot/held-taps.js';
-import { MapTab } from './shell/map-tab.js';
 import { notices } from './shell/notice.js';
 import { ownName } from './control/own-name.js';
-import { Page } from './shell/router.js';
+import { Router } from './shell/router.js';
 import { Phone } from './phone/phone.js';
 import { Presence } from './control/presence.js';
-import { ScanTab } from './shell/scan-tab.js';
 import { Screens } from './shell/screens.js';
-import { SettingsTab } from './shell/settings-tab.js';
 import { closeSheet, mountSheets } from './shell/sheet.js';
 import { Store } from './core/store.js';
 import { Tabs } from './shell/tabs.js';
 import { Undrawn } from './shell/undrawn.js';
-import { Voice } from './alarms/alarm-sound.js';
+import { AlarmSound } from './alarms/alarm-sound.js';
 import { lossKey, mount as mountDialogs } from './shell/dialogs.js';
 import { mount as mountBadge } from './shell/badge.js';
 import { mount as mountChecks } from './alarms/checks.js';
@@ -40,7 +37,7 @@ import { mount as mountNearest } from './home/nearest.js';
 import { mount as mountPedals } from './home/pedals.js';
 import { mount as mountPosition } from './home/position.js';
 import { mount as mountPreferences } from './shell/preferences.js';
-import { mount as mountRail } from './shell/action-bar.js';
+import { mount as mountActionBar } from './shell/action-bar.js';
 import { mount as mountReach } from './control/alarm-reach.js';
 import { mount as mountSlowing } from './slowdown/slowing.js';
 import { mount as mountSnackbar } from './shell/snackbar.js';
@@ -93,22 +90,22 @@ async function begin() {
   const admission = document.documentElement.dataset['access'] === 'paired' ? new Admission(address, shut) : null;
   let name = ''; // one, also where nothing can be kept
   const store = new Store(() => takeEarly() ?? admission?.dial() ?? new WebSocket(address), () => (name ||= deviceName(navigator.userAgent, keptHere())), ownName);
-  const voice = new Voice();
-  store.undrawn = undrawn = new Undrawn(() => store.frame, () => voice.say('high'));
+  const alarmSound = new AlarmSound();
+  store.painter.undrawn = undrawn = new Undrawn(() => store.frame, () => alarmSound.say('high'));
   stop = () => {
     store.stop();
-    voice.say(null);
+    alarmSound.say(null);
   };
   const monitor = need(document, '#monitor');
   const tell = notices(field(document, 'snacks'));
   const control = new Control(store, tell, openPhone);
   /** What was refused because another is in control is said with a key that helps. @type {typeof tell} */
   const say = (sentence, title, way) => tell(sentence, title, way ?? control.wayOf(sentence));
-  const page = new Page(store, say);
+  const router = new Router(store, say);
   /** Called when another tab or screen came in front; the tabs' contents come later. */
   let front = () => {};
   const tabs = new Tabs(monitor, () => front());
-  page.onShown = () => {
+  router.onShown = () => {
     tabs.place();
     front();
   };
@@ -120,36 +117,33 @@ async function begin() {
   mountNearest(need(monitor, '[data-part="nearest"]'), store);
   mountPedals(need(monitor, '[data-part="pedals"]'), store);
   mountPosition(need(monitor, '[data-part="position"]'), store);
-  mountRail(monitor, store, page);
+  mountActionBar(monitor, store, router);
   // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
-  for (const type of ['pointerup', 'keydown']) listen(document, type, () => voice.isRunning || voice.arm(), { capture: true });
+  for (const type of ['pointerup', 'keydown']) listen(document, type, () => alarmSound.isRunning || alarmSound.arm(), { capture: true });
   store.start();
   await glanced(store);
-  store.greet();
+  store.sync.greet();
 
   // What asks for the operator, and what acts on the car.
   store.on('beat', speak);
   store.on('tick', speak);
-  mountDialogs(store, page);
+  mountDialogs(store, router);
   mountSnackbar(field(document, 'snacks'), store, say);
   mountSlowing(monitor, store, control, say); // after the dialogs: its count-down lies over them
   await breath();
   mountControl(monitor, field(document, 'snacks'), store, control);
   await breath();
-  const arming = new Arming(voice, new Phone(store));
-  const handset = new Handset();
-  new Presence(store, arming, handset);
+  const arming = new Arming(alarmSound, new Phone(store));
+  const deviceStatus = new DeviceStatus();
+  new Presence(store, arming, deviceStatus);
   await breath();
   mountStart(need(document, '#start'), store);
-  mountConnect(need(document, '#connect'), store, page, arming);
-  const scan = new ScanTab(need(monitor, '[data-panel="scan"]'), store);
-  const map = new MapTab(need(monitor, '[data-panel="map"]'), store, () => page.isMonitorShown && tabs.shows('map') && screens.open === null, say);
-  const files = new FilesTab(need(monitor, '[data-panel="files"]'), store, say, () => page.isMonitorShown && tabs.shows('files') && screens.open === null);
-  const settings = new SettingsTab(need(monitor, '[data-panel="settings"]'), store, say, () => page.isMonitorShown && tabs.shows('settings') && screens.open === null);
+  mountConnect(need(document, '#connect'), store, router, arming);
+  const contents = lazyTabs(monitor, store, say, (name) => router.isMonitorShown && tabs.shows(name) && screens.open === null);
   const screens = new Screens(monitor, store, () => front());
   mountSheets();
   mountInstall(say);
-  mountPreferences(voice);
+  mountPreferences(alarmSound);
   await breath();
   mountReach(need(monitor, '[data-part="reach"]'), store, openPhone);
   mountChecks(need(monitor, '[data-part="checks"]'), store);
@@ -157,7 +151,7 @@ async function begin() {
   mountTrends(need(monitor, '[data-part="trends"]'), store);
   await breath();
   mountBadge(store);
-  page.onShown = () => {
+  router.onShown = () => {
     tabs.place();
     front();
     unfold();
@@ -165,7 +159,7 @@ async function begin() {
 
   /** What lies under the fold of Home comes after what is seen first, a part at a time. */
   async function unfold() {
-    if (!page.isMonitorShown) return;
+    if (!router.isMonitorShown) return;
     for (const part of monitor.querySelectorAll('[data-late][hidden]')) {
       await new Promise((resolve) => { requestAnimationFrame(resolve); });
       await breath();
@@ -173,19 +167,15 @@ async function begin() {
     }
   }
 
-  /** The scan is sent and drawn only while its tab is in front and nothing lies over it; Settings is loaded once it is. */
   front = () => {
     queueMicrotask(() => {
-      scan.setFront(page.isMonitorShown && tabs.shows('scan') && screens.open === null);
-      map.look();
-      files.look();
-      settings.look();
+      for (const content of contents) content.look();
     });
   };
 
   /** What this phone can do is looked at seldom. */
   function openPhone() {
-    import('./phone/this-phone.js').then(({ openThisPhone }) => openThisPhone(store, arming, handset)).catch(() => say('What shows this phone could not be fetched.', 'Not opened'));
+    import('./phone/this-phone.js').then(({ openThisPhone }) => openThisPhone(store, arming, deviceStatus)).catch(() => say('What shows this phone could not be fetched.', 'Not opened'));
   }
 
   /** This device is not paired, or was removed just now. @param {import('./pairing/admission.js').Refusal} why */
@@ -196,14 +186,14 @@ async function begin() {
       location.reload(); // nothing of the car stays on a page that may not look any more; the screen then says the reason
       return;
     }
-    page.isShut = true;
-    page.draw();
+    router.isShut = true;
+    router.draw();
     import('./pairing/pairing.js').then(({ openPairing }) => openPairing(need(document, '#pairing'), {
       why,
       name: store.name,
       onPaired: () => {
-        page.isShut = false;
-        page.draw();
+        router.isShut = false;
+        router.draw();
         admission?.admit();
       },
     })).catch(() => say('The screen for pairing could not be fetched from the server. Load the page again.', 'Not paired'));
@@ -216,17 +206,17 @@ async function begin() {
     isViewed = true;
     import('./control/viewer.js').then(({ mountViewer }) => mountViewer(store, say)).catch(() => {}); // the server refuses it all the same
   }
-  store.whenOpen(greet);
+  store.sync.whenOpen(greet);
 
   function draw() {
-    page.draw();
-    show(field(monitor, 'sound-off'), voice.isPossible ? !voice.isRunning : false);
+    router.draw();
+    show(field(monitor, 'sound-off'), alarmSound.isPossible ? !alarmSound.isRunning : false);
   }
 
   function speak() {
-    if (store.drawing.isFailed) return; // undrawn.js sounds
+    if (store.painter.drawing.isFailed) return; // undrawn.js sounds
     const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
-    voice.say(soundOf(page.unclosed(store.heeded), { isServerLost, isLossAcknowledged: page.answered === lossKey(store.frame, store.isSilent) }));
+    alarmSound.say(soundOf(router.unclosed(store.heeded), { isServerLost, isLossAcknowledged: router.answered === lossKey(store.frame, store.isSilent) }));
   }
 
   store.on('refused', (answer) => {
@@ -242,7 +232,7 @@ async function begin() {
   listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
   listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
   listen(field(need(document, '#connect'), 'saved'), 'click', () => {
-    import('./files/files-board.js').then(({ openSaved }) => openSaved(store, say, page)).catch(() => say('The recordings could not be fetched from the server. Try again.', 'Not opened'));
+    import('./files/files-board.js').then(({ openSaved }) => openSaved(store, say, router)).catch(() => say('The recordings could not be fetched from the server. Try again.', 'Not opened'));
   });
 
   // A link may lead to a moment of a recording.
@@ -250,7 +240,7 @@ async function begin() {
   const then = thenOf(asked.get('then'));
   const recording = asked.get('replay');
   let isAsked = false;
-  store.whenOpen(() => {
+  store.sync.whenOpen(() => {
     if (isAsked) return;
     isAsked = true;
     if (asked.has('then')) history.replaceState(history.state, '', location.pathname);
@@ -268,6 +258,47 @@ async function begin() {
   function prefetch() {
     for (const load of [() => import('./slowdown/slow-sheet.js'), () => import('./alarms/log.js'), () => import('./home/signals.js'), () => import('./scan/scan.js'), () => import('./home/chart.js')]) load().catch(() => {});
   }
+}
+
+/**
+ * The tabs whose content is fetched when they first come to the front.
+ * @param {HTMLElement} monitor
+ * @param {Store} store
+ * @param {ReturnType<typeof notices>} say
+ * @param {(name: string) => boolean} isFront
+ */
+function lazyTabs(monitor, store, say, isFront) {
+  const panel = (/** @type {string} */ name) => need(monitor, `[data-panel="${name}"]`);
+  const shown = (/** @type {string} */ name) => () => isFront(name);
+  return [
+    new LazyTab(panel('scan'), {
+      what: 'The scan', state: 'none-words', isShown: shown('scan'), fetch: () => import('./scan/scan.js'),
+      mount: ({ mount }) => {
+        const scan = mount(panel('scan'), store);
+        const look = () => scan.setFront(isFront('scan')); // sent and drawn only while it is in front
+        look();
+        return { look };
+      },
+    }),
+    new LazyTab(panel('map'), {
+      what: 'The map', state: 'none-words', isShown: shown('map'), isNear: true, fetch: () => import('./map/map.js'),
+      mount: ({ mount }) => {
+        mount(panel('map'), store, shown('map'), say);
+        return {};
+      },
+    }),
+    new LazyTab(panel('files'), {
+      what: 'The recordings', state: 'files-state', isShown: shown('files'), fetch: () => import('./files/files.js'),
+      mount: ({ mount }) => mount(panel('files'), store, say, shown('files')),
+    }),
+    new LazyTab(panel('settings'), {
+      what: 'The settings', state: 'settings-state', isShown: shown('settings'), fetch: () => import('./settings/settings.js'),
+      mount: ({ mount }) => {
+        mount(panel('settings'), store, say, shown('settings'));
+        return {};
+      },
+    }),
+  ];
 }
 
 /**

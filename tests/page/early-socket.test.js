@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { takeEarly } from '../../static/js/boot/early-socket.js';
-import { Wire } from '../../static/js/core/socket.js';
+import { PageSocket } from '../../static/js/core/socket.js';
 
 /** @typedef {import('../../static/js/boot/early-socket.js').Early} Early */
 
@@ -28,12 +28,12 @@ function dialled(told) {
   return { early, socket };
 }
 
-/** A wire that takes it over, and dials by itself after that. */
+/** A socket that takes it over, and dials by itself after that. */
 function wired() {
   /** @type {unknown[]} */
   const heard = [];
   const dials = { count: 0 };
-  const wire = new Wire(
+  const pageSocket = new PageSocket(
     {
       opened: () => heard.push('open'), closed: () => heard.push('closed'),
       text: (text, at_ms) => heard.push([text, at_ms]), bytes: (bytes) => heard.push(bytes.byteLength),
@@ -43,29 +43,29 @@ function wired() {
       return takeEarly() ?? /** @type {any} */ (new Socket());
     },
   );
-  return { wire, heard, dials };
+  return { pageSocket, heard, dials };
 }
 
 test('what came before the script is heard first, in its order and with the moment when it came', async () => {
   const { early, socket } = dialled([
     { type: 'open', at_ms: 10 }, { type: 'message', data: 'hello', at_ms: 20 }, { type: 'message', data: new ArrayBuffer(3), at_ms: 30 },
   ]);
-  const { wire, heard } = wired();
-  wire.look(100);
+  const { pageSocket, heard } = wired();
+  pageSocket.look(100);
   assert.deepEqual(heard, []); // whoever dials hears nothing before it listens
   await Promise.resolve();
   early.hear?.({ type: 'message', data: 'later', at_ms: 110 });
   assert.deepEqual(heard, ['open', ['hello', 20], 3, ['later', 110]]);
-  assert.equal(wire.send({ kind: 'hello' }), true);
+  assert.equal(pageSocket.send({ kind: 'hello' }), true);
   assert.deepEqual(socket.sent, ['{"kind":"hello"}']);
 });
 
 test('one that opens after it was taken over is as any other', async () => {
   const { early } = dialled([]);
-  const { wire, heard } = wired();
-  wire.look(0);
+  const { pageSocket, heard } = wired();
+  pageSocket.look(0);
   await Promise.resolve();
-  assert.equal(wire.send({}), false);
+  assert.equal(pageSocket.send({}), false);
   early.hear?.({ type: 'open', at_ms: 5 });
   early.hear?.({ type: 'message', data: 'hello', at_ms: 6 });
   early.hear?.({ type: 'close', at_ms: 7 });
@@ -82,12 +82,12 @@ test('one that failed is not taken over, and none is taken twice', () => {
 
 test('one that was given up while its ticket was under way is hung up when it opens', async () => {
   const { early, socket } = dialled([]);
-  const { wire, heard } = wired();
+  const { pageSocket, heard } = wired();
   early.socket = null; // the ticket is asked for
-  wire.look(0);
+  pageSocket.look(0);
   await Promise.resolve();
-  wire.look(6000); // given up, and dialled anew
-  wire.look(9000);
+  pageSocket.look(6000); // given up, and dialled anew
+  pageSocket.look(9000);
   early.socket = /** @type {any} */ (socket);
   early.hear?.({ type: 'open', at_ms: 9100 });
   assert.equal(socket.isClosed, true);

@@ -4,7 +4,7 @@ import { burstOf, samplesOf } from './sound-layout.js';
 
 /** @typedef {'high' | 'medium' | 'low' | 'count'} Loud count: of a slow-down that is about to begin by itself */
 
-export class Voice {
+export class AlarmSound {
   /** @type {AudioContext | null} */
   #context = null;
   /** @type {AudioScheduledSourceNode | null} */

@@ -12,9 +12,9 @@ export class Arming {
   /** @type {Armed} */
   screen = 'wakeLock' in navigator ? 'asks' : 'missing';
 
-  /** @param {import('../alarms/alarm-sound.js').Voice} voice @param {import('../phone/phone.js').Phone} phone */
-  constructor(voice, phone) {
-    this.voice = voice;
+  /** @param {import('../alarms/alarm-sound.js').AlarmSound} alarmSound @param {import('../phone/phone.js').Phone} phone */
+  constructor(alarmSound, phone) {
+    this.alarmSound = alarmSound;
     this.phone = phone;
     document.addEventListener('visibilitychange', () => this.#stayAwake());
   }
@@ -27,14 +27,14 @@ export class Arming {
   /** Within the tap. Nothing here is waited for: the vehicle is connected meanwhile. */
   ask() {
     this.#isAsked = true;
-    this.voice.arm();
+    this.alarmSound.arm();
     this.#stayAwake();
     this.phone.arm();
   }
 
   #soundArm() {
-    if (!this.voice.isPossible) return 'missing';
-    if (this.voice.isRunning) return 'ready';
+    if (!this.alarmSound.isPossible) return 'missing';
+    if (this.alarmSound.isRunning) return 'ready';
     return this.#isAsked ? 'refused' : 'asks';
   }
 

@@ -12,16 +12,16 @@ export class Presence {
   /**
    * @param {import('../core/store.js').Store} store
    * @param {import('../boot/arming.js').Arming} arming
-   * @param {import('../phone/device-status.js').Handset} handset
+   * @param {import('../phone/device-status.js').DeviceStatus} deviceStatus
    */
-  constructor(store, arming, handset) {
+  constructor(store, arming, deviceStatus) {
     this.store = store;
     this.arming = arming;
-    this.handset = handset;
+    this.deviceStatus = deviceStatus;
     const look = () => this.#look();
     store.on('tick', look);
     store.on('beat', look); // while the page is hidden frames come and its timers hardly run
-    store.whenOpen(() => {
+    store.sync.whenOpen(() => {
       this.#told_ms = -Infinity;
       look();
     });
@@ -31,15 +31,15 @@ export class Presence {
   }
 
   #word() {
-    const { voice, arms } = this.arming;
+    const { alarmSound, arms } = this.arming;
     return {
       visible: !document.hidden,
-      draws: !this.store.drawing.isFailed,
-      sound: voice.isInterrupted ? 'interrupted' : arms.sound,
+      draws: !this.store.painter.drawing.isFailed,
+      sound: alarmSound.isInterrupted ? 'interrupted' : arms.sound,
       awake: arms.screen,
-      vibrates: this.handset.vibrates,
-      battery: this.handset.battery,
-      charging: this.handset.charging,
+      vibrates: this.deviceStatus.vibrates,
+      battery: this.deviceStatus.battery,
+      charging: this.deviceStatus.charging,
     };
   }
 
@@ -55,6 +55,6 @@ export class Presence {
 
   /** @param {object} word */
   #send(word) {
-    return this.store.wire.send({ kind: 'present', ...word, lag_s: Math.min(MOST_LAG_S, this.store.lag_s) });
+    return this.store.socket.send({ kind: 'present', ...word, lag_s: Math.min(MOST_LAG_S, this.store.lag_s) });
   }
 }

@@ -14,7 +14,7 @@ export const LAG_GRACE_S = 0.6;
  * @param {number} lag_s age of that frame at the glass: its way here and the silence since [s]
  * @returns {{ink: Freshness, age_s: number | null}}
  */
-export function inkOf(signal, lag_s) {
+export function freshnessStyle(signal, lag_s) {
   if (!signal) return { ink: 'not_published', age_s: null };
   const age_s = signal.age_s === null ? null : signal.age_s + lag_s;
   if (signal.freshness === 'never' || signal.freshness === 'not_published' || age_s === null) {

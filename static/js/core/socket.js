@@ -17,8 +17,8 @@ const LAST_WAIT_MS = 2000;
  * @property {() => void} closed
  */
 
-/** One socket at a time. Time is an argument: whoever owns a Wire calls `look` a few times a second. */
-export class Wire {
+/** One socket at a time. Time is an argument: whoever owns it calls `look` a few times a second. */
+export class PageSocket {
   /** @type {Socket | null} */
   #socket = null;
   #isOpen = false;

@@ -6,9 +6,9 @@ import { html, icon, listen, need, setAttribute } from '../core/dom.js';
 /**
  * @param {import('../core/store.js').Store} store
  * @param {(sentence: string, title?: string, way?: import('../shell/notice.js').Way) => void} say
- * @param {import('../shell/router.js').Page} page
+ * @param {import('../shell/router.js').Router} router
  */
-export function openSaved(store, say, page) {
+export function openSaved(store, say, router) {
   if (document.querySelector('.saved-board')) return;
   const beneath = need(document, '#connect');
   const back = html('button', { type: 'button', class: 'btn', 'aria-label': 'Back', 'data-f': 'saved-back' }, icon('back'));
@@ -32,7 +32,7 @@ export function openSaved(store, say, page) {
     listen(back, 'click', () => history.back()),
     listen(window, 'popstate', close), // the phone's back key too
     store.on('draw', () => {
-      if (page.isMonitorShown) close(); // a car is monitored, or a recording is shown
+      if (router.isMonitorShown) close(); // a car is monitored, or a recording is shown
     }),
   ];
 }

@@ -39,17 +39,17 @@ const COMPARED_LIVES_S = 5;
 /**
  * The car as the newest frame has it.
  * @param {State} frame
- * @param {(signal: string) => {ink: Freshness, age_s: number | null}} inkOf
+ * @param {(signal: string) => {ink: Freshness, age_s: number | null}} freshnessStyle
  * @returns {CarShown}
  */
-export function carOf(frame, inkOf) {
-  const { ink, age_s } = inkOf('position');
+export function carOf(frame, freshnessStyle) {
+  const { ink, age_s } = freshnessStyle('position');
   const fix = frame.signals['position']?.value ?? null;
   const hasFix = fix !== null && !(typeof fix['status'] === 'number' && fix['status'] < 0);
   const place = hasFix ? placeOf(fix) : null;
   const isLive = place !== null && (ink === 'fresh' || ink === 'ageing');
   const ellipse = hasFix ? ellipseOf(fix['covariance_m2'], fix['sigma_m']) : null;
-  const turn = inkOf('heading');
+  const turn = freshnessStyle('heading');
   const said_deg = frame.signals['heading']?.value?.['heading_deg'];
   const heading_deg = typeof said_deg === 'number' && Number.isFinite(said_deg) ? said_deg : null;
   const isHeadingLive = heading_deg !== null && (turn.ink === 'fresh' || turn.ink === 'ageing');

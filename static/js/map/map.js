@@ -135,7 +135,7 @@ export function mount(root, store, isShown, say = () => {}) {
 
   function drawSoon() {
     if (store.now() - due_ms < LOST_MS || !isShown()) return;
-    store.picture(() => {
+    store.painter.picture(() => {
       due_ms = -Infinity;
       if (isShown()) draw();
     });

@@ -11,7 +11,7 @@ export function isApple(userAgent, touchPoints) {
   return /iPhone|iPad|iPod/.test(userAgent) || (/Macintosh/.test(userAgent) && touchPoints > 1);
 }
 
-export class Handset {
+export class DeviceStatus {
   /** 0 … 1; null: this browser does not tell. @type {number | null} */
   battery = null;
   /** @type {boolean | null} */

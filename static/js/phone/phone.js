@@ -161,7 +161,7 @@ export class Phone {
   /** @param {object} said */
   #send(said) {
     if (this.store.isViewer) return false; // the car is compared with an operator's phone
-    return this.store.wire.send({ kind: 'position', id: 'position', phone: this.#name, handheld: this.#isHandheld, ...said });
+    return this.store.socket.send({ kind: 'position', id: 'position', phone: this.#name, handheld: this.#isHandheld, ...said });
   }
 
   /** In the background a phone gives no position; in front again its watch may be dead without saying so. */

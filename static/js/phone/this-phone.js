@@ -9,9 +9,9 @@ const SAID = { sounding: 'That was an alarm’s sound. Not heard? Turn the media
 /**
  * @param {import('../core/store.js').Store} store
  * @param {import('../boot/arming.js').Arming} arming
- * @param {import('./device-status.js').Handset} handset
+ * @param {import('./device-status.js').DeviceStatus} deviceStatus
  */
-export function openThisPhone(store, arming, handset) {
+export function openThisPhone(store, arming, deviceStatus) {
   const verdict = html('p', { class: 'sub', id: 'this-phone-words', role: 'status' });
   const list = html('ul', { class: 'arm' });
   const arm = html('button', { type: 'button', class: 'key solid wide', 'data-f': 'arm' }, 'Arm this phone');
@@ -23,12 +23,12 @@ export function openThisPhone(store, arming, handset) {
   let said = '';
 
   function factsNow() {
-    const { voice, arms } = arming;
+    const { alarmSound, arms } = arming;
     const mine = (store.frame?.phones ?? []).find((one) => one.id === store.page);
     return {
-      ...arms, sound: voice.isInterrupted ? /** @type {const} */ ('interrupted') : arms.sound, positionSays: mine?.why_text ? `${mine.why_text}.` : '', rides: mine?.chosen === true,
-      vibrates: handset.vibrates, battery: handset.battery, charging: handset.charging, isOnline: handset.isOnline, network: handset.network, lag_s: store.lag_s,
-      isApple: handset.isApple, isSecure: window.isSecureContext, isReplaying: store.replaying,
+      ...arms, sound: alarmSound.isInterrupted ? /** @type {const} */ ('interrupted') : arms.sound, positionSays: mine?.why_text ? `${mine.why_text}.` : '', rides: mine?.chosen === true,
+      vibrates: deviceStatus.vibrates, battery: deviceStatus.battery, charging: deviceStatus.charging, isOnline: deviceStatus.isOnline, network: deviceStatus.network, lag_s: store.lag_s,
+      isApple: deviceStatus.isApple, isSecure: window.isSecureContext, isReplaying: store.replaying,
     };
   }
 
@@ -49,7 +49,7 @@ export function openThisPhone(store, arming, handset) {
     draw();
   });
   test.addEventListener('click', async () => {
-    said = SAID[await arming.voice.test('medium')];
+    said = SAID[await arming.alarmSound.test('medium')];
     draw();
   });
   const stops = [store.on('draw', draw), store.on('tick', draw), addSheet(sheet)];

@@ -33,7 +33,7 @@ export async function openReplay(id, store, say, at_s = 0) {
   await styled();
   say('It is read from the disk.', 'Opening the recording');
   let answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
-  for (let tries = 1; !answer.ok && !store.wire.isOpen && tries < TRIES; tries += 1) {
+  for (let tries = 1; !answer.ok && !store.socket.isOpen && tries < TRIES; tries += 1) {
     await opened(store); // the connection broke meanwhile: nobody refused
     answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
   }
@@ -42,7 +42,7 @@ export async function openReplay(id, store, say, at_s = 0) {
     return false;
   }
   current?.unmount();
-  store.turn(true);
+  store.replaying = true;
   current = new Replay(id, store, say);
   for (const note of document.querySelectorAll('.snack.note')) note.remove();
   return true;
@@ -120,16 +120,16 @@ class Replay {
   async leave(why) {
     if (this.#isLeaving) return;
     this.#isLeaving = true;
-    if (why === undefined && this.store.wire.isOpen) {
+    if (why === undefined && this.store.socket.isOpen) {
       const answer = await this.store.ask('replay', { do: 'leave' });
-      if (!answer.ok && this.store.wire.isOpen) {
+      if (!answer.ok && this.store.socket.isOpen) {
         this.#isLeaving = false;
         this.say(answer.reason ?? 'Refused.', 'Still in the replay');
         return;
       }
     }
     this.unmount();
-    this.store.turn(false);
+    this.store.replaying = false;
     const url = new URL(location.href);
     url.searchParams.delete('replay');
     url.searchParams.delete('t');
@@ -166,7 +166,7 @@ class Replay {
     const { store } = this;
     const answer = await store.ask('replay', { do: 'open', recording: this.id, at_s }, OPENS_MS);
     if (current !== this || !answer.ok) {
-      if (current === this && store.wire.isOpen) void this.leave(answer.reason ?? 'Refused.');
+      if (current === this && store.socket.isOpen) void this.leave(answer.reason ?? 'Refused.');
       return;
     }
     if (rate !== 1) void store.ask('replay', { do: 'rate', rate });

@@ -80,8 +80,8 @@ export function mount(root, store) {
     if (key === 'Escape' && mark.at) mark.clear();
     else {
       const side = /** @type {Record<string, 1 | -1 | 0>} */ ({ ArrowLeft: 1, ArrowRight: -1, Home: 0, Enter: 0, ' ': 0 })[key];
-      if (side === undefined || !store.scan || !isLive()) return false;
-      mark.step(store.scan, side, reach_m, store.scanAt_ms);
+      if (side === undefined || !store.scans.newest || !isLive()) return false;
+      mark.step(store.scans.newest, side, reach_m, store.scans.at_ms);
     }
     tellMark();
     return true;
@@ -89,10 +89,10 @@ export function mount(root, store) {
 
   /** @param {number} x_px @param {number} y_px */
   function touch(x_px, y_px) {
-    if (!store.scan || !isLive()) return;
+    if (!store.scans.newest || !isLive()) return;
     const scale = plotScale(glass.canvas.clientWidth, glass.canvas.clientHeight, reach_m);
     const { x_m, y_m } = placeOf(scale, x_px, y_px);
-    mark.touch(store.scan, x_m, y_m, THUMB_PX / scale.k, store.scanAt_ms);
+    mark.touch(store.scans.newest, x_m, y_m, THUMB_PX / scale.k, store.scans.at_ms);
     tellMark();
   }
 
@@ -108,20 +108,20 @@ export function mount(root, store) {
   }
 
   function heard() {
-    if (store.scan && !mark.hear(store.scan, store.scanAt_ms)) tellMark('the marked return is gone');
+    if (store.scans.newest && !mark.hear(store.scans.newest, store.scans.at_ms)) tellMark('the marked return is gone');
     drawSoon();
   }
 
   function isLive() {
     const { ink } = inkOfScan(store, glass.shown);
-    return store.scan !== null && (ink === 'fresh' || ink === 'ageing');
+    return store.scans.newest !== null && (ink === 'fresh' || ink === 'ageing');
   }
 
   function drawSoon() {
     if (!isFront) return;
-    glass.draw(() => !isFront || !store.scan ? null : {
-      scan: store.scan,
-      at_ms: store.scanAt_ms,
+    glass.draw(() => !isFront || !store.scans.newest ? null : {
+      scan: store.scans.newest,
+      at_ms: store.scans.at_ms,
       around: {
         reach_m, car: carOf(store), limit_m: store.limit('obstacle.standoff_m'),
         mark: mark.at && { x_m: mark.at.x_m, y_m: mark.at.y_m, isSeen: mark.isSeen },
@@ -132,7 +132,7 @@ export function mount(root, store) {
   function read() {
     if (!isFront) return;
     const { ink, age_s } = inkOfScan(store, glass.shown);
-    const { scan } = store;
+    const scan = store.scans.newest;
     const isThere = scan !== null && ink !== 'never' && ink !== 'not_published';
     const isNow = isThere && ink !== 'stale';
     if (!isNow && mark.at) {
@@ -165,7 +165,7 @@ export function mount(root, store) {
 
   function markedWords() {
     if (!mark.at) return '';
-    const old_s = (store.now() - mark.seen_ms) / 1000 + (store.scan?.age_s ?? 0);
+    const old_s = (store.now() - mark.seen_ms) / 1000 + (store.scans.newest?.age_s ?? 0);
     return `Marked: ${mark.words}, ${mark.isSeen ? '' : 'not seen for '}${age(old_s, 2)} s${mark.isSeen ? ' ago' : ''}`;
   }
 
@@ -196,7 +196,7 @@ export function mount(root, store) {
     setFront(isNow) {
       if (isNow === isFront) return;
       isFront = isNow;
-      store.watchScan('scan tab', isNow);
+      store.scans.watch('scan tab', isNow);
       read();
       drawSoon();
     },
@@ -214,8 +214,8 @@ export function mount(root, store) {
  */
 function inkOfScan(store, shown) {
   const state = store.ink('scan');
-  if (!store.scan || state.ink === 'never' || state.ink === 'not_published') return state;
-  const { age_s: then_s, at_ms } = shown ?? { age_s: store.scan.age_s, at_ms: store.scanAt_ms };
+  if (!store.scans.newest || state.ink === 'never' || state.ink === 'not_published') return state;
+  const { age_s: then_s, at_ms } = shown ?? { age_s: store.scans.newest.age_s, at_ms: store.scans.at_ms };
   const age_s = then_s + (store.now() - at_ms) / 1000;
   // A server that does not know the laser's rate yet is patient with it; a picture of a moving world is not: ten periods.
   const period_s = store.signal('scan')?.period_s ?? 0.1;

@@ -6,9 +6,9 @@ import { field, listen, need, setAttribute, setIcon, setText } from '../core/dom
 /**
  * @param {HTMLElement} root
  * @param {import('../core/store.js').Store} store
- * @param {import('./router.js').Page} page
+ * @param {import('./router.js').Router} router
  */
-export function mount(root, store, page) {
+export function mount(root, store, router) {
   const pause = field(root, 'pause');
   const word = field(root, 'pause-word');
   const mark = need(pause, '.i');
@@ -18,12 +18,12 @@ export function mount(root, store, page) {
     listen(field(root, 'stop'), 'click', () => openSheet(stopSheet)),
     listen(field(stopSheet, 'yes'), 'click', async () => {
       closeSheet(stopSheet);
-      await page.stop();
+      await router.stop();
     }),
     listen(pause, 'click', async () => {
       const isPaused = store.frame?.session.paused === true;
       const answer = await store.ask(isPaused ? 'resume' : 'pause');
-      if (!answer.ok) page.say(answer.reason ?? 'Refused.', isPaused ? 'Not resumed' : 'Not paused');
+      if (!answer.ok) router.say(answer.reason ?? 'Refused.', isPaused ? 'Not resumed' : 'Not paused');
     }),
     store.on('draw', draw),
   ];

@@ -33,7 +33,7 @@ export function mount(store) {
 
   function draw() {
     const badge = badgeOf(store.frame, { isSilent: store.isSilent, isMonitoring: store.isMonitoring, word: store.chain.word });
-    if (document.title !== badge.title && !store.drawing.isFailed) document.title = badge.title; // else undrawn.js writes it
+    if (document.title !== badge.title && !store.painter.drawing.isFailed) document.title = badge.title; // else undrawn.js writes it
     setAttribute(link, 'href', icons[badge.icon]);
     if (badge.count === told) return;
     told = badge.count;

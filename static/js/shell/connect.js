@@ -80,10 +80,10 @@ export function isSameCar(one, other) {
 /**
  * @param {HTMLElement} root
  * @param {import('../core/store.js').Store} store
- * @param {import('./router.js').Page} page
+ * @param {import('./router.js').Router} router
  * @param {import('../boot/arming.js').Arming} arming
  */
-export function mount(root, store, page, arming) {
+export function mount(root, store, router, arming) {
   const at = (/** @type {string} */ name) => field(root, name);
   const input = /** @type {HTMLInputElement} */ (at('address'));
   const [says, list, go] = [at('says'), at('found'), at('go')];
@@ -131,7 +131,7 @@ export function mount(root, store, page, arming) {
     arming.ask(); // within the tap, and before anything is waited for
     const address = input.value.trim();
     if (isBack()) {
-      page.chosen();
+      router.chosen();
       return;
     }
     isBusy = true;
@@ -139,11 +139,11 @@ export function mount(root, store, page, arming) {
     const answer = await store.ask('connect', { address });
     isBusy = false;
     if (address) keep(remembered(addresses(), address));
-    page.suggestion = answer.suggestion ?? null;
+    router.suggestion = answer.suggestion ?? null;
     // A bad address opens the sheet of the failed connection, which says the same; what never went out is said here.
     if (!answer.ok && store.frame?.session.phase !== 'failed') complain(answer.reason ?? 'Refused.');
     isTyped = false;
-    page.chosen();
+    router.chosen();
   }
 
   /** Is the vehicle in the field being monitored all the while? Then nothing is dialled anew. */

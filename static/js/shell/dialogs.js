@@ -60,9 +60,9 @@ export function lossKey(frame, isSilent) {
 
 /**
  * @param {import('../core/store.js').Store} store
- * @param {import('./router.js').Page} page
+ * @param {import('./router.js').Router} router
  */
-export function mount(store, page) {
+export function mount(store, router) {
   const sheets = /** @type {Record<Dialog['kind'], HTMLDialogElement>} */ (Object.fromEntries(
     ['alarm', 'lost', 'mute', 'failed'].map((kind) => [kind, need(document, `#sheet-${kind}`)])));
   /** @type {Dialog | null} */
@@ -78,17 +78,18 @@ export function mount(store, page) {
     }));
     // Some browsers close without asking; what is not acknowledged comes back with the next frame.
     stops.push(listen(sheet, 'close', () => {
-      if (standing && sheets[standing.kind] === sheet && !store.drawing.isFailed) answer();
+      if (!sheet.isConnected) return; // the page gave up and took it away: nobody answered
+      if (standing && sheets[standing.kind] === sheet && !store.painter.drawing.isFailed) answer();
     }));
   }
   on(sheets.alarm, 'acknowledge', answer);
-  on(sheets.lost, 'retry', () => (store.chain.cut === 2 ? page.reconnect() : page.retry()));
-  on(sheets.lost, 'change', () => page.choose());
-  on(sheets.lost, 'exit', () => page.exit());
-  on(sheets.mute, 'retry', () => page.reconnect());
-  on(sheets.mute, 'exit', () => page.exit());
-  on(sheets.failed, 'retry', () => page.retry());
-  on(sheets.failed, 'change', () => page.choose());
+  on(sheets.lost, 'retry', () => (store.chain.cut === 2 ? router.reconnect() : router.retry()));
+  on(sheets.lost, 'change', () => router.choose());
+  on(sheets.lost, 'exit', () => router.exit());
+  on(sheets.mute, 'retry', () => router.reconnect());
+  on(sheets.mute, 'exit', () => router.exit());
+  on(sheets.failed, 'retry', () => router.retry());
+  on(sheets.failed, 'change', () => router.choose());
 
   /** @param {HTMLDialogElement} sheet @param {string} name @param {() => void} act */
   function on(sheet, name, act) {
@@ -98,21 +99,21 @@ export function mount(store, page) {
   async function answer() {
     if (!standing) return;
     const { kind, alarm } = standing;
-    if (kind !== 'alarm') page.answered = lossKey(store.frame, store.isSilent);
-    if (alarm && store.isViewer) page.closeHere(alarm);
+    if (kind !== 'alarm') router.answered = lossKey(store.frame, store.isSilent);
+    if (alarm && store.isViewer) router.closeHere(alarm);
     else if (alarm) {
       const reply = await store.ask('acknowledge', { alarm: alarm.id, occurrence: alarm.occurrence });
-      if (!reply.ok && kind === 'alarm') page.say(reply.reason ?? 'Refused.', 'Not acknowledged');
+      if (!reply.ok && kind === 'alarm') router.say(reply.reason ?? 'Refused.', 'Not acknowledged');
     }
     draw();
   }
 
   function judge() {
     const key = lossKey(store.frame, store.isSilent);
-    if (page.answered !== null && page.answered !== key && key === 'none') page.answered = null;
-    standing = store.drawing.isFailed ? null : dialogOf({ // else undrawn.js names the alarms
-      frame: page.unclosed(store.frame), isSilent: store.isSilent, silence_s: store.silence_s,
-      isChoosing: page.isChoosing, isAnswered: page.answered === key,
+    if (router.answered !== null && router.answered !== key && key === 'none') router.answered = null;
+    standing = store.painter.drawing.isFailed ? null : dialogOf({ // else undrawn.js names the alarms
+      frame: router.unclosed(store.frame), isSilent: store.isSilent, silence_s: store.silence_s,
+      isChoosing: router.isChoosing, isAnswered: router.answered === key,
     });
     return standing;
   }
@@ -130,7 +131,7 @@ export function mount(store, page) {
     if (standing.kind === 'alarm') fillAlarm(wanted, standing.alarm);
     else fillLink(wanted, standing.kind, store);
     if (standing.kind === 'lost') setText(field(wanted, 'title'), standing.alarm?.title ?? 'Connection lost');
-    if (standing.kind === 'failed') setWords(field(wanted, 'change'), page.suggestion ? `Use ${page.suggestion}` : 'Change the address');
+    if (standing.kind === 'failed') setWords(field(wanted, 'change'), router.suggestion ? `Use ${router.suggestion}` : 'Change the address');
     if (!wanted.open) {
       wanted.showModal();
       need(wanted, 'button').focus();

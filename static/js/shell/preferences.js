@@ -5,7 +5,7 @@ import { openSheet } from './sheet.js';
 import { chooseSpeedUnit, speedUnit } from '../core/units.js';
 
 /**
- * @typedef {import('../alarms/alarm-sound.js').Voice} Voice
+ * @typedef {import('../alarms/alarm-sound.js').AlarmSound} AlarmSound
  * @typedef {Exclude<import('../alarms/alarm-sound.js').Loud, 'count'>} Loud the alarms’
  */
 
@@ -19,7 +19,7 @@ export function openPreferences() {
 
 /**
  * What is said after a trial of a sound: plainly, where this phone cannot sound.
- * @param {Awaited<ReturnType<Voice['test']>>} result
+ * @param {Awaited<ReturnType<AlarmSound['test']>>} result
  * @param {Loud} sound
  */
 export function trialWords(result, sound) {
@@ -30,10 +30,10 @@ export function trialWords(result, sound) {
 }
 
 /**
- * @param {Voice} voice
+ * @param {AlarmSound} alarmSound
  * @returns {() => void}
  */
-export function mount(voice) {
+export function mount(alarmSound) {
   const root = document.documentElement;
   const choices = [
     ...keys('themeKey', () => root.dataset['theme'] ?? 'phone', choose),
@@ -52,7 +52,7 @@ export function mount(voice) {
     })),
     ...all('soundKey').map((key) => listen(key, 'click', async () => {
       const sound = /** @type {Loud} */ (key.dataset['soundKey']);
-      setText(says, trialWords(await voice.test(sound), sound));
+      setText(says, trialWords(await alarmSound.test(sound), sound));
     })),
     listen(sheet(), 'close', () => setText(says, '')),
   ];

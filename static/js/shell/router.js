@@ -4,7 +4,7 @@ import { need, setAttribute, show } from '../core/dom.js';
 
 /** @typedef {import('../core/store.js').Store} Store */
 
-export class Page {
+export class Router {
   /** The operator went back to the connect screen while the server may go on. */
   isChoosing = false;
   /** This device is not paired with the server: only the pairing screen is shown. */
@@ -72,7 +72,7 @@ export class Page {
   }
 
   async retry() {
-    if (this.store.isSilent) this.store.wire.hurry();
+    if (this.store.isSilent) this.store.socket.hurry();
     else if (!this.store.frame?.session.address) this.choose(); // what was typed is no address: there is nothing to dial
     else await this.#ask('retry', 'Not tried again');
   }

@@ -29,7 +29,7 @@ export function thenWords(frame) {
  * @param {import('../core/store.js').Store} store
  */
 export function veilOf(store) {
-  if (store.isSilent || store.drawing.isFailed) return 'all';
+  if (store.isSilent || store.painter.drawing.isFailed) return 'all';
   const { frame } = store;
   if (!frame) return 'all';
   if (frame.session.phase === 'lost' || store.chain.cut !== null) return 'values';
@@ -58,7 +58,7 @@ export function mount(root, store) {
   /** Everything was drawn: the page draws, and where it drew a fresh frame, its values are not covered for 2 s more. */
   function rewind() {
     if (!proof.isDrawn()) {
-      store.drawing.distrust();
+      store.painter.drawing.distrust();
       throw new Error('What was written is not there');
     }
     beat = 1 - beat;
@@ -80,7 +80,7 @@ export function mount(root, store) {
     show(plate, true);
     const view = store.chain;
     // While all is well the plate already says what it will have to say if this script hangs: then nobody knows where the chain is cut.
-    const isUnsaid = kind === null || store.drawing.isFailed;
+    const isUnsaid = kind === null || store.painter.drawing.isFailed;
     show(chain, !isUnsaid);
     drawBigChain(chain, view);
     setWords(title, isUnsaid || view.age_s === null ? 'Stale' : `${view.word === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);

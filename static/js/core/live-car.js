@@ -1,0 +1,27 @@
+// What a frame says of the live car, also while the page shows a recording.
+
+/** @typedef {import('./protocol.js').State} State */
+
+/** What must be heard of; null: nothing is known of it. @param {State | null} frame @returns {State | null} */
+export function liveOf(frame) {
+  if (!frame?.replay) return frame;
+  const { live } = frame;
+  const decelerate = live?.decelerate ?? { state: 'not_available', why: null };
+  return live ? { ...frame, alarms: live.alarms, recording: live.recording, decelerate, session: { ...frame.session, phase: live.phase, paused: live.paused } } : null;
+}
+
+/** Who is in control. @param {State | null} frame */
+export function controlOf(frame) {
+  return (frame?.replay ? frame.live?.control : frame?.control) ?? null;
+}
+
+/**
+ * The number of the lease by which a page is in control; null: it is not.
+ * @param {ReturnType<typeof controlOf>} control as the newest frame has it
+ * @param {string} page by which the server knows the page
+ * @param {number | null} granted what an answer said, until the frames have it
+ */
+export function fenceOf(control, page, granted) {
+  const known = control?.page === page && page ? (control.fence ?? null) : null;
+  return granted !== null && (control?.fence ?? 0) < granted ? granted : known;
+}

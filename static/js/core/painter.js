@@ -1,0 +1,111 @@
+// When the page draws: what moves ten times a second, the rest five times, what asks for the operator at once. And whether it could.
+
+import { Drawing } from './drawing.js';
+
+/** Digits change at most five times a second. */
+export const DRAW_EVERY_MS = 200;
+/** What moves, moves for so long from one frame to the next (instruments.css): a new aim sooner would only cost [ms]. */
+const MOVE_EVERY_MS = 95;
+/** While frames come so close after each other they set the pace of drawing, after that a timer does [ms]. */
+const FED_MS = 300;
+
+export class Painter {
+  drawing = new Drawing();
+  /** What tells the operator that this page does not draw. @type {{show(): void, hide(): void} | null} */
+  undrawn = null;
+  /** Something failed since the last drawing. */
+  #hasFailed = false;
+  #complained = '';
+  #drew_ms = -Infinity;
+  #moved_ms = -Infinity;
+  #isMoved = false;
+  #urgent = '';
+  #isUrgent = false;
+  #emitter;
+
+  /** @param {import('./emitter.js').Emitter<import('./store.js').Topic>} emitter gets `move`, `draw` and `drawn` */
+  constructor(emitter) {
+    this.#emitter = emitter;
+  }
+
+  /** Draw with the next picture; what it throws is a failure of drawing. @param {() => void} draw */
+  picture(draw) {
+    requestAnimationFrame(() => this.#emitter.guard(draw));
+  }
+
+  /**
+   * A fresh frame came: what asks for the operator is drawn at once; pointers ten times a second, the rest five times and with them.
+   * @param {import('./protocol.js').State} frame
+   * @param {number} now_ms when it came
+   * @param {boolean} isFirst nothing moves yet that a picture could fall between
+   */
+  frame(frame, now_ms, isFirst) {
+    const urgent = urgentOf(frame);
+    const isUrgent = urgent !== this.#urgent;
+    this.#urgent = urgent;
+    if (isUrgent) this.#isUrgent = true;
+    if (this.#isMoved || (!isUrgent && now_ms - this.#moved_ms < MOVE_EVERY_MS)) return;
+    this.#isMoved = true;
+    this.#moved_ms = now_ms;
+    const show = () => {
+      this.#isMoved = false;
+      this.#emitter.emit('move');
+      if (this.#isUrgent || now_ms - this.#drew_ms >= 2 * MOVE_EVERY_MS) this.draw();
+      this.#isUrgent = false;
+    };
+    if (isFirst) show();
+    else this.picture(show);
+  }
+
+  /** Called five times a second, before all else: has the page drawn lately? @param {boolean} isSeen */
+  look(isSeen) {
+    const wasFailed = this.drawing.isFailed;
+    this.drawing.look(isSeen);
+    if (!this.drawing.isFailed) return;
+    if (!wasFailed) console.error('Nothing was drawn for 1 s');
+    this.undrawn?.show();
+    this.#isMoved = false; // a picture that was asked for may never come
+  }
+
+  /** Without frames a timer sets the pace. @param {number} now_ms @param {number} heard_ms when the last fresh frame came */
+  keepUp(now_ms, heard_ms) {
+    if (now_ms - heard_ms > FED_MS && now_ms - this.#drew_ms >= DRAW_EVERY_MS - 20) this.picture(() => this.draw());
+  }
+
+  draw() {
+    this.#drew_ms = performance.now();
+    this.#emitter.emit('draw');
+    if (!this.#hasFailed) this.#emitter.emit('drawn');
+    const isComplete = !this.#hasFailed;
+    this.#hasFailed = false;
+    if (!isComplete) return;
+    this.drawing.completed();
+    if (!this.drawing.isFailed) this.undrawn?.hide();
+  }
+
+  /** The page covers itself: what was to be drawn, heard or sounded was not. @param {unknown} error */
+  failed(error) {
+    this.#hasFailed = true;
+    this.drawing.failed();
+    this.undrawn?.show();
+    const complaint = `${error}`;
+    if (complaint === this.#complained) return; // the same ten times a second
+    this.#complained = complaint;
+    try {
+      console.error(error);
+    } catch {
+      // even that may be what is broken
+    }
+  }
+}
+
+/**
+ * What must not wait for the next drawing: alarms, the link, a pause.
+ * @param {import('./protocol.js').State} frame
+ */
+function urgentOf(frame) {
+  const { session, link, alarms, decelerate } = frame;
+  const { order } = decelerate;
+  const slow = [decelerate.state, order?.number, order?.sending, order?.confirmed, order?.stands, (frame.live?.decelerate ?? decelerate).countdown?.trigger].join(' ');
+  return [session.phase, session.paused, link.cut, slow, ...alarms.map((alarm) => `${alarm.id} ${alarm.occurrence} ${alarm.state}`)].join('|');
+}

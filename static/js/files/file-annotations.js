@@ -1,0 +1,52 @@
+// What people say of a recording: its name, a note, tags.
+
+import { nameOf, tagsOf } from './files-layout.js';
+import { sentenceOf } from './files-model.js';
+import { html, listen, setWords } from '../core/dom.js';
+
+/**
+ * @typedef {import('./file-dialog.js').FileDialog} FileDialog
+ * @typedef {import('./files-layout.js').Recording} Recording
+ * @typedef {import('./files-model.js').FilesModel} FilesModel
+ */
+
+/** @param {FileDialog} dialog @param {FilesModel} model @param {Recording} row */
+export function rename(dialog, model, row) {
+  const input = /** @type {HTMLInputElement} */ (html('input', { type: 'text', id: 'file-name', value: row.title, maxlength: 120, autocomplete: 'off', enterkeyhint: 'done', dir: 'auto' }));
+  const refused = html('p', { class: 'bad', role: 'alert' });
+  const done = () => keep(dialog, model, row, { title: input.value }, refused);
+  dialog.show(`Rename ${nameOf(row, Date.now())}`, [refused], [html('div', { class: 'form-lines' }, html('label', { for: 'file-name' }, 'Name'), input, html('p', { class: 'sub' }, 'Empty: called by its time.'))],
+    [dialog.key('Save the name', done, 'main')], 'Cancel');
+  listen(input, 'keydown', (event) => {
+    if (event.key === 'Enter') done();
+  });
+  input.focus();
+  input.select();
+}
+
+/** @param {FileDialog} dialog @param {FilesModel} model @param {Recording} row */
+export function annotate(dialog, model, row) {
+  const note = /** @type {HTMLTextAreaElement} */ (html('textarea', { id: 'file-note', maxlength: 4000, rows: 4, dir: 'auto' }));
+  note.value = row.note;
+  const tags = /** @type {HTMLInputElement} */ (html('input', { type: 'text', id: 'file-tags', value: row.tags.join(', '), autocomplete: 'off', dir: 'auto' }));
+  const refused = html('p', { class: 'bad', role: 'alert' });
+  dialog.show(`Note and tags of ${nameOf(row, Date.now())}`, [refused], [html('div', { class: 'form-lines' }, html('label', { for: 'file-note' }, 'Note'), note, html('label', { for: 'file-tags' }, 'Tags, with commas between'), tags)],
+    [dialog.key('Save', () => keep(dialog, model, row, { note: note.value, tags: tagsOf(tags.value) }, refused), 'main')], 'Cancel');
+  note.focus();
+}
+
+/**
+ * @param {FileDialog} dialog
+ * @param {FilesModel} model
+ * @param {Recording} row
+ * @param {{title?: string, note?: string, tags?: string[]}} annotations
+ * @param {HTMLElement} refused where a refusal is said
+ */
+async function keep(dialog, model, row, annotations, refused) {
+  try {
+    await model.remark(row, annotations);
+    dialog.close();
+  } catch (error) {
+    setWords(refused, `Not saved. ${sentenceOf(error)}`);
+  }
+}
