@@ -74,6 +74,7 @@ async def test_a_disk_that_fills_up_ends_the_recording_and_it_is_completed_when_
         user.say(n)
         n += 1
         await asyncio.sleep(0.001)
+    await user.until(lambda: user.recorder.status.state != "saving")  # it tries to complete what it has
     status = user.recorder.status
     assert status.state == "stopped"
     assert status.trouble == "Recording stopped: the disk is full."
