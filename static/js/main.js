@@ -309,10 +309,14 @@ function lazyTabs(monitor, store, say, isFront) {
 function glanced(store) {
   return new Promise((resolve) => {
     setTimeout(resolve, WAITS_MS);
+    let draws = 0;
     const off = store.on('draw', () => {
       if (!store.frame) return;
+      draws += 1;
+      if (draws === 1) requestAnimationFrame(() => setTimeout(resolve)); // the next picture begins: this one was shown
+      if (draws < 3) return;
       off();
-      requestAnimationFrame(() => setTimeout(resolve)); // the next picture begins: this one was shown
+      resolve(); // also where the browser's setTimeout never calls: what asks for the operator must come
     });
   });
 }
