@@ -8,7 +8,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
-PYTEST := PYTHONASYNCIODEBUG=1 $(PY) -m pytest
+PYTEST := PYTHONASYNCIODEBUG=1 $(PY) -m pytest --durations=10
 FAST := not browser and not slow and not soak
 
 help: ## this list

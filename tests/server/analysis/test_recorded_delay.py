@@ -12,7 +12,7 @@ from server.analysis.rehearse import rehearse
 from server.app.config import Config
 from server.recording.delay import DelayWriter, LinkDelay, RecordedDelay
 from server.recording.read.read import open_recording
-from server.replay.recorded_events import read_told
+from server.replay.recorded_events import read_recorded_events
 from server.replay.run import Drive, Run
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
@@ -76,7 +76,7 @@ async def test_a_session_over_a_slow_link_is_judged_again_as_it_was(bridge: RosB
         for alarm in ("link_late", "link_late_moving"):
             print(f"{alarm}: {raised[alarm]:.3f} s, judged again {again[alarm]:.3f} s")
             assert again[alarm] == pytest.approx(raised[alarm], abs=TICK_S), alarm
-        run = Run(recording, Drive(recording, read_told(recording), ""))
+        run = Run(recording, Drive(recording, read_recorded_events(recording), ""))
         run.advance(raised["link_late_moving"])
         reading = run.known.state.get("speed")
         assert reading is not None
