@@ -78,10 +78,10 @@ async def test_a_session_over_a_slow_link_is_judged_again_as_it_was(bridge: RosB
             assert again[alarm] == pytest.approx(raised[alarm], abs=TICK_S), alarm
         run = Run(recording, Drive(recording, read_recorded_events(recording), ""))
         run.advance(raised["link_late_moving"])
-        reading = run.known.state.get("speed")
+        reading = run.run_state.state.get("speed")
         assert reading is not None
         assert reading.delay_s > 1.0
-        late_s = run.known.state.snapshot(run.at_s).link.late_s
+        late_s = run.run_state.state.snapshot(run.at_s).link.late_s
         assert late_s is not None
         assert late_s > 2.0
 
