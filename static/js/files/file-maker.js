@@ -54,7 +54,7 @@ export class FileMaker {
     const asItIs = html('a', { href: addressOf(row.id, '/file.mcap'), download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, kind[0]), html('small', {}, kind[1])), html('span', { class: 'end' }, ...words(sizeWords(row.size_bytes))));
     listen(asItIs, 'click', () => setTimeout(() => this.#dialog.close()));
     const made = row.state === 'read' ? FORMATS.filter(([format]) => format !== row.format && (format !== 'ros2' || row.ros_version === 2)) : [];
-    this.#dialog.show(`Download ${name}`, [html('p', { class: 'sub' }, 'Other forms than the file itself are made when they are asked for.')], [html('ul', { class: 'menu-list' }, html('li', {}, asItIs),
+    this.#dialog.show(`Download ${name}`, [html('p', { class: 'sub' }, 'Other formats are made on request.')], [html('ul', { class: 'menu-list' }, html('li', {}, asItIs),
       ...made.map(([format, label, use]) => {
         const key = html('button', { type: 'button', 'data-format': format, 'data-operator': true }, icon('download'), html('span', { class: 'tx' }, html('b', {}, label), html('small', {}, use)));
         listen(key, 'click', () => this.#make(row, format, label, back));
@@ -70,7 +70,7 @@ export class FileMaker {
     if (this.#job !== job || !this.#dialog.isOpen) return;
     if (over.state === 'done') {
       save(job.address);
-      this.#dialog.show(`${label} of ${nameOf(row, Date.now())}`, [html('p', { role: 'status' }, `It is made. This phone saves it among its downloads.${over.is_whole === false ? ' Not all of the recording is in it:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#dialog.key('Save again', () => save(job.address)), this.#dialog.key('Back', () => this.download(row, back))]);
+      this.#dialog.show(`${label} of ${nameOf(row, Date.now())}`, [html('p', { role: 'status' }, `Done. It is saved among this phone’s downloads.${over.is_whole === false ? ' Not all of the recording is in it:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#dialog.key('Save again', () => save(job.address)), this.#dialog.key('Back', () => this.download(row, back))]);
     } else if (over.state === 'cancelled') this.download(row, back);
     else this.#dialog.refuse('Not made', over.sentence ?? 'The server could not make it.', back);
   }

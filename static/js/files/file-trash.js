@@ -25,7 +25,7 @@ export class FileTrash {
   /** @param {Recording} row @param {() => void} back */
   askDelete(row, back) {
     const name = nameOf(row, Date.now());
-    this.#dialog.show(`Delete ${name}?`, [html('p', {}, ...words('It goes into the trash, and can be taken back from there until the trash is emptied.'))], [], [this.#dialog.key('Delete', () => this.#delete(row, back), 'main')], 'Keep it');
+    this.#dialog.show(`Delete ${name}?`, [html('p', {}, ...words('It is moved to the trash and can be restored until the trash is emptied.'))], [], [this.#dialog.key('Delete', () => this.#delete(row, back), 'main')], 'Keep it');
   }
 
   /** @param {Recording} row @param {() => void} back */
