@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from server.mail.address import MailAddress
-from server.mail.header_text import file_name, one_line
+from server.mail.header_text import EncodedText, file_name, needs_encoding, one_line
 
 _LINE = 57  # bytes that make one line of 76 letters, RFC 2045 6.8
 _PIECE = _LINE * 4096  # some 230 kB at once
@@ -73,10 +73,16 @@ def build(draft: Draft) -> EmailMessage:
     needs_utf8 = any(one.needs_utf8 for one in (draft.sender, *draft.to))
     mail = EmailMessage(policy=policy.SMTPUTF8 if needs_utf8 else policy.SMTP)
     mail["Date"] = datetime.fromtimestamp(draft.at_ms // 1000, UTC)
-    mail["From"] = Address(one_line(draft.sender_name), draft.sender.local, draft.sender.domain)
+    mail["From"] = (
+        EncodedText("From", draft.sender_name, f"<{draft.sender.text}>")
+        if needs_encoding(draft.sender_name)
+        else Address(one_line(draft.sender_name), draft.sender.local, draft.sender.domain)
+    )
     mail["To"] = [Address("", one.local, one.domain) for one in draft.to]
     mail["Message-ID"] = one_line(draft.message_id)
-    mail["Subject"] = one_line(draft.subject)
+    mail["Subject"] = (
+        EncodedText("Subject", draft.subject) if needs_encoding(draft.subject) else one_line(draft.subject)
+    )
     mail.set_content(draft.text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n") + "\n", cte="base64")
     if draft.attachment is not None:
         name = file_name(draft.attachment.name)

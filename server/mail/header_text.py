@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from email.header import Header
+from email.policy import Policy
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,119}")
 # Line breaks beyond CR and LF, and signs that turn the direction of writing: a subject must not rewrite its line.
@@ -16,14 +18,34 @@ def is_one_line(text: str) -> bool:
 
 
 def one_line(text: str) -> str:
-    """Return the text as a header may hold it. Raises ValueError unless it is one line.
-
-    `email.message` decodes an encoded word (RFC 2047) that it is given, and one may hold a line break. So none
-    is left in the text.
-    """
+    """Return the text. Raises ValueError unless it is one line."""
     if not is_one_line(text):
         raise ValueError("a line break cannot stand in a line")
-    return text.replace("=?", "= ?")
+    return text
+
+
+def needs_encoding(text: str) -> bool:
+    """Return whether a text must go out as encoded words (RFC 2047)."""
+    return not text.isascii() or "=?" in text
+
+
+class EncodedText:
+    """A header whose text goes out as encoded words, as `EmailPolicy` takes it: an object with a name and `fold`.
+
+    The headers of `email.headerregistry` decode an encoded word that they are given, and a line break that it may
+    hold gets out; and they lose blanks between encoded words. `email.header.Header` does neither.
+    """
+
+    def __init__(self, name: str, text: str, rest: str = "") -> None:
+        self.name = name
+        self._text = one_line(text)
+        self._rest = rest  # what stands behind it on a line of its own
+
+    def fold(self, *, policy: Policy) -> str:
+        """Return the lines of the header."""
+        encoded = Header(self._text, "utf-8", header_name=self.name).encode(linesep=policy.linesep)
+        rest = f"{policy.linesep} {self._rest}" if self._rest else ""
+        return f"{self.name}: {encoded}{rest}{policy.linesep}"
 
 
 def file_name(name: str) -> str:
