@@ -203,7 +203,7 @@ async def test_delete_asks_and_can_be_taken_back_at_once_and_later(opened: Phone
     for again in (False, True):
         await item.get_by_role("button").tap()
         await sheet(opened).get_by_text("Delete", exact=False).last.tap()
-        await expect(sheet(opened)).to_contain_text("can be taken back")
+        await expect(sheet(opened)).to_contain_text("can be restored")
         if again:
             await sheet(opened).get_by_role("button", name="Keep it").tap()
             await expect(sheet(opened)).to_be_hidden()

@@ -9,6 +9,7 @@ from urllib.parse import quote
 
 import httpx
 import pytest
+from packaging.utils import canonicalize_name
 
 from server.app.config import Config
 from server.system.page_files import static_dir
@@ -17,9 +18,9 @@ from tests.server.conftest import serving
 
 
 def test_all_that_is_required_is_named_with_version_and_licence() -> None:
-    found = {part.name.lower().replace("_", "-"): part for part in parts(static_dir() / "vendor")}
+    found = {canonicalize_name(part.name): part for part in parts(static_dir() / "vendor")}
     required = {
-        re.split(r"[^\w.-]", one)[0].lower().replace("_", "-")
+        canonicalize_name(re.split(r"[^\w.-]", one)[0])
         for one in metadata.requires("catgraph") or ()
         if "extra ==" not in one
     }
