@@ -21,7 +21,9 @@ from monitor.runner import Monitor
 from server.app import app, process
 from server.app.config import Config
 from server.rosbridge import codec
+from server.vehicle.message_intake import MessageIntake
 from server.vehicle.session import Session
+from server.vehicle.tick import Tick
 from tests.bench.orders import obey, options
 
 VEHICLE = "car"
@@ -58,9 +60,9 @@ class Timed:
 async def main() -> None:
     timed = {
         "parse": Timed(codec, "decode"),
-        "message": Timed(Session, "message_received"),
+        "message": Timed(MessageIntake, "message_received"),
         "step": Timed(Monitor, "step"),
-        "tick": Timed(Session, "tick"),
+        "tick": Timed(Tick, "run"),
         "frame": Timed(Session, "frame"),
     }
     made: list[Any] = []
