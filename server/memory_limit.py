@@ -16,7 +16,7 @@ TOO_LARGE = "a part of it, unpacked, is larger than this machine can hold."
 def bounded_memory() -> Iterator[None]:
     """Within it, what would take nearly all free memory of the machine raises MemoryError."""
     before = resource.getrlimit(resource.RLIMIT_DATA)
-    free, used = _bytes("/proc/meminfo", "MemAvailable"), _bytes("/proc/self/status", "VmData")
+    free, used = free_bytes(), _bytes("/proc/self/status", "VmData")
     if free is None or used is None or before[0] != resource.RLIM_INFINITY:  # somebody has bounded it already
         yield
         return
@@ -25,6 +25,11 @@ def bounded_memory() -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_DATA, before)
+
+
+def free_bytes() -> int | None:
+    """What the machine can give without taking it from others; None: it does not say."""
+    return _bytes("/proc/meminfo", "MemAvailable")
 
 
 def _bytes(file: str, name: str) -> int | None:

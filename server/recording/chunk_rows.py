@@ -4,17 +4,19 @@ four times as long."""
 from __future__ import annotations
 
 import heapq
+import os
 import struct
 from collections.abc import Callable, Container, Iterable, Iterator
+from io import BytesIO
 from operator import attrgetter, itemgetter
 from typing import IO, Protocol, TypeVar
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Chunk
-from mcap.stream_reader import get_chunk_data_stream
 
 from server.recording.chunks import HEAD_BYTES
+from server.recording.unpack import verified
 
 _MESSAGE = int(Opcode.MESSAGE)
 _MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
@@ -51,16 +53,27 @@ def in_order(parts: Iterable[P], read: Callable[[P], list[ChunkRow]]) -> Iterato
             yield time_ns, channel, raw
 
 
+def read_chunk(file: IO[bytes], at: int) -> Chunk:
+    """The chunk whose record begins at a place in the file. What it says of lengths is not believed: none reserves
+    memory. Damage makes the reader fail in every way there is."""
+    left = file.seek(0, os.SEEK_END) - at - HEAD_BYTES
+    file.seek(at)
+    length = int.from_bytes(file.read(HEAD_BYTES)[1:], "little")
+    if length > left:
+        raise ValueError("it is longer than its file")
+    chunk: Chunk = Chunk.read(ReadDataStream(BytesIO(file.read(length))))
+    return chunk
+
+
 def chunk_rows(
     file: IO[bytes], at: int, channels: Container[int], from_ns: int, to_ns: int = 2**64 - 1
 ) -> list[ChunkRow]:
     """What came on these channels within a time, in its order, of the chunk whose record begins at a place in the file.
 
-    Damage makes the reader fail in every way there is.
+    Raises PartTooLarge and MemoryError; damage makes the reader fail in every other way there is.
     """
-    file.seek(at + HEAD_BYTES)
-    stream, size = get_chunk_data_stream(Chunk.read(ReadDataStream(file)), validate_crc=True)
-    data = stream.read(size)
+    data = verified(read_chunk(file, at))
+    size = len(data)
     rows: list[ChunkRow] = []
     place = 0
     while place < size:

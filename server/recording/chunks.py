@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -12,12 +11,14 @@ from typing import IO, Any
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, Metadata, Schema
-from mcap.stream_reader import get_chunk_data_stream
+
+from server.recording.unpack import verified
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD_BYTES = 1 + 8  # of a record: what it is, and how long
 _MESSAGE_HEAD = struct.Struct("<BQHIQ")  # opcode, length, channel, sequence, log time
 _LARGEST = 1 << 31  # bytes; a record that claims more is none
+LARGEST_CHUNK = 256 << 20  # bytes, unpacked; ours have 32 kB, or one message
 
 
 @dataclass(slots=True)
@@ -100,12 +101,8 @@ class Walk:
 
 def _chunk(at: int, raw: bytes) -> WholeChunk:
     record = Chunk.read(_stream(raw[HEAD_BYTES:]))
-    stream, size = get_chunk_data_stream(record, validate_crc=True)
-    data = stream.read(size)
-    if len(data) != record.uncompressed_size or (
-        record.uncompressed_crc and zlib.crc32(data) != record.uncompressed_crc
-    ):
-        raise ValueError("another size, or another checksum")
+    data = verified(record, LARGEST_CHUNK)
+    size = len(data)
     chunk = WholeChunk(at=at, raw=raw, record=record)
     place = 0
     while place < size:

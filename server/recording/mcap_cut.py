@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 from mcap.data_stream import ReadDataStream
@@ -13,6 +14,7 @@ from mcap.stream_reader import breakup_chunk
 
 from server.recording.errors import RecordingUnreadable
 from server.recording.mcap_file import Index, McapFile, latest
+from server.recording.unpack import verified
 
 MAGIC = b"\x89MCAP0\r\n"  # begins a file, and ends one that was closed
 _HEAD_BYTES = 1 + 8  # of a record: what it is, and how long
@@ -57,6 +59,8 @@ class CutMcapFile(McapFile):
             at += _HEAD_BYTES + length
         if not parts:
             raise RecordingUnreadable(f"{self.path} is not complete: it ends too early")
+        if not channels:  # no part tells what its messages are
+            raise RecordingUnreadable(f"{self.path} is not complete, and none of its {len(parts)} parts can be read")
         return Index(
             schemas=schemas, channels=channels, counts=counts, parts=parts, metadata=latest(notes), profile=profile
         )
@@ -81,8 +85,10 @@ class CutMcapFile(McapFile):
             uncompressed_size=chunk.uncompressed_size,
         )
         try:
-            records = breakup_chunk(chunk, validate_crc=True)
-        except Exception:  # damaged besides: reading will find it out again, and name it
+            records = breakup_chunk(replace(chunk, compression="", data=verified(chunk)))
+        except MemoryError:
+            raise
+        except Exception:  # damaged besides, or too large: reading will find it out again, and name it
             return part
         for record in records:
             match record:

@@ -103,8 +103,10 @@ class McapFile:
         """The messages of a part that are wanted; none where it is damaged."""
         try:
             return chunk_rows(self._file, part.chunk_start_offset, numbers, start_ns)
-        except Exception:  # damage makes the readers fail in every way there is
-            self.damage.lost.append((part.message_start_time, part.message_end_time))
+        except MemoryError:
+            raise
+        except Exception as why:  # damage makes the readers fail in every way there is
+            self.damage.leave_out(part.message_start_time, part.message_end_time, why)
             return []
 
     def close(self) -> None:

@@ -22,6 +22,7 @@ from server.recording.recognise import Kind, recognise
 from server.recording.rosbag1 import Bag1
 from server.recording.rosbag2 import Bag2
 from server.recording.source import Channel, FileSource
+from server.recording.unpack import PartTooLarge
 from server.source import Json, Message, RosVersion, message_of
 
 __all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
@@ -203,8 +204,8 @@ class Recording:
                     continue
                 yield time_ns / 1e9, topic, type, message
             if source.damage.is_total:
-                raise RecordingUnreadable(f"{source.path} is damaged: none of its {source.damage.parts} parts is whole")
-        except RecordingUnreadable:
+                raise RecordingUnreadable(source.damage.why_nothing(source.path))
+        except (RecordingUnreadable, MemoryError):
             raise
         except Exception as error:  # a damaged file makes the readers fail in every way there is
             raise RecordingUnreadable(_what_is_wrong(source.path, error)) from None
@@ -247,6 +248,8 @@ def _what_is_wrong(path: Path, error: Exception) -> str:
     if isinstance(error, PermissionError) or isinstance(error.__cause__, PermissionError):
         return f"{path} may not be read by this user: permission denied"
     said = " ".join(str(error).split()).rstrip(".")
+    if isinstance(error, PartTooLarge):
+        return f"{path} cannot be read: of a part of it, {said}"
     if "not indexed" in said:
         return f"{path} was not closed properly and has no index: repair it with `rosbag reindex`"
     if any(words in said for words in _ENDS_EARLY):

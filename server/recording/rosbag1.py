@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from bisect import bisect_left
 from collections import OrderedDict
@@ -9,13 +10,15 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO, NamedTuple, cast
 
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag1 import Reader, ReaderError
+from rosbags.rosbag1.reader import Header, RecordType
 
 from server.recording.errors import RecordingUnreadable
 from server.recording.source import Channel, Damage
+from server.recording.unpack import PartTooLarge, unpack
 from server.source import RosVersion
 
 CACHE_BYTES = 64_000_000  # unpacked chunks kept: chunks may overlap in time
@@ -31,14 +34,36 @@ _length = struct.Struct("<I").unpack_from
 _Entry = tuple[int, int, int, int]  # of an index: ns, chunk, place in it, connection
 
 
+class _Packed(NamedTuple):
+    """One chunk, and what its header says."""
+
+    datasize: int
+    datapos: int
+    compression: str
+    size: int  # unpacked
+
+
 class _Reader(Reader):
     """The library's, but for the entries of the index: made one by one they take longer than all else of opening."""
 
     indexes: dict[int, list[_Entry]]  # type: ignore[assignment]  # by connection, in order
+    chunks: dict[int, _Packed]  # type: ignore[assignment]  # by place in the file
 
     def __init__(self, path: Path, on_first_chunk: Callable[[int], None]) -> None:
         super().__init__(path)
         self._on_first_chunk: Callable[[int], None] | None = on_first_chunk
+
+    def read_chunk(self) -> _Packed:  # type: ignore[override]
+        """The header of the chunk at the current place, with its size: the library's own keeps none."""
+        file = cast("BinaryIO", self.bio)
+        header = Header.read(file, RecordType.CHUNK)
+        compression, size = header.get_string("compression"), header.get_uint32("size")
+        packed = _length(file.read(4))[0]
+        place = file.tell()
+        file.seek(packed, os.SEEK_CUR)
+        if compression not in ("none", "bz2", "lz4"):
+            raise ReaderError(f"Compression {compression[:20]!r} is not supported.")
+        return _Packed(packed, place, compression, size)
 
     def read_index_data(self, pos: int, indexes: dict[int, list[Any]]) -> None:
         """One record of a connection's messages in the chunk at `pos`. Raises ReaderError where it is none."""
@@ -125,7 +150,7 @@ class Bag1:
         header, file = self._reader.chunks[position], cast("BinaryIO", self._reader.bio)
         try:
             file.seek(header.datapos)
-            packed = file.read(header.datasize)
+            packed = file.read(min(header.datasize, os.fstat(file.fileno()).st_size))  # not what it says: it reserves
         except (OSError, MemoryError) as error:
             failed: Future[bytes] = Future()
             failed.set_exception(error)
@@ -143,6 +168,8 @@ class Bag1:
         future = self._coming.pop(position)
         try:
             chunk = future.result()
+        except PartTooLarge as why:
+            raise RecordingUnreadable(f"{self.path.name} cannot be read: of a part of it, {why}") from None
         except (OSError, EOFError, ValueError, RuntimeError, MemoryError):  # what bz2, lz4 and the disk may say
             raise RecordingUnreadable(f"{self.path.name} is damaged: a part of it cannot be unpacked") from None
         self._chunks[position] = chunk
@@ -159,10 +186,10 @@ def _since(start_ns: int, index: Sequence[_Entry]) -> Sequence[_Entry]:
     return index[first:] if first else index
 
 
-def _unpacked(header: Any, packed: bytes) -> bytes:
+def _unpacked(header: _Packed, packed: bytes) -> bytes:
     if len(packed) < header.datasize:
         raise EOFError
-    return bytes(header.decompressor(packed))
+    return unpack(header.compression, packed, header.size if header.compression != "none" else len(packed))
 
 
 def _message(chunk: bytes, offset: int) -> bytes:

@@ -12,6 +12,7 @@ from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
+from server.recording import rosbags_bounds
 from server.recording.chunk_rows import ChunkRow, chunk_rows, in_order
 from server.recording.errors import RecordingUnreadable
 from server.recording.source import Channel, Damage, DefinitionFormat
@@ -22,6 +23,9 @@ _FORMATS: dict[Any, DefinitionFormat] = {
     MessageDefinitionFormat.MSG: "msg",
     MessageDefinitionFormat.IDL: "idl",
 }
+
+
+rosbags_bounds.install()
 
 
 class _UriPath(PosixPath):
@@ -65,8 +69,10 @@ class _WholeParts(McapReader):
     def _whole(self, part: Any, wanted: dict[int, Connection], from_ns: int, to_ns: int) -> list[ChunkRow]:
         try:
             return chunk_rows(cast("BinaryIO", self.bio), part.chunk_start_offset, wanted, from_ns, to_ns)
-        except Exception:  # damage makes the readers fail in every way there is
-            self.damage.lost.append((part.message_start_time, part.message_end_time))
+        except MemoryError:
+            raise
+        except Exception as why:  # damage makes the readers fail in every way there is
+            self.damage.leave_out(part.message_start_time, part.message_end_time, why)
             return []
 
 
@@ -87,6 +93,8 @@ class Bag2:
         self.path = path
         if kind == "db3":
             _assert_whole(path)
+        elif kind == "directory":
+            rosbags_bounds.demand_plain(path / "metadata.yaml")
         self._reader = _READERS[kind](_UriPath(path))
         self._reader.open()
         self._connections = dict(enumerate(self._reader.connections))
@@ -107,7 +115,11 @@ class Bag2:
     def damage(self) -> Damage:
         files = getattr(self._reader, "storages", None) or [self._reader]
         found = [file.damage for file in files if isinstance(file, _WholeParts)]
-        return Damage(parts=sum(one.parts for one in found), lost=[part for one in found for part in one.lost])
+        return Damage(
+            parts=sum(one.parts for one in found),
+            lost=[part for one in found for part in one.lost],
+            too_large=sum(one.too_large for one in found),
+        )
 
     def close(self) -> None:
         self._reader.close()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
 
+from server.recording.unpack import PartTooLarge
 from server.source import RosVersion
 
 DefinitionFormat = Literal["none", "msg", "idl"]
@@ -33,11 +34,24 @@ class Damage:
     parts: int = 0  # that were to be read
     lost: list[tuple[int, int]] = field(default_factory=list)  # first and last ns of each damaged one, by its index
 
+    too_large: int = 0  # of the lost ones: larger, unpacked, than may be read
     is_cut: bool = False  # its end is missing besides, nobody knows how much
+
+    def leave_out(self, start_ns: int, end_ns: int, why: Exception) -> None:
+        """One part cannot be read."""
+        self.lost.append((start_ns, end_ns))
+        self.too_large += isinstance(why, PartTooLarge)
 
     @property
     def is_total(self) -> bool:
         return bool(self.parts) and len(self.lost) == self.parts
+
+    def why_nothing(self, path: Path) -> str:
+        """Why nothing of a file can be read, where this is total."""
+        if self.too_large:
+            which = "its only part is" if self.parts == 1 else f"{self.too_large} of its {self.parts} parts are"
+            return f"{path} cannot be read: {which} larger, unpacked, than may be read"
+        return f"{path} is damaged: none of its {self.parts} parts is whole"
 
     def sentences(self, name: str, origin_ns: int, end_ns: int) -> list[str]:
         """What is missing and when, for a person."""
@@ -46,8 +60,9 @@ class Damage:
             first_s = (min(start_ns for start_ns, _ in self.lost) - origin_ns) / 1e9
             last_s = (max(end_ns for _, end_ns in self.lost) - origin_ns) / 1e9
             which = "1 part" if len(self.lost) == 1 else f"{len(self.lost)} parts"
+            what = "holds parts that are larger than may be read" if self.too_large else "is damaged"
             said.append(
-                f"{name} is damaged: {which} of {self.parts}, between {first_s:.1f} s and {last_s:.1f} s, "
+                f"{name} {what}: {which} of {self.parts}, between {first_s:.1f} s and {last_s:.1f} s, "
                 f"{'is' if len(self.lost) == 1 else 'are'} left out"
             )
         if self.is_cut:

@@ -202,7 +202,7 @@ def _short(window: Window, first_ns: int, last_ns: int) -> Iterator[str]:
 def _damage(recording: Recording, first_ns: int) -> Iterator[str]:
     """What could not be read. That a file has no end yet is no damage to a clip: see `_short`."""
     for file in recording.files:
-        lost = Damage(parts=file.damage.parts, lost=file.damage.lost)
+        lost = Damage(parts=file.damage.parts, lost=file.damage.lost, too_large=file.damage.too_large)
         yield from (f"{sentence}." for sentence in lost.sentences(file.path.name, first_ns, file.end_ns))
 
 

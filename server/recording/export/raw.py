@@ -66,9 +66,9 @@ def _of_file(number: int, file: FileSource, wanted: Callable[[Channel], bool], s
     try:
         for time_ns, channel, data in file.messages(set(channels), start_ns):
             yield Raw(time_ns, number, channels[channel], data)
-    except RecordingUnreadable:
+    except (RecordingUnreadable, MemoryError):
         raise
     except Exception as error:  # a damaged file makes the readers fail in every way there is
         raise RecordingUnreadable(f"{file.path} is damaged or not complete: {error}") from None
     if file.damage.is_total:
-        raise RecordingUnreadable(f"{file.path} is damaged: none of its {file.damage.parts} parts is whole")
+        raise RecordingUnreadable(file.damage.why_nothing(file.path))

@@ -1,0 +1,92 @@
+"""Unpacks one part of a recording, and never more of it than fits: a few kilobytes can unpack to many gigabytes."""
+
+from __future__ import annotations
+
+import bz2
+import zlib
+from typing import Any
+
+import lz4.frame
+import zstandard
+
+from server.memory_limit import free_bytes
+
+MOST_BYTES = 1 << 30  # of one part, unpacked; recorders write 1 MB, and one message is hardly ever larger than 100 MB
+UNASKED_BYTES = 16 << 20  # up to so much, the machine is not asked for its free memory
+FREE_PART = 0.25  # of the free memory, for one part
+
+
+class PartTooLarge(Exception):
+    """A part would take more memory, unpacked, than is allowed; `str()` says how much is, without a file's name."""
+
+
+def unpack(compression: str, packed: bytes, size: int, most: int = MOST_BYTES) -> bytes:
+    """What is packed in a part that says it holds `size` bytes.
+
+    Raises PartTooLarge where it says or holds too many, and ValueError, RuntimeError, EOFError, OSError or
+    zstandard.ZstdError where it is damaged or is not of its size. `compression`: "", "none", "bz2", "lz4" or "zstd".
+    """
+    allowed = allowed_bytes(most) if size > UNASKED_BYTES else most
+    if size > allowed:
+        raise too_large(allowed)
+    match compression:
+        case "" | "none":
+            data = packed
+        case "bz2":
+            data = _streamed(bz2.BZ2Decompressor(), packed, size)
+        case "lz4":
+            data = _streamed(lz4.frame.LZ4FrameDecompressor(), packed, size)
+        case "zstd":
+            data = _zstd(packed, size)
+        case other:
+            raise ValueError(f"packed as {other[:20]!r}, which is not supported")
+    if len(data) != size:
+        raise ValueError("another size than it says")
+    return data
+
+
+def unpack_message(packed: bytes) -> bytes:
+    """One message packed with zstd, as rosbag2 packs them one by one. Raises as `unpack`."""
+    size = zstandard.frame_content_size(packed)
+    if size >= 0:
+        return unpack("zstd", packed, size)
+    allowed = allowed_bytes(MOST_BYTES)
+    data = zstandard.ZstdDecompressor().stream_reader(packed).read(allowed + 1)
+    if len(data) > allowed:
+        raise too_large(allowed)
+    return data
+
+
+def verified(chunk: Any, most: int = MOST_BYTES) -> bytes:
+    """The records in a chunk of MCAP. Raises as `unpack`, and ValueError where its checksum is another."""
+    data = unpack(chunk.compression, chunk.data, chunk.uncompressed_size, most)
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError("another checksum")
+    return data
+
+
+def allowed_bytes(most: int) -> int:
+    """How large a part may be, by what the machine has free."""
+    free = free_bytes()
+    return most if free is None else min(most, int(free * FREE_PART))
+
+
+def too_large(allowed: int) -> PartTooLarge:
+    return PartTooLarge(f"it would take more than {allowed / 2**20:.0f} MB, unpacked")
+
+
+def _streamed(unpacker: Any, packed: bytes, size: int) -> bytes:
+    """At most one byte more than it says."""
+    data = bytes(unpacker.decompress(packed, size + 1))
+    if len(data) == size and not unpacker.eof:  # its end mark may not have been read yet
+        data += unpacker.decompress(b"", 1)
+    if not unpacker.eof and len(data) <= size:
+        raise EOFError("it ends too early")
+    return data
+
+
+def _zstd(packed: bytes, size: int) -> bytes:
+    told = zstandard.frame_content_size(packed)
+    if told >= 0 and told != size:  # what a frame says is reserved before anything is unpacked
+        raise ValueError("another size than it says")
+    return zstandard.ZstdDecompressor().decompress(packed, max_output_size=max(1, size))
