@@ -15,6 +15,7 @@ Also = Literal["none", "light", "all"]
 
 MAX_OTHERS = 500  # subscriptions cost the bridge a thread each
 MOST_NAMED = 20
+MOST_WRITTEN = 500  # names in a file, where they may stand several times
 LONGEST_NAME = 255  # letters; ROS 2 allows no more
 QUEUE_LENGTH = 50  # messages the bridge keeps for us in a burst
 
@@ -28,8 +29,12 @@ class Missing:
     too_large: Mapping[str, int] = field(default_factory=dict)  # → bytes of a message; not subscribed to any more
 
     def as_json(self) -> dict[str, Any]:
-        """For the state, ten times a second to every page: at most MOST_NAMED of each, each at most LONGEST_NAME."""
+        """For the state, ten times a second to every page: at most MOST_NAMED of each, each at most LONGEST_NAME, and
+        how many there are."""
         return {
+            "left_out_count": len(self.left_out) + len(self.too_large),
+            "not_received_count": len(self.not_received),
+            "too_large_count": len(self.too_large),
             "left_out": [_short(topic) for topic in [*self.left_out, *self.too_large][:MOST_NAMED]],
             "not_received": [_short(topic) for topic in [*self.not_received][:MOST_NAMED]],
             "too_large": [
@@ -39,10 +44,13 @@ class Missing:
         }
 
     def as_metadata(self) -> dict[str, str]:
-        """For the file, a line each."""
+        """For the file: a line each, at most MOST_WRITTEN of them, and how many there are."""
+        left_out = [*self.left_out, *self.too_large]
         return {
-            "left_out": "\n".join(map(_short, [*self.left_out, *self.too_large])),
-            "not_received": "\n".join(map(_short, self.not_received)),
+            "left_out": "\n".join(map(_short, left_out[:MOST_WRITTEN])),
+            "left_out_count": str(len(left_out)),
+            "not_received": "\n".join(map(_short, [*self.not_received][:MOST_WRITTEN])),
+            "not_received_count": str(len(self.not_received)),
         }
 
 

@@ -34,6 +34,7 @@ from server.version import catgraph_version
 NOWHERE = "This server keeps nothing: it was started without a folder for data."
 EARLY_AT_MOST = 200  # own words kept while no part is open: those of a gap stand at the beginning of the next part
 EARLY_S = 10.0  # and those from before a session began, if it was not long before: how it came to be connected
+NOTE_EVERY_S = 2.0  # at most: what is missing in a part, written into it
 BEGIN_AFTER_S = 2.0  # a car that says nothing is recorded all the same: that it said nothing
 SETTLE_S = 5.0  # a disk that takes longer is not waited for when the server ends
 GB = 1e9
@@ -52,6 +53,8 @@ class _Tape:
     is_open: bool = False  # the part is being written
     lost_s: float | None = None  # since when it is held
     due_s: float | None = None  # a part is to begin with the next message, or at this moment
+    noted: Missing | None = None  # what the part says already of what is missing in it
+    noted_s: float = -math.inf
 
     @property
     def newest(self) -> int:
@@ -261,6 +264,9 @@ class SessionRecording:
             self._tape = None
         if self._recorder is not None:
             self._recorder.allowance = self._allowance()
+            if tape.is_open and self.missing != (tape.noted or Missing()) and now_s - tape.noted_s >= NOTE_EVERY_S:
+                tape.noted, tape.noted_s = self.missing, now_s
+                self._recorder.note(**self.missing.as_metadata())
 
     async def stop(self) -> None:
         """Completes what is being written; for the end of the server."""
@@ -398,7 +404,7 @@ class SessionRecording:
         self.prepare()
         assert self._recorder is not None
         self._recorder.allowance = self._allowance()
-        tape.begun = part
+        tape.begun, tape.noted, tape.noted_s = part, None, -math.inf
         self._recorder.begin(part)
         if self._definitions:
             self._recorder.learn(self._definitions)

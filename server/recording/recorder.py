@@ -160,6 +160,10 @@ class Recorder:
             return
         self._queue.append(("own", channel, at_ns, {"time_ms": at_ns // 1_000_000, **said}))
 
+    def note(self, **more: str) -> None:
+        """What is known of the part by now; a part that is recovered after a kill says it too."""
+        self._put(("note", more))
+
     def end(self, *, then: Callable[[], None] | None = None, **ended: str) -> None:
         """The part is complete with what was taken so far; `then` is called on the loop when the disk has it all, or
         has refused."""
@@ -213,6 +217,9 @@ class Recorder:
                 case "own":
                     if self._file is not None:
                         self._own(self._file, *item[1:])
+                case "note":
+                    if self._file is not None:
+                        self._file.note(**item[1])
                 case "begin":
                     self._open(item[1])
                 case "prepare":

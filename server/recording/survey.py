@@ -28,7 +28,7 @@ from server.recording.remarks import line
 from server.recording.sketch import sketch
 from server.topics import map_signals
 
-VERSION = 2  # of what is found: with another one, files are read again
+VERSION = 3  # of what is found: with another one, files are read again
 PRIORITIES = ("critical", "warning", "advisory")
 MAX_RAISED = 200  # alarms told one by one; all are counted
 MAX_SENTENCES = 10
@@ -82,7 +82,9 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "is_clip": "clip_of" in metadata,
         "clip_of": _text(metadata.get("clip_of")),
         "left_out": _names(metadata.get("left_out", "")),
+        "left_out_count": _count(metadata, "left_out"),
         "not_received": _names(metadata.get("not_received", "")),
+        "not_received_count": _count(metadata, "not_received"),
         "damage": damage[:MAX_SENTENCES],
         "sketch": None if drawn is None else drawn.as_json(),
     }
@@ -90,6 +92,12 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
 
 def _names(lines: str) -> list[str]:
     return [name[:200] for name in lines.split("\n") if name][:MAX_SENTENCES]
+
+
+def _count(metadata: Mapping[str, str], name: str) -> int:
+    """How many there are; older files say it only by their names."""
+    named = sum(1 for line in metadata.get(name, "").split("\n") if line)
+    return max(named, _whole(metadata.get(f"{name}_count")) or 0)
 
 
 def _drive(recording: Recording, metadata: Mapping[str, str]) -> tuple[State, float | None, list[str]]:

@@ -89,6 +89,11 @@ class PartFile:
         sequence = self._sequence[channel] = self._sequence.get(channel, 0) + 1
         self._writer.add_message(channel, at_ns, data, publish_time=at_ns, sequence=sequence)
 
+    def note(self, **more: str) -> None:
+        """What is known of the drive by now, besides what was known when it began: a kill does not lose it."""
+        self._metadata |= more
+        self._writer.add_metadata(METADATA, self._metadata)  # between two chunks: the current one is not written yet
+
     def flush(self) -> None:
         """Hands all that was added to the system: a kill does not lose it any more."""
         if self.failed is not None:

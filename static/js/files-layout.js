@@ -1,6 +1,6 @@
 // How recordings read in the list: their time, length, size and alarms in words. Pure functions, no DOM.
 
-import { missingWords } from './missing-topics.js';
+import { missingWords, namesWords } from './missing-topics.js';
 import { duration, fixed, NOTHING } from './words.js';
 import { speedWords } from './units.js';
 
@@ -25,7 +25,9 @@ import { speedWords } from './units.js';
  * @property {'waiting' | 'read' | 'unreadable'} state
  * @property {string | null} problem why it cannot be read
  * @property {string[]} damage what of it cannot be read
- * @property {string[]} [left_out] topics that were not recorded
+ * @property {string[]} [left_out] topics that were not recorded, the first of them
+ * @property {number} [left_out_count]
+ * @property {number} [not_received_count]
  * @property {string[]} [not_received] topics that had a publisher, and of which no message came
  * @property {1 | 2 | null} [ros_version] null: not read yet, or unreadable
  * @property {string | null} ended closed, recovered, or null where nobody says
@@ -146,8 +148,8 @@ export function factWords(row) {
 export function warningWords(row) {
   const why = row.ended_why ?? 'the server ended while it was recorded.';
   const recovered = row.ended === 'recovered' ? [/recover/i.test(why) ? why : `Recovered: ${why}`] : [];
-  const leftOut = row.left_out?.length ? [`Not recorded: ${row.left_out.join(', ')}.`] : [];
-  const silent = row.not_received?.length ? [`No message came from: ${row.not_received.join(', ')}.`] : [];
+  const leftOut = row.left_out?.length ? [`Not recorded: ${namesWords(row.left_out, row.left_out_count)}.`] : [];
+  const silent = row.not_received?.length ? [`No message came from: ${namesWords(row.not_received, row.not_received_count)}.`] : [];
   return [...recovered, ...row.damage, ...leftOut, ...silent];
 }
 
@@ -199,8 +201,11 @@ export function pointsOf(line) {
  * @property {string | null} [reason] why it is not recording
  * @property {number} [as_json]
  * @property {string[]} [left_out]
+ * @property {number} [left_out_count]
  * @property {string[]} [not_received]
+ * @property {number} [not_received_count]
  * @property {{topic: string, mb: number}[]} [too_large]
+ * @property {number} [too_large_count]
  *
  * @typedef {{name: string, mark: string, facts: string, missing: string, isOn: boolean, isBad: boolean, order: boolean | null}} Live order: what a key asks for, true to record; null: no key
  */

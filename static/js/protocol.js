@@ -134,7 +134,10 @@
  * @property {number} [messages]
  * @property {number} [as_json]
  * @property {number} [dropped]
- * @property {string[]} [left_out] topics that are not recorded
+ * @property {string[]} [left_out] topics that are not recorded, the first of them
+ * @property {number} [left_out_count] of all that are not recorded
+ * @property {number} [not_received_count]
+ * @property {number} [too_large_count]
  * @property {string[]} [not_received] topics that have a publisher and of which no message comes
  * @property {{topic: string, mb: number}[]} [too_large] topics that were left because of the size of their messages
  * @property {number | null} [room_gb]

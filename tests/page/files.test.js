@@ -66,6 +66,7 @@ test('the facts in one sentence, and what is unknown as unknown', () => {
   assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'the server was killed.', damage: ['A part is lost.'] })), ['Recovered: the server was killed.', 'A part is lost.']);
   assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'car_1 was recovered.', left_out: ['/camera', '/points'] })), ['car_1 was recovered.', 'Not recorded: /camera, /points.']);
   assert.deepEqual(warningWords(row({ not_received: ['/imu'] })), ['No message came from: /imu.']);
+  assert.deepEqual(warningWords(row({ left_out: ['/camera', '/points'], left_out_count: 9 })), ['Not recorded: /camera, /points and 7 more.']);
   assert.deepEqual(warningWords(row({ ended: 'recovered' })), ['Recovered: the server ended while it was recorded.']);
   assert.deepEqual(warningWords(row()), []);
 });
@@ -106,4 +107,6 @@ test('what is recorded now, and why nothing is', () => {
   assert.equal(liveOf({ ...on, ...missing }, now)?.missing, 'Not recorded: /points. Too large to record: /camera (40 MB a message). No message comes from: /imu, /names. '
     + '3 messages kept as JSON: not of their type, or its definition is not known.');
   assert.equal(liveOf({ ...off, ...missing }, now)?.missing, '');
+  const many = { left_out: ['/points', '/camera'], left_out_count: 9, too_large: [{ topic: '/camera', mb: 40.2 }], too_large_count: 1, not_received: ['/imu'], not_received_count: 2 };
+  assert.equal(liveOf({ ...on, ...many }, now)?.missing, 'Not recorded: /points and 7 more. Too large to record: /camera (40 MB a message). No message comes from: /imu and 1 more.');
 });

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import pytest
 from server.bridge.server import RosBridge
 from server.config import Config, Vehicle
 from server.others import choose
+from server.recording.chunks import Walk
 from server.recording.folder import RecordingsFolder
 from server.recording.read import open_recording
 from server.recording.standing import read_standing
@@ -44,6 +45,15 @@ def files(data: Path) -> list[str]:
     return sorted(path.name for path in (data / "recordings").rglob("*.mcap*") if path.suffix != ".json")
 
 
+def said_so_far(path: Path) -> Mapping[str, str]:
+    """What the file says of itself that is being written."""
+    with path.open("rb") as file:
+        walk = Walk(file, path.stat().st_size)
+        for _ in walk.chunks():
+            pass
+    return walk.metadata[-1].metadata
+
+
 async def listed(base: str) -> list[str]:
     async with httpx.AsyncClient(base_url=base) as client:
         return [row["id"] for row in (await client.get("/api/recordings")).json()["recordings"]]
@@ -59,6 +69,7 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         state = await one.state(lambda s: s["recording"]["messages"] > 20, within_s=SOON_S)
         assert state["recording"]["state"] == "recording"
         assert state["recording"]["left_out"] == ["/camera"]
+        assert state["recording"]["left_out_count"] == 1
         assert state["recording"]["reason"] is None
         assert state["link"]["topics_subscribed"] == 2, "what is heard for the recorder alone counts for nobody else"
         received = state["session"]["received"]
@@ -73,6 +84,10 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         state = await one.state(lambda s: s["session"]["received"] > received + 10, SOON_S)
         assert state["session"]["rejected"] == 0
         name = state["recording"]["name"]
+        (writing,) = (tmp_path / "recordings").rglob("*.writing")
+        async with asyncio.timeout(SOON_S):  # a kill leaves what is in the file by now
+            while said_so_far(writing).get("left_out") != "/camera":
+                await asyncio.sleep(0.1)
         assert (await one.ask(kind="set", values={"speed_limit.max_mps": 12.0}))["ok"]
         assert (await one.ask(kind="pause"))["ok"]
         refused = await one.ask(kind="record", on=True)
@@ -103,7 +118,7 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         assert metadata["vehicle"] == "car"
         assert metadata["address"] == bridge.address  # type: ignore[attr-defined]
         assert (metadata["part"], metadata["ended"], metadata["why"]) == ("1", "closed", "Monitoring was stopped.")
-        assert metadata["left_out"] == "/camera"
+        assert (metadata["left_out"], metadata["left_out_count"]) == ("/camera", "1")
         changes = [said["change"] for _, said in recording.own("/catgraph/alarms")]
         assert [c for c in changes if c in ("started", "connected", "paused")] == ["started", "connected", "paused"]
         assert "settings" in changes[changes.index("connected") : changes.index("paused")]

@@ -13,8 +13,9 @@ import pytest
 from mcap.reader import make_reader
 
 from server.recording.folder import RecordingsFolder
+from server.recording.mcap_file import latest
 from server.recording.recover import recover_all
-from tests.server.recording.recording_child import BEGAN_NS, record_until_killed
+from tests.server.recording.recording_child import BEGAN_NS, MISSING, record_until_killed
 
 AT_ONCE = 2  # more of them would wait for each other on two cores
 OLD_S = 0.5
@@ -27,6 +28,7 @@ class Killed:
     missing: int  # of the messages older than half a second
     lost_s: float  # how old the oldest message was that could not be read
     files: int
+    metadata: dict[str, str]  # of the last file
 
 
 def kill_once(root: Path, after_s: float, part_s: float = 3600.0) -> Killed:
@@ -54,14 +56,22 @@ def kill_once(root: Path, after_s: float, part_s: float = 3600.0) -> Killed:
     assert [one.aside for one in done if one.aside] == []
     assert folder.unfinished() == []
     found: list[int] = []
+    metadata: dict[str, str] = {}
     for path in folder.finished():
         with path.open("rb") as file:
-            rows = [m.log_time for _, _, m in make_reader(file, validate_crcs=True).iter_messages()]
+            reader = make_reader(file, validate_crcs=True)
+            rows = [m.log_time for _, _, m in reader.iter_messages()]
+            metadata = latest(reader.iter_metadata())
         found += [at_ns - BEGAN_NS for at_ns in rows]
     assert found == list(range(len(found))), "each once, in order, none missing in between"
     old = max((handed for at_ns, handed in reports if at_ns <= killed_ns - OLD_S * 1e9), default=0)
     lost_ns = min((at_ns for at_ns, handed in reports if handed > len(found)), default=killed_ns)
-    return Killed(missing=max(0, old - len(found)), lost_s=(killed_ns - lost_ns) / 1e9, files=len(folder.finished()))
+    return Killed(
+        missing=max(0, old - len(found)),
+        lost_s=(killed_ns - lost_ns) / 1e9,
+        files=len(folder.finished()),
+        metadata=metadata,
+    )
 
 
 def kill_often(root: Path, kills: int, part_s: float) -> list[Killed]:
@@ -89,3 +99,12 @@ def test_killed_while_one_part_ends_and_the_next_begins_nothing_is_damaged(tmp_p
     """The disk is waited for between two parts, so here more than half a second may be missing; nothing else is."""
     found = kill_often(tmp_path, kills, part_s=0.3)
     assert any(one.files > 1 for one in found), "some were killed in a later part"
+
+
+@pytest.mark.world(n=4)
+@pytest.mark.slow
+def test_what_is_missing_in_a_recording_is_said_by_one_that_was_recovered(tmp_path: Path) -> None:
+    multiprocessing.get_context("forkserver").set_forkserver_preload(["tests.server.recording.recording_child"])
+    found = kill_once(tmp_path, 1.0)
+    assert found.metadata["ended"] == "recovered"
+    assert {name: found.metadata.get(name) for name in MISSING} == MISSING

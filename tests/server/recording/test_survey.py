@@ -69,7 +69,12 @@ def test_the_topics_of_the_drives_own_settings_count(tmp_path: Path) -> None:
     )
     found = survey(path)
     assert found["top_speed_mps"] is None
-    assert found["left_out"] == ["/camera", "/points"]
+    assert (found["left_out"], found["left_out_count"]) == (["/camera", "/points"], 2)
+    many = "\n".join(f"/camera_{n}" for n in range(500))
+    found = survey(record(tmp_path / "car" / "car_3.mcap", left_out=many, left_out_count="700"))
+    assert (len(found["left_out"]), found["left_out_count"], found["not_received_count"]) == (10, 700, 0)
+    old = survey(record(tmp_path / "car" / "car_4.mcap", left_out=many))
+    assert old["left_out_count"] == 500
     assert survey(record(tmp_path / "car" / "car_2.mcap", settings="[[["))["top_speed_mps"] == 5.0
 
 
