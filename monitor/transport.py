@@ -203,6 +203,10 @@ class TransportDelay:
         fast = [delay_s for delay_s, is_fast in recent if is_fast]
         return max(fast or [delay_s for delay_s, _ in recent], default=self._trip_s)
 
+    def delays(self) -> dict[str, float]:
+        """How old the newest message of each topic was when it came."""
+        return {name: topic.delay_s for name, topic in self._topics.items() if topic.at_s is not None}
+
     def queued_s(self, now_s: float) -> float:
         """How much of that is because more is asked of the link than it carries."""
         return max(0.0, self.late_s(now_s) - min(self._usual_trip_s, self._usual_before_s, USUAL_AT_MOST_S))

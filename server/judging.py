@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from monitor.runner import Monitor, Transition
 from monitor.state import State
-from monitor.transport import TransportDelay
 from monitor.values import Steering
 from server.decode import stamp_s
 from server.profiles import Profile
@@ -18,6 +17,12 @@ from server.tuning import PERCENT_A_RAD
 TICK_S = 0.1  # time judges this often
 
 ByTopic = Mapping[str, tuple[Source, ...]]
+
+
+class Delays(Protocol):
+    """Who knows how old a message was that came: TransportDelay, or a recording of its estimates."""
+
+    def receive(self, topic: str, at_s: float, stamp_s: float | None = None) -> float: ...
 
 
 def by_topic(sources: Iterable[Source]) -> dict[str, tuple[Source, ...]]:
@@ -43,10 +48,11 @@ def receive(
     state: State,
     profile: Profile,
     tyre_rad_per_unit: float,
-    transport: TransportDelay | None = None,
+    transport: Delays | None = None,
 ) -> tuple[str, ...]:
     """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock;
-    `tyre_rad_per_unit` of the steering signal, 0: not known; `transport` None: it came without delay, as from a file.
+    `tyre_rad_per_unit` of the steering signal, 0: not known; `transport` None: it came without
+    delay, as far as is known.
     """
     reception.received += 1
     stamp = stamp_s(message)

@@ -35,6 +35,7 @@ from server.pause import Pause
 from server.problems import Problem
 from server.raw_frame import RawFrame
 from server.reception import Reception, Tally
+from server.recording.delay import LinkDelay
 from server.recording.folder import RecordingsFolder
 from server.recording.recover import Recovered
 from server.scan_feed import ScanFeed
@@ -703,6 +704,10 @@ class Session:
         self._recording.ros_version = self._conversation.ros_version
         self._recording.missing = self._conversation.missing
         self._recording.tick(now_s)
+        if self._phase == "monitoring":
+            facts = self._facts(now_s)
+            link = LinkDelay(now_s, facts.late_s, facts.throttled, facts.reduced)
+            self._recording.delays(self._transport.delays(), link)
         self._conversation.record(self._recording.also)
         self._state.recorder(self._recording.facts(now_s))
 

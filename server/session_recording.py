@@ -11,7 +11,7 @@ import contextlib
 import math
 import uuid
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from server import wire
 from server.address import without_login
 from server.others import Also, Missing
 from server.recording import space
+from server.recording.delay import DelayWriter, LinkDelay
 from server.recording.folder import RecordingsFolder, id_of, part_id
 from server.recording.own import Own
 from server.recording.recorder import Part, Recorder, Status
@@ -55,6 +56,7 @@ class _Tape:
     due_s: float | None = None  # a part is to begin with the next message, or at this moment
     noted: Missing | None = None  # what the part says already of what is missing in it
     noted_s: float = -math.inf
+    delays: DelayWriter = field(default_factory=DelayWriter)  # of the part
 
     @property
     def newest(self) -> int:
@@ -214,6 +216,14 @@ class SessionRecording:
             self.own("phone", {"by": by} | {name: value for name, value in said.items() if name != "kind"})
         else:
             self.own("operator", {"by": by, "ok": reason is None, "reason": reason} | said)
+
+    def delays(self, delays: Mapping[str, float], link: LinkDelay) -> None:
+        """How old what comes is, once a tick: whoever judges the recording must know it."""
+        tape = self._tape
+        if tape is not None and tape.is_open and self._recorder is not None:
+            row = tape.delays.row(delays, link)
+            if row is not None:
+                self._recorder.own("delay", row, self._ns(self._now()))
 
     def events(self, numbered: list[dict[str, Any]]) -> None:
         """Numbered events of the log."""
@@ -404,6 +414,7 @@ class SessionRecording:
         self.prepare()
         assert self._recorder is not None
         self._recorder.allowance = self._allowance()
+        tape.delays = DelayWriter()
         tape.begun, tape.noted, tape.noted_s = part, None, -math.inf
         self._recorder.begin(part)
         if self._definitions:

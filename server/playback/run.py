@@ -24,6 +24,7 @@ from server.judging import TICK_S
 from server.playback.slowed import SlowDownTold, Slowed
 from server.playback.told import NewSettings, Pause, Told
 from server.reception import Reception
+from server.recording.delay import LinkDelay, RecordedDelay
 from server.recording.read import Recording
 from server.rehearsal.thresholds import Wishes, tuning_for
 from server.scan_feed import judged
@@ -84,6 +85,8 @@ class Drive:
         self.length_s = recording.duration_s
         self.ros_version = recording.ros_version
         self.notes: list[str] = [*recording.notes, *told.notes]
+        delay = RecordedDelay(recording)
+        self.delay = delay if delay.is_known else None
         self._names: dict[str, str] = {}  # as the recording spells a topic → as a bridge would offer it
         for topic in recording.topics:
             with contextlib.suppress(BadName):
@@ -230,6 +233,7 @@ class Run:
             state=known.state,
             profile=self._ways.tuning.profile,
             tyre_rad_per_unit=self._ways.tuning.limits.steering.tyre_rad_per_unit,
+            transport=self.drive.delay,
         )
         if changed:
             self._tell(judging.judge(known.monitor, known.state, now_s, changed))
@@ -293,7 +297,11 @@ class Run:
     def _link(self, now_s: float) -> LinkFacts:
         """A link that opened with the first message and answers as long as there is something to read."""
         known = self.known
+        delay = self.drive.delay.link(now_s) if self.drive.delay is not None else LinkDelay()
         return LinkFacts(
+            late_s=delay.late_s,
+            throttled=delay.throttled,
+            reduced=delay.reduced,
             phase="monitoring",
             since_s=known.opened_s,
             bridge_heard_s=now_s,

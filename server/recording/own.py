@@ -12,7 +12,7 @@ PREFIX = "/catgraph/"
 LIBRARY = "catgraph"  # how the header of our files begins to say who wrote them
 METADATA = "catgraph"  # the name of the metadata record that says whose drive it is
 
-Own = Literal["alarms", "phone", "operator", "settings", "link", "commands"]
+Own = Literal["alarms", "phone", "operator", "settings", "link", "commands", "delay"]
 
 _TEXT: dict[str, Any] = {"type": "string"}
 _MAYBE_TEXT: dict[str, Any] = {"type": ["string", "null"]}
@@ -39,6 +39,10 @@ _CHANNELS: dict[Own, tuple[str, dict[str, Any]]] = {
     "link": (
         "The link to the car whenever it changed, and what is recorded of its topics.",
         {"phase": _TEXT, "address": _MAYBE_TEXT, "problem": _MAYBE_TEXT, "ros_version": {"type": ["integer", "null"]}},
+    ),
+    "delay": (
+        "The delay of the link where it changed: of each topic's newest message, in seconds, and of the link.",
+        {"late_s": {"type": ["number", "null"]}, "delays": {"type": "object"}},
     ),
     "commands": (
         "What was sent to the car, exactly as it was sent.",

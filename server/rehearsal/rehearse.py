@@ -18,6 +18,7 @@ from server import judging
 from server.bridge.names import BadName, canonical_name
 from server.judging import TICK_S
 from server.reception import Reception
+from server.recording.delay import LinkDelay, RecordedDelay
 from server.recording.read import Recording, RecordingUnreadable, Row
 from server.rehearsal.episodes import Diary, Episode
 from server.rehearsal.faults import Faults, Laid
@@ -33,6 +34,7 @@ from server.tuning import Tuning
 
 SAMPLE_TICKS = ASKED_EVERY  # what every check says is known then, without asking any again
 _link_facts = maker(LinkFacts)  # one for each tick
+_NO_DELAY = LinkDelay()
 SILENCE_S = 600.0  # after so long without a message nothing new can be said: the judge is not stepped through the rest
 
 
@@ -121,6 +123,8 @@ class _Run:
         self._monitor = Monitor(limits=self._tuning.limits)
         self._state = State(expected_rates(self._tuning.limits))
         self._reception = Reception()
+        delay = RecordedDelay(recording)
+        self._delay = delay if delay.is_known else None
         self._published = judging.published(self._sources.values())
         self._last_message_s: float | None = None
         self._opened_s = 0.0
@@ -202,6 +206,7 @@ class _Run:
                     state=state,
                     profile=profile,
                     tyre_rad_per_unit=monitor.limits.steering.tyre_rad_per_unit,
+                    transport=self._delay,
                 )
                 if changed:
                     transitions = judging.judge(monitor, state, now_s, changed)
@@ -256,7 +261,11 @@ class _Run:
 
     def _link(self, now_s: float) -> LinkFacts:
         """A link that opened with the first message and answers as long as there is something to read."""
+        delay = self._delay.link(now_s) if self._delay is not None else _NO_DELAY
         return _link_facts(
+            late_s=delay.late_s,
+            throttled=delay.throttled,
+            reduced=delay.reduced,
             phase="monitoring",
             since_s=self._opened_s,
             bridge_heard_s=now_s,

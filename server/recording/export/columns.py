@@ -147,6 +147,11 @@ OWN_TABLES: Mapping[str, OwnTable] = {
         file="commands.csv",
         columns={"topic": "topic", "type": "type", "by": "by"},
     ),
+    "/catgraph/delay": OwnTable(
+        what="How late the link was, whenever that changed. `delays` in the details: of each topic's newest message.",
+        file="delay.csv",
+        columns={"late [s]": "late_s", "asked for less": "reduced"},
+    ),
     "/catgraph/link": OwnTable(
         what="The link to the car whenever it changed.",
         file="link.csv",
