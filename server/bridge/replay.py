@@ -18,6 +18,7 @@ from server.bridge.names import BadName, canonical_name, canonical_type
 from server.bridge.player import play
 from server.bridge.replay_report import Report, say
 from server.bridge.server import CannotListen, RosBridge
+from server.bridge.stamps import moved
 from server.recording.read import Recording, RecordingUnreadable, open_recording
 from server.source import Message
 
@@ -124,9 +125,11 @@ class _Replay:
         if self._args.wait:
             await self._wait_for_subscribers()
         self._report.begin()
+        rounds = Rounds(self._args.rate)
         while True:
             round_ends_s = time.monotonic() + SHORTEST_ROUND_S
-            await play(self._messages(), self._bridge, rate=self._args.rate, ahead=AHEAD, on_message=self._report.note)
+            messages = rounds.next(self._messages(), time.monotonic())
+            await play(messages, self._bridge, rate=self._args.rate, ahead=AHEAD, on_message=self._report.note)
             if not self._args.loop:
                 return
             await asyncio.sleep(max(0.0, round_ends_s - time.monotonic()))
@@ -153,6 +156,22 @@ class _Replay:
     def _is_heard(self) -> bool:
         topics = (self._bridge.graph.find(name) for name in self._names.values())
         return any(topic is not None and topic.subscribers for topic in topics)
+
+
+class Rounds:
+    """One playing after the other: the clock in the stamps goes on where it was, as a car's does."""
+
+    def __init__(self, rate: float) -> None:
+        self._rate = rate
+        self._began_s: float | None = None
+
+    def next(self, messages: Iterator[Message], now_s: float) -> Iterator[Message]:
+        """The messages of a round that begins now."""
+        if self._began_s is None:
+            self._began_s = now_s
+            return messages
+        by_s = (now_s - self._began_s) * self._rate
+        return (replace(message, message=moved(message.message, by_s)) for message in messages)
 
 
 def _renamed(recording: Recording, remap: dict[str, str]) -> dict[str, str]:
