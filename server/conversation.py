@@ -18,7 +18,7 @@ from server.passing import CLIENT_COUNT, Passing
 from server.problems import Problem
 from server.questions import Asks, Questions
 from server.source import RosVersion
-from server.topics import BY_SIGNAL, TOPICS, Source, could_carry, map_signals, plain_type
+from server.topics import BY_SIGNAL, COMMAND, TOPICS, Source, could_carry, map_signals, plain_type
 from server.tuning import Tuning
 
 log = logging.getLogger("catgraph.conversation")
@@ -154,6 +154,12 @@ class Conversation:
         elif self._link is not None and self.by_topic:
             self._subscribe_by_name(self._link)
         return True
+
+    @property
+    def _commanded(self) -> set[str | None]:
+        """Where the car is commanded: there the bridge is a publisher once we have armed, and nothing need come."""
+        source = self.sources.get(COMMAND)
+        return {self.commanded_on, source.topic if source is not None else None}
 
     def end(self) -> None:
         """Whatever is still answered is of no interest any more."""
@@ -377,7 +383,8 @@ class Conversation:
         candidates = could_carry(offer.topics, self._tuning.settings.topics)
         topics = self._delivery.to_ask(self._now(), candidates)
         answers = await asyncio.gather(
-            *(discovery.ask_publishers(asks, topic, and_bridge=True) for topic in topics), return_exceptions=True
+            *(discovery.ask_publishers(asks, topic, and_bridge=topic not in self._commanded) for topic in topics),
+            return_exceptions=True,
         )
         if link is not self._link:
             return

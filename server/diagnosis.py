@@ -56,9 +56,12 @@ class Diagnosis:
     def failed(self, words: str) -> None:
         """The bridge answered a question with a failure, in these words."""
         self.is_rosbridge = True
+        cause = cause_of(words)
+        if cause == "killed" and self._asked_s is not None:
+            return  # a bridge of ROS 1 gives up after 5 s and says the same: rosapi hangs
         self._asked_s = None
         self._failures += 1
-        self._cause = cause_of(words)
+        self._cause = cause
         if self._cause == "no_master":
             self._master_was_gone, self._master_is_back = True, False
 

@@ -112,7 +112,7 @@ class LinkLoad:
 
     def throttled(self, now_s: float) -> frozenset[str]:
         """The signals whose rate is ours and not the car's, also until it has been measured anew."""
-        for name in SIGNALS:
-            if self.throttle_ms(name):
-                self._judged_since_s[name] = now_s
+        if self.step:
+            # Also where nothing is throttled: the bridge keeps one message of each, and loses the others of a burst.
+            self._judged_since_s.update(dict.fromkeys(SIGNALS, now_s))
         return frozenset(name for name, at_s in self._judged_since_s.items() if now_s - at_s <= SETTLE_S)

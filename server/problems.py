@@ -176,8 +176,9 @@ def hidden_topics(topics: Sequence[str]) -> Problem:
     return Problem(
         code="topics_hidden",
         title=f"The bridge does not pass on {_names(topics)}.",
-        hint="They have a publisher, but the bridge did not subscribe to them: its topics_glob hides them. "
-        "Start rosbridge with a topics_glob that includes them, or without one.",
+        hint="They have a publisher, but the bridge did not subscribe to them: its topics_glob hides them, or their "
+        "message types are not installed where it runs. Start rosbridge with a topics_glob that includes them, or "
+        "without one, and with their packages.",
         mark="hidden topics",
     )
 

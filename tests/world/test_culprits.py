@@ -93,6 +93,18 @@ def test_no_answer_is_named_after_a_while(was_there: bool, flows: bool, code: st
     assert one.problem(9.1, flows=flows) is None
 
 
+def test_a_rosapi_that_hangs_stays_named_when_the_bridge_gives_its_question_up() -> None:
+    """A real bridge of ROS 1 answers 5 s after the question, with the words of a rosapi that was killed."""
+    one = Diagnosis()
+    one.answered(0.0)
+    one.unanswered(1.0)
+    assert one.problem(4.0, flows=True) == problems.ROSAPI_SILENT
+    one.failed(KILLED)
+    assert one.problem(6.1, flows=True) == problems.ROSAPI_SILENT
+    one.answered(9.0)
+    assert one.problem(9.1, flows=True) is None
+
+
 def passing(subscribers: tuple[str, ...] | None, *, clients: int | None = None) -> Passing:
     one = Passing(bridges=frozenset({"/rosbridge_websocket"}))
     one.follow(["/gps_fix"], 0.0)
@@ -109,6 +121,7 @@ def test_a_topic_that_the_bridge_did_not_subscribe_to_is_hidden() -> None:
     assert found.code == "topics_hidden"
     assert "/gps_fix" in found.title
     assert "topics_glob" in found.hint
+    assert "types are not installed" in found.hint, "a bridge without a type's package behaves the same"
 
 
 def test_a_topic_that_is_subscribed_and_does_not_come_is_blocked_by_a_neighbour() -> None:

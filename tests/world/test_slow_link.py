@@ -8,8 +8,9 @@ from itertools import pairwise
 
 import pytest
 
+from monitor.signals import SIGNALS
 from monitor.transport import TransportDelay
-from server.link_load import LEVELS, RESTORE_AFTER_S, LinkLoad
+from server.link_load import LEVELS, RESTORE_AFTER_S, SETTLE_S, LinkLoad
 from tests.monitor.slow_links import Link, Stream, run
 
 SHORT = 40
@@ -170,6 +171,17 @@ def test_a_very_slow_link_is_asked_for_the_least_at_once_a_hiccup_for_nothing_le
     assert not load.look(0.1, 0.4)
     assert any(load.look(2.0, 1.0 + tick / 10) for tick in range(6))
     assert load.step == len(LEVELS) - 1
+
+
+def test_while_less_is_asked_for_no_rate_is_the_car_s() -> None:
+    """The bridge keeps one message of each topic then, and loses the others of a burst."""
+    load = LinkLoad()
+    assert not load.throttled(0.0)
+    load.step = 1
+    assert load.throttled(1.0) == set(SIGNALS)
+    load.step = 0
+    assert load.throttled(1.0 + SETTLE_S) == set(SIGNALS), "the rate has to be measured anew"
+    assert not load.throttled(1.1 + SETTLE_S)
 
 
 def test_what_is_judged_is_thinned_last() -> None:
