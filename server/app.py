@@ -17,6 +17,7 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp
 
 from monitor.catalog import AnyCheck
+from server import preload  # noqa: F401
 from server.access.access import Access
 from server.access.guard import Guard
 from server.bus import LocalBus

@@ -7,15 +7,21 @@ import logging
 import math
 import sqlite3
 import threading
+import time
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from server.web.pictures import media_type, plain_text
+from server.web.pictures import media_type, pixels, plain_text
 
 log = logging.getLogger("catgraph.map")
 
+LARGEST_BYTES = 4 << 20  # of a tile, and of all else that the file holds in one place; tiles have some 50 kB
+MOST_PIXELS = 4096  # along an edge of a tile; usual are 256 and 512
+MOST_METADATA = 1000  # rows
+LOOK_S, TILE_S = 60.0, 1.0  # a file may hold a view that never ends; without an index the look goes through all tiles
+_STEPS = 100_000  # of SQLite between two looks at the clock, some ms
 DEEPEST = 24  # 1 cm a pixel; a deeper number is no zoom level
 _VECTOR = ("pbf", "mvt", "mlt")
 _GZIP = b"\x1f\x8b"  # vector tiles are packed so, pictures never
@@ -45,13 +51,17 @@ class MapFile:
         self._lock = threading.Lock()
         self._said_damaged = False
         self._rows = _opened(path)
+        self._until_s = math.inf
+        self._rows.set_progress_handler(lambda: time.monotonic() > self._until_s, _STEPS)
         try:
+            self._until_s = time.monotonic() + LOOK_S
             self.layer = self._look()
         except MapRefused:
             self._rows.close()
             raise
-        except (sqlite3.Error, OverflowError) as why:
+        except (sqlite3.Error, OverflowError) as error:
             self._rows.close()
+            why = "it takes too long" if time.monotonic() > self._until_s else error
             raise MapRefused(f"The map {path} cannot be read: {why}.") from None
 
     def close(self) -> None:
@@ -69,10 +79,13 @@ class MapFile:
                 log.error("the map %s is damaged: %s", self._path, why)
             return None
         kind = media_type(data) if data else None
-        return (data, kind) if data and kind else None
+        if not data or not kind or max(pixels(data) or (0, 0)) > MOST_PIXELS:
+            return None
+        return data, kind
 
     def _read(self, z: int, column: int, row: int) -> bytes | None:
         with self._lock:
+            self._until_s = time.monotonic() + TILE_S
             found = self._rows.execute(
                 "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ?",
                 (z, column, row),
@@ -85,7 +98,10 @@ class MapFile:
             raise MapRefused(f"{self._path} is no MBTiles file: it has no tiles.")
         told: dict[str, str] = {}
         if "metadata" in names:
-            told = {str(name): str(value) for name, value in self._rows.execute("SELECT name, value FROM metadata")}
+            told = {
+                str(name): str(value)
+                for name, value in self._rows.execute(f"SELECT name, value FROM metadata LIMIT {MOST_METADATA}")
+            }
         one = self._rows.execute("SELECT tile_data FROM tiles LIMIT 1").fetchone()
         if one is None:
             raise MapRefused(f"The map {self._path} has no tile in it.")
@@ -127,6 +143,7 @@ def _opened(path: Path) -> sqlite3.Connection:
     for promise in ("mode=ro", "mode=ro&immutable=1"):
         try:
             rows = sqlite3.connect(f"{path.resolve().as_uri()}?{promise}", uri=True, check_same_thread=False)
+            rows.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_BYTES)
             rows.execute("PRAGMA query_only = on")
             with closing(rows.execute("SELECT count(*) FROM sqlite_master")) as counted:
                 counted.fetchone()

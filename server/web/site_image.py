@@ -21,9 +21,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from monitor.geo import offset_m
 from server import bounded_toml
 from server.web.mbtiles import MapRefused
-from server.web.pictures import media_type, plain_text
+from server.web.pictures import media_type, pixels, plain_text
 
 LARGEST_BYTES = 32 * 2**20
+MOST_PIXELS = 64 * 10**6  # 256 MB in a browser
 LEAST_M, MOST_M = 1.0, 20_000.0  # an edge of the picture on the ground
 
 Place = tuple[Annotated[float, Field(ge=-85.0, le=85.0)], Annotated[float, Field(ge=-180.0, le=180.0)]]
@@ -65,6 +66,11 @@ def site_image(path: Path) -> SiteImage:
     kind = media_type(data)
     if kind is None:
         raise MapRefused(f"The site image {path} is neither png, nor jpg, nor webp.")
+    width, height = pixels(data) or (0, 0)
+    if width * height > MOST_PIXELS:
+        raise MapRefused(
+            f"The site image {path} has {width} × {height} pixels; a phone can draw {MOST_PIXELS // 10**6} million."
+        )
     try:
         told = _Beside.model_validate(bounded_toml.loads(_beginning(beside)))
     except OSError as why:

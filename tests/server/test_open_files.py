@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import resource
+import subprocess
+import sys
 
 import pytest
 
@@ -61,3 +63,15 @@ async def test_it_is_an_alarm_and_the_checks_go_on(bridge: RosBridge, monkeypatc
         await page.until(lambda: {"speed_limit", "monitoring_impaired"} <= standing(), within_s=20.0)
         texts = [str(alarm) for alarm in page.states[-1]["alarms"] if alarm["id"] == "monitoring_impaired"]
         assert "files and connections" in texts[0]
+
+
+def test_nothing_that_slows_or_serves_is_imported_when_no_file_can_be_opened_any_more() -> None:
+    """What libraries import late is imported with the server."""
+    script = (
+        "import sys, server.app, resource, numpy, time\n"
+        "resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))\n"
+        "numpy.median([1.0, 2.0, 3.0]); time.strptime('5', '%S'); 'ä.de'.encode('idna')\n"
+        "assert 'anyio._backends._asyncio' in sys.modules\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
