@@ -15,6 +15,7 @@ from server.link import MAX_MESSAGE_BYTES, CallFailed, LinkDown, RosLink, Subscr
 from server.link_load import LinkLoad
 from server.others import Also, Missing
 from server.passing import CLIENT_COUNT, Passing
+from server.probation import Probation
 from server.problems import Problem
 from server.questions import Asks, Questions
 from server.source import RosVersion
@@ -84,6 +85,8 @@ class Conversation:
         self.others: Mapping[str, str] = {}  # topic → type of what is subscribed to only to be recorded
         self.left_out: tuple[str, ...] = ()  # topics that are not recorded, for they are bulky or there are too many
         self.diagnosis = Diagnosis()
+        self._probation = Probation()
+        self._may_be_large: set[str] = set()  # types that have arrays without a bound
         self._passing = Passing()
         self._by_name_s: float | None = None  # when the names were last subscribed to without rosapi
         self._by_name_pause_s = BY_NAME_AGAIN_S
@@ -103,6 +106,7 @@ class Conversation:
         link, asks = self._link, self._questions
         looked_s = -LOOK_AGAIN_S
         self._delivery.opened(self._now())
+        self._probation.opened(self._now())
         self.diagnosis.opened()
         self._passing.opened()
         self._by_name_s, self._by_name_pause_s = self._now(), BY_NAME_AGAIN_S
@@ -115,6 +119,8 @@ class Conversation:
                 alive = await discovery.ask_alive(asks, timed=partial(self._timed, asked_s))
                 if self.commanded_on is not None:
                     self.publishers = await discovery.ask_publishers(asks, self.commanded_on)
+                if self.load.level.records_others and self._probation.look(self._now()):
+                    self._subscribe()
                 await self._watch_delivery(link, asks)
                 await self._watch_passing(link, asks)
             except LinkDown:
@@ -147,8 +153,13 @@ class Conversation:
 
     def watch_load(self, late_s: float) -> bool:
         """Asks for less where the link is late, and for more once it is in time; True where that changed."""
+        before = self.load.step
         if not self.load.look(late_s, self._now()):
             return False
+        if before == 0:
+            self._tell_left(self._probation.silent(()))
+        elif self.load.step == 0:
+            self._probation.opened(self._now())
         if self._offer is not None:
             self._subscribe()
         elif self._link is not None and self.by_topic:
@@ -185,8 +196,24 @@ class Conversation:
 
     def heard(self, topic: str) -> None:
         """A message came on a topic."""
+        self._probation.heard(topic)
         if self._delivery.heard(topic, self._now()):
             self._look_soon = True  # it has a publisher now: it may carry a signal
+
+    def fell_silent(self) -> None:
+        """The link was given up because the bridge did not answer; it may be busy with what is only recorded."""
+        suspects = [
+            topic
+            for topic, kind in self.others.items()
+            if kind in self._may_be_large and topic not in self._delivery.delivered
+        ]
+        self._tell_left(self._probation.silent(suspects))
+        if suspects and self._offer is not None:
+            self._subscribe()  # before the link asks for them again
+
+    def _tell_left(self, topics: list[str]) -> None:
+        for topic in topics:
+            self._noted(f"{topic} is not received any more: while it is asked for, the bridge does not answer in time.")
 
     def skipped(self, topic: str | None, size: int) -> None:
         """A message that was too large to be read. The second one of a topic ends its subscription: it would take the
@@ -304,6 +331,7 @@ class Conversation:
         if link is self._link:
             self._asked |= types
             self._fit |= fit
+            self._may_be_large |= {kind for kind in types if kind not in found or "[]" in found[kind]}
             if found:
                 self._learned(found)
             self._subscribe()
@@ -349,6 +377,9 @@ class Conversation:
             self.others, self.left_out = others.choose(
                 self._offer.topics, without={*wanted, *too_large}, also=self._also, asked=self._asked
             )
+            held = self._probation.held & self.others.keys()
+            self.left_out = tuple(sorted({*self.left_out, *held}))
+            self.others = {topic: kind for topic, kind in self.others.items() if topic not in held}
             if not self.load.level.records_others:
                 self.left_out = tuple(sorted({*self.left_out, *self.others}))
                 self.others = {}

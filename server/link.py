@@ -37,6 +37,7 @@ from roslibpy.comm.comm_asyncio import AsyncioRosBridgeClientFactory, AsyncioRos
 from server import frames, problems
 from server.address import Address, BadAddress, refuse_forbidden
 from server.clean_text import clean
+from server.fragments import Fragments, TooLarge, is_fragment
 from server.large_message import ENDS_BYTES, topic_of
 from server.outgoing import NotAllowed, Outgoing
 from server.problems import Problem
@@ -375,6 +376,7 @@ class RosLink:
         self._ids = itertools.count(1)
         self._stopped = False
         self._outgoing = Outgoing()
+        self._fragments = Fragments(MAX_MESSAGE_BYTES)
         self._was_asked = False  # anything, on this connection
         self.junk_count = 0  # frames that were no operations, on this connection
         self.server_software = ""  # what the other side called itself in its newest handshake
@@ -567,6 +569,7 @@ class RosLink:
             socket.dropConnection(abort=True)
             return
         self._socket = socket
+        self._fragments = Fragments(MAX_MESSAGE_BYTES)
         self._outgoing.reset()
         self._was_asked, self.junk_count = False, 0
         self.server_software = str((getattr(socket, "http_headers", None) or {}).get("server", ""))[:60]
@@ -625,6 +628,9 @@ class RosLink:
         if socket is not self._socket:
             return  # stopped, or dropped: what is still in the pipe is no news
         self.frame_bytes = len(payload)
+        if is_fragment(payload, is_binary):
+            self._fragment(socket, payload)
+            return
         raw = raw_frame(payload, is_binary)
         if raw is not None and self._takes_unparsed(raw):
             return
@@ -646,9 +652,23 @@ class RosLink:
                 level, text = _words(operation.get("level"), 20), _words(operation.get("msg"), 500)
                 self._tell(self._listener.status_received, level, text)
             case "fragment":
-                self._junk(socket, "a fragment, which was not asked for")
+                self._junk(socket, "a fragment that cannot be put together")
             case _:
                 self._junk(socket, "an operation that rosbridge does not have")
+
+    def _fragment(self, socket: _BridgeProtocol, payload: bytes) -> None:
+        try:
+            whole = self._fragments.add(payload)
+        except frames.Unreadable as error:
+            self._junk(socket, str(error))
+            return
+        if isinstance(whole, TooLarge):
+            self._skipped(socket, whole.topic, whole.size)
+        elif whole is not None:
+            if is_fragment(whole, False):
+                self._junk(socket, "fragments that hold a fragment")
+            else:
+                self._frame(socket, whole, False)
 
     def _takes_unparsed(self, raw: RawFrame) -> bool:
         """Whether nothing more is to be done with a frame; it is parsed where this fails."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from server.address import Address, BadAddress
 
 LOGIN_WANTED = "login_wanted"
+BRIDGE_SILENT = "bridge_silent"
 ROSBRIDGE_SERVERS = ("AutobahnPython", "TornadoServer")  # what rosbridge of ROS 1 and ROS 2 is built on
 MAX_NAMES = 3  # of topics in a sentence
 
@@ -202,7 +203,7 @@ def _names(topics: Sequence[str]) -> str:
 
 def bridge_silent(address: Address) -> Problem:
     return Problem(
-        code="bridge_silent",
+        code=BRIDGE_SILENT,
         title="The bridge does not answer.",
         hint=f"Nothing comes from {address.shown}: the car is out of radio range, switched off, or rosbridge hangs.",
         mark="silent",

@@ -554,6 +554,8 @@ class Session:
     def link_closed(self, problem: Problem) -> None:
         now_s = self._now()
         self._slowing.link_closed()
+        if problem.code == problems.BRIDGE_SILENT:
+            self._conversation.fell_silent()
         if self._proved:
             is_new = self._phase != "lost"
             self._problem = problem

@@ -38,7 +38,10 @@ JUNK: dict[str, tuple[bytes | str, str]] = {
     "an operation that is a list": ('{"op":["publish"]}', "an operation that rosbridge does not have"),
     "an operation that is an object": ('{"op":{}}', "an operation that rosbridge does not have"),
     "a client's operation": ('{"op":"subscribe","topic":"/a"}', "an operation that rosbridge does not have"),
-    "a fragment": ('{"op":"fragment","id":"1","data":"{","num":0,"total":2}', "a fragment, which was not asked for"),
+    "a fragment": (
+        '{"op":"fragment","id":"1","data":"{","num":1,"total":2}',
+        "a fragment that does not fit the one before",
+    ),
     "a publish without msg": ('{"op":"publish","topic":"/a"}', "a publish without topic or msg"),
     "a publish without topic": ('{"op":"publish","msg":{}}', "a publish without topic or msg"),
     "a topic that is a list": ('{"op":"publish","topic":["/a"],"msg":{}}', "a publish without topic or msg"),

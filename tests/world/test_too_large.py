@@ -71,3 +71,29 @@ async def test_the_second_such_message_ends_its_subscription_and_names_the_topic
                         await asyncio.sleep(0.05)
             finally:
                 camera.cancel()
+
+
+async def test_a_bridge_of_ros_2_sends_them_in_fragments_and_it_is_the_same(tmp_path: Path) -> None:
+    """As CBOR such a message never comes; as JSON it comes in pieces of 10 MB."""
+    cloud = {"layout": {"dim": [], "data_offset": 0}, "data": b"\0" * MAX_MESSAGE_BYTES}
+
+    async def scan(bridge: RosBridge) -> None:
+        while True:
+            bridge.publish("/cloud", cloud)
+            await asyncio.sleep(1.0)
+
+    async with bridging(ros_version=2, like="real") as (bridge, port):
+        bridge.advertise("/catvehicle/vel", "geometry_msgs/msg/Twist")
+        bridge.advertise("/cloud", "std_msgs/msg/UInt8MultiArray")
+        config = Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{port}"),), data=tmp_path)
+        async with serving(config) as base, driving(bridge), viewer(base) as one:
+            clouds = asyncio.create_task(scan(bridge))
+            try:
+                state = await one.state(lambda s: bool(s["recording"]["too_large"]), within_s=60)
+                assert state["recording"]["too_large"] == [{"topic": "/cloud", "mb": 21.3}]
+                topic = bridge.graph.find("/cloud")
+                async with asyncio.timeout(10):
+                    while topic is not None and topic.subscribers:
+                        await asyncio.sleep(0.05)
+            finally:
+                clouds.cancel()

@@ -1,0 +1,115 @@
+"""A topic that is only recorded and keeps a bridge from answering does not cost what is judged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from server import probation
+from server.config import Config, Vehicle
+from server.conversation import Conversation
+from server.link import RosLink
+from server.probation import LEFT_AFTER, STEADY_S, Probation
+from server.session import Session
+from tests.server.bridge.conftest import bridging
+from tests.server.cars import driving
+from tests.server.conftest import serving
+from tests.server.ear import until
+from tests.server.viewer import viewer
+
+pytestmark = pytest.mark.world(n=10)
+SOON_S = 60.0  # on two busy cores
+
+
+def drive(one: Probation, *, bad: str, suspects: list[str], seconds: float = 60.0) -> tuple[int, list[str]]:
+    """The link falls silent a second after `bad` is subscribed to. How often it did, and what was left."""
+    losses, left, asked_s = 0, [], 0.0
+    one.opened(0.0)
+    for tick in range(int(seconds * 10)):
+        now_s = tick / 10
+        before = bad in one.held
+        one.look(now_s)
+        if before and bad not in one.held:
+            asked_s = now_s
+        if bad not in one.held and now_s - asked_s >= 1.0:
+            losses += 1
+            left += one.silent([topic for topic in suspects if topic not in one.held])
+            one.opened(now_s + 1.0)
+            asked_s = now_s + 1.0
+    return losses, left
+
+
+def test_the_one_that_silences_the_bridge_is_found_and_left_and_all_others_come_back() -> None:
+    one, suspects = Probation(), ["/a", "/cloud", "/z"]
+    losses, left = drive(one, bad="/cloud", suspects=suspects)
+    assert left == ["/cloud"]
+    assert losses == 1 + LEFT_AFTER, "once with all of them, and then alone"
+    assert one.held == {"/cloud"}
+
+
+def test_a_lost_radio_holds_them_back_for_a_while_and_leaves_none() -> None:
+    one = Probation()
+    one.opened(0.0)
+    assert one.silent(["/a", "/b"]) == []
+    one.opened(10.0)
+    assert one.held == {"/a", "/b"}
+    assert not one.look(10.0 + STEADY_S - 0.1)
+    assert one.look(10.0 + STEADY_S)
+    assert one.held == {"/b"}
+    one.heard("/b")  # it cannot be this one
+    assert one.look(10.0 + 2 * STEADY_S) is False
+    assert one.held == set()
+
+
+def test_while_the_link_is_down_none_is_tried() -> None:
+    one = Probation()
+    one.opened(0.0)
+    one.silent(["/a"])
+    assert not one.look(1e6)
+    assert one.held == {"/a"}
+
+
+async def test_after_a_silence_of_the_bridge_the_large_ones_that_never_came_wait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(probation, "STEADY_S", 3.0)
+    links: list[RosLink] = []
+    silent = Conversation.fell_silent
+
+    def fell_silent(conversation: Conversation) -> None:
+        assert conversation._link is not None
+        links.append(conversation._link)
+        silent(conversation)
+
+    monkeypatch.setattr(Conversation, "fell_silent", fell_silent)
+    opened: list[Any] = []
+    link_opened = Session.link_opened
+
+    def keep(session: Session) -> None:
+        opened.append(session._link)
+        link_opened(session)
+
+    monkeypatch.setattr(Session, "link_opened", keep)
+    async with bridging(ros_version=2, like="real") as (bridge, port):
+        bridge.advertise("/catvehicle/vel", "geometry_msgs/msg/Twist")
+        bridge.advertise("/cloud", "std_msgs/msg/UInt8MultiArray")
+        bridge.advertise("/word", "std_msgs/msg/String")
+
+        def is_asked_for(topic: str) -> bool:
+            found = bridge.graph.find(topic)
+            return bool(found and found.subscribers)
+
+        config = Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{port}"),), data=tmp_path)
+        async with driving(bridge), serving(config) as base, viewer(base) as one:
+            await until(lambda: is_asked_for("/cloud") and is_asked_for("/word"), within_s=SOON_S)
+            socket = opened[0]._socket
+            socket.was_silent = True
+            socket.dropConnection(abort=True)
+            await until(lambda: links and not is_asked_for("/word"), within_s=SOON_S)
+            await until(lambda: is_asked_for("/word"), within_s=SOON_S)
+            assert not is_asked_for("/cloud")
+            await one.state(lambda s: s["recording"]["left_out"] == ["/cloud"], SOON_S)
+            await until(lambda: is_asked_for("/cloud"), within_s=SOON_S)
+            await one.state(lambda s: s["recording"]["left_out"] == [], SOON_S)
