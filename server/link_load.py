@@ -41,13 +41,13 @@ LEVELS = (
     Level(
         words="Topics that are only recorded are left out, all signals come less often",
         scan_ms=500,
-        trends_ms=1000,
+        trends_ms=500,
         judged_ms=100,
     ),
     Level(
         words="Topics that are only recorded are left out, all signals come at 5 Hz at most",
         scan_ms=500,
-        trends_ms=1000,
+        trends_ms=500,
         judged_ms=200,
     ),
 )

@@ -8,9 +8,10 @@ from itertools import pairwise
 
 import pytest
 
+from monitor.rates import STALE_FLOOR_S
 from monitor.signals import SIGNALS
 from monitor.transport import TransportDelay
-from server.link_load import LEVELS, RESTORE_AFTER_S, SETTLE_S, LinkLoad
+from server.link_load import LEVELS, RESTORE_AFTER_S, RESTORE_BELOW_S, SETTLE_S, LinkLoad
 from tests.monitor.slow_links import Link, Stream, run
 
 SHORT = 40
@@ -182,6 +183,12 @@ def test_while_less_is_asked_for_no_rate_is_the_car_s() -> None:
     load.step = 0
     assert load.throttled(1.0 + SETTLE_S) == set(SIGNALS), "the rate has to be measured anew"
     assert not load.throttled(1.1 + SETTLE_S)
+
+
+def test_no_signal_falls_silent_because_less_is_asked_for() -> None:
+    """Between two messages a value grows as old as the pause, beyond how late it came."""
+    for level in LEVELS:
+        assert max(level.judged_ms, level.scan_ms, level.trends_ms) / 1000 + RESTORE_BELOW_S < STALE_FLOOR_S
 
 
 def test_what_is_judged_is_thinned_last() -> None:
