@@ -17,46 +17,55 @@ class WhyWords:
     brief: str
 
 
-def why_words(why: Why, view: PhoneView, now_s: float) -> WhyWords:
+def name_of(view: PhoneView) -> str:
+    """The phone as an alarm names it: every operator reads that, so "this phone" would be wrong."""
+    return f"the phone ({view.label or 'one'}, of {view.count} phones)" if view.count > 1 else "the phone"
+
+
+def why_words(why: Why, view: PhoneView, now_s: float, phone: str = "this phone") -> WhyWords:
+    """The reason as text. `phone` names the phone within the sentence: "this phone" beside the phone's own row."""
     match why:
         case "denied":
-            return WhyWords(sentence="The phone was not allowed to tell it", short="denied", brief="permission")
+            return WhyWords(sentence=f"Location permission denied on {phone}", short="denied", brief="permission")
         case "insecure":
             return WhyWords(
-                sentence="The page was not opened over HTTPS, and phones give it to no other",
+                sentence=f"The page on {phone} was not opened over HTTPS, which a position needs",
                 short="HTTPS",
                 brief="needs HTTPS",
             )
         case "unavailable":
-            return WhyWords(sentence="The phone finds no position", short="no fix", brief="no fix")
+            return WhyWords(sentence=f"No position found by {phone}", short="no fix", brief="no fix")
         case "timeout":
-            return WhyWords(sentence="The phone has been waiting for a fix", short="no fix", brief="no fix")
+            return WhyWords(
+                sentence=f"No GPS fix on {phone} for {view.missing_s(now_s):.0f} s", short="no fix", brief="no fix"
+            )
         case "hidden":
             return WhyWords(
-                sentence="The page is in the background, where phones give no position",
+                sentence=f"The page on {phone} is in the background, where it gets no position",
                 short="hidden",
                 brief="background",
             )
         case "off":
-            return WhyWords(sentence="The phone has left", short="left", brief="left")
+            return WhyWords(sentence=f"The page on {phone} was closed", short="left", brief="left")
         case "coarse":
             radius_m = view.fix.accuracy_m if view.fix is not None else 0.0
             return WhyWords(
-                sentence=f"The phone knows it to {radius_m:.0f} m only, {WORST_ACCURACY_M:.0f} m are needed",
+                sentence=f"Position of {phone} is accurate to {radius_m:.0f} m only; "
+                f"{WORST_ACCURACY_M:.0f} m is needed",
                 short="coarse",
                 brief=f"±{radius_m:.0f} m",
             )
         case "old":
             return WhyWords(
-                sentence=f"The phone's newest fix is {now_s - view.measured_s:.0f} s old", short="old", brief="old"
+                sentence=f"The newest fix of {phone} is {now_s - view.measured_s:.0f} s old", short="old", brief="old"
             )
         case "late":
             return WhyWords(
-                sentence="The phone's messages come too late over the radio", short="late", brief="comes late"
+                sentence=f"Positions of {phone} arrive too late over the radio", short="late", brief="comes late"
             )
         case "silent":
             return WhyWords(
-                sentence=f"The phone has not been heard for {now_s - view.heard_s:.0f} s",
+                sentence=f"No position from {phone} for {now_s - view.heard_s:.0f} s",
                 short="silent",
                 brief="silent",
             )

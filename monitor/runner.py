@@ -31,7 +31,7 @@ IMPAIRED_SPEC = AlarmSpec(
     needs_ack=True,
     off_delay_s=10.0,  # a check that fails now and then is one failing check
     actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-    advice="What is named is not watched. Tell whoever keeps catgraph.",
+    advice="The part named is not monitored. Tell the administrator of catgraph.",
 )
 
 NO_LINK = unknown("No link to the car", short="no link")

@@ -98,7 +98,7 @@ def parse(text: str) -> Address:
 def _split(typed: str) -> Address:
     parts = _url_parts(typed)
     if parts.username is not None or parts.password is not None:
-        raise BadAddress("An address with a user name is not dialled.", "Leave out what stands before the @.")
+        raise BadAddress("An address with a user name is not accepted.", "Leave out what stands before the @.")
     port = _port(parts)
     host = _host_of(parts.hostname or "")
     if port == 0:

@@ -17,7 +17,7 @@ from server.tls.setup import Whereabouts
 _WHITE_ON_BLACK, _AS_BEFORE = "\x1b[97;40m", "\x1b[0m"  # the blocks are the light modules
 WITHOUT_HTTPS = (
     "Without HTTPS a phone's browser gives this page no position, does not keep the screen awake, installs nothing for",
-    "when the server is away, neither shares files nor copies text; and who is on the network can read along.",
+    "when the server is away, neither shares files nor copies text; and anyone on the network can eavesdrop.",
 )
 
 

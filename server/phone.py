@@ -51,7 +51,7 @@ def as_json(view: PhoneView, now_s: float) -> dict[str, Any] | None:
     if not view.is_there(now_s):
         return None
     newest = view.comparisons[-1] if view.comparisons else None
-    return _place(view, now_s) | {
+    return _place(view, now_s, "the phone") | {
         "count": view.count,
         "choice": _choice(view, now_s),
         "choice_text": _choice_words(view, now_s),
@@ -73,9 +73,12 @@ def all_as_json(views: tuple[PhoneView, ...], compared: PhoneView, now_s: float)
 def riding_words(snapshot: Snapshot, phone: str | None) -> str:
     """What the log says when a phone was chosen."""
     if phone is None:
-        return "No phone is said to ride in the car: the first with a usable position is compared with it."
-    label = next((view.label for view in snapshot.phones if view.phone == phone), "") or "A phone not heard of yet"
-    return f"{label} rides in the car: it is compared with the car's position."
+        return "No phone is chosen as the one in the car: the first with a usable position is used."
+    label = (
+        next((view.label for view in snapshot.phones if view.phone == phone), "")
+        or "A phone that has not connected yet"
+    )
+    return f"{label} is in the car: it is compared with the car's position."
 
 
 def _choice(view: PhoneView, now_s: float) -> str:
@@ -89,17 +92,17 @@ def _choice(view: PhoneView, now_s: float) -> str:
 def _choice_words(view: PhoneView, now_s: float) -> str:
     match _choice(view, now_s):
         case "operator":
-            return "It was chosen to ride in the car."
+            return "This phone was chosen as the one in the car."
         case "only":
-            return "No phone was chosen to ride in the car: this is the only one."
+            return "No phone was chosen as the one in the car. The only phone is used."
         case "first":
             return (
-                f"No phone was chosen to ride in the car: of {view.count}, this was the first with a usable position."
+                f"No phone was chosen as the one in the car. Of {view.count}, the first with a usable position is used."
             )
-    return f"No phone was chosen to ride in the car, and of {view.count} this one ought to have a position."
+    return f"No phone was chosen as the one in the car. None of {view.count} has a usable position."
 
 
-def _place(view: PhoneView, now_s: float) -> dict[str, Any]:
+def _place(view: PhoneView, now_s: float, name: str = "this phone") -> dict[str, Any]:
     """Where one phone is, or why it cannot tell."""
     why, fix = view.why_not(now_s), view.fix
     return {
@@ -118,5 +121,5 @@ def _place(view: PhoneView, now_s: float) -> dict[str, Any]:
         "age_s": wire.plain(max(0.0, now_s - view.measured_s), 2) if fix else None,
         "used": why is None,
         "why": why,
-        "why_text": why_words(why, view, now_s).sentence if why else None,
+        "why_text": why_words(why, view, now_s, name).sentence if why else None,
     }

@@ -32,7 +32,7 @@ class Problem:
 
 
 def of_bad_address(error: BadAddress) -> Problem:
-    return Problem(code=error.code, title=str(error), hint=error.hint, mark="not dialled")
+    return Problem(code=error.code, title=str(error), hint=error.hint, mark="not tried")
 
 
 def of_dial_error(error: BaseException, address: Address) -> Problem:

@@ -76,7 +76,7 @@ def _check(id: str, label: str, title: str, levels: Collection[int], priority: P
             needs_ack=is_warning,
             off_delay_s=10.0,  # ten reports of a 1 Hz publisher: a part at its own limit comes and goes
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="The car says so of itself: look at the component named.",
+            advice="The car reports it itself: check the component named.",
         ),
         limits=Limits,
         find=partial(find, frozenset(levels)),

@@ -40,7 +40,7 @@ def find(snapshot: Snapshot, limits: NotMovingLimits, was_active: bool) -> Findi
         f"The car stands for {standing_s:.0f} s",
         brief=f"{standing_s:.0f} s",
         measured=Quantity(label="Standing for", value=standing_s, unit="s"),
-        limit=Quantity(label="Said after", value=limits.after_s, unit="s"),
+        limit=Quantity(label="Reported after", value=limits.after_s, unit="s"),
         causes=("speed",),
     )
 

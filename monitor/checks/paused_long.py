@@ -46,7 +46,7 @@ def find(snapshot: Snapshot, limits: PausedLimits, was_active: bool) -> Finding:
         text,
         brief=f"{paused_s / 60:.0f} min",
         measured=Quantity(label="Paused for", value=paused_s, unit="s"),
-        limit=Quantity(label="Said after", value=after_s, unit="s"),
+        limit=Quantity(label="Reported after", value=after_s, unit="s"),
         causes=("paused",),
         level=1 + math.floor(math.log2(paused_s / after_s)),
     )
@@ -68,7 +68,7 @@ CHECKS = (
             sound=Sound.MEDIUM,
             needs_ack=False,  # to go on is to have seen it
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="Press Resume: until then nothing is checked and nothing is told.",
+            advice="Press Resume: until then nothing is checked and no alarm comes.",
         ),
         limits=PausedLimits,
         find=find,

@@ -79,7 +79,7 @@ CHECKS = (
             on_delay_s=0.3,
             off_delay_s=1.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="Two controllers may be fighting over the car: be ready to take over.",
+            advice="Two controllers may command the car at once: be ready to take over.",
         ),
         limits=PedalLimits,
         find=find,

@@ -25,7 +25,7 @@ from monitor.check import (
 )
 from monitor.figures import beside
 from monitor.motion import MOVES_ABOVE_MPS
-from monitor.phone_words import why_words
+from monitor.phone_words import name_of, why_words
 from monitor.phones import FIX_LIVES_S, NO_PHONE
 from monitor.state import Snapshot
 
@@ -44,7 +44,7 @@ class AgreementLimits(Limits):
         low=2.0,
         high=1000.0,
         step=1.0,
-        help="And at least what the errors of both receivers explain: 9, 14, 25, 50 m for phones that state 3, 5, 10, "
+        help="And at least the combined error of both receivers: 9, 14, 25, 50 m for phones that state 3, 5, 10, "
         "20 m beside a good receiver in the car.",
     )
     least_correlation: float = threshold(
@@ -70,7 +70,7 @@ def _why_not(snapshot: Snapshot, was_active: bool) -> Finding | None:
         return unknown("The car's receiver has no fix", short="no fix")
     reason = view.why_not(now_s)
     if reason is not None:
-        words = why_words(reason, view, now_s)
+        words = why_words(reason, view, now_s, name_of(view))
         return unknown(words.sentence, short=words.short)
     return None
 
@@ -95,12 +95,12 @@ def agree(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -> Find
     is_fault = len(apart) >= FAULTS
     newest = apart[-1] if is_fault else comparisons[-1]
     allowed_m = max(newest.gate_m, limits.least_m)
-    which = f" ({view.label or 'one'}, of {view.count} phones)" if view.count > 1 else ""
     text = (
-        f"The phone{which} is {beside(newest.distance_m, allowed_m, 0)} m from the car; {allowed_m:.0f} m are explained"
+        f"{name_of(view).replace('the', 'The', 1)} is {beside(newest.distance_m, allowed_m, 0)} m from the car; "
+        f"up to {allowed_m:.0f} m is normal"
     )
     measured = Quantity(label="Apart", value=newest.distance_m, unit="m")
-    limit = Quantity(label="Explained", value=allowed_m, unit="m")
+    limit = Quantity(label="Normal up to", value=allowed_m, unit="m")
     if is_fault:
         return fault(
             text, brief=f"{newest.distance_m:.0f} m", measured=measured, limit=limit, causes=("phone", "position")

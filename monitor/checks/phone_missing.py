@@ -23,13 +23,15 @@ from monitor.check import (
     threshold,
     unknown,
 )
-from monitor.phone_words import why_words
+from monitor.phone_words import name_of, why_words
 from monitor.phones import FIX_LIVES_S, NO_PHONE
 from monitor.state import Snapshot
 
 
 class MissingLimits(Limits):
-    after_s: float = threshold(10.0, "Missing phone position is said after", unit="s", low=2.0, high=300.0, step=1.0)
+    after_s: float = threshold(
+        10.0, "Missing phone position is reported after", unit="s", low=2.0, high=300.0, step=1.0
+    )
 
 
 def find(snapshot: Snapshot, limits: MissingLimits, was_active: bool) -> Finding:
@@ -46,14 +48,14 @@ def find(snapshot: Snapshot, limits: MissingLimits, was_active: bool) -> Finding
         return _none("This is no phone: no position is expected of it", was_active)
     if why == "silent" and not view.was_usable and not view.is_chosen:
         return _none("No phone is sharing its position", was_active)  # nothing was lost with it
-    words, missing_s = why_words(why, view, now_s), view.missing_s(now_s)
+    words, missing_s = why_words(why, view, now_s, name_of(view)), view.missing_s(now_s)
     if missing_s < limits.after_s and not was_active:
         return unknown(words.sentence, short=words.short)
     return fault(
-        f"{words.sentence}; none for {missing_s:.0f} s",
+        words.sentence,
         brief=words.brief,
         measured=Quantity(label="Missing for", value=missing_s, unit="s"),
-        limit=Quantity(label="Said after", value=limits.after_s, unit="s"),
+        limit=Quantity(label="Reported after", value=limits.after_s, unit="s"),
         causes=("phone",),
     )
 

@@ -70,7 +70,7 @@ CHECKS = (
         label="Alarm reach",
         order=126,
         alarm=AlarmSpec(
-            title="No operator hears alarms",
+            title="Nobody can hear alarms",
             priority=Priority.WARNING,
             place=Place.LIST,  # the strip shows it on every tab; a page that is silent says so itself, above all else
             sound=Sound.MEDIUM,
@@ -79,7 +79,7 @@ CHECKS = (
             off_delay_s=2.0,
             repeat_after_s=1800.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="Open this page on a phone, touch it so that it may sound, and keep it in front.",
+            advice="Open this page on a phone, touch it once to allow sound, and keep it in front.",
         ),
         limits=ReachLimits,
         find=find,

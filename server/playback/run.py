@@ -364,7 +364,7 @@ class Run:
         return frame
 
     def _told_standing(self) -> list[Alarm]:
-        """The alarms as they were told then, each with what its check says when it is asked anew."""
+        """The original alarms, each with the re-evaluated finding of its check."""
         findings = self.known.monitor.findings
         self._teller.alarms = self.known.told
         shown = self._teller.standing()

@@ -23,6 +23,15 @@ export const isAboutLink = (alarm) => LINK_ACTIONS.some((action) => alarm.action
 const LINK_ACTIONS = ['retry', 'reconnect', 'exit', 'change_address'];
 
 /**
+ * An alarm's title; of one that returned to normal, that it did.
+ * @param {Pick<Alarm, 'title' | 'active'>} alarm
+ */
+export function titleOf({ title, active }) {
+  if (active) return title;
+  return title === 'Connection lost' ? 'Connection was lost, now back' : `${title}: ended`;
+}
+
+/**
  * What still stands before what has returned; then by danger, then the newest.
  * @param {Alarm[]} alarms
  */
@@ -94,7 +103,7 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
     const among = isOne ? `${fixed(worst.for_s)} s` : counted(standing.length, 'alarm', 'alarms');
     return {
       kind: worst.priority === 'critical' ? 'crit' : 'warn', icon: worst.priority === 'critical' ? 'crit' : 'warn',
-      text: worst.active ? worst.title : `${worst.title}: returned`, end: among, hasReturned: !worst.active, opens: 'alarms',
+      text: titleOf(worst), end: among, hasReturned: !worst.active, opens: 'alarms',
     };
   }
   if (chain.cut === 2) {

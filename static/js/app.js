@@ -252,7 +252,7 @@ async function begin() {
     isAsked = true;
     if (asked.has('then')) history.replaceState(history.state, '', location.pathname);
     if (then) location.assign(then); // a link in a mail: now that this device is known
-    if (recording) import('./replay.js').then(({ openReplay }) => openReplay(recording, store, say, Number(asked.get('t')) || 0)).catch(() => say('What shows a recording could not be fetched.', 'Not replayed'));
+    if (recording) import('./replay.js').then(({ openReplay }) => openReplay(recording, store, say, Number(asked.get('t')) || 0)).catch(() => say('The replay could not be loaded.', 'Not replayed'));
   });
   draw();
   front();

@@ -31,7 +31,7 @@ export function armWords(what, state) {
   }[what];
   if (state === 'refused') return { tag: 'Refused', kind: 'warn', cost: `Refused: ${cost}` };
   const why = what === 'sound' ? 'This browser has no sound' : 'Needs HTTPS';
-  return { tag: 'Not here', kind: 'warn', cost: `${why}: ${cost}` };
+  return { tag: 'Not available', kind: 'warn', cost: `${why}: ${cost}` };
 }
 
 /**
@@ -204,7 +204,7 @@ export function mount(root, store, page, arming) {
     shownFound = key;
     if (!found?.length) {
       list.replaceChildren(html('li', { class: 'none' }, html('span', { class: 'm' },
-        found ? 'None found. Type the address of the car’s rosbridge.' : 'The server does not say what it finds.')));
+        found ? 'None found. Enter the address of the car’s rosbridge.' : 'The server gives no list.')));
       return;
     }
     list.replaceChildren(...found.map((one) => {

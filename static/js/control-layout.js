@@ -1,6 +1,6 @@
 // What the page says of control and of who would hear an alarm: pure functions of the newest frame and of events.
 
-import { fixed } from './words.js';
+import { counted, fixed } from './words.js';
 
 /**
  * @typedef {import('./protocol.js').ControlNow} ControlNow
@@ -15,7 +15,7 @@ import { fixed } from './words.js';
  * @param {boolean} isSilent
  */
 export function chipOf(control, page, isSilent) {
-  if (isSilent || !control) return { text: '?', label: 'Control: the server does not answer, so nobody knows who is in control', is: 'unknown' };
+  if (isSilent || !control) return { text: '?', label: 'Control: the server does not answer, so it is unknown who is in control', is: 'unknown' };
   if (control.page && control.page === page) return { text: 'You', label: 'You are in control', is: 'you' };
   if (control.holder) return { text: control.holder, label: `${control.holder} is in control`, is: 'other' };
   return { text: 'No one', label: 'No one is in control', is: 'free' };
@@ -27,9 +27,9 @@ export function chipOf(control, page, isSilent) {
  */
 export function reachOf(reach) {
   if (!reach) return { text: 'Not known who can hear alarms', why: '', isBad: false };
-  const who = reach.of === 1 ? 'operator' : 'operators';
-  const text = reach.of === 0 ? 'No operator is here to hear alarms' : `${reach.can} of ${reach.of} ${who} can hear alarms`;
-  return { text, why: reach.why, isBad: reach.can === 0 };
+  const operators = counted(reach.of, 'operator', 'operators');
+  if (reach.can === 0) return { text: `Nobody can hear alarms (${reach.of === 0 ? 'no operator' : operators})`, why: reach.why, isBad: true };
+  return { text: `${reach.can} of ${operators} can hear alarms`, why: reach.why, isBad: false };
 }
 
 /**
@@ -44,7 +44,7 @@ export function noticeOf(event, page) {
   switch (event.act) {
     case 'requested':
     case 'withdrawn':
-      return isMine || isByMe ? null : { title: event.act === 'requested' ? 'Control is asked for' : 'Not asked for any more', text, offers: null };
+      return isMine || isByMe ? null : { title: event.act === 'requested' ? 'Control requested' : 'Request cancelled', text, offers: null };
     case 'kept':
       return isByMe ? null : { title: 'Control is kept', text, offers: null };
     case 'lapsed':
@@ -73,15 +73,15 @@ export function noticeOf(event, page) {
 export function sheetOf(control, reach, page) {
   const others = (reach?.pages ?? []).filter((one) => one.here && one.page !== page);
   const asked = (control.requests ?? []).find((one) => one.page === page);
-  const former = control.former && control.former.page !== page ? ` ${control.former.name} has it again by coming back within ${seconds(control.former.may_return_s)}.` : '';
+  const former = control.former && control.former.page !== page ? ` ${control.former.name} can reclaim it for ${seconds(control.former.may_return_s)}.` : '';
   if (control.page === page && page) {
     return { state: 'you', title: 'You are in control', text: 'Only this page may connect, pause, stop and change settings. Anybody may acknowledge alarms.', handTo: others, asked_s: null };
   }
   if (control.holder) {
-    const text = asked ? `You asked for it: silence grants it in ${seconds(asked.left_s)}.` : 'Ask for it, and it is yours unless it is refused within 10 s. To take it over is told on every page.';
+    const text = asked ? `You asked for control. It is granted in ${seconds(asked.left_s)} unless it is refused.` : 'A request is granted unless it is refused within 10 s. Taking over is announced to everyone.';
     return { state: asked ? 'asking' : 'other', title: `${control.holder} is in control`, text, handTo: [], asked_s: asked ? asked.left_s : null };
   }
-  return { state: 'free', title: 'No one is in control', text: `Whoever orders something takes it.${former}`, handTo: [], asked_s: null };
+  return { state: 'free', title: 'No one is in control', text: `The first to act takes control.${former}`, handTo: [], asked_s: null };
 }
 
 /** The oldest request, where this page must answer it. @param {ControlNow | null} control @param {string} page */

@@ -44,7 +44,7 @@ export function openControl(store, control) {
     if (seen.state !== 'other' && seen.state !== 'asking') isConfirming = false;
     const asksOver = isConfirming;
     setText(title, asksOver ? `Take over from ${now.holder}?` : seen.title);
-    setWords(text, asksOver ? `${now.holder} may be about to act. It is told on every page and stands in the log.` : seen.text);
+    setWords(text, asksOver ? `${now.holder} may be about to act. Taking over is announced to everyone and logged.` : seen.text);
     const line = reachOf(told);
     reach.replaceChildren(icon(line.isBad ? 'bell-off' : 'bell', 's'), html('span', {}, html('b', {}, ...words(line.text)), ...(line.why ? [html('br'), html('span', { class: 'small sub' }, ...words(line.why))] : [])), icon('next', 's'));
     const kind = JSON.stringify([seen.state, isConfirming, seen.handTo.map((one) => [one.page, one.name, one.can, one.why_text])]);
@@ -67,7 +67,7 @@ export function openControl(store, control) {
     if (state === 'you') return [key('Give control up', () => void order('release'))];
     if (asksOver) return [key('Take over', () => void order('take_over'), 'main'), key('Back', confirm(false))];
     return [
-      ...(state === 'asking' ? [key('Do not ask any more', () => void order('withdraw'))] : [key('Ask for control', () => void order('request'), 'main')]),
+      ...(state === 'asking' ? [key('Cancel request', () => void order('withdraw'))] : [key('Ask for control', () => void order('request'), 'main')]),
       key('Take over …', confirm(true)),
     ];
   }

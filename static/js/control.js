@@ -32,7 +32,7 @@ export class Control {
   /** Ask the server for something about control. @param {string} act @param {object} [fields] */
   async order(act, fields = {}) {
     const answer = await this.store.ask('control', { do: act, ...fields });
-    if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Control is as it was');
+    if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Control not changed');
     return answer;
   }
 
@@ -61,7 +61,7 @@ export function mount(root, snacks, store, control) {
   const keep = html('button', { type: 'button', class: 'key' }, 'Keep');
   const give = html('button', { type: 'button', class: 'key solid' }, 'Hand over');
   const asks = html('div', { class: 'snack asks', role: 'alert', 'data-f': 'asks' },
-    html('div', { class: 'side' }, icon('operator')), html('div', { class: 'tx' }, html('b', {}, 'Control is asked for'), text), html('div', { class: 'ac' }, keep, give));
+    html('div', { class: 'side' }, icon('operator')), html('div', { class: 'tx' }, html('b', {}, 'Control requested'), text), html('div', { class: 'ac' }, keep, give));
   let asking = '';
   /** @type {{notice: NonNullable<ReturnType<typeof noticeOf>>, at_ms: number} | null} */
   let news = null;

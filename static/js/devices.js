@@ -196,7 +196,7 @@ class Invitation {
     clearInterval(this.#ticking);
     show(this.code, false);
     setText(this.pin, '');
-    setText(this.state, 'It is fetched from the server.');
+    setText(this.state, 'Loading from the server…');
     this.#asked += 1;
     const mine = this.#asked;
     try {
@@ -222,7 +222,7 @@ class Invitation {
       setText(this.state, 'It is over: choose the role again for a new one.');
       return;
     }
-    const does = this.#role === 'operator' ? 'It may then act, as this one' : 'It may then look, and change nothing';
+    const does = this.#role === 'operator' ? 'It can then act as an operator' : 'It can then watch, but change nothing';
     setWords(this.state, `Scan the code with the other phone, or type the PIN there. For one phone, for ${leftWords(left_s)}. ${does}.`);
   }
 }

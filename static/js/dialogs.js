@@ -191,7 +191,7 @@ export function linkWords(kind, view, frame) {
   const tried = link && link.attempts > 0 ? `Tried ${times(link.attempts)} in ${age(link.trying_for_s)} s.` : '';
   if (kind === 'failed') return [view.sentence, '', [link?.problem?.hint, tried].filter(Boolean).join(' ')];
   if (kind === 'mute') {
-    const heard = link ? `${link.topics_heard} of ${link.topics_subscribed} topics spoke.` : '';
+    const heard = link ? `${link.topics_heard} of ${link.topics_subscribed} topics sent data.` : '';
     return [view.sentence, heard, view.detail];
   }
   const isServer = view.cut === 0;

@@ -224,7 +224,7 @@ export function liveOf(recorder, { vehicle, isMonitoring, isSilent }) {
   const isOn = state === 'recording';
   const facts = [for_s === null || state === 'off' ? '' : lengthWords(for_s), bytes ? sizeWords(bytes) : '', dropped ? `${dropped} messages lost: the disk is too slow` : ''];
   const mark = isOn ? [vehicle ?? '', (part ?? 1) > 1 ? `part ${part}` : ''] : [reason ?? ''];
-  if (isSilent) return { name: 'Recording?', mark: 'The server does not answer: nobody knows whether it records.', facts: '', missing: '', isOn: false, isBad: true, order: null };
+  if (isSilent) return { name: 'Recording?', mark: 'The server does not answer: it is unknown whether it records.', facts: '', missing: '', isOn: false, isBad: true, order: null };
   return {
     missing: isOn || state === 'held' ? missingWords(recorder) : '',
     name: NAMES[state] ?? state, mark: mark.filter(Boolean).join(' · '), facts: facts.filter(Boolean).join(' · '), isOn, isBad: state === 'stopped' || Boolean(dropped),

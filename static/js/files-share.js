@@ -21,14 +21,14 @@ export async function share({ row, name, address, say, offer, link, done }) {
   const type = 'application/octet-stream';
   if (!navigator.share) {
     const isCopied = await navigator.clipboard?.writeText(address).then(() => true, () => false);
-    say(`This browser shares nothing by itself. ${isCopied ? 'The link is copied:' : 'Copy this link:'} it works for whoever reaches this server.`);
+    say(`This browser cannot share. ${isCopied ? 'The link is copied:' : 'Copy this link:'} it works for anyone who can reach this server.`);
     link();
     return;
   }
   const trial = new File([new Uint8Array(1)], fileName, { type });
   if (!navigator.canShare?.({ files: [trial] }) || row.size_bytes > MOST_BYTES) {
-    const why = row.size_bytes > MOST_BYTES ? `${sizeWords(row.size_bytes)} are too much for this phone to hand over` : 'This phone hands over no such files';
-    say(`${why}: a link is shared instead. It works for whoever reaches this server.`);
+    const why = row.size_bytes > MOST_BYTES ? `${sizeWords(row.size_bytes)} are too large for this phone to share` : 'This phone cannot share such files';
+    say(`${why}: a link is shared instead. It works for anyone who can reach this server.`);
     offer('Share the link', () => hand({ title: name, url: address }, say, done));
     return;
   }
@@ -55,6 +55,6 @@ async function hand(what, say, done) {
     done();
   } catch (error) {
     if (error instanceof DOMException && error.name === 'AbortError') return; // the operator thought better of it
-    say('The phone did not take it. Download it instead.');
+    say('The phone refused the file. Download it instead.');
   }
 }

@@ -197,7 +197,7 @@ export class FileSheet {
     const asItIs = html('a', { href: addressOf(row.id, '/file.mcap'), download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, kind[0]), html('small', {}, kind[1])), html('span', { class: 'end' }, ...words(sizeWords(row.size_bytes))));
     listen(asItIs, 'click', () => setTimeout(() => closeSheet(this.sheet)));
     const made = row.state === 'read' ? FORMATS.filter(([format]) => format !== row.format && (format !== 'ros2' || row.ros_version === 2)) : [];
-    this.#show(`Download ${this.name}`, [html('p', { class: 'sub' }, 'Other forms than the file itself are made when they are asked for.')], [html('ul', { class: 'menu-list' }, html('li', {}, asItIs),
+    this.#show(`Download ${this.name}`, [html('p', { class: 'sub' }, 'Other formats are made on request.')], [html('ul', { class: 'menu-list' }, html('li', {}, asItIs),
       ...made.map(([format, label, use]) => {
         const key = html('button', { type: 'button', 'data-format': format, 'data-operator': true }, icon('download'), html('span', { class: 'tx' }, html('b', {}, label), html('small', {}, use)));
         listen(key, 'click', () => this.#make(format, label));
@@ -213,7 +213,7 @@ export class FileSheet {
     if (this.#job !== job || !this.sheet.open) return;
     if (over.state === 'done') {
       save(job.address);
-      this.#show(`${label} of ${this.name}`, [html('p', { role: 'status' }, `It is made. This phone saves it among its downloads.${over.is_whole === false ? ' Not all of the recording is in it:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#key('Save again', () => save(job.address)), this.#key('Back', () => this.#download())]);
+      this.#show(`${label} of ${this.name}`, [html('p', { role: 'status' }, `Done. It is saved among this phone’s downloads.${over.is_whole === false ? ' Not all of the recording is in it:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#key('Save again', () => save(job.address)), this.#key('Back', () => this.#download())]);
     } else if (over.state === 'cancelled') this.#download();
     else this.#refused('Not made', over.sentence ?? 'The server could not make it.');
   }
@@ -312,7 +312,7 @@ export class FileSheet {
   // -- deleting --------------------------------------------------------------------------------------------------------
 
   #askDelete() {
-    this.#show(`Delete ${this.name}?`, [html('p', {}, ...words('It goes into the trash, and can be taken back from there until the trash is emptied.'))], [], [this.#key('Delete', () => this.#delete(), 'main')], 'Keep it');
+    this.#show(`Delete ${this.name}?`, [html('p', {}, ...words('It is moved to the trash and can be restored until the trash is emptied.'))], [], [this.#key('Delete', () => this.#delete(), 'main')], 'Keep it');
   }
 
   async #delete() {

@@ -139,7 +139,7 @@ export function mount(panel, store, say, isShown) {
     show(empty, isEmpty);
     if (!isEmpty) return;
     setText(emptyTitle, model.isTrash ? 'The trash is empty' : model.isFiltered ? 'Nothing found' : 'No recordings yet');
-    emptyWords.replaceChildren(...words(model.isTrash ? 'What is deleted comes here first.' : model.isFiltered ? 'No recording is called so, or has it in its note or tags.' : 'A drive is recorded while the car is monitored, and stands here as soon as it ends.'));
+    emptyWords.replaceChildren(...words(model.isTrash ? 'Deleted recordings are kept here until the trash is emptied.' : model.isFiltered ? 'No name, note or tag matches.' : 'A drive is recorded while the car is monitored. It appears here when it ends.'));
   }
 
   /** @param {boolean} isTrash */

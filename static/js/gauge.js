@@ -122,7 +122,7 @@ export function mount(root, store) {
     setText(acceleration, isPushKnown ? signed(push) : pushInk.ink === 'not_published' ? 'not published' : '–');
     setText(accelerationUnit, isPushKnown || pushInk.ink !== 'not_published' ? 'm/s²' : '');
     setAttribute(accelerationMeter, 'aria-valuemin', -scale.acceleration_max_mps2);
-    meter(accelerationMeter, isPushKnown && pushInk.ink !== 'stale' ? push : null, scale.acceleration_max_mps2, `${signed(push)} metres a second squared`);
+    meter(accelerationMeter, isPushKnown && pushInk.ink !== 'stale' ? push : null, scale.acceleration_max_mps2, `${signed(push)} metres per second squared`);
   }
 
   /** What the car was ordered, beside what it does. @param {number | null} speed_mps @param {ReturnType<typeof scaleOf>} scale */

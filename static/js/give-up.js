@@ -12,5 +12,5 @@ export function giveUp() {
   setAttribute(document.body, 'data-screen', 'start');
   show(field(start, 'chain'), false); // nobody knows how the link stands
   setText(field(start, 'title'), 'This page does not work');
-  setWords(field(start, 'words'), 'It could not begin in whole, so no value and no alarm is shown. Load it again; if that does not help, use another browser.');
+  setWords(field(start, 'words'), 'It could not start completely, so no value and no alarm is shown. Reload it. If that does not help, use another browser.');
 }

@@ -41,7 +41,7 @@ export function mount(say) {
     offer = null; // it can be asked once
     draw();
     const { outcome } = (await asked?.prompt().catch(() => null)) ?? { outcome: 'failed' };
-    if (outcome === 'failed') say('The browser did not open its question. Its own menu may offer “Install” too.', 'Not installed');
+    if (outcome === 'failed') say('The browser did not ask. Its own menu may offer “Install” too.', 'Not installed');
   }
 
   draw();

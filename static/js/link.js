@@ -40,8 +40,8 @@ export function chainOf({ frame, isSilent, silence_s, lag_s, heard_ms }) {
   if (session.phase === 'connecting' || session.phase === 'failed') {
     return {
       word: 'Dialling', age_s: link.trying_for_s + lag_s, cut: 1, since_ms: null,
-      nodes: nodesOf(1, ['here', 'answers', link.problem?.mark ?? 'dialled', 'unknown']),
-      sentence: link.problem?.title ?? 'The bridge is being dialled.',
+      nodes: nodesOf(1, ['here', 'answers', link.problem?.mark ?? 'connecting', 'unknown']),
+      sentence: link.problem?.title ?? 'Connecting to the bridge.',
       detail: link.problem?.hint ?? '',
     };
   }
@@ -88,7 +88,7 @@ function waking(silence_s) {
   return {
     word: 'Waking', age_s: silence_s, cut: null, since_ms: null,
     nodes: nodesOf(null, ['here', 'answers', '', '']),
-    sentence: 'This page was away.', detail: 'Values come back with the third fresh frame.',
+    sentence: 'This page was away.', detail: 'Values return with the next data.',
   };
 }
 
@@ -103,7 +103,7 @@ function serverSilent(silence_s, heard_ms) {
     word: 'Lost', age_s: wasHeard ? silence_s : null, cut: 0, since_ms: heard_ms,
     nodes: nodesOf(0, ['here', wasHeard ? `silent ${age(silence_s)} s` : 'no answer', 'unknown', 'unknown']),
     sentence: wasHeard ? 'The server fell silent.' : 'The server does not answer.',
-    detail: wasHeard ? `Nothing has come from it since ${timeOfDay(heard_ms)}; this page keeps trying.` : 'This page keeps trying.',
+    detail: wasHeard ? `Last data at ${timeOfDay(heard_ms)}. This page keeps trying.` : 'This page keeps trying.',
   };
 }
 

@@ -75,10 +75,10 @@ class MailForm {
       label('sender_name', 'Sender’s name'), this.senderName,
       label('allowed', 'Allowed recipients'), this.allowed, hint('allowed', 'Addresses, domains (example.org) or all below one (*.example.org). Empty: everyone.'),
       label('limit_mb', 'Size limit of a mail, MB'), this.limit, hint('limit', 'Before it is encoded: 18 MB make a mail of 25 MB, which most providers take.'),
-      label('link_base', 'This server’s address in links'), this.linkBase, hint('link', 'Where who gets a link reaches it. Empty: as this page does.'),
+      label('link_base', 'This server’s address in links'), this.linkBase, hint('link', 'Address at which recipients reach this server. Empty: the address of this page.'),
       label('ca', 'Certificate of the mail server’s own CA (PEM)'), this.ca, hint('ca', 'Where given, only servers it certifies are trusted. Empty: those this computer trusts.'),
       this.bad, this.good, this.save,
-      label('test', 'Send a trial mail to'), this.to, hint('test', 'Empty: only the login is tried. It tries what is saved.'),
+      label('test', 'Send a test e-mail to'), this.to, hint('test', 'Empty: only the login is tested. The saved settings are tested.'),
       html('div', { class: 'pair' }, this.test, outbox));
     this.fields = [this.host, this.port, this.user, this.password, this.sender, this.senderName, this.allowed, this.limit, this.linkBase, this.ca];
     for (const one of this.fields) listen(one, 'input', () => this.#changed());
@@ -163,7 +163,7 @@ class MailForm {
   async #test() {
     setAttribute(this.test, 'disabled', true);
     setText(this.bad, '');
-    setText(this.good, 'The mail server is dialled; this takes a few seconds.');
+    setText(this.good, 'Connecting to the mail server. This takes a few seconds.');
     const to = this.to.value.trim();
     try {
       const { sentence, said } = await request('/api/mail/test', { method: 'POST', body: to ? { to } : {} });

@@ -168,13 +168,13 @@ class MailSheet {
       return;
     }
     setAttribute(this.send, 'disabled', true);
-    setWords(this.told, 'It is handed to the server.');
+    setWords(this.told, 'Sending to the server…');
     try {
       await request('/api/mail', { method: 'POST', body: { recordings: this.#ids, format: this.#format, to, subject: this.subject.value.trim(), text: this.text.value, too_large: this.#tooLarge, key: this.#key } });
       keep(to.join(', '));
       this.#ids = [];
       closeSheet(this.sheet);
-      this.say('It is in the outbox, and stays there until the mail server has it.', 'Mail ordered', { label: 'Outbox', act: () => openOutbox(this.say) });
+      this.say('It stays in the outbox until the mail server accepts it.', 'E-mail queued', { label: 'Outbox', act: () => openOutbox(this.say) });
     } catch (error) {
       setText(this.told, '');
       this.#refuse(sentenceOf(error), null);
@@ -208,12 +208,12 @@ class MailSheet {
     try {
       const address = this.#format === 'mcap' ? pathOf(id, 'mcap') : await this.#made(id);
       if (address === null) return;
-      setWords(this.told, 'It is fetched from the server.');
+      setWords(this.told, 'Loading from the server…');
       const answer = await fetch(address);
       if (!answer.ok) throw new Error('It could not be fetched from the server. Try again.');
       this.#file = new File([await answer.blob()], `${id}.${ending}`, { type });
-      setWords(this.told, 'It is here. Press once more: a phone hands files over only at a press.');
-      setText(/** @type {HTMLElement} */ (this.own.lastElementChild), 'Hand it to my mail app');
+      setWords(this.told, 'Ready. Press once more: the phone opens the file only after a press.');
+      setText(/** @type {HTMLElement} */ (this.own.lastElementChild), 'Open it in my mail app');
     } catch (error) {
       setText(this.told, '');
       this.#refuse(sentenceOf(error), null);
@@ -244,7 +244,7 @@ class MailSheet {
   #mailto() {
     const links = this.#ids.map((id) => new URL(pathOf(id, this.#format), location.href).href);
     const link = html('a', { href: mailtoOf({ to: recipientsOf(this.to.value), subject: this.subject.value, text: this.text.value, links }) });
-    setWords(this.told, 'Your mail app gets links in place of files: this phone hands it none. They work for whoever reaches this server.');
+    setWords(this.told, 'Your mail app gets links, because this phone cannot pass files to it. The links work for anyone who can reach this server.');
     link.click();
   }
 }

@@ -53,11 +53,16 @@ export function carOf(frame, inkOf) {
   const said_deg = frame.signals['heading']?.value?.['heading_deg'];
   const heading_deg = typeof said_deg === 'number' && Number.isFinite(said_deg) ? said_deg : null;
   const isHeadingLive = heading_deg !== null && (turn.ink === 'fresh' || turn.ink === 'ageing');
-  const whither = isHeadingLive ? '' : heading_deg === null ? ', heading unknown' : `, heading ${age(turn.age_s)} s old`;
+  const unknown = [...(ellipse ? [] : ['accuracy']), ...(heading_deg === null ? ['heading'] : [])];
+  const known = [
+    ellipse ? `Car ±${metres(ellipse.major_m)}` : 'Car',
+    ...(unknown.length ? [`${unknown.join(' and ')} unknown`] : []),
+    ...(heading_deg !== null && !isHeadingLive ? [`heading ${age(turn.age_s)} s old`] : []),
+  ].join(', ');
   return {
     place, isLive, ink, age_s, ellipse,
     heading_deg, isHeadingLive,
-    label: isLive ? `Car ${ellipse ? `±${metres(ellipse.major_m)}` : '±?'}${whither}` : `Car STALE ${age(age_s)} s`,
+    label: isLive ? known : `Car STALE ${age(age_s)} s`,
     says: carSays(ink, age_s, fix !== null && !hasFix),
   };
 }
@@ -67,7 +72,7 @@ function carSays(ink, age_s, isLost) {
   if (ink === 'not_published') return 'The car publishes no position.';
   if (ink === 'never') return 'No position has come from the car yet.';
   if (ink === 'stale') return `The car’s position is ${age(age_s)} s old: it may be elsewhere by now.`;
-  if (isLost) return 'The car’s receiver has no fix: nobody knows where the car is.';
+  if (isLost) return 'The car’s receiver has no fix: the car’s position is unknown.';
   return '';
 }
 

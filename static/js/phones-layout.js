@@ -1,4 +1,4 @@
-// What is said of each phone that tells where it is, and which of them is compared with the car: pure functions.
+// What is said of each phone that shares its position, and which of them is compared with the car: pure functions.
 
 import { placeOf } from './geodesy.js';
 import { age, fixed } from './words.js';
@@ -24,9 +24,9 @@ export function nameOf(phone, page) {
  */
 export function phoneRow(phone, lag_s, page) {
   const age_s = phone.age_s === null ? null : phone.age_s + lag_s;
-  const fix = phone.accuracy_m === null || age_s === null ? 'no fix yet' : `to ${fixed(phone.accuracy_m, 0)} m, ${age(age_s)} s ago`;
-  const says = phone.why_text ? `${phone.why_text}.` : `Knows its position ${fix}.`;
-  const tag = phone.chosen ? 'In the car' : phone.compared ? 'Compared' : '';
+  const fix = phone.accuracy_m === null || age_s === null ? 'No GPS fix yet' : `Accurate to ${fixed(phone.accuracy_m, 0)} m, ${age(age_s)} s ago`;
+  const says = `${phone.why_text || fix}.`;
+  const tag = phone.chosen ? 'In the car' : phone.compared ? 'Used' : '';
   return { id: phone.id, name: nameOf(phone, page), says, tag, isChosen: phone.chosen === true };
 }
 
@@ -34,10 +34,11 @@ export function phoneRow(phone, lag_s, page) {
 export function phonesLine(frame, page) {
   const phones = frame.phones ?? [];
   const compared = phones.find((one) => one.compared);
-  const many = phones.length === 1 ? '1 phone tells where it is' : `${phones.length} phones tell where they are`;
+  const many = phones.length === 1 ? '1 phone shares its position' : `${phones.length} phones share their position`;
   if (!compared) return { text: many, why: '' };
-  const who = nameOf(compared, page);
-  return { text: many, why: compared.chosen ? `${who === 'You' ? 'Yours' : who} rides in the car` : `${who === 'You' ? 'Yours' : who} is compared: nobody said which rides in the car` };
+  const isMine = compared.id === page;
+  const name = nameOf(compared, page);
+  return { text: many, why: compared.chosen ? `${isMine ? 'Yours' : name} is in the car` : `Using ${isMine ? 'yours' : name}. Choose the phone in the car` };
 }
 
 /**

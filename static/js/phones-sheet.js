@@ -1,4 +1,4 @@
-// The sheet of all phones that tell where they are: why one has no position, and which of them rides in the car.
+// The sheet of all phones that share their position: why one has no position, and which of them rides in the car.
 
 import { html, icon, setWords, words } from './dom.js';
 import { phoneRow } from './phones-layout.js';
@@ -12,7 +12,7 @@ export function openPhones(store, say) {
   const text = html('p', { class: 'sub', id: 'phones-words', role: 'status' });
   const list = html('ul', { class: 'menu-list phones' });
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-phones', 'aria-labelledby': 'phones-title', 'aria-describedby': 'phones-words' },
-    html('div', { class: 'bd' }, html('h2', { id: 'phones-title' }, 'Which phone rides in the car?'), text), list,
+    html('div', { class: 'bd' }, html('h2', { id: 'phones-title' }, 'Which phone is in the car?'), text), list,
     html('div', { class: 'keys' }, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
   let shown = '';
 
@@ -28,7 +28,7 @@ export function openPhones(store, say) {
   function draw() {
     const { frame } = store;
     if (!frame) return;
-    setWords(text, frame.phone?.choice_text ?? 'No phone tells where it is.');
+    setWords(text, frame.phone?.choice_text ?? 'No phone is sharing its position.');
     const rows = (frame.phones ?? []).map((one) => phoneRow(one, store.lag_s, store.page));
     const key = JSON.stringify(rows);
     if (key === shown) return;

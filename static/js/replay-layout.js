@@ -1,5 +1,6 @@
 // Where things stand on the time line of a replay, and in which words: pure functions, no DOM.
 
+import { titleOf } from './alarm-layout.js';
 import { counted, duration } from './words.js';
 
 export const RATES = /** @type {const} */ ([0.25, 0.5, 1, 2, 4, 8, 16]);
@@ -178,8 +179,8 @@ export function toldOf(frame) {
   if (!replay) return { kind: '', icon: 'unknown', text: '', end: '' };
   const end = replay.alarms_from === 'recording' ? 'original alarms' : 're-evaluated';
   if (replay.hangs_s) return { kind: 'gap', icon: 'clock', text: `The replay has not answered for ${replay.hangs_s.toFixed(0)} s`, end: '' };
-  if (replay.is_seeking) return { kind: '', icon: 'clock', text: `Going to ${clockOf(replay.at_s)}`, end: '' };
-  if (replay.silent_s === null) return { kind: 'gap', icon: 'unknown', text: 'No message of the car yet', end: '' };
+  if (replay.is_seeking) return { kind: '', icon: 'clock', text: `Seeking to ${clockOf(replay.at_s)}`, end: '' };
+  if (replay.silent_s === null) return { kind: 'gap', icon: 'unknown', text: 'No message from the car yet', end: '' };
   if (replay.silent_s > 1) return { kind: 'gap', icon: 'unknown', text: `Nothing recorded for ${replay.silent_s.toFixed(1)} s`, end: '' };
   const standing = alarms.filter((alarm) => alarm.active && alarm.state !== 'SHELVED').sort((a, b) => RANK[b.priority] - RANK[a.priority] || b.raised_ms - a.raised_ms);
   const worst = standing[0];
@@ -209,6 +210,6 @@ export function asideOf(live) {
   const worst = [...urgent].sort((a, b) => RANK[b.priority] - RANK[a.priority])[0];
   if (!worst) return live.phase === 'monitoring' && live.paused ? { kind: 'warn', text: 'Live: monitoring is paused', asking: null } : null;
   const asking = urgent.find((alarm) => alarm.priority === 'critical' && alarm.state === 'UNACKED') ?? null;
-  const more = urgent.length > 1 ? ` (1 of ${urgent.length})` : '';
-  return { kind: worst.priority === 'critical' ? 'crit' : 'warn', text: `Live: ${worst.title}${worst.active ? '' : ': over'}${more}`, asking };
+  const more = urgent.length > 1 ? ` (${urgent.length} alarms)` : '';
+  return { kind: worst.priority === 'critical' ? 'crit' : 'warn', text: `Live: ${titleOf(worst)}${more}`, asking };
 }

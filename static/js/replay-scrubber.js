@@ -48,7 +48,7 @@ export class Scrubber {
     this.slider = html('div', { class: 'time-line', role: 'slider', tabindex: 0, 'aria-label': 'Moment of the recording', 'aria-valuemin': 0, 'aria-valuemax': 0, 'aria-valuenow': 0 }, this.picture);
     this.before = html('button', { type: 'button', class: 'key', 'aria-label': 'Previous alarm' }, icon('back'), 'Alarm');
     this.play = html('button', { type: 'button', class: 'key' }, icon('play', 'fill'), html('span', {}, 'Play'));
-    this.rate = /** @type {HTMLSelectElement} */ (html('select', { 'aria-label': 'Pace of the replay', class: 'n' }, ...RATES.map((rate) => html('option', { value: rate }, rateWords(rate)))));
+    this.rate = /** @type {HTMLSelectElement} */ (html('select', { 'aria-label': 'Playback speed', class: 'n' }, ...RATES.map((rate) => html('option', { value: rate }, rateWords(rate)))));
     this.rateKey = html('label', { class: 'key' }, this.rate, html('span', { 'aria-hidden': 'true' }, 'Rate'));
     this.after = html('button', { type: 'button', class: 'key', 'aria-label': 'Next alarm' }, icon('next'), 'Alarm');
     this.clock = html('b', { class: 'n' });
@@ -225,7 +225,7 @@ export class Scrubber {
         const answer = await this.store.ask('replay', { do: 'seek', at_s: sent });
         if (!answer.ok) {
           this.#wanted = null;
-          this.say(answer.reason ?? 'Refused.', 'Not gone there');
+          this.say(answer.reason ?? 'Refused.', 'Position not changed');
         }
       }
     } finally {
@@ -236,6 +236,6 @@ export class Scrubber {
   /** @param {Record<string, unknown>} order */
   async #order(order) {
     const answer = await this.store.ask('replay', order);
-    if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'The replay did not obey');
+    if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Replay not changed');
   }
 }

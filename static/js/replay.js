@@ -31,7 +31,7 @@ let current = null;
  */
 export async function openReplay(id, store, say, at_s = 0) {
   await styled();
-  say('It is read from the disk.', 'Opening the recording');
+  say('Opening…');
   let answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
   for (let tries = 1; !answer.ok && !store.wire.isOpen && tries < TRIES; tries += 1) {
     await opened(store); // the connection broke meanwhile: nobody refused
@@ -139,7 +139,7 @@ class Replay {
       stop();
       if (!current) setAttribute(this.root, 'data-replay', null);
     });
-    if (why !== undefined) this.say(why, 'The replay is over');
+    if (why !== undefined) this.say(why, 'Replay ended');
   }
 
   unmount() {

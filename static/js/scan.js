@@ -185,7 +185,7 @@ export function mount(root, store) {
     const nearest = isBlind ? 'the corridor cannot be seen' : side ? `nearest return in the corridor ${fixed(gap_m)} metres, ${side.degrees} ${side.side}` : 'no return in the corridor';
     setAttribute(glass.canvas, 'aria-label', `Laser scan from above: ${nearest}`);
     const sectors = sectorSentences([...sectorsOf(scan), ...unseenOf(scan)], 6);
-    setText(at('told'), `${beamWords(scan)}. ${sectors.length ? `Nothing is known of these sectors: ${sectors.join('; ')}.` : ''}`);
+    setText(at('told'), `${beamWords(scan)}. ${sectors.length ? `No data from these sectors: ${sectors.join('; ')}.` : ''}`);
   }
 
   return {

@@ -16,7 +16,7 @@ export class SettingsDevices {
     this.say = say;
     this.isPairing = document.documentElement.dataset['access'] === 'paired';
     this.state = html('span', { class: 'count' });
-    this.place = html('div', {}, html('p', { class: 'state', role: 'status' }, 'It is fetched from the server.'));
+    this.place = html('div', {}, html('p', { class: 'state', role: 'status' }, 'Loading from the server…'));
     this.element = /** @type {HTMLDetailsElement} */ (html('details', { class: 'group', 'data-part': 'devices', hidden: !this.isPairing },
       html('summary', {}, html('span', { class: 'h' }, 'Paired devices'), this.state, icon('next')), this.place));
     this.stops = [listen(this.element, 'toggle', () => { if (this.element.open) this.#load(); })];

@@ -116,7 +116,7 @@ export class SettingsFileKeys {
     const before = this.model.body?.version;
     const outcome = await this.model.replace(text);
     if (!outcome.ok) this.say(`${outcome.reason} Nothing was changed.`, 'Not imported');
-    else if (this.model.body?.version === before) this.say('It holds what is in force already.', 'Imported');
+    else if (this.model.body?.version === before) this.say('It contains the settings already in force.', 'Imported');
     else this.say(`${counted(this.model.undoLines.length, 'setting')} changed. Undo takes it back.`, 'Imported');
   }
 

@@ -14,7 +14,7 @@ export class SettingsMail {
   constructor(say) {
     this.say = say;
     this.state = html('span', { class: 'count' });
-    this.place = html('div', {}, html('p', { class: 'state', role: 'status' }, 'It is fetched from the server.'));
+    this.place = html('div', {}, html('p', { class: 'state', role: 'status' }, 'Loading from the server…'));
     this.group = /** @type {HTMLDetailsElement} */ (html('details', { class: 'group', 'data-part': 'mail' },
       html('summary', {}, html('span', { class: 'h' }, 'E-mail'), this.state, icon('next')), this.place));
     this.element = html('section', { 'aria-label': 'E-mail' }, html('div', { class: 'sec' }, html('span', {}, 'Server'), html('span', {}, 'for all its vehicles')), this.group);

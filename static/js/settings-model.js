@@ -187,7 +187,7 @@ export class SettingsModel {
   /** Takes the last change of this page back, if nobody changed anything since. @returns {Promise<Outcome>} */
   async undo() {
     const undo = this.#undo;
-    if (!undo || !this.body) return { ok: false, reason: 'There is nothing to take back.' };
+    if (!undo || !this.body) return { ok: false, reason: 'There is nothing to undo.' };
     await this.#current();
     if (this.body.version < undo.version) return { ok: false, reason: this.problem ?? 'The server has not confirmed the change yet.' };
     this.#undo = null;

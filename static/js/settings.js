@@ -65,7 +65,7 @@ export function mount(panel, store, say, isShown) {
     show(keys, query === '');
     if (!isForced) panel.scrollTop = 0;
     show(none, hits === 0 && query !== '');
-    if (hits === 0) setText(none, `Nothing here is called “${query}”.`);
+    if (hits === 0) setText(none, `No setting matches “${query}”.`);
   }
 
   function draw() {

@@ -69,10 +69,10 @@ export function slideOf(seen) {
     return { kind: 'go', title, why, label: `${title} ${why}` };
   }
   if (now.state === 'armed') {
-    if (isViewer) return off('Slow-down armed', 'a viewer only looks');
+    if (isViewer) return off('Slow-down armed', 'a viewer cannot use it');
     return { kind: 'armed', title: 'Slide to', why: 'slow down', label: 'Slide to slow down. With a keyboard hold Enter for 1 second' };
   }
-  if (now.state === 'safe') return off('Slow-down off', isViewer ? 'a viewer only looks' : 'press to arm');
+  if (now.state === 'safe') return off('Slow-down off', isViewer ? 'a viewer cannot use it' : 'press to arm');
   const why = bare(now.why ?? 'not available');
   return off('Slow-down off', why.length > BRIEF ? 'press for the reason' : why);
 }
@@ -188,8 +188,8 @@ export function guardWords(guard, lag_s = 0) {
  * @returns {{can: boolean, label: string, why: string}}
  */
 export function releaseOf({ isViewer, mayControl, holder }) {
-  if (isViewer) return { can: false, label: 'Release: not by a viewer', why: 'A viewer only looks. Whoever is in control releases the car.' };
-  if (!mayControl) return { can: false, label: `Only ${holder ?? 'another'} can release`, why: `${holder ?? 'Another'} is in control: only who is in control releases the car.` };
+  if (isViewer) return { can: false, label: 'Release: not by a viewer', why: 'A viewer cannot release the car. The operator in control can.' };
+  if (!mayControl) return { can: false, label: `Only ${holder ?? 'another'} can release`, why: `${holder ?? 'Another'} is in control: only the operator in control can release the car.` };
   return { can: true, label: 'Release the car', why: '' };
 }
 
@@ -211,17 +211,17 @@ export function sheetOf(seen, lag_s) {
     ['Slows at', `${fixed(now.deceleration_mps2 ?? null)} m/s²`, false],
     rivalsOf(now.rivals),
   ] : [];
-  if (isSilent || !now) return { ...plain, title: 'Slow-down off', text: 'The server does not answer: nobody knows how it stands.', facts: [], act: null, says: '' };
+  if (isSilent || !now) return { ...plain, title: 'Slow-down off', text: 'The server does not answer: its state is unknown.', facts: [], act: null, says: '' };
   if (isReplay) return { ...plain, title: 'As it was recorded', text: 'A recording is shown: nothing here goes to the car.', facts, act: null, says: '' };
   if (now.state === 'not_available') return { ...plain, title: 'Slow-down not available', text: now.why ?? 'The server does not say why.', facts, act: null, says: '' };
   const isArmed = now.state === 'armed' || order !== null;
   const by = now.armed_by ? `Armed by ${now.armed_by}.` : '';
   const title = order ? 'The car is being slowed' : isArmed ? 'Slow-down armed' : 'Arm the slow-down?';
   const text = order ? orderWords(order, lag_s).text
-    : isArmed ? `${by} Any operator orders it: slide to the end and let go.`.trim()
-      : 'Armed, any operator slows the car with one slide. It holds the tyres’ angle and stays at 0 until it is released.';
+    : isArmed ? `${by} Any operator can slow the car: slide to the end and let go.`.trim()
+      : 'When armed, one slide slows the car. The steering angle is held, and speed 0 is commanded until the car is released.';
   if (order) return { ...plain, title, text, facts, act: null, says: '' };
-  if (isViewer) return { ...plain, title, text, facts, act: null, says: 'This phone is paired as a viewer: it looks, and changes nothing.' };
+  if (isViewer) return { ...plain, title, text, facts, act: null, says: 'This phone is paired as a viewer: it can watch, but change nothing.' };
   if (!mayControl) return { ...plain, title, text, facts, act: 'ask', says: `${holder ?? 'Another'} is in control, and ${isArmed ? 'disarms' : 'arms'} it.` };
   return { ...plain, title, text, facts, act: isArmed ? 'disarm' : 'arm', says: '' };
 }
@@ -245,7 +245,7 @@ export function connectRow(now, isMonitoring) {
   if (orderOf(now)) return { tag: 'Slowing', kind: 'warn', cost: 'the car is being slowed now' };
   if (now.state === 'armed') return { tag: 'Armed', kind: 'plain', cost: text };
   if (now.state === 'safe') return { tag: 'Off', kind: 'unk', cost: `armed on Home. ${text}` };
-  return { tag: 'Not here', kind: 'unk', cost: bare(now.why ?? 'not available') };
+  return { tag: 'Not available', kind: 'unk', cost: bare(now.why ?? 'not available') };
 }
 
 /** A sentence without its end. @param {string} sentence */

@@ -32,7 +32,7 @@ export function openSlow(store, control) {
   async function obey(act) {
     const answer = act === 'ask' ? await store.ask('control', { do: 'request' }) : await store.ask(act);
     refused = answer.ok ? '' : (answer.reason ?? 'Refused.');
-    if (answer.ok && act === 'ask') refused = 'Asked: silence grants control within 10 s. Then arm it.';
+    if (answer.ok && act === 'ask') refused = 'Requested: control is granted within 10 s unless it is refused. Then arm it.';
     else if (answer.ok) return sheet.close();
     draw();
   }

@@ -11,7 +11,7 @@ import { age, duration } from './words.js';
  * @param {boolean} isSilent the server is, so that nobody knows whether it records
  */
 export function recordingWords({ state, for_s, reason }, isSilent) {
-  if (isSilent) return { isOn: false, text: '?', title: 'The server does not answer: nobody knows whether it records.', order: null };
+  if (isSilent) return { isOn: false, text: '?', title: 'The server does not answer: it is unknown whether it records.', order: null };
   const title = `Recording ${state === 'recording' ? 'now' : state}.${reason ? ` ${reason}` : ''}`;
   if (state === 'off') return { isOn: false, text: 'off', title, order: true };
   if (state === 'stopped') return { isOn: false, text: 'fault', title, order: true };

@@ -35,7 +35,7 @@ export async function openTopicPicker(store, model, signal) {
   const label = store.signal(signal)?.label ?? signal;
   const list = field(sheet, 'list');
   setText(field(sheet, 'title'), `Topic of ${label}`);
-  setWords(field(sheet, 'words'), 'The topics of the car are being asked for.');
+  setWords(field(sheet, 'words'), 'Loading the car’s topics…');
   setWords(field(sheet, 'refused'), '');
   sheet.dataset['signal'] = signal;
   list.replaceChildren();
@@ -50,7 +50,7 @@ export async function openTopicPicker(store, model, signal) {
     words = candidates === null ? 'The bridge does not say which topics the car has.' : candidates.length
       ? `${counted(candidates.length, 'topic')} of the car can be read as this signal.` : 'No topic of the car has a type that can be read as this signal.';
   } catch {
-    words = 'The topics could not be asked for: the server does not answer.';
+    words = 'The topics could not be loaded: the server does not answer.';
   }
   if (sheet.dataset['signal'] !== signal) return; // another signal was asked for meanwhile
   setWords(field(sheet, 'words'), words);

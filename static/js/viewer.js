@@ -34,7 +34,7 @@ export function mountViewer(store, say) {
     if (event.type !== 'click' && event.type !== 'submit') return;
     const sheet = event.target.closest('dialog');
     if (sheet && isAsked(sheet)) sheet.close(); // what is said stands beneath it
-    say(WHY, 'A viewer only looks');
+    say(WHY, 'A viewer can only watch');
   };
   for (const type of ['click', 'pointerdown', 'input', 'change', 'submit']) document.addEventListener(type, hold, { capture: true });
 

@@ -102,13 +102,13 @@ test('what still stands comes before what has returned, and the strip says which
   const both = strip(state({ alarms: [returned, warning({ active: true })] }));
   assert.deepEqual([both.kind, both.text, both.hasReturned, both.end], ['warn', warning().title, false, '2 alarms']);
   const only = strip(state({ alarms: [returned] }));
-  assert.deepEqual([only.kind, only.text, only.hasReturned, only.end], ['crit', 'Speed above limit: returned', true, '1 alarm']);
+  assert.deepEqual([only.kind, only.text, only.hasReturned, only.end], ['crit', 'Speed above limit: ended', true, '1 alarm']);
 });
 
 test('an advisory hides neither a warning that waits to be acknowledged nor how many alarms there are', () => {
   const advisory = warning({ id: 'moving', priority: 'advisory', title: 'Component warns' });
   const returned = strip(state({ alarms: [advisory, warning({ state: 'RTN_UNACKED', active: false })] }));
-  assert.deepEqual([returned.kind, returned.text, returned.hasReturned, returned.end], ['warn', `${warning().title}: returned`, true, '2 alarms']);
+  assert.deepEqual([returned.kind, returned.text, returned.hasReturned, returned.end], ['warn', `${warning().title}: ended`, true, '2 alarms']);
   assert.equal(strip(state({ alarms: [advisory, { ...advisory, id: 'b' }] })).end, '2 alarms');
   const checks = /** @type {any} */ ([{ id: 'a', label: 'A', verdict: 'ok' }, { id: 'b', label: 'B', verdict: 'unknown' }]);
   assert.equal(strip(state({ checks, alarms: [advisory] })).end, '1 not checked');

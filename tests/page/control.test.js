@@ -24,8 +24,8 @@ test('the chip says you, a name, no one, or that nobody knows', () => {
 
 test('how many hear alarms', () => {
   assert.deepEqual(reachOf({ can: 2, of: 3, why: 'sound off', pages: [], left_out: 0 }), { text: '2 of 3 operators can hear alarms', why: 'sound off', isBad: false });
-  assert.equal(reachOf({ can: 0, of: 1, why: '', pages: [], left_out: 0 }).text, '0 of 1 operator can hear alarms');
-  assert.deepEqual(reachOf({ can: 0, of: 0, why: '', pages: [], left_out: 0 }), { text: 'No operator is here to hear alarms', why: '', isBad: true });
+  assert.equal(reachOf({ can: 0, of: 1, why: '', pages: [], left_out: 0 }).text, 'Nobody can hear alarms (1 operator)');
+  assert.deepEqual(reachOf({ can: 0, of: 0, why: '', pages: [], left_out: 0 }), { text: 'Nobody can hear alarms (no operator)', why: '', isBad: true });
   assert.equal(reachOf(null).isBad, false);
 });
 
@@ -38,7 +38,7 @@ test('what happened to control is told to whom it concerns', () => {
   assert.deepEqual(told('granted', 'page-b', 'page-a', null), ['You lost control', 'You are in control', 'Control changed']);
   assert.deepEqual(told('lapsed', null, 'page-a', null), ['You lost control', 'Nobody is in control', 'Nobody is in control']);
   assert.deepEqual(told('returned', 'page-a', null, 'page-a'), ['You are in control again', 'Control is back', 'Control is back']);
-  assert.deepEqual(told('requested', 'page-a', null, 'page-b'), [null, null, 'Control is asked for']);
+  assert.deepEqual(told('requested', 'page-a', null, 'page-b'), [null, null, 'Control requested']);
   assert.deepEqual(told('kept', 'page-a', null, 'page-a'), [null, 'Control is kept', 'Control is kept']);
   assert.deepEqual(told('released', null, 'page-a', 'page-a'), [null, 'Nobody is in control', 'Nobody is in control']);
   assert.equal(noticeOf(event('lapsed', null, 'page-a', null), 'page-b')?.offers, 'take');
@@ -53,9 +53,9 @@ test('the sheet offers what can be done from here', () => {
   assert.deepEqual(mine.handTo.map((one) => one.name), ['Ben']); // Cem sleeps
   assert.equal(sheetOf(ANNS, reach, 'page-b').state, 'other');
   const asking = sheetOf({ ...ANNS, requests: [{ page: 'page-b', name: 'Ben', left_s: 6.2 }] }, reach, 'page-b');
-  assert.deepEqual([asking.state, asking.text], ['asking', 'You asked for it: silence grants it in 7 s.']);
+  assert.deepEqual([asking.state, asking.text], ['asking', 'You asked for control. It is granted in 7 s unless it is refused.']);
   const lapsed = sheetOf({ ...FREE, former: { name: 'Ann', page: 'page-a', may_return_s: 12 } }, reach, 'page-b');
-  assert.match(lapsed.text, /Ann has it again by coming back within 12 s\.$/);
+  assert.match(lapsed.text, /Ann can reclaim it for 12 s\.$/);
   assert.equal(sheetOf({ holder: null }, null, 'page-a').state, 'free');
 });
 
@@ -83,14 +83,14 @@ test('each thing that keeps a phone from alarming has its own words', () => {
   assert.match(why({ sound: 'refused' }), /not allowed to sound/);
   assert.match(why({ sound: 'missing' }), /no sound/);
   assert.match(why({ isOnline: false }), /offline/);
-  assert.match(why({ lag_s: 2.1 }), /server is not heard/);
+  assert.match(why({ lag_s: 2.1 }), /No data from the server/);
   assert.match(why({ isReplaying: true }), /shows a recording/);
 });
 
 test('what an iPhone lacks is said as such', () => {
   const found = tags({ isApple: true, vibrates: false, battery: null, charging: null, screen: 'missing' });
-  assert.equal(found['Vibration'][2], 'An iPhone lets no page vibrate.');
-  assert.equal(found['Battery'][2], 'An iPhone tells no page: look at it yourself.');
+  assert.equal(found['Vibration'][2], 'On an iPhone no page can vibrate.');
+  assert.equal(found['Battery'][2], 'An iPhone does not show its battery level to pages. Check it yourself.');
   assert.match(found['Screen stays awake'][2], /from iOS 16\.4 on/);
   assert.match(found['Alarm sound'][2], /silent switch may mute it/);
 });
@@ -102,7 +102,7 @@ test('battery, network and position: low, far and missing', () => {
   assert.deepEqual(tags({ lag_s: 1.5 })['Network'].slice(0, 2), ['Slow', 'warn']);
   assert.match(tags({ network: 'cellular' })['Network'][2], /join the car’s Wi-Fi/);
   assert.match(tags({ position: 'missing', isSecure: false })['Position'][2], /needs HTTPS/);
-  assert.match(tags({ positionSays: 'The phone finds no position.', rides: true })['Position'][2], /finds no position\. This phone rides in the car\./);
+  assert.match(tags({ positionSays: 'The phone finds no position.', rides: true })['Position'][2], /finds no position\. This phone is in the car\./);
   assert.match(tags({ screen: 'missing', isSecure: false })['Screen stays awake'][2], /needs HTTPS/);
 });
 
@@ -116,16 +116,16 @@ test('which phones are iPhones', () => {
 const at = (id, more = {}) => ({ id, label: `phone ${id}`, handheld: true, lat_deg: 32.23, lon_deg: -110.95, accuracy_m: 5, sigma_m: 3.3, alt_m: null, speed_mps: null, heading_deg: null, at_ms: 0, age_s: 0.5, used: true, why: null, why_text: null, compared: false, chosen: false, ...more });
 
 test('each phone in its own words', () => {
-  assert.deepEqual(phoneRow(at('aaaa', { chosen: true, compared: true }), 0.1, 'aaaa'), { id: 'aaaa', name: 'You', says: 'Knows its position to 5 m, 0.6 s ago.', tag: 'In the car', isChosen: true });
-  const denied = phoneRow(at('bbbb', { used: false, why: 'denied', why_text: 'The phone was not allowed to tell it', age_s: null, accuracy_m: null }), 0, 'aaaa');
-  assert.deepEqual([denied.name, denied.says, denied.tag], ['phone bbbb', 'The phone was not allowed to tell it.', '']);
+  assert.deepEqual(phoneRow(at('aaaa', { chosen: true, compared: true }), 0.1, 'aaaa'), { id: 'aaaa', name: 'You', says: 'Accurate to 5 m, 0.6 s ago.', tag: 'In the car', isChosen: true });
+  const denied = phoneRow(at('bbbb', { used: false, why: 'denied', why_text: 'Location permission denied on this phone', age_s: null, accuracy_m: null }), 0, 'aaaa');
+  assert.deepEqual([denied.name, denied.says, denied.tag], ['phone bbbb', 'Location permission denied on this phone.', '']);
   assert.equal(nameOf(at('cccc', { label: null }), 'aaaa'), 'A phone');
 });
 
 test('in one line, which is compared and why', () => {
   const line = (...phones) => phonesLine({ phones }, 'aaaa');
-  assert.deepEqual(line(at('aaaa', { compared: true })), { text: '1 phone tells where it is', why: 'Yours is compared: nobody said which rides in the car' });
-  assert.equal(line(at('bbbb', { compared: true, chosen: true }), at('aaaa')).why, 'phone bbbb rides in the car');
+  assert.deepEqual(line(at('aaaa', { compared: true })), { text: '1 phone shares its position', why: 'Using yours. Choose the phone in the car' });
+  assert.equal(line(at('bbbb', { compared: true, chosen: true }), at('aaaa')).why, 'phone bbbb is in the car');
   assert.equal(line(at('bbbb')).why, '');
 });
 

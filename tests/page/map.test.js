@@ -221,7 +221,7 @@ test('a car that is not known to be there is never shown as live, and why is sai
 
 test('unknown quality and unknown heading are said and drawn as that', () => {
   const car = carOf(frameOf({ ...FIX, sigma_m: null, covariance_m2: null }, null, null), inked('fresh', 'not_published'));
-  assert.deepEqual([car.ellipse, car.label, car.heading_deg], [null, 'Car ±?, heading unknown', null]);
+  assert.deepEqual([car.ellipse, car.label, car.heading_deg], [null, 'Car, accuracy and heading unknown', null]);
   const standing = carOf(frameOf(FIX), inked('fresh', 'stale'));
   assert.deepEqual([standing.isHeadingLive, standing.label], [false, 'Car ±5 m, heading 3.4 s old']);
 });

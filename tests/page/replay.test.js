@@ -89,8 +89,8 @@ test('the line says first what is wrong with the replay, then what was not recor
   assert.equal(told({}, { alarms: [fast, alarm({ id: 'b', priority: 'warning' })] }).end, '2 alarms, re-evaluated');
   assert.equal(told({}, { alarms: [alarm({ active: false, state: 'RTN_UNACKED' })] }).text, 'No alarms', 'what was over then is no alarm of this moment');
   assert.equal(told({ silent_s: 3.42 }, { alarms: [fast] }).text, 'Nothing recorded for 3.4 s');
-  assert.equal(told({ silent_s: null }).text, 'No message of the car yet');
-  assert.equal(told({ is_seeking: true, silent_s: 9 }).text, 'Going to 04:06');
+  assert.equal(told({ silent_s: null }).text, 'No message from the car yet');
+  assert.equal(told({ is_seeking: true, silent_s: 9 }).text, 'Seeking to 04:06');
   assert.equal(told({ hangs_s: 3.2, is_seeking: true }).text, 'The replay has not answered for 3 s');
   assert.equal(told({ is_settled: false }).text, 'Checks still warming up');
   assert.equal(toldOf(playing({ session: { paused: true } })).text, 'Monitoring was paused');
@@ -105,7 +105,7 @@ test('what is live is told beside a recording: alarms, a lost link, a pause, and
   assert.equal(asideOf(live({ paused: true }))?.text, 'Live: monitoring is paused');
   const fast = alarm();
   const gps = alarm({ id: 'gps', title: 'GPS drift', priority: 'warning' });
-  assert.deepEqual(asideOf(live({ alarms: [gps, fast] })), { kind: 'crit', text: 'Live: Speed above limit (1 of 2)', asking: fast });
+  assert.deepEqual(asideOf(live({ alarms: [gps, fast] })), { kind: 'crit', text: 'Live: Speed above limit (2 alarms)', asking: fast });
   assert.equal(asideOf(live({ alarms: [gps] }))?.kind, 'warn');
   assert.equal(asideOf(live({ alarms: [gps] }))?.asking, null);
   assert.equal(asideOf(live({ alarms: [alarm({ state: 'ACKED' })] }))?.asking, null, 'somebody has seen it');

@@ -389,7 +389,8 @@ async def map_stale(server: Canned, page: Page) -> None:
     server.state["signals"]["position"] |= {"freshness": "stale", "age_s": 3.35}
     server.state["signals"]["heading"] |= {"freshness": "stale", "age_s": 3.35}
     server.state["phone"] |= {
-        "used": False, "why": "hidden", "why_text": "The page is in the background, where phones give no position",
+        "used": False, "why": "hidden",
+        "why_text": "The page on the phone is in the background, where it gets no position",
         "age_s": 12.4,
     }  # fmt: skip
     server.state["checks"][5] |= {"verdict": "unknown", "brief": "not checked: hidden"}
@@ -404,7 +405,7 @@ async def map_coarse(server: Canned, page: Page) -> None:
     server.state["signals"]["heading"] |= {"freshness": "stale", "age_s": 12.0}
     server.state["phone"] |= {
         "accuracy_m": 60.0, "used": False, "why": "coarse",
-        "why_text": "The phone knows it to 60 m only, 50 m are needed",
+        "why_text": "Position of the phone is accurate to 60 m only; 50 m is needed",
     }  # fmt: skip
     server.state["checks"][5] |= {"verdict": "unknown", "brief": "not checked: coarse"}
 

@@ -30,9 +30,9 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
   assert.equal(words(slow('not_available', { why: 'No link to the car.' })), 'off: Slow-down off No link to the car');
   assert.equal(words(slow('not_available', { why: 'The steering of this kind of car is not known, and a command would turn its wheels.' })), 'off: Slow-down off press for the reason');
   assert.equal(words(slow('safe')), 'off: Slow-down off press to arm');
-  assert.equal(words(slow('safe'), { isViewer: true }), 'off: Slow-down off a viewer only looks');
+  assert.equal(words(slow('safe'), { isViewer: true }), 'off: Slow-down off a viewer cannot use it');
   assert.equal(words(slow('armed')), 'armed: Slide to slow down');
-  assert.equal(words(slow('armed'), { isViewer: true }), 'off: Slow-down armed a viewer only looks');
+  assert.equal(words(slow('armed'), { isViewer: true }), 'off: Slow-down armed a viewer cannot use it');
   assert.equal(words(slow('armed'), { mayControl: false, holder: 'Ben' }), 'armed: Slide to slow down', 'any operator stops the car');
   assert.equal(words(slow('armed'), { isSilent: true }), 'off: Slow-down off the server does not answer');
   assert.equal(words(null), 'off: Slow-down off the server does not answer');
@@ -161,7 +161,7 @@ test('the sheet: what would be commanded, who competes, and the one thing this p
 test('its row on the connect screen', () => {
   assert.equal(connectRow(slow('armed'), false).tag, 'Off');
   assert.deepEqual([connectRow(slow('armed'), true).tag, connectRow(slow('safe'), true).tag, connectRow(ordered(), true).tag], ['Armed', 'Off', 'Slowing']);
-  assert.deepEqual(connectRow(slow('not_available', { why: 'No link to the car.' }), true), { tag: 'Not here', kind: 'unk', cost: 'No link to the car' });
+  assert.deepEqual(connectRow(slow('not_available', { why: 'No link to the car.' }), true), { tag: 'Not available', kind: 'unk', cost: 'No link to the car' });
 });
 
 test('in the log: each step by its mark, one that was not confirmed as what it is', () => {

@@ -59,7 +59,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     assert acknowledged(canned) == [("gps_jump", 4)]
     canned.state["alarms"] = canned.state["alarms"][:1]
     await expect(rows).to_have_count(2)
-    await expect(strip).to_have_text("Connection lost: returned1 alarm")
+    await expect(strip).to_have_text("Connection was lost, now back1 alarm")
     await expect(strip).to_have_attribute("data-returned", "")
     ended = phone.page.locator("[data-f=alarms-ended]")
     await expect(ended).to_have_text("Acknowledge all that ended 1")
@@ -99,7 +99,7 @@ async def test_a_warning_lies_over_the_tabs_and_never_over_the_list_of_alarms(ph
     canned.state["alarms"][0] |= {**RETURNED, "place": "snackbar"}
     await expect(snackbar).to_contain_text("Returned to normal")
     await expect(snackbar.get_by_text("Shelve")).to_be_hidden()  # as in the list: what has returned is acknowledged
-    await expect(phone.f("strip")).to_have_text("Laser silent: returned2 alarms")
+    await expect(phone.f("strip")).to_have_text("Laser silent: ended2 alarms")
     await phone.f("strip").tap()
     await expect(phone.page.locator("[data-f=alarms] li")).to_have_count(3)  # and the suppressed one
     await expect(snackbar).to_be_hidden()

@@ -99,11 +99,11 @@ async def test_mail_is_set_up_and_tried_in_settings(
     await group(phone).get_by_label("User").fill("")
     await group(phone).get_by_role("button", name="Save").tap()
     await expect(group(phone).get_by_role("status")).to_contain_text("Saved")
-    await group(phone).get_by_label("Send a trial mail to").fill("ann@example.org")
+    await group(phone).get_by_label("Send a test e-mail to").fill("ann@example.org")
     await group(phone).get_by_role("button", name="Test").tap()
     await expect(group(phone).get_by_role("status")).to_contain_text("It took a mail to ann@example.org. It says: 250")
     assert post.taken[-1]["to"] == ["ann@example.org"]
-    await group(phone).get_by_label("Send a trial mail to").fill(GONE)
+    await group(phone).get_by_label("Send a test e-mail to").fill(GONE)
     await group(phone).get_by_role("button", name="Test").tap()
     await expect(group(phone).get_by_role("alert")).to_contain_text("550 5.1.1")
     phone.complaints[:] = [said for said in phone.complaints if not re.search("status of (422|502)", said)]
@@ -187,7 +187,7 @@ async def test_the_phones_own_mail_program_is_handed_the_file_where_it_takes_it(
     )
     await sheet.get_by_label("Message").fill("Hello")
     await sheet.get_by_role("button", name="Open in my mail app").tap()
-    await sheet.get_by_role("button", name="Hand it to my mail app").tap()
+    await sheet.get_by_role("button", name="Open it in my mail app").tap()
     await expect(sheet).to_be_hidden()
     name, size, text = await phone.page.evaluate("window.shared")
     whole = (await api.get(f"/api/recordings/{DRIVE}/file.mcap")).content

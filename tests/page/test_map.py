@@ -133,7 +133,7 @@ async def test_car_and_phone_with_distance_bearing_and_their_errors(phone: Phone
         car.covariance_m2 = (9.0, 9.0, 6.0)  # long to the north-east
         await expect(it.svg(".acc")).to_have_attribute("transform", re.compile(r"rotate\(45\)"))
         car.covariance_m2 = None
-        await expect(it.svg(".name")).to_have_text("Car ±?")
+        await expect(it.svg(".name")).to_have_text("Car, accuracy unknown")
         await expect(it.svg(".acc")).to_be_hidden()
 
 
@@ -214,7 +214,7 @@ async def test_a_stale_car_loses_its_ink_and_its_line(phone: Phone) -> None:
 async def test_without_a_fix_the_coordinates_are_no_position(phone: Phone) -> None:
     async with roaming() as car, looking(phone, car) as it:
         car.status = -1
-        await expect(it.f("car-says")).to_have_text("The car’s receiver has no fix: nobody knows where the car is.")
+        await expect(it.f("car-says")).to_have_text("The car’s receiver has no fix: the car’s position is unknown.")
         await expect(it.f("car-age")).to_have_text("no fix")
         await expect(it.f("car-lat")).to_have_text("–")
         await expect(it.svg(".name")).to_have_text("Car was here")
@@ -243,17 +243,17 @@ async def test_every_reason_of_the_phone_is_said_in_words(phone: Phone) -> None:
     async with roaming() as car, looking(phone, car) as it:
         await expect(it.f("phone-says")).to_have_text("No phone is sharing its position.")
         await phone.f("sound-off").tap()  # arms the position too: this phone refuses
-        await expect(it.f("phone-says")).to_have_text("The phone was not allowed to tell it.")
+        await expect(it.f("phone-says")).to_have_text("Location permission denied on the phone.")
         await expect(it.f("verdict-why")).to_have_text("denied")
         async with lying(phone, car, 30.0, 40.0, accuracy_m=80.0):
             await expect(it.f("phone-says")).to_have_text(
-                "The phone knows it to 80 m only, 50 m are needed.", timeout=12_000
+                "Position of the phone is accurate to 80 m only; 50 m is needed.", timeout=12_000
             )
             await expect(it.f("apart")).to_have_text(re.compile(r"^(49\.9|50\.0|50\.1)$"))  # by its fix, uncompared
             await expect(it.f("allowed")).to_have_text("–")
             await expect(it.page.locator(".mapv .name").nth(1)).to_have_text("Phone ±80 m")
         await phone.page.context.clear_permissions()
-        await expect(it.f("phone-says")).to_have_text("The phone was not allowed to tell it.")
+        await expect(it.f("phone-says")).to_have_text("Location permission denied on the phone.")
         await expect(it.svg(".phone-mark")).to_have_attribute("data-ink", "stale")
         await expect(it.f("phone-age")).to_have_text(re.compile(r"^STALE \d"))
 

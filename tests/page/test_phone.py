@@ -109,7 +109,7 @@ async def test_case_07_a_permission_taken_away_is_told_with_its_name_and_given_b
         await expect(tile(phone, "Phone–car")).to_contain_text("permission")
         state = await ride.until(lambda s: any(one["id"] == "phone_missing" for one in s["alarms"]))
         (alarm,) = [one for one in state["alarms"] if one["id"] == "phone_missing"]
-        assert alarm["text"].startswith("The phone was not allowed to tell it; none for 1")
+        assert alarm["text"].startswith("Location permission denied on the phone")
         await context.grant_permissions(["geolocation"])
         await ride.until(uses_it)
         await expect(tile(phone, "Phone–car")).to_contain_text("OK")

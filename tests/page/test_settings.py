@@ -246,7 +246,7 @@ async def test_a_search_shows_what_it_names_and_nothing_else(phone: Phone, watch
     await expect(number(phone, "obstacle.wheelbase_m")).to_have_value("2.62")
     await expect(phone.page.locator(".topic:visible")).to_have_count(0)
     await search.fill("<img src=x>")
-    await expect(phone.page.locator(".nothing")).to_have_text("Nothing here is called “<img src=x>”.")
+    await expect(phone.page.locator(".nothing")).to_have_text("No setting matches “<img src=x>”.")
     await search.fill("navsatfix")
     await expect(phone.page.locator(".topic:visible")).to_have_count(1)
     await search.fill("")

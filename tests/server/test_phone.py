@@ -130,7 +130,7 @@ def test_the_state_shows_it_without_a_number_that_is_none() -> None:
     assert (shown["used"], shown["why"], shown["why_text"]) == (
         False,
         "timeout",
-        "The phone has been waiting for a fix",
+        "No GPS fix on the phone for 1 s",
     )
     assert {shown[name] for name in ("lat_deg", "accuracy_m", "age_s", "apart_m", "correlation")} == {None}
     for i in range(20):
@@ -144,7 +144,7 @@ def test_the_state_shows_it_without_a_number_that_is_none() -> None:
         "at_ms": 1_700_000_000_000, "age_s": 0.5, "used": True, "why": None, "why_text": None,
         "apart_m": 11.1, "bearing_deg": 180.0, "compared_age_s": 0.5, "explained_m": 74.6, "correlation": None,
         "chosen": False, "choice": "only",
-        "choice_text": "No phone was chosen to ride in the car: this is the only one.",
+        "choice_text": "No phone was chosen as the one in the car. The only phone is used.",
     }  # fmt: skip
 
 
@@ -253,7 +253,7 @@ def test_case_07_a_permission_that_is_taken_away_is_told_with_its_name() -> None
         ("phone_missing", "raised"),
         ("phone_missing", "cleared"),
     ]
-    assert found.told[0].text == "The phone was not allowed to tell it; none for 10 s"
+    assert found.told[0].text == "Location permission denied on the phone"
     assert 28.0 < found.told[0].at_s < 31.0
     assert "FAULT permission" in found.briefs["phone_missing"]
 

@@ -81,7 +81,7 @@ def test_three_of_five_beyond_the_gate_and_10_m(comparisons: tuple[Comparison, .
 
 def test_what_the_operator_reads_of_it() -> None:
     finding = asked("phone_car", view(comparisons=apart(2.0, 511.6, 511.6, 511.6, 2.0)))
-    assert finding.text == "The phone is 512 m from the car; 14 m are explained"
+    assert finding.text == "The phone is 512 m from the car; up to 14 m is normal"
     assert finding.brief == "FAULT 512 m"
     assert finding.measured is not None
     assert finding.limit is not None
@@ -173,21 +173,25 @@ def test_the_correlation_has_a_deadband_and_a_setting() -> None:
 # -- missing -----------------------------------------------------------------------------------------------------------
 
 WHYS: dict[Why, tuple[str, str, str]] = {
-    "denied": ("The phone was not allowed to tell it", "not checked: denied", "FAULT permission"),
+    "denied": ("Location permission denied on the phone", "not checked: denied", "FAULT permission"),
     "insecure": (
-        "The page was not opened over HTTPS, and phones give it to no other",
+        "The page on the phone was not opened over HTTPS, which a position needs",
         "not checked: HTTPS",
         "FAULT needs HTTPS",
     ),
-    "unavailable": ("The phone finds no position", "not checked: no fix", "FAULT no fix"),
-    "timeout": ("The phone has been waiting for a fix", "not checked: no fix", "FAULT no fix"),
+    "unavailable": ("No position found by the phone", "not checked: no fix", "FAULT no fix"),
+    "timeout": ("No GPS fix on the phone for 10 s", "not checked: no fix", "FAULT no fix"),
     "hidden": (
-        "The page is in the background, where phones give no position",
+        "The page on the phone is in the background, where it gets no position",
         "not checked: hidden",
         "FAULT background",
     ),
-    "coarse": ("The phone knows it to 800 m only, 50 m are needed", "not checked: coarse", "FAULT ±800 m"),
-    "late": ("The phone's messages come too late over the radio", "not checked: late", "FAULT comes late"),
+    "coarse": (
+        "Position of the phone is accurate to 800 m only; 50 m is needed",
+        "not checked: coarse",
+        "FAULT ±800 m",
+    ),
+    "late": ("Positions of the phone arrive too late over the radio", "not checked: late", "FAULT comes late"),
 }
 
 
@@ -203,7 +207,7 @@ def test_each_reason_is_said_after_10_s_and_nothing_is_compared_meanwhile(
     sentence, not_checked, brief = words
     before, after = asked("phone_missing", without(why, 9.9)), asked("phone_missing", without(why, 10.0))
     assert (before.verdict, before.brief) == ("unknown", not_checked)
-    assert (after.verdict, after.brief, after.text) == ("fault", brief, f"{sentence}; none for 10 s")
+    assert (after.verdict, after.brief, after.text) == ("fault", brief, sentence)
     for check in ("phone_car", "phone_tracks"):
         other = asked(check, without(why, 20.0, comparisons=apart(*[600.0] * 5), tracks=tracks(0.0)))
         assert (other.verdict, other.brief) == ("unknown", not_checked)
@@ -211,9 +215,9 @@ def test_each_reason_is_said_after_10_s_and_nothing_is_compared_meanwhile(
 
 def test_a_fix_that_grew_old_and_a_phone_that_fell_silent() -> None:
     old = view(measured_s=NOW_S - 12.0, usable_s=NOW_S - 12.0)
-    assert asked("phone_missing", old).text == "The phone's newest fix is 12 s old; none for 12 s"
+    assert asked("phone_missing", old).text == "The newest fix of the phone is 12 s old"
     silent = view(heard_s=NOW_S - 14.0, measured_s=NOW_S - 14.0, usable_s=NOW_S - 14.0)
-    assert asked("phone_missing", silent).text == "The phone has not been heard for 14 s; none for 14 s"
+    assert asked("phone_missing", silent).text == "No position from the phone for 14 s"
     assert asked("phone_missing", silent).brief == "FAULT silent"
 
 

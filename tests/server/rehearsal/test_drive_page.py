@@ -76,7 +76,7 @@ def test_the_page_shows_them_with_the_log_and_the_settings(tmp_path: Path) -> No
     own = [*STORY, (BEGIN_S * NS, "/catgraph/settings", {"version": 1, "toml": TOML, "in_force": {}})]
     text, data = page(made(tmp_path, own), tmp_path)
     assert "<title>My drive · catgraph drive</title>" in text
-    assert "As they were told while the car drove." in text
+    assert "Original alarms, as announced during the drive." in text
     assert [(bar["alarm"], bar["from"], bar["to"]) for bar in data["episodes"]] == [
         ("speed_limit", 2.0, 9.0),
         ("obstacle", 12.0, 20.0),
