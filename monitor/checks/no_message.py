@@ -45,7 +45,7 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
 
 
 def _words(bridge_answers: bool, topics: int) -> str:
-    spoke = f"0 of {topics} topics spoke within {WITHIN_S:.0f} s."
+    spoke = f"0 of {topics} topics sent data within {WITHIN_S:.0f} s."
     if not bridge_answers:
         return f"Connected, but neither the bridge's ROS side nor the car answers. {spoke}"
     if topics == 0:

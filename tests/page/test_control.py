@@ -140,7 +140,7 @@ async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(browse
         await holds(one, "Ann")
 
         await one.press("Cem", "Ask for control")
-        await expect(one["Cem"].page.locator("#sheet-control")).to_contain_text("silence grants it in")
+        await expect(one["Cem"].page.locator("#sheet-control")).to_contain_text("It is granted in")
         await asks.get_by_role("button", name="Hand over").tap()
         await holds(one, "Cem")
         await one["Cem"].page.locator("#sheet-control").get_by_role("button", name="Close").tap()
@@ -248,7 +248,11 @@ async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
             await expect(phone.page.locator(".strip")).to_contain_text("Nobody can hear alarms", timeout=40_000)
             async with httpx.AsyncClient() as client:
                 standing = (await client.get(f"{watch.address}/api/alarms")).json()["alarms"]
-            assert "nobody can hear alarms: none of 1 (sound off)" in standing[0]["text"]
+            assert [
+                "nobody can hear alarms: none of 1 (sound off)" in one["text"]
+                for one in standing
+                if one["id"] == "reach"
+            ] == [True]
             await phone.page.locator('[data-part="reach"]').tap()
             sheet = phone.page.locator("#sheet-this-phone")
             await expect(sheet).to_be_visible()
@@ -266,8 +270,8 @@ async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
 
 
 @pytest.mark.timeout(120)
-async def test_each_phone_has_its_marker_and_the_one_that_rides_is_compared(browser: Browser, tmp_path: Path) -> None:
-    """Ann tells a position, Ben was not allowed to; Ann, in control, says that Ben's rides in the car."""
+async def test_each_phone_has_its_marker_and_the_one_in_the_car_is_compared(browser: Browser, tmp_path: Path) -> None:
+    """Ann tells a position, Ben was not allowed to; Ann, in control, says that Ben's is in the car."""
     async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
         one = Crew({}, watch)
         contexts = []
@@ -288,7 +292,7 @@ async def test_each_phone_has_its_marker_and_the_one_that_rides_is_compared(brow
             await one["Ann"].page.locator("#tab-map").tap()
             await one["Ann"].f("phones").tap()
             sheet = one["Ann"].page.locator("#sheet-phones")
-            await expect(sheet).to_contain_text("of 2, this was the first with a usable position")
+            await expect(sheet).to_contain_text("Of 2, the first with a usable position is used")
             bens = sheet.get_by_role("button", name="Ben")
             await expect(bens).to_contain_text("Location permission denied on this phone.")
             await bens.tap()

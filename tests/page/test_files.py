@@ -265,7 +265,7 @@ async def test_another_form_is_made_while_one_waits_and_can_be_cancelled(opened:
         await sheet(opened).get_by_role("button", name="GPX track").tap()
     await (await coming.value).save_as(tmp_path / "it.gpx")
     assert "<trkpt" in (tmp_path / "it.gpx").read_text()
-    await expect(sheet(opened)).to_contain_text("It is made.")
+    await expect(sheet(opened)).to_contain_text("Done.")
     await expect(sheet(opened).get_by_role("button", name="Save again")).to_be_visible()
 
 

@@ -88,7 +88,7 @@ async def test_a_link_leads_to_a_moment_and_one_tap_back_to_live(phone: Phone, w
 async def test_it_plays_pauses_and_changes_its_pace(phone: Phone, watch: Watch) -> None:
     page = await replayed(phone, watch, 2.0)
     await expect(clock(page)).to_have_text("00:02")
-    await page.get_by_label("Pace of the replay").select_option("8")
+    await page.get_by_label("Playback speed").select_option("8")
     await page.get_by_role("button", name="Play", exact=True).tap()
     await expect(clock(page)).to_have_text(re.compile("00:(1[0-9]|[2-6])"), timeout=10_000)
     await page.get_by_role("button", name="Pause").tap()

@@ -78,12 +78,12 @@ def test_without_a_link_no_message_is_expected(phase: Phase) -> None:
 @pytest.mark.parametrize(
     ("answers", "topics", "text"),
     [
-        (True, 9, "The bridge answers, the car publishes nothing. 0 of 9 topics spoke within 5 s."),
+        (True, 9, "The bridge answers, the car publishes nothing. 0 of 9 topics sent data within 5 s."),
         (True, 0, "The bridge answers, but offers no topic that catgraph knows."),
         (
             False,
             9,
-            "Connected, but neither the bridge's ROS side nor the car answers. 0 of 9 topics spoke within 5 s.",
+            "Connected, but neither the bridge's ROS side nor the car answers. 0 of 9 topics sent data within 5 s.",
         ),
     ],
 )
