@@ -1,9 +1,27 @@
 // A word of the page itself: something was refused, a blind time is over. It goes by itself, and takes no place of an alarm.
 
-import { html, icon, mirror, words } from './dom.js';
+import { html, icon, mirror, need, words } from './dom.js';
 
 const STAYS_MS = 8000;
 const OFFERS_MS = 15_000; // what can be pressed must be found and reached first
+
+/**
+ * Tell the style sheets how much of the view is covered, so that what must be read is laid out above it.
+ * @param {HTMLElement} root where snackbars stand
+ */
+function makeRoom(root) {
+  const view = need(document, '#monitor > .view');
+  const { style } = document.documentElement;
+  const seen = new ResizeObserver(() => {
+    const box = view.getBoundingClientRect();
+    const covered_px = root.offsetHeight === 0 ? 0 : Math.max(0, Math.ceil(box.bottom - root.getBoundingClientRect().top));
+    style.setProperty('--snack', `${covered_px}px`);
+    style.setProperty('--view', `${Math.floor(box.height)}px`);
+    style.setProperty('--room', `${Math.floor(box.height) - covered_px}px`);
+  });
+  seen.observe(root);
+  seen.observe(view);
+}
 
 /** @typedef {{label: string, act: () => void}} Way what a notice offers, as one key */
 
@@ -14,6 +32,7 @@ const OFFERS_MS = 15_000; // what can be pressed must be found and reached first
 export function notices(root) {
   const isCovering = () => root.querySelector('.snack:not([hidden])') !== null;
   mirror(document.body, 'data-snack', isCovering, [root], { childList: true, subtree: true, attributeFilter: ['hidden'] });
+  makeRoom(root);
   return (sentence, title = '', way = undefined) => {
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close' }, icon('close'));
     const text = html('div', { class: 'tx' }, ...(title ? [html('b', {}, ...words(title))] : []), html('span', {}, ...words(sentence)));

@@ -1,0 +1,101 @@
+"""Where snackbars stand: whatever the size of the screen, what must be read or pressed at once is not under one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from playwright.async_api import Browser, Page, expect
+
+from tests.page.canned import Canned, alarm, live, slow, slowed
+from tests.page.conftest import PHONE
+
+SIZES = [(320, 640), (360, 640), (412, 915), (640, 360), (915, 412), (800, 600), (1180, 820), (1280, 800), (1440, 900)]
+LONG = "The newest fix of the phone (Ann-Kathrin, of 3 phones) is 12 s old and comes too late over the radio. " * 3
+# Which of these overlap a snackbar that is seen, by how many square pixels. A panel out of sight does not count.
+COVERED = """() => {
+  const seen = (one) => one.getClientRects().length > 0;
+  const snacks = [...document.querySelectorAll('.snack')].filter(seen).map((one) => one.getBoundingClientRect());
+  const over = (a, b) => Math.max(0, Math.min(a.right, b.right) - Math.max(a.left, b.left))
+    * Math.max(0, Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top));
+  const kept = {speed: '.gauge .speed', strip: '#monitor > .strip', slide: '#monitor > .rail .slide',
+    stop: '#monitor > .rail [data-f=stop]', steps: '#monitor > .under'};
+  const found = {snacks: snacks.length};
+  for (const [name, selector] of Object.entries(kept)) {
+    const box = document.querySelector(selector)?.getBoundingClientRect();
+    found[name] = box ? snacks.reduce((sum, one) => sum + over(one, box), 0) : 0;
+  }
+  const [speed, view] = ['.gauge .speed', '#monitor > .view']
+    .map((one) => document.querySelector(one).getBoundingClientRect());
+  found.isSpeedThere = speed.height > 12 && speed.top >= view.top && speed.bottom <= view.bottom;
+  return found;
+}"""
+
+
+def warned(**more: Any) -> dict[str, Any]:
+    return live() | {"alarms": [alarm("phone_missing", "Phone position missing", text=LONG)]} | more
+
+
+async def opened(browser: Browser, served: Canned, width: int, height: int) -> Page:
+    context = await browser.new_context(**PHONE | {"viewport": {"width": width, "height": height}})
+    page = await context.new_page()
+    await page.goto(served.address)
+    await expect(page.locator("[data-f=warning]")).to_be_visible()
+    await page.evaluate("document.fonts.ready")
+    return page
+
+
+async def nothing_covered(page: Page, *, snacks: int, is_low: bool = False) -> None:
+    """`is_low`: on a phone on its side the steps of a slow-down leave the gauge no height, warning or not."""
+    await expect(page.locator(".snack:not([hidden])")).to_have_count(snacks)
+    await page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    found = await page.evaluate(COVERED)
+    if is_low:
+        found |= {"steps": 0, "isSpeedThere": True}
+    assert found == {
+        "snacks": snacks, "speed": 0, "strip": 0, "slide": 0, "stop": 0, "steps": 0, "isSpeedThere": True,
+    }  # fmt: skip
+
+
+@pytest.mark.world(n=18)
+@pytest.mark.parametrize(("width", "height"), SIZES)
+@pytest.mark.parametrize("armed", ["armed", "slowing"])
+async def test_a_warning_covers_neither_speed_nor_strip_nor_slide(
+    browser: Browser, width: int, height: int, armed: str
+) -> None:
+    served = Canned()
+    async with served.running():
+        served.state = warned(decelerate=slow("armed") if armed == "armed" else slowed(True))
+        page = await opened(browser, served, width, height)
+        await nothing_covered(page, snacks=1, is_low=armed == "slowing" and height < 400)
+        await page.context.close()
+
+
+@pytest.mark.world(n=18)
+@pytest.mark.parametrize(("width", "height"), [(360, 640), (412, 915), (1440, 900)])
+async def test_nor_do_a_warning_and_a_notice_together(browser: Browser, width: int, height: int) -> None:
+    served = Canned()
+    async with served.running():
+        served.state = warned(decelerate=slow("armed"))
+        page = await opened(browser, served, width, height)
+        served.refuses["acknowledge"] = "Ben is in control."
+        await page.locator("[data-f=warning]").get_by_role("button", name="Acknowledge").tap()
+        await nothing_covered(page, snacks=2)
+        await page.context.close()
+
+
+@pytest.mark.world(n=18)
+async def test_a_warning_costs_the_map_of_a_wide_screen_nothing(browser: Browser) -> None:
+    served = Canned()
+    async with served.running():
+        served.state = warned()
+        page = await opened(browser, served, 1440, 900)
+        await page.locator("#tab-map").tap()
+        box = page.locator("#monitor .mapbox")
+        await expect(box).to_be_visible()
+        await expect(page.locator("#monitor .banner:visible")).to_have_count(0)  # that no sound is allowed yet
+        under = (await box.bounding_box() or {})["height"]
+        served.state = live()
+        await expect(page.locator("[data-f=warning]")).to_be_hidden()
+        assert (await box.bounding_box() or {})["height"] == under
+        await page.context.close()
