@@ -71,8 +71,11 @@ async function run() {
     try {
       stop(); // values that look alive, on a page that could not ask for anybody, would be a lie
     } finally {
-      undrawn?.show();
-      giveUp();
+      try {
+        giveUp(); // it removes the dialogs: closed, an alarm's would be taken for acknowledged
+      } finally {
+        undrawn?.show();
+      }
     }
   }
 }

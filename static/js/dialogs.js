@@ -78,7 +78,7 @@ export function mount(store, page) {
     }));
     // Some browsers close without asking; what is not acknowledged comes back with the next frame.
     stops.push(listen(sheet, 'close', () => {
-      if (standing && sheets[standing.kind] === sheet && !store.drawing.isFailed) answer();
+      if (standing && sheets[standing.kind] === sheet && !store.drawing.isFailed && !store.isStopped) answer();
     }));
   }
   on(sheets.alarm, 'acknowledge', answer);

@@ -62,6 +62,8 @@ export class Store {
   #started_ms = 0;
   #drew_ms = -Infinity;
   #moved_ms = -Infinity;
+  /** Nothing is drawn any more, and nothing is answered. */
+  isStopped = false;
   #isMoved = false;
   #urgent = '';
   #isUrgent = false;
@@ -136,6 +138,7 @@ export class Store {
   stop() {
     for (const stop of this.#stops.splice(0)) stop();
     this.#listeners.clear(); // a picture may be under way
+    this.isStopped = true;
     this.wire.stop();
   }
 
