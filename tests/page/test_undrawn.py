@@ -88,6 +88,11 @@ class Glass:
         answer = await self._cdp.send("Runtime.evaluate", {"expression": script, "returnByValue": True})
         assert "exceptionDetails" not in answer, answer
 
+    async def value(self, script: str) -> float:
+        """A number that the page's own scripts hold."""
+        answer = await self._cdp.send("Runtime.evaluate", {"expression": script, "returnByValue": True})
+        return float(answer["result"]["value"])
+
     async def until(self, is_so: Any, within_s: float) -> dict[str, Any] | None:
         """What is seen once `is_so`; None: not within that time."""
         due_s = time.monotonic() + within_s
@@ -263,3 +268,60 @@ async def test_whatever_is_broken_before_the_page_begins_it_says_so(browser: Bro
 @pytest.mark.soak
 async def test_each_of_all_functions_before_the_page_begins(browser: Browser, canned: Canned) -> None:
     assert await before_in_lanes(browser, canned, FUNCTIONS) == []
+
+
+# What sounds: every node that is joined to the loudspeaker is joined to a meter too.
+METER = """(() => {
+  const {connect} = AudioNode.prototype;
+  const meters = new Map();
+  AudioNode.prototype.connect = function (to, ...rest) {
+    if (to === this.context.destination) {
+      if (!meters.has(this.context)) meters.set(this.context, new AnalyserNode(this.context, {fftSize: 16384}));
+      connect.call(this, meters.get(this.context));
+    }
+    return connect.call(this, to, ...rest);
+  };
+  globalThis.catgraphLoudest = () => {
+    let loudest = 0;
+    for (const [context, meter] of meters) {
+      const wave = new Float32Array(meter.fftSize);
+      meter.getFloatTimeDomainData(wave);
+      if (context.state === 'running') for (const one of wave) loudest = one > loudest ? one : loudest;
+    }
+    return loudest;
+  };
+})()"""
+
+
+async def loudest(glass: Glass, for_s: float) -> float:
+    """The highest peak at the loudspeaker, of 1."""
+    due_s, found = time.monotonic() + for_s, 0.0
+    while time.monotonic() < due_s and found < 0.05:
+        found = max(found, await glass.value("catgraphLoudest()"))
+        await asyncio.sleep(0.1)
+    return found
+
+
+@pytest.mark.world(n=14)
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize(
+    "function", functions("Number.prototype toFixed|Element.prototype setAttribute|window requestAnimationFrame never")
+)
+async def test_a_page_that_cannot_draw_sounds_the_alarm(browser: Browser, function: tuple[str, str, str]) -> None:
+    """No alarm stands: the page itself is what the operator must hear of. Drawing again, it is still."""
+    served = Canned()
+    async with served.running():
+        served.state["signals"]["speed"]["value"] = {"speed_mps": 4.2}
+        served.state["alarms"] = []
+        glass = await opened(browser, served, METER)
+        assert await glass.until(is_calm, 30)
+        await glass.page.locator("#monitor .gauge").tap()
+        assert await loudest(glass, 1.5) == 0.0
+        await glass.do("catgraphBreak({!r}, {!r}, {!r})".format(*function))
+        assert await glass.until(is_covered, 8)
+        assert await loudest(glass, 5) >= 0.05
+        await glass.do("catgraphMend()")
+        assert await glass.until(is_calm, 25)
+        await asyncio.sleep(0.5)  # the meter holds the last 0.4 s
+        assert await loudest(glass, 1.5) == 0.0
+        await glass.page.context.close()
