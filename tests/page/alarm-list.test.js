@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { countWords, rowsOf } from '../../static/js/alarms/alarms-layout.js';
+import { countWords, noneWords, rowsOf } from '../../static/js/alarms/alarms-layout.js';
 
 /** @param {string} id @param {any} [more] @returns {any} */
 const alarm = (id, more) => ({
@@ -33,4 +33,20 @@ test('states are said in the words of ISA-18.2', () => {
   assert.equal(state({ state: 'RTN_UNACKED', active: false }), 'returned unacknowledged');
   assert.equal(state({ state: 'ACKED', acknowledged_by: 'Ann' }), 'acknowledged by Ann');
   assert.match(state({ state: 'SHELVED', shelved_by: 'Ann', shelved_until_ms: 0 }) ?? '', /^shelved until \d\d:\d\d:\d\d by Ann$/);
+});
+
+test('what is shelved or suppressed is not called acknowledged', () => {
+  assert.equal(countWords(shown([alarm('known', { state: 'ACKED' })])), 'all acknowledged');
+  assert.equal(countWords(shown([alarm('known', { state: 'ACKED' }), alarm('shelved', { state: 'SHELVED' })])), 'none to acknowledge');
+  assert.equal(countWords([]), '');
+});
+
+test('an empty list says "no alarms" only where alarms could have come', () => {
+  const usual = { isSilent: false, isReplay: false, isPaused: false, isChecked: true };
+  const words = (/** @type {Partial<typeof usual>} */ more) => noneWords({ ...usual, ...more });
+  assert.equal(words({}), 'No alarms.');
+  assert.equal(words({ isReplay: true }), 'No alarms at this moment of the recording.');
+  for (const more of [{ isSilent: true }, { isPaused: true }, { isPaused: true, isReplay: true }, { isChecked: false }, { isChecked: false, isReplay: true }]) {
+    assert.doesNotMatch(words(more), /^No alarms/);
+  }
 });

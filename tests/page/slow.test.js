@@ -30,9 +30,9 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
   assert.equal(words(slow('not_available', { why: 'No link to the car.' })), 'off: Slow-down off No link to the car');
   assert.equal(words(slow('not_available', { why: 'The steering of this kind of car is not known, and a command would turn its wheels.' })), 'off: Slow-down off press for the reason');
   assert.equal(words(slow('safe')), 'off: Slow-down off press to arm');
-  assert.equal(words(slow('safe'), { isViewer: true }), 'off: Slow-down off a viewer cannot use it');
+  assert.equal(words(slow('safe'), { isViewer: true }), 'off: Slow-down off not for viewers');
   assert.equal(words(slow('armed')), 'armed: Slide to slow down');
-  assert.equal(words(slow('armed'), { isViewer: true }), 'off: Slow-down armed a viewer cannot use it');
+  assert.equal(words(slow('armed'), { isViewer: true }), 'off: Slow-down armed not for viewers');
   assert.equal(words(slow('armed'), { mayControl: false, holder: 'Ben' }), 'armed: Slide to slow down', 'any operator stops the car');
   assert.equal(words(slow('armed'), { isSilent: true }), 'off: Slow-down off the server does not answer');
   assert.equal(words(null), 'off: Slow-down off the server does not answer');

@@ -105,3 +105,16 @@ async def test_a_warning_lies_over_the_tabs_and_never_over_the_list_of_alarms(ph
     await expect(snackbar).to_be_hidden()
     await phone.f("back").tap()
     await expect(snackbar).to_be_visible()
+
+
+@pytest.mark.world(n=17)
+async def test_the_empty_list_of_a_paused_car_does_not_say_that_there_are_no_alarms(
+    phone: Phone, canned: Canned
+) -> None:
+    canned.state["alarms"] = []
+    await phone.open(canned.address)
+    await phone.f("strip").tap()
+    none = phone.page.locator("[data-f=alarms-none]")
+    await expect(none).to_have_text("No alarms.")
+    canned.state["session"] |= {"paused": True, "paused_for_s": 42.1}
+    await expect(none).to_have_text("Monitoring is paused: no alarm can be raised.")

@@ -328,7 +328,7 @@ async def test_a_viewer_sees_all_of_it_and_orders_nothing(browser: Browser, car:
         await phone.open(car.address)
         await phone.live()
         slide = phone.page.locator(RAIL)
-        await expect(slide).to_have_text("Slow-down armed a viewer cannot use it", use_inner_text=True)
+        await expect(slide).to_have_text("Slow-down armed not for viewers", use_inner_text=True)
         await slide.tap(force=True)  # it says of itself that it is disabled
         await expect(phone.page.locator(".snack.note")).to_contain_text("viewer")
         car.state["decelerate"] = slowed()

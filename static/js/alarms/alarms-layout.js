@@ -64,8 +64,19 @@ export function stateWords(alarm) {
   return alarm.state === 'ACKED' ? `acknowledged${by(alarm.acknowledged_by)}` : 'unacknowledged';
 }
 
-/** "3 unacknowledged", "none waits". @param {Row[]} rows */
+/** "3 unacknowledged"; what is shelved or suppressed is not called acknowledged. @param {Row[]} rows */
 export function countWords(rows) {
   const waiting = rows.filter(({ kind }) => kind === 'unacknowledged' || kind === 'returned').length;
-  return waiting ? `${waiting} unacknowledged` : rows.length ? 'all acknowledged' : '';
+  return waiting ? `${waiting} unacknowledged` : rows.length === 0 ? '' : rows.some(({ kind }) => kind !== 'acknowledged') ? 'none to acknowledge' : 'all acknowledged';
+}
+
+/**
+ * What stands in place of an empty list: "no alarms" only where alarms could have come.
+ * @param {{isSilent: boolean, isReplay: boolean, isPaused: boolean, isChecked: boolean}} seen isChecked: messages of the car are judged
+ */
+export function noneWords({ isSilent, isReplay, isPaused, isChecked }) {
+  if (isSilent) return 'Alarms unknown: the server does not answer.';
+  if (isPaused) return isReplay ? 'Monitoring was paused: no alarm could be raised.' : 'Monitoring is paused: no alarm can be raised.';
+  if (!isChecked) return isReplay ? 'Nothing recorded yet: nothing is checked.' : 'No message from the car: nothing is checked.';
+  return isReplay ? 'No alarms at this moment of the recording.' : 'No alarms.';
 }

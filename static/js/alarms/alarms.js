@@ -1,6 +1,6 @@
 // The list of alarms behind the strip: every one that stands, has returned, is shelved or suppressed, with its keys.
 
-import { countWords, rowsOf } from './alarms-layout.js';
+import { countWords, noneWords, rowsOf } from './alarms-layout.js';
 import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
 import { openShelve } from './shelve.js';
@@ -24,7 +24,7 @@ export function mount(root, store) {
   const load = html('p', { class: 'sec', 'data-f': 'load' });
   const note = html('p', { class: 'sec', 'data-f': 'alarms-note' });
   const list = html('ul', { class: 'alarms', 'data-f': 'alarms' });
-  const none = html('p', { class: 'state', 'data-f': 'alarms-none' }, 'No alarms.');
+  const none = html('p', { class: 'state', 'data-f': 'alarms-none' });
   const says = html('p', { class: 'note-line bad', role: 'alert', 'data-f': 'alarms-says' });
   const ended = html('button', { type: 'button', class: 'key wide', 'data-f': 'alarms-ended' });
   root.replaceChildren(
@@ -97,6 +97,10 @@ export function mount(root, store) {
       : store.isViewer ? 'A viewer cannot acknowledge.' : frame?.session.paused ? 'Paused: the alarms of the car are suppressed until Resume.' : '';
     setText(note, rows.length || frame?.session.paused ? why : '');
     show(none, rows.length === 0);
+    setText(none, noneWords({
+      isSilent: store.isSilent, isReplay: store.replaying, isPaused: frame?.session.paused === true,
+      isChecked: frame?.replay ? frame.replay.silent_s !== null : store.chain.word === 'Live',
+    }));
     const returned = rows.filter(({ kind }) => kind === 'returned').length;
     setWords(ended, `Acknowledge all that ended${returned ? ` ${returned}` : ''}`);
     setAttribute(ended, 'disabled', !mayAct || returned === 0);

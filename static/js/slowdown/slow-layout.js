@@ -69,10 +69,10 @@ export function slideOf(seen) {
     return { kind: 'go', title, why, label: `${title} ${why}` };
   }
   if (now.state === 'armed') {
-    if (isViewer) return off('Slow-down armed', 'a viewer cannot use it');
+    if (isViewer) return off('Slow-down armed', 'not for viewers');
     return { kind: 'armed', title: 'Slide to', why: 'slow down', label: 'Slide to slow down. With a keyboard hold Enter for 1 second' };
   }
-  if (now.state === 'safe') return off('Slow-down off', isViewer ? 'a viewer cannot use it' : 'press to arm');
+  if (now.state === 'safe') return off('Slow-down off', isViewer ? 'not for viewers' : 'press to arm');
   const why = bare(now.why ?? 'not available');
   return off('Slow-down off', why.length > BRIEF ? 'press for the reason' : why);
 }
@@ -240,11 +240,11 @@ function rivalsOf(rivals) {
  * @returns {{tag: string, kind: 'plain' | 'warn' | 'unk', cost: string}}
  */
 export function connectRow(now, isMonitoring) {
-  if (!isMonitoring || !now) return { tag: 'Off', kind: 'unk', cost: 'armed on Home, once the car is there' };
+  if (!isMonitoring || !now) return { tag: 'Off', kind: 'unk', cost: 'can be armed on Home once connected' };
   const { text } = guardWords(now.guard);
   if (orderOf(now)) return { tag: 'Slowing', kind: 'warn', cost: 'the car is being slowed now' };
   if (now.state === 'armed') return { tag: 'Armed', kind: 'plain', cost: text };
-  if (now.state === 'safe') return { tag: 'Off', kind: 'unk', cost: `armed on Home. ${text}` };
+  if (now.state === 'safe') return { tag: 'Off', kind: 'unk', cost: `can be armed on Home. ${text}` };
   return { tag: 'Not available', kind: 'unk', cost: bare(now.why ?? 'not available') };
 }
 

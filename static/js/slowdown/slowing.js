@@ -70,7 +70,7 @@ export function mount(root, store, control, say) {
     const seen = seenOf(store);
     const { state, why } = seen.now ?? {};
     const because = seen.isSilent ? 'the server does not answer.'
-      : seen.isViewer ? 'a viewer cannot use it.'
+      : seen.isViewer ? 'viewers cannot use it.'
         : state === 'safe' ? 'the slow-down is not armed; acknowledge the alarm, then arm it on Home.'
           : why ?? 'it is not available.';
     return `${because} Use the physical stop.`;
