@@ -103,6 +103,10 @@ class LinkLoad:
                 self._restored_s = None
             self.step = top if late_s > STEEP_ABOVE_S else self.step + 1
 
+    def relapse_is_explained(self) -> None:
+        """One topic that was tried made the link late: the others need not wait longer for it."""
+        self._patience_s = RESTORE_AFTER_S
+
     def throttle_ms(self, signal: str) -> int:
         """At most one message of this signal in so many milliseconds; 0: all."""
         level = self.level

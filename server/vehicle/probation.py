@@ -1,8 +1,8 @@
-"""Topics that are only recorded, and for which a bridge stopped answering: they are tried one by one, or left.
+"""Recorded topics under suspicion of delaying the bridge: each is tried alone, and left if it delays the bridge again.
 
-A bridge of ROS 2 does nothing else while it writes a message; with one of 40 MB it answers no ping for two seconds, the
-link is given up, and all is subscribed to anew. What is only recorded must not cost what is judged. Pure: time is an
-argument.
+A ROS 2 bridge does nothing else while it encodes a message. One of 40 MB delays all others by a second or more, or the
+bridge answers no ping and the link is closed. Such a topic must cost neither the judged signals nor the recording of
+the other topics. Pure: time is an argument.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class Probation:
         self._tried, self._since_s = None, now_s
 
     def silent(self, suspects: Collection[str]) -> list[str]:
-        """The bridge stopped answering; `suspects` are subscribed topics of which nothing ever came. Answers those that
-        are left from now on."""
+        """Returns the topics that are left from now on, after the bridge stopped answering or fell behind. `suspects`:
+        subscribed topics of which no message ever came."""
         tried, self._tried, self._since_s = self._tried, None, math.inf
         if tried is not None:
             self._waiting[tried] += 1
@@ -42,6 +42,11 @@ class Probation:
         for topic in suspects:
             self._waiting.setdefault(topic, 0)
         return []
+
+    @property
+    def is_trying(self) -> bool:
+        """Whether one of them is subscribed to now, to see what it does."""
+        return self._tried is not None
 
     def heard(self, topic: str) -> None:
         """A message of it came: it is not this one."""

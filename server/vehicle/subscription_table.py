@@ -121,17 +121,25 @@ class SubscriptionTable:
             return False, []
         if self.load.step == 0:
             self.probation.opened(self._now())
-        return True, self.probation.silent(()) if before == 0 else []
+        if before:
+            return True, []
+        if self.probation.is_trying:
+            self.load.relapse_is_explained()
+        return True, self.probation.silent(self._suspects())
 
     def fell_silent(self) -> tuple[bool, list[str]]:
         """The link was given up because the bridge did not answer; it may be busy with what is only recorded. Whether
         topics are suspected of it, and those that are left now."""
-        suspects = [
+        suspects = self._suspects()
+        return bool(suspects), self.probation.silent(suspects)
+
+    def _suspects(self) -> list[str]:
+        """Recorded topics whose type may be large, and of which no message ever came."""
+        return [
             topic
             for topic, kind in self.recorded.topics.items()
             if kind in self._definitions.may_be_large and topic not in self._delivery.delivered
         ]
-        return bool(suspects), self.probation.silent(suspects)
 
     def renew_all(self) -> None:
         """A new roscore does not know the old subscriptions."""

@@ -11,8 +11,11 @@ from server.app.config import Config
 from server.rosbridge.link import RosLink
 from server.vehicle import probation
 from server.vehicle.connection import Connection
+from server.vehicle.delivery import Delivery
 from server.vehicle.probation import LEFT_AFTER, STEADY_S, Probation
+from server.vehicle.subscription_table import SubscriptionTable
 from server.vehicle.subscriptions import Subscriptions
+from server.vehicle.type_definitions import TypeDefinitions
 from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
 from tests.server.conftest import serving
@@ -70,6 +73,37 @@ def test_while_the_link_is_down_none_is_tried() -> None:
     one.silent(["/a"])
     assert not one.look(1e6)
     assert one.held == {"/a"}
+
+
+def test_one_that_makes_all_others_late_is_found_and_left_and_the_others_are_recorded_again() -> None:
+    """A ROS 2 bridge that encodes 40 MB each second sends everything else a second late, and answers each ping."""
+    clock = [0.0]
+    definitions, delivery = TypeDefinitions(lambda _: None, lambda: None), Delivery()
+    definitions.asked = definitions.may_be_large = {"std_msgs/msg/UInt8MultiArray"}
+    table = SubscriptionTable(None, definitions, delivery, now=lambda: clock[0])
+    table.also = "all"
+    offered = {f"/{name}": "std_msgs/msg/UInt8MultiArray" for name in ("a", "cloud", "z")}
+
+    def subscribe() -> None:
+        table.subscribe({}, offered, needs_client_count=False)
+        delivery.follow([], [*table.recorded.topics], clock[0])
+
+    left, recorded_s = [], 0.0
+    table.opened()
+    subscribe()
+    for tick in range(1800):
+        clock[0] = tick / 10
+        if "/a" in table.recorded.topics:
+            recorded_s += 0.1
+            delivery.heard("/a", clock[0])
+            delivery.heard("/z", clock[0])
+        changed, now_left = table.look_at_load(1.1 if "/cloud" in table.recorded.topics else 0.05)
+        left += now_left
+        if changed or table.tries_another():
+            subscribe()
+    assert left == ["/cloud"]
+    assert (set(table.recorded.topics), table.recorded.left_out) == ({"/a", "/z"}, ("/cloud",))
+    assert recorded_s > 90.0
 
 
 async def test_after_a_silence_of_the_bridge_the_large_ones_that_never_came_wait(
