@@ -100,7 +100,8 @@ class MissingWatch:
             self._noted(f"No message comes from topics that have a publisher: {', '.join(news[:MOST_NAMED])}.")
 
     async def look_behind(self, asks: Asks) -> None:
-        """Of a signal's topic that has a publisher and does not come: did the bridge subscribe? Raises LinkDown."""
+        """Asks whether the bridge subscribed to the signals' topics that have a publisher and do not arrive; subscribes
+        anew to those that another client stopped blocking. Raises LinkDown."""
         needed = self._undelivered.needs_clients
         self._undelivered.follow(self.delivery.never_came(self._now()), self._now())
         if self._undelivered.needs_clients != needed:
@@ -110,3 +111,5 @@ class MissingWatch:
             self._undelivered.bridges = frozenset(nodes or ())
         for topic in self._undelivered.to_ask(self._now()):
             self._undelivered.answered(topic, await discovery.ask_subscribers(asks, topic), self._now())
+        for topic in self._undelivered.to_renew(self._now()):
+            self._renew(topic)

@@ -30,6 +30,7 @@ class Passing:
     _since_s: dict[str, float] = field(default_factory=dict)  # silent topics with a publisher
     _asked_s: dict[str, float] = field(default_factory=dict)
     _is_subscribed: dict[str, bool] = field(default_factory=dict)  # by the bridge
+    _freed: set[str] = field(default_factory=set)  # silent topics that another client may have stopped blocking
 
     def opened(self) -> None:
         """Another connection: another bridge may answer it."""
@@ -37,12 +38,14 @@ class Passing:
         self._since_s.clear()
         self._asked_s.clear()
         self._is_subscribed.clear()
+        self._freed.clear()
 
     def follow(self, silent: Collection[str], now_s: float) -> None:
         """Judged topics with a publisher of which nothing came yet, on this connection."""
         for known in (self._since_s, self._asked_s, self._is_subscribed):
             for topic in [topic for topic in known if topic not in silent]:
                 del known[topic]
+        self._freed &= set(silent)
         for topic in silent:
             self._since_s.setdefault(topic, now_s)
 
@@ -56,10 +59,20 @@ class Passing:
     def answered(self, topic: str, subscribers: tuple[str, ...] | None, now_s: float) -> None:
         """Which nodes subscribe to a topic; None: rosapi does not say."""
         self._asked_s[topic] = now_s
+        before = self._is_subscribed.pop(topic, None)
         if subscribers is None:
-            self._is_subscribed.pop(topic, None)
+            return
+        is_subscribed = not self.bridges.isdisjoint(subscribers)
+        if before and not is_subscribed:  # the client that blocked it left, and ROS 1 forgot our subscription with it
+            self._freed.add(topic)
         else:
-            self._is_subscribed[topic] = not self.bridges.isdisjoint(subscribers)
+            self._is_subscribed[topic] = is_subscribed
+
+    def to_renew(self, now_s: float) -> list[str]:
+        """Returns, once, the topics that may arrive after a new subscription, because a client left them."""
+        freed, self._freed = sorted(self._freed), set()
+        self._asked_s.update(dict.fromkeys(freed, now_s))  # the bridge needs a moment to subscribe
+        return freed
 
     @property
     def needs_clients(self) -> bool:
@@ -69,7 +82,10 @@ class Passing:
     def counted(self, message: Any) -> None:
         """A message of CLIENT_COUNT."""
         count = message.get("data") if isinstance(message, dict) else None
+        before = self.clients
         self.clients = max(0, count - OWN_CLIENTS) if type(count) is int and 0 <= count < 10_000 else None
+        if before is not None and self.clients is not None and self.clients < before:
+            self._freed |= set(self._since_s)
 
     def problem(self, now_s: float) -> Problem | None:
         """What keeps the topics from us; None: nothing is known to."""

@@ -13,7 +13,10 @@ from server.rosbridge import connection_errors
 from server.rosbridge.diagnosis import SILENT_S, Diagnosis
 from server.rosbridge.link import CallFailed, LinkDown, RosLink
 from server.rosbridge.rosapi_client import Questions
-from server.vehicle.undelivered import BLOCKED_AFTER_S, Passing
+from server.vehicle import discovery
+from server.vehicle.delivery import Delivery
+from server.vehicle.missing_watch import MissingWatch
+from server.vehicle.undelivered import BLOCKED_AFTER_S, OWN_CLIENTS, Passing
 from tests.server.cli.test_doctor import doctor
 from tests.server.ear import Bridge, Ear, bridging, linked, until
 from tests.world.bridge_player import FILES, name_of, playing
@@ -147,6 +150,44 @@ def test_without_the_bridges_name_nothing_is_asked_and_nothing_blamed() -> None:
     one.follow(["/gps_fix"], 0.0)
     assert one.to_ask(0.0) == []
     assert one.problem(99.0) is None
+
+
+@pytest.mark.parametrize(("disconnects", "moments"), [(True, [12, 17]), (False, [15])])
+async def test_after_a_neighbour_left_its_topics_are_subscribed_to_anew_and_no_glob_is_blamed(
+    monkeypatch: pytest.MonkeyPatch, disconnects: bool, moments: list[int]
+) -> None:
+    """ROS 1 then forgets our subscription, so that its bridge is no subscriber, as behind a topics_glob."""
+    clock: list[float] = [0.0]
+    subscribers: tuple[str, ...] = ("/rosbridge_websocket",)
+    renewed: list[tuple[float, str]] = []
+
+    async def ask_subscribers(asks: Any, topic: str) -> tuple[str, ...]:
+        return subscribers
+
+    monkeypatch.setattr(discovery, "ask_subscribers", ask_subscribers)
+    watch = MissingWatch(
+        now=lambda: clock[0],
+        renew=lambda topic: renewed.append((clock[0], topic)),
+        remap=lambda: None,
+        resubscribe=lambda: None,
+        noted=lambda _: None,
+        type_of=lambda _: None,
+    )
+    watch._undelivered.bridges = frozenset(subscribers)
+    monkeypatch.setattr(Delivery, "never_came", lambda *_: ["/vel"])
+    found = []
+    for tick in range(30):
+        clock[0] = float(tick)
+        if clock[0] == 12:
+            subscribers = ()
+        watch.client_count({"data": OWN_CLIENTS + (clock[0] < 12 or not disconnects)})
+        await watch.look_behind(None)  # type: ignore[arg-type]
+        problem = watch.problem(clock[0])
+        found.append(problem.code if problem else None)
+    assert set(found[5:12]) == {"topics_blocked"}
+    assert "topics_hidden" not in found[: moments[-1] + 5], "not before the new subscriptions had their time"
+    assert found[-1] == "topics_hidden"
+    assert renewed == [(at_s, "/vel") for at_s in moments]
 
 
 # -- questions -------------------------------------------------------------------------------------------------------
