@@ -1,134 +1,126 @@
 // The alarm log: what stands and who has seen it, then what happened, newest first, with the times in which this page was blind.
 
-import { MARKS, KINDS, asked, dayWords, eventWords, joined, lowest, tookWords } from './log-layout.js';
+import { MARKS, KINDS, dayWords, eventWords, joined, lowest, tookWords } from './log-layout.js';
 import { gapWords } from '../core/event-log.js';
 import { html, icon, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
 import { byUrgency } from './alarm-layout.js';
+import { OlderEvents, queryOf } from './older-events.js';
 import { loadWords, standingWords } from './standing.js';
 import { timeOfDay } from '../core/format.js';
 
-/**
- * @typedef {import('../core/event-log.js').Row} Row
- * @typedef {import('../core/protocol.js').AlarmEvent} AlarmEvent
- */
-
-const PAGE = 100; // events a request
+/** @typedef {import('../core/event-log.js').Row} Row */
 
 /**
  * @param {HTMLElement} root
  * @param {import('../core/store.js').Store} store
  */
 export function mount(root, store) {
+  const log = new AlarmLog(root, store);
+  const { kinds, find, older } = log.parts;
+  const stops = [
+    store.on('draw', () => log.draw()),
+    listen(kinds, 'click', (event) => {
+      const kind = /** @type {HTMLElement | null} */ (event.target.closest('[data-kind]'))?.dataset['kind'];
+      if (kind) log.choose({ kind: /** @type {any} */ (kind) });
+    }),
+    listen(find, 'input', () => log.choose({ text: find.value })),
+    listen(older, 'click', () => void log.older.fetch(log.filter, store.log.rows)),
+  ];
+  return () => {
+    log.older.clear();
+    stops.forEach((stop) => stop());
+    root.replaceChildren();
+  };
+}
+
+class AlarmLog {
+  /** @type {import('./log-layout.js').Filter} */
+  filter = { kind: 'all', text: '' };
+  #happened = '';
+  #standing = '';
+
+  /** @param {HTMLElement} root @param {import('../core/store.js').Store} store */
+  constructor(root, store) {
+    this.store = store;
+    this.parts = build(root);
+    this.older = new OlderEvents(() => this.draw());
+    this.choose({});
+  }
+
+  get isAll() {
+    return this.filter.kind === 'all' && !this.filter.text.trim();
+  }
+
+  /** @param {Partial<import('./log-layout.js').Filter>} change */
+  choose(change) {
+    const { kinds, csv, json } = this.parts;
+    this.filter = { ...this.filter, ...change };
+    this.older.clear();
+    for (const button of kinds.querySelectorAll('button')) setAttribute(button, 'aria-pressed', String(button.dataset['kind'] === this.filter.kind));
+    for (const [link, form] of /** @type {const} */ ([[csv, 'csv'], [json, 'json']])) {
+      link.setAttribute('href', `/api/log.${form}?${queryOf(this.filter)}`);
+      link.setAttribute('aria-label', `Save ${this.isAll ? 'the whole log' : 'what is found'} as ${form.toUpperCase()}`);
+    }
+    this.draw();
+  }
+
+  draw() {
+    const { frame } = this.store;
+    const { inTen, standing, shelved, load, trouble, now } = this.parts;
+    const alarms = frame?.alarms ?? [];
+    setText(inTen, String(frame?.alarm_load?.in_10_min ?? '–'));
+    setText(standing, String(alarms.filter((alarm) => alarm.state !== 'SHELVED').length));
+    setText(shelved, String(alarms.filter((alarm) => alarm.state === 'SHELVED').length));
+    setWords(load, loadWords(frame?.alarm_load));
+    setWords(trouble, frame?.log_trouble ?? '');
+    show(trouble, Boolean(frame?.log_trouble));
+    const lines = byUrgency(alarms).map((alarm) => [alarm.title, standingWords(alarm), timeOfDay(alarm.raised_ms), alarm.priority]);
+    const key = JSON.stringify(lines);
+    if (key !== this.#standing) {
+      now.replaceChildren(...lines.map(standingRow));
+      this.#standing = key;
+    }
+    this.#drawEvents();
+  }
+
+  #drawEvents() {
+    const { number, list, note, older } = this.parts;
+    const { rows, last } = this.store.log;
+    const { events, next } = this.older;
+    setText(note, this.older.note);
+    setAttribute(older, 'data-busy', this.older.isBusy || null);
+    setAttribute(older, 'hidden', next === null || (next === undefined && (lowest(rows) ?? 2) <= 1));
+    const today = new Date(Date.now()).toDateString(); // the headings of the days change at midnight
+    const key = JSON.stringify([rows.length, last, events.length, this.filter, today]);
+    if (key === this.#happened) return;
+    number.replaceChildren('No. ', html('span', { class: 'n' }, String(last ?? 0)));
+    const all = joined(rows, events, this.filter);
+    list.replaceChildren(...(all.length ? all.flatMap((one, i) => withDay(one, all[i - 1], all))
+      : [html('li', { class: 'none' }, html('span'), html('span', { class: 't' }, this.isAll ? 'Nothing has happened yet' : 'Nothing found here'))]));
+    this.#happened = key;
+  }
+}
+
+/** Builds the parts of the log in `root`. @param {HTMLElement} root */
+function build(root) {
   const [inTen, standing, shelved] = [html('span', { class: 'n v' }), html('span', { class: 'n v' }), html('span', { class: 'n v' })];
   const number = html('span');
   const list = html('ul', { class: 'log', 'data-f': 'happened' });
   const now = html('ul', { class: 'log', 'data-f': 'standing' });
   const load = html('p', { class: 'sec', 'data-f': 'load' });
   const trouble = html('p', { class: 'sec', 'data-f': 'trouble', role: 'status' });
-  const three = (/** @type {string} */ label, /** @type {HTMLElement} */ value) => html('div', {}, html('span', { class: 'lab' }, label), html('br'), value);
+  const figure = (/** @type {string} */ label, /** @type {HTMLElement} */ value) => html('div', {}, html('span', { class: 'lab' }, label), html('br'), value);
   const kinds = html('div', { class: 'seg kinds', role: 'group', 'aria-label': 'Which events' },
     ...KINDS.map(([kind, label]) => html('button', { type: 'button', 'data-kind': kind, 'aria-pressed': 'false' }, label)));
   const find = /** @type {HTMLInputElement} */ (html('input', { type: 'search', id: 'log-find', maxlength: 100, enterkeyhint: 'search', autocomplete: 'off', placeholder: 'Find in the log', 'aria-label': 'Find in the log' }));
   const [csv, json] = [html('a', { class: 'key', download: '' }, icon('download'), 'CSV'), html('a', { class: 'key', download: '' }, icon('download'), 'JSON')];
   const older = html('button', { type: 'button', class: 'key wide', 'data-f': 'older' }, 'Older');
-  const said = html('p', { class: 'note-line', role: 'status', 'data-f': 'log-says' });
+  const note = html('p', { class: 'note-line', role: 'status', 'data-f': 'log-says' });
   root.replaceChildren(
-    html('section', { class: 'three' }, three('In 10 min', inTen), three('Standing', standing), three('Shelved', shelved)), load, trouble, now,
+    html('section', { class: 'three' }, figure('In 10 min', inTen), figure('Standing', standing), figure('Shelved', shelved)), load, trouble, now,
     html('div', { class: 'log-tools' }, kinds, html('div', { class: 'field' }, icon('find'), find), html('div', { class: 'pair' }, csv, json)),
-    html('div', { class: 'sec' }, html('span', {}, 'Newest first'), number), list, said, html('div', { class: 'keys' }, older));
-
-  /** @type {import('./log-layout.js').Filter} */
-  let filter = { kind: 'all', text: '' };
-  /** @type {{events: AlarmEvent[], next: number | null | undefined}} undefined: not asked yet */
-  let past = { events: [], next: undefined };
-  let turn = 0; // of the filter: an answer to an older question is dropped
-  let isAsking = false;
-  let drawn = '';
-  let stood = '';
-
-  const stops = [
-    store.on('draw', draw),
-    listen(kinds, 'click', (event) => {
-      const kind = /** @type {HTMLElement | null} */ (event.target.closest('[data-kind]'))?.dataset['kind'];
-      if (kind) choose({ ...filter, kind: /** @type {any} */ (kind) });
-    }),
-    listen(find, 'input', () => choose({ ...filter, text: find.value })),
-    listen(older, 'click', fetchOlder),
-  ];
-
-  /** @param {import('./log-layout.js').Filter} wanted */
-  function choose(wanted) {
-    filter = wanted;
-    past = { events: [], next: undefined };
-    turn += 1;
-    isAsking = false;
-    setText(said, '');
-    for (const button of kinds.querySelectorAll('button')) setAttribute(button, 'aria-pressed', String(button.dataset['kind'] === filter.kind));
-    const vehicle = document.documentElement.dataset['vehicle'];
-    for (const [link, form] of /** @type {const} */ ([[csv, 'csv'], [json, 'json']])) {
-      link.setAttribute('href', `/api/log.${form}?${new URLSearchParams({ ...(vehicle ? { vehicle } : {}), ...asked(filter) })}`);
-      link.setAttribute('aria-label', `Save ${filter.kind === 'all' && !filter.text.trim() ? 'the whole log' : 'what is found'} as ${form.toUpperCase()}`);
-    }
-    draw();
-  }
-
-  async function fetchOlder() {
-    if (isAsking) return;
-    const mine = turn;
-    isAsking = true;
-    setAttribute(older, 'data-busy', true);
-    const before = past.next ?? lowest(store.log.rows);
-    const vehicle = document.documentElement.dataset['vehicle'];
-    const query = new URLSearchParams({ ...(vehicle ? { vehicle } : {}), limit: String(PAGE), ...(before === null ? {} : { before: String(before) }), ...asked(filter) });
-    try {
-      const answer = await fetch(`/api/log?${query}`, { cache: 'no-store' });
-      if (!answer.ok) throw new Error(String(answer.status));
-      const { events, next_before } = await answer.json();
-      if (mine !== turn) return;
-      past = { events: [...past.events, ...events], next: next_before };
-      setText(said, next_before === null ? 'This is the beginning of the log.' : events.length ? '' : 'Nothing among the last 2000 events; older ones may fit.');
-    } catch {
-      if (mine === turn) setText(said, 'The server did not give older events. Try again.');
-    } finally {
-      if (mine === turn) {
-        isAsking = false;
-        setAttribute(older, 'data-busy', null);
-        draw();
-      }
-    }
-  }
-
-  function draw() {
-    const alarms = store.frame?.alarms ?? [];
-    setText(inTen, String(store.frame?.alarm_load?.in_10_min ?? '–'));
-    setText(standing, String(alarms.filter((alarm) => alarm.state !== 'SHELVED').length));
-    setText(shelved, String(alarms.filter((alarm) => alarm.state === 'SHELVED').length));
-    setWords(load, loadWords(store.frame?.alarm_load));
-    setWords(trouble, store.frame?.log_trouble ?? '');
-    show(trouble, Boolean(store.frame?.log_trouble));
-    const lines = byUrgency(alarms).map((alarm) => [alarm.title, standingWords(alarm), timeOfDay(alarm.raised_ms), alarm.priority]);
-    const standingKey = JSON.stringify(lines);
-    if (standingKey !== stood) {
-      now.replaceChildren(...lines.map(standingRow));
-      stood = standingKey;
-    }
-    const { rows, last } = store.log;
-    setAttribute(older, 'hidden', past.next === null || (past.next === undefined && (lowest(rows) ?? 2) <= 1));
-    const today = new Date(Date.now()).toDateString(); // at midnight "Today" is another day
-    const key = JSON.stringify([rows.length, last, past.events.length, filter, today]);
-    if (key === drawn) return;
-    number.replaceChildren('No. ', html('span', { class: 'n' }, String(last ?? 0)));
-    const all = joined(rows, past.events, filter);
-    list.replaceChildren(...(all.length ? all.flatMap((one, i) => withDay(one, all[i - 1], all)) : [html('li', { class: 'none' }, html('span'), html('span', { class: 't' }, filter.kind === 'all' && !filter.text.trim() ? 'Nothing has happened yet' : 'Nothing found here'))]));
-    drawn = key;
-  }
-
-  choose(filter);
-  return () => {
-    turn += 1;
-    stops.forEach((stop) => stop());
-    root.replaceChildren();
-  };
+    html('div', { class: 'sec' }, html('span', {}, 'Newest first'), number), list, note, html('div', { class: 'keys' }, older));
+  return { inTen, standing, shelved, number, list, now, load, trouble, kinds, find, csv, json, older, note };
 }
 
 /** @param {string[]} line title, words, time of day, priority */

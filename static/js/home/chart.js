@@ -3,15 +3,15 @@
 import uPlot from '../../vendor/uPlot.esm.js';
 import { field, html, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
+import { mountFingers } from './chart-fingers.js';
 import { openSheet } from '../shell/sheet.js';
 import { SPAN, STEP_S, extent, unknown_s, viewAfter } from './trends-layout.js';
-import { colours, nowOf } from './trends.js';
+import { colours } from './spark.js';
+import { nowOf } from './trend-feed.js';
 import { shownIn } from '../core/units.js';
 import { age, fixed, signed } from '../core/format.js';
 
 const WHOLE = /** @type {[number, number]} */ ([-SPAN * STEP_S, 0]);
-/** A finger that moved less is a tap [px]. */
-const TAP_PX = 8;
 
 /**
  * @typedef {import('./trends-layout.js').Spec} Spec
@@ -20,7 +20,7 @@ const TAP_PX = 8;
 
 /**
  * @param {Spec} spec
- * @param {import('./trends.js').Trends} trends
+ * @param {import('./trend-feed.js').Trends} trends
  * @param {import('../core/store.js').Store} store
  */
 export async function open(spec, trends, store) {
@@ -41,7 +41,7 @@ class Chart {
   /** @type {Course} */
   course;
 
-  /** @param {HTMLDialogElement} sheet @param {Spec} spec @param {import('./trends.js').Trends} trends @param {import('../core/store.js').Store} store */
+  /** @param {HTMLDialogElement} sheet @param {Spec} spec @param {import('./trend-feed.js').Trends} trends @param {import('../core/store.js').Store} store */
   constructor(sheet, spec, trends, store) {
     this.sheet = sheet;
     this.spec = spec;
@@ -64,7 +64,7 @@ class Chart {
       key('earlier', () => this.#change({ pan: -0.5 })),
       key('later', () => this.#change({ pan: 0.5 })),
       listen(this.host, 'keydown', (event) => this.#pressed(event)),
-      ...this.#fingers(),
+      mountFingers(this.host, () => this.plot, { change: (change) => this.#change(change), read: (at_s) => this.read(at_s) }),
       listen(window, 'catgraph-theme', anew),
       listen(matchMedia('(prefers-color-scheme: light)'), 'change', anew),
       listen(window, 'resize', anew),
@@ -178,40 +178,6 @@ class Chart {
     if (event.ctrlKey || event.metaKey || event.altKey || !acts[event.key]) return;
     event.preventDefault();
     acts[event.key]?.();
-  }
-
-  /** One finger reads, and moves what is zoomed; two zoom. */
-  #fingers() {
-    /** @type {Map<number, number>} where each finger is [px] */
-    const down = new Map();
-    let moved_px = 0;
-    const left = () => this.plot.over.getBoundingClientRect();
-    const timeOf = (/** @type {number} */ x_px) => this.plot.posToVal(x_px - left().left, 'x');
-    return [
-      listen(this.host, 'pointerdown', (event) => {
-        if (!this.plot.over.contains(event.target)) return;
-        down.set(event.pointerId, event.clientX);
-        moved_px = down.size > 1 ? TAP_PX : 0;
-        this.host.setPointerCapture(event.pointerId);
-      }),
-      listen(this.host, 'pointermove', (event) => {
-        const before = down.get(event.pointerId);
-        if (before === undefined) return;
-        const others = [...down].filter(([id]) => id !== event.pointerId).map(([, x]) => x);
-        down.set(event.pointerId, event.clientX);
-        moved_px += Math.abs(event.clientX - before);
-        const width_px = left().width || 1;
-        const [other] = others;
-        if (other !== undefined) {
-          const about = Math.max(0, Math.min(1, ((other + event.clientX) / 2 - left().left) / width_px));
-          this.#change({ zoom: Math.max(20, Math.abs(before - other)) / Math.max(20, Math.abs(event.clientX - other)), about });
-        } else if (moved_px >= TAP_PX) this.#change({ pan: (before - event.clientX) / width_px });
-      }),
-      listen(this.host, 'pointerup', (event) => {
-        if (down.delete(event.pointerId) && moved_px < TAP_PX) this.read(timeOf(event.clientX));
-      }),
-      listen(this.host, 'pointercancel', (event) => down.delete(event.pointerId)),
-    ];
   }
 
   #build() {

@@ -9,14 +9,136 @@ import { age, signed } from '../core/format.js';
 
 const VIEW = '0 0 380 250';
 
+/** @typedef {{speed_max_mps: number, acceleration_max_mps2: number, limit_mps: number | null}} Scale */
+
 /**
  * @param {HTMLElement} root
  * @param {import('../core/store.js').Store} store
  * @returns {() => void}
  */
 export function mount(root, store) {
+  const gauge = new Gauge(root, store);
+  gauge.move();
+  if (store.frame) gauge.draw(); // before the first frame it is not shown
+  const watcher = new IntersectionObserver((entries) => {
+    gauge.isSeen = entries.at(-1)?.isIntersecting ?? true;
+    gauge.move();
+  });
+  watcher.observe(root);
+  const stops = [store.on('move', () => gauge.move()), store.on('draw', () => gauge.draw()), () => watcher.disconnect()];
+  return () => stops.forEach((stop) => stop());
+}
+
+class Gauge {
+  isSeen = true;
+  #drawnFace = '';
+
+  /** @param {HTMLElement} root @param {import('../core/store.js').Store} store */
+  constructor(root, store) {
+    this.root = root;
+    this.store = store;
+    this.parts = build(root);
+  }
+
+  /** The ends of both scales, and the speed limit. @returns {Scale} */
+  #scale() {
+    return {
+      speed_max_mps: this.store.limit('gauge.speed_max_mps') ?? 15,
+      acceleration_max_mps2: this.store.limit('gauge.acceleration_max_mps2') ?? 3,
+      limit_mps: this.store.limit('speed_limit.max_mps'),
+    };
+  }
+
+  /** Draws what stands still, when the scale or the unit changed. */
+  #drawFace() {
+    const scale = this.#scale();
+    const key = JSON.stringify([scale, speedUnit()]);
+    if (key === this.#drawnFace) return;
+    showFace(this.parts, scale);
+    this.#drawnFace = key;
+  }
+
+  /** Rotates what moves, with each frame. */
+  move() {
+    if (!this.isSeen) return; // six moving layers out of sight cost as much as all the rest
+    this.#drawFace();
+    const { store } = this;
+    const { pointer, white, turn, red, faster, slower } = this.parts;
+    const scale = this.#scale();
+    const limit = scale.limit_mps === null ? 180 : speedAngle(scale.limit_mps, scale.speed_max_mps);
+    const angle = speedAngle(number(store.signal('speed')?.value?.speed_mps) ?? 0, scale.speed_max_mps);
+    rotate(pointer, angle);
+    rotate(white, Math.min(angle, limit));
+    rotate(turn, limit);
+    rotate(red, Math.max(0, angle - limit));
+    const push = accelerationAngle(number(store.signal('acceleration')?.value?.acceleration_mps2) ?? 0, scale.acceleration_max_mps2);
+    rotate(faster, Math.max(0, push));
+    rotate(slower, Math.min(0, push));
+  }
+
+  /** Writes what is read, five times a second. */
+  draw() {
+    this.#drawFace();
+    const { root, store } = this;
+    const { speed, box, struck, unit, note, speedMeter } = this.parts;
+    const scale = this.#scale();
+    const speedInk = store.ink('speed');
+    const speed_mps = number(store.signal('speed')?.value?.speed_mps);
+    const isSpeedKnown = speed_mps !== null && isValue(speedInk.ink);
+    setAttribute(root, 'data-speed', isSpeedKnown ? speedInk.ink : 'never');
+    const [digits, unitWord] = isSpeedKnown ? speedWords(speed_mps) : ['–', speedUnit()];
+    const block = digitsBox(digits);
+    const isOver = isSpeedKnown && speedInk.ink !== 'stale' && scale.limit_mps !== null && Math.abs(speed_mps) > scale.limit_mps;
+    setText(speed, digits);
+    setAttribute(speed, 'data-size', block.size);
+    setAttribute(root, 'data-over', isOver);
+    for (const part of [box, struck]) {
+      setAttribute(part, 'x', block.x);
+      setAttribute(part, 'width', block.width);
+    }
+    const isBack = isSpeedKnown && speed_mps < 0 && digits.startsWith('−');
+    setAttribute(unit, 'x', block.unitX);
+    setText(unit, isSpeedKnown ? (isBack ? `${unitWord} back` : unitWord) : '');
+    setText(note, noteOf(speedInk, isSpeedKnown));
+    const isSpeedNow = isSpeedKnown && speedInk.ink !== 'stale';
+    const isOrdered = this.#drawOrder(isSpeedNow ? speed_mps : null, scale);
+    meter(speedMeter, isSpeedNow ? Math.abs(speedIn(speed_mps)) : null, speedIn(scale.speed_max_mps), `${digits} ${spokenSpeedUnit()}${isOrdered}`);
+    this.#drawAcceleration(scale);
+  }
+
+  /** @param {Scale} scale */
+  #drawAcceleration(scale) {
+    const { root, store } = this;
+    const { acceleration, accelerationUnit, accelerationMeter } = this.parts;
+    const pushInk = store.ink('acceleration');
+    const push = number(store.signal('acceleration')?.value?.acceleration_mps2);
+    const isPushKnown = push !== null && isValue(pushInk.ink);
+    setAttribute(root, 'data-push', isPushKnown ? pushInk.ink : 'never');
+    setText(acceleration, isPushKnown ? signed(push) : pushInk.ink === 'not_published' ? 'not published' : '–');
+    setText(accelerationUnit, isPushKnown || pushInk.ink !== 'not_published' ? 'm/s²' : '');
+    setAttribute(accelerationMeter, 'aria-valuemin', -scale.acceleration_max_mps2);
+    meter(accelerationMeter, isPushKnown && pushInk.ink !== 'stale' ? push : null, scale.acceleration_max_mps2, `${signed(push)} metres per second squared`);
+  }
+
+  /** Draws the speed of a slow-down order; returns its text for the meter. @param {number | null} speed_mps @param {Scale} scale */
+  #drawOrder(speed_mps, { speed_max_mps, limit_mps }) {
+    const { arc, order, ordered } = this.parts;
+    const ordered_mps = number(this.store.isSilent ? null : orderOf(this.store.frame?.decelerate)?.ordered_mps);
+    for (const part of [arc, order]) show(part, ordered_mps !== null);
+    if (ordered_mps === null) return '';
+    const mark = orderMark(ordered_mps, speed_mps, speed_max_mps, limit_mps);
+    setAttribute(arc, 'd', mark.d);
+    for (const [name, value] of /** @type {const} */ ([['x', mark.x], ['y', mark.y], ['text-anchor', mark.anchor]])) setAttribute(order, name, value);
+    const [words] = speedWords(ordered_mps);
+    setText(ordered, words);
+    return `, ordered ${words}`;
+  }
+}
+
+/** Builds the parts of the gauge in `root`. @param {HTMLElement} root */
+function build(root) {
   const face = svg('svg', { viewBox: VIEW, 'aria-hidden': 'true' });
-  // What moves lies in layers of its own and is turned by the compositor: no path is drawn anew while the car drives.
+  // What moves has layers of its own that the compositor rotates: no path is drawn again while the car drives.
   const white = sweep(172, 188, 180);
   const red = sweep(172, 188, 180, 'over');
   const turn = html('div', { class: 'turn' }, red);
@@ -42,111 +164,28 @@ export function mount(root, store) {
     face, html('div', { class: 'clip' }, white), html('div', { class: 'clip' }, turn), html('div', { class: 'clip right' }, faster),
     html('div', { class: 'clip left' }, slower), pointer, top, speedMeter, accelerationMeter,
   );
-  let drawnFace = '';
-  let isSeen = true;
+  return { face, white, red, turn, faster, slower, pointer, bug, acceleration, accelerationUnit, box, speed, struck, unit, note, arc, ordered, order, speedMeter, accelerationMeter };
+}
 
-  function scaleOf() {
-    return {
-      speed_max_mps: store.limit('gauge.speed_max_mps') ?? 15,
-      acceleration_max_mps2: store.limit('gauge.acceleration_max_mps2') ?? 3,
-      limit_mps: store.limit('speed_limit.max_mps'),
-    };
-  }
-
-  function drawFace() {
-    const scale = scaleOf();
-    const key = JSON.stringify([scale, speedUnit()]);
-    if (key === drawnFace) return;
-    const { tracks, rungs, ticks, labels, limit } = faceOf({
-      speed_max: speedIn(scale.speed_max_mps), acceleration_max_mps2: scale.acceleration_max_mps2, limit: speedIn(scale.limit_mps),
-    });
-    face.replaceChildren(
-      svg('path', { class: 'track', d: tracks.join('') }), // as one: the browser pays for each path, not for its length
-      svg('path', { class: 'rung', d: rungs.join('') }),
-      ...[false, true].map((isBig) => svg('path', { class: isBig ? 'tick big' : 'tick', d: ticks.filter((tick) => tick.isBig === isBig).map(({ d }) => d).join('') })),
-      ...labels.map(({ text, x, y }) => svg('text', { class: /[+−]/.test(text) ? 'num end' : 'num', x, y, 'text-anchor': 'middle' }, text)),
-    );
-    bug.replaceChildren(...(limit ? [
-      svg('path', { class: 'bugline', d: limit.line }), svg('path', { class: 'bug', d: limit.wedge }),
-      svg('text', { class: 'lim', x: limit.x, y: limit.y, 'text-anchor': limit.anchor }, 'limit ', svg('tspan', { class: 'num' }, limit.text)),
-    ] : []));
-    drawnFace = key;
-  }
-
-  // Each frame: what moves.
-  function move() {
-    if (!isSeen) return; // six layers on their way to where nobody looks cost as much as all the rest
-    drawFace();
-    const scale = scaleOf();
-    const limit = scale.limit_mps === null ? 180 : speedAngle(scale.limit_mps, scale.speed_max_mps);
-    const angle = speedAngle(number(store.signal('speed')?.value?.speed_mps) ?? 0, scale.speed_max_mps);
-    rotate(pointer, angle);
-    rotate(white, Math.min(angle, limit));
-    rotate(turn, limit);
-    rotate(red, Math.max(0, angle - limit));
-    const push = accelerationAngle(number(store.signal('acceleration')?.value?.acceleration_mps2) ?? 0, scale.acceleration_max_mps2);
-    rotate(faster, Math.max(0, push));
-    rotate(slower, Math.min(0, push));
-  }
-
-  // Five times a second: what is read.
-  function draw() {
-    drawFace();
-    const scale = scaleOf();
-    const speedInk = store.ink('speed');
-    const speed_mps = number(store.signal('speed')?.value?.speed_mps);
-    const isSpeedKnown = speed_mps !== null && isValue(speedInk.ink);
-    setAttribute(root, 'data-speed', isSpeedKnown ? speedInk.ink : 'never');
-    const [digits, unitWord] = isSpeedKnown ? speedWords(speed_mps) : ['–', speedUnit()];
-    const block = digitsBox(digits);
-    const isOver = isSpeedKnown && speedInk.ink !== 'stale' && scale.limit_mps !== null && Math.abs(speed_mps) > scale.limit_mps;
-    setText(speed, digits);
-    setAttribute(speed, 'data-size', block.size);
-    setAttribute(root, 'data-over', isOver);
-    for (const part of [box, struck]) {
-      setAttribute(part, 'x', block.x);
-      setAttribute(part, 'width', block.width);
-    }
-    const isBack = isSpeedKnown && speed_mps < 0 && digits.startsWith('−');
-    setAttribute(unit, 'x', block.unitX);
-    setText(unit, isSpeedKnown ? (isBack ? `${unitWord} back` : unitWord) : '');
-    setText(note, noteOf(speedInk, isSpeedKnown));
-    const isSpeedNow = isSpeedKnown && speedInk.ink !== 'stale';
-    const isOrdered = drawOrder(isSpeedNow ? speed_mps : null, scale);
-    meter(speedMeter, isSpeedNow ? Math.abs(speedIn(speed_mps)) : null, speedIn(scale.speed_max_mps), `${digits} ${spokenSpeedUnit()}${isOrdered}`);
-
-    const pushInk = store.ink('acceleration');
-    const push = number(store.signal('acceleration')?.value?.acceleration_mps2);
-    const isPushKnown = push !== null && isValue(pushInk.ink);
-    setAttribute(root, 'data-push', isPushKnown ? pushInk.ink : 'never');
-    setText(acceleration, isPushKnown ? signed(push) : pushInk.ink === 'not_published' ? 'not published' : '–');
-    setText(accelerationUnit, isPushKnown || pushInk.ink !== 'not_published' ? 'm/s²' : '');
-    setAttribute(accelerationMeter, 'aria-valuemin', -scale.acceleration_max_mps2);
-    meter(accelerationMeter, isPushKnown && pushInk.ink !== 'stale' ? push : null, scale.acceleration_max_mps2, `${signed(push)} metres per second squared`);
-  }
-
-  /** What the car was ordered, beside what it does. @param {number | null} speed_mps @param {ReturnType<typeof scaleOf>} scale */
-  function drawOrder(speed_mps, { speed_max_mps, limit_mps }) {
-    const ordered_mps = number(store.isSilent ? null : orderOf(store.frame?.decelerate)?.ordered_mps);
-    for (const part of [arc, order]) show(part, ordered_mps !== null);
-    if (ordered_mps === null) return '';
-    const mark = orderMark(ordered_mps, speed_mps, speed_max_mps, limit_mps);
-    setAttribute(arc, 'd', mark.d);
-    for (const [name, value] of /** @type {const} */ ([['x', mark.x], ['y', mark.y], ['text-anchor', mark.anchor]])) setAttribute(order, name, value);
-    const [words] = speedWords(ordered_mps);
-    setText(ordered, words);
-    return `, ordered ${words}`;
-  }
-
-  move();
-  if (store.frame) draw(); // before the first frame it is not shown
-  const watcher = new IntersectionObserver((entries) => {
-    isSeen = entries.at(-1)?.isIntersecting ?? true;
-    move();
+/**
+ * Draws tracks, ticks, labels and the mark of the limit.
+ * @param {ReturnType<typeof build>} parts
+ * @param {Scale} scale
+ */
+function showFace({ face, bug }, scale) {
+  const { tracks, rungs, ticks, labels, limit } = faceOf({
+    speed_max: speedIn(scale.speed_max_mps), acceleration_max_mps2: scale.acceleration_max_mps2, limit: speedIn(scale.limit_mps),
   });
-  watcher.observe(root);
-  const stops = [store.on('move', move), store.on('draw', draw), () => watcher.disconnect()];
-  return () => stops.forEach((stop) => stop());
+  face.replaceChildren(
+    svg('path', { class: 'track', d: tracks.join('') }), // as one: the browser pays for each path, not for its length
+    svg('path', { class: 'rung', d: rungs.join('') }),
+    ...[false, true].map((isBig) => svg('path', { class: isBig ? 'tick big' : 'tick', d: ticks.filter((tick) => tick.isBig === isBig).map(({ d }) => d).join('') })),
+    ...labels.map(({ text, x, y }) => svg('text', { class: /[+−]/.test(text) ? 'num end' : 'num', x, y, 'text-anchor': 'middle' }, text)),
+  );
+  bug.replaceChildren(...(limit ? [
+    svg('path', { class: 'bugline', d: limit.line }), svg('path', { class: 'bug', d: limit.wedge }),
+    svg('text', { class: 'lim', x: limit.x, y: limit.y, 'text-anchor': limit.anchor }, 'limit ', svg('tspan', { class: 'num' }, limit.text)),
+  ] : []));
 }
 
 /** @param {import('../core/protocol.js').Freshness} ink */
@@ -174,7 +213,7 @@ function sweep(inner, outer, from, kind = '') {
   return svg('svg', { viewBox: VIEW, class: `moves ${kind}`.trim(), 'aria-hidden': 'true' }, svg('path', { class: 'val', d: band(inner, outer, from, from + 180) }));
 }
 
-/** A turn smaller than the pointer is wide is put, not moved: it looks the same, and is half of what Home costs [degrees]. */
+/** A turn that is smaller than the width of the pointer is put there without a transition: it looks the same and halves the cost of Home [degrees]. */
 const PUT_DEG = 1;
 /** @type {WeakMap<Element, number>} */
 const turned = new WeakMap();

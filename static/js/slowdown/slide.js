@@ -1,124 +1,153 @@
-// One slide of the slow-down on the page: the rail's, and the one at the same pixels in an alarm's sheet.
+// One slide of the slow-down: the one in the action bar, or the one at the same pixels in an alarm's sheet.
 
 import { field, listen, need, setAttribute, setText, setWords } from '../core/dom.js';
 import { FAR_ENOUGH, KNOB_PX, Slide } from './slide-layout.js';
 
-/** Border and gap at both ends of the knob's way [px]: slowing.css. */
+/** Border and gap at both ends of the slide [px]: slowing.css. */
 const ENDS_PX = 8;
-/** How long what a wrong press is told stands [ms]. */
+/** How long the hint after a wrong press is shown [ms]. */
 const HINT_MS = 2500;
 const HINTS = /** @type {const} */ ({ tap: ['Do not tap:', 'slide it'], short: ['Slide it', 'to the end'] });
 
-/**
- * @typedef {{kind: 'off' | 'armed' | 'go', title: string, why: string, label: string}} View
- * @param {HTMLElement} slide
- * @param {{press: () => void, order: (at_ms: number) => void}} on press: it is off, and was pressed; order: when it was let go
- * @returns {{draw: (view: View) => void, stop: () => void}}
- */
-export function mountSlide(slide, { press, order }) {
-  const gesture = new Slide();
-  const [knob, way, title, why] = [need(slide, '.knob'), need(slide, '.way'), field(slide, 'slow-title'), field(slide, 'slow-why')];
+/** @typedef {{kind: 'off' | 'armed' | 'go', title: string, why: string, label: string}} View */
+
+export class SlideKey {
   /** @type {View} */
-  let view = { kind: 'off', title: '', why: '', label: '' };
+  #view = { kind: 'off', title: '', why: '', label: '' };
   /** @type {readonly [string, string] | null} */
-  let hint = null;
+  #hint = null;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
-  let hinting;
-  let watching = 0;
+  #hinting;
+  #watching = 0;
 
-  const isMirrored = () => document.documentElement.dataset['hand'] === 'left';
-
-  /** From the end where the knob rests, along its way [px]. @param {number} x_px */
-  function along(x_px) {
-    const box = slide.getBoundingClientRect();
-    return { at_px: (isMirrored() ? box.right - x_px : x_px - box.left) - ENDS_PX / 2, way_px: box.width - ENDS_PX - KNOB_PX };
+  /**
+   * @param {HTMLElement} slide
+   * @param {{press: () => void, order: (at_ms: number) => void}} on press: pressed while off; order: slid to the end, with the time of the release
+   */
+  constructor(slide, on) {
+    this.gesture = new Slide();
+    this.slide = slide;
+    this.on = on;
+    this.knob = need(slide, '.knob');
+    this.trail = need(slide, '.way');
+    this.title = field(slide, 'slow-title');
+    this.why = field(slide, 'slow-why');
+    this.stops = [...this.#pointers(), ...this.#keys()];
   }
 
-  function place() {
-    const { share, phase } = gesture;
-    const moved_px = share * along(0).way_px;
-    setAttribute(slide, 'data-moves', phase === 'drag' || phase === 'hold' || null);
-    setAttribute(slide, 'data-far', (phase === 'drag' && share >= FAR_ENOUGH) || null);
-    knob.style.transform = share ? `translateX(${((isMirrored() ? -1 : 1) * moved_px).toFixed(1)}px)` : '';
-    way.style.width = share ? `${(moved_px + KNOB_PX).toFixed(1)}px` : '';
+  stop() {
+    for (const stop of this.stops) stop();
+    clearTimeout(this.#hinting);
+  }
+
+  /** @param {View} view */
+  draw(view) {
+    if (view.kind !== this.#view.kind) this.#rest();
+    if (view.kind !== 'armed') this.#hint = null;
+    this.#view = view;
+    setAttribute(this.slide, 'data-kind', view.kind);
+    setAttribute(this.slide, 'aria-label', view.label);
+    setText(this.title, this.#hint ? this.#hint[0] : view.title);
+    setWords(this.why, this.#hint ? this.#hint[1] : view.why);
+  }
+
+  get #isMirrored() {
+    return document.documentElement.dataset['hand'] === 'left';
+  }
+
+  get #isArmed() {
+    return this.#view.kind === 'armed';
+  }
+
+  /** Distance from the end where the knob rests, and the whole distance [px]. @param {number} x_px */
+  #along(x_px) {
+    const box = this.slide.getBoundingClientRect();
+    return { at_px: (this.#isMirrored ? box.right - x_px : x_px - box.left) - ENDS_PX / 2, way_px: box.width - ENDS_PX - KNOB_PX };
+  }
+
+  #place() {
+    const { share, phase } = this.gesture;
+    const moved_px = share * this.#along(0).way_px;
+    setAttribute(this.slide, 'data-moves', phase === 'drag' || phase === 'hold' || null);
+    setAttribute(this.slide, 'data-far', (phase === 'drag' && share >= FAR_ENOUGH) || null);
+    this.knob.style.transform = share ? `translateX(${((this.#isMirrored ? -1 : 1) * moved_px).toFixed(1)}px)` : '';
+    this.trail.style.width = share ? `${(moved_px + KNOB_PX).toFixed(1)}px` : '';
   }
 
   /** @param {import('./slide-layout.js').Outcome} outcome @param {number} at_ms */
-  function end(outcome, at_ms) {
-    place();
-    if (outcome === 'order') order(at_ms);
+  #end(outcome, at_ms) {
+    this.#place();
+    if (outcome === 'order') this.on.order(at_ms);
     else if (outcome) {
-      hint = HINTS[outcome];
-      clearTimeout(hinting);
-      hinting = setTimeout(() => {
-        hint = null;
-        draw(view);
+      this.#hint = HINTS[outcome];
+      clearTimeout(this.#hinting);
+      this.#hinting = setTimeout(() => {
+        this.#hint = null;
+        this.draw(this.#view);
       }, HINT_MS);
-      draw(view);
+      this.draw(this.#view);
     }
   }
 
-  function watch() {
-    cancelAnimationFrame(watching);
-    const outcome = gesture.look(performance.now());
-    place();
-    if (outcome) end(outcome, performance.now());
-    else if (gesture.phase === 'hold') watching = requestAnimationFrame(watch);
+  /** Follows a key that is held down. */
+  #watch() {
+    cancelAnimationFrame(this.#watching);
+    const outcome = this.gesture.look(performance.now());
+    this.#place();
+    if (outcome) this.#end(outcome, performance.now());
+    else if (this.gesture.phase === 'hold') this.#watching = requestAnimationFrame(() => this.#watch());
   }
 
-  function rest() {
-    if (gesture.phase === 'rest') return;
-    gesture.rest();
-    place();
+  #rest() {
+    if (this.gesture.phase === 'rest') return;
+    this.gesture.rest();
+    this.#place();
   }
 
-  /** @param {View} seen */
-  function draw(seen) {
-    if (seen.kind !== view.kind) rest();
-    if (seen.kind !== 'armed') hint = null;
-    view = seen;
-    setAttribute(slide, 'data-kind', seen.kind);
-    setAttribute(slide, 'aria-label', seen.label);
-    setText(title, hint ? hint[0] : seen.title);
-    setWords(why, hint ? hint[1] : seen.why);
+  #pointers() {
+    const { slide, gesture } = this;
+    const rest = () => this.#rest();
+    return [
+      listen(slide, 'click', () => { if (this.#view.kind === 'off') this.on.press(); }),
+      listen(slide, 'pointerdown', (/** @type {PointerEvent} */ event) => {
+        if (!this.#isArmed || event.button !== 0) return;
+        const { at_px, way_px } = this.#along(event.clientX);
+        gesture.down(event.pointerId, at_px, way_px);
+        if (!event.isPrimary) gesture.bar(); // another finger is on the screen already
+        slide.setPointerCapture(event.pointerId); // wherever it moves now, it presses no other key
+        this.#place();
+      }),
+      listen(slide, 'pointermove', (/** @type {PointerEvent} */ event) => {
+        if (gesture.phase !== 'drag') return;
+        gesture.move(event.pointerId, this.#along(event.clientX).at_px);
+        this.#place();
+      }),
+      listen(slide, 'pointerup', (/** @type {PointerEvent} */ event) => this.#end(gesture.up(event.pointerId), event.timeStamp)),
+      listen(slide, 'pointercancel', rest),
+      listen(document, 'pointerdown', (/** @type {PointerEvent} */ event) => {
+        if (event.isPrimary || gesture.phase === 'rest') return;
+        gesture.bar();
+        this.#place();
+      }, { capture: true }),
+      listen(slide, 'blur', rest),
+      listen(slide, 'contextmenu', (event) => { if (this.#isArmed) event.preventDefault(); }),
+    ];
   }
 
-  const stops = [
-    listen(slide, 'click', () => { if (view.kind === 'off') press(); }),
-    listen(slide, 'pointerdown', (/** @type {PointerEvent} */ event) => {
-      if (view.kind !== 'armed' || event.button !== 0) return;
-      const { at_px, way_px } = along(event.clientX);
-      gesture.down(event.pointerId, at_px, way_px);
-      if (!event.isPrimary) gesture.bar(); // another finger lies on the glass already
-      slide.setPointerCapture(event.pointerId); // wherever it goes now, no other key is hit
-      place();
-    }),
-    listen(slide, 'pointermove', (/** @type {PointerEvent} */ event) => {
-      if (gesture.phase !== 'drag') return;
-      gesture.move(event.pointerId, along(event.clientX).at_px);
-      place();
-    }),
-    listen(slide, 'pointerup', (/** @type {PointerEvent} */ event) => end(gesture.up(event.pointerId), event.timeStamp)),
-    listen(slide, 'pointercancel', rest),
-    listen(document, 'pointerdown', (/** @type {PointerEvent} */ event) => {
-      if (event.isPrimary || gesture.phase === 'rest') return;
-      gesture.bar();
-      place();
-    }, { capture: true }),
-    listen(slide, 'keydown', (/** @type {KeyboardEvent} */ event) => {
-      if (view.kind !== 'armed' || event.key === 'Tab') return;
-      event.preventDefault();
-      gesture.press(event.key, event.repeat, performance.now());
-      watch();
-    }),
-    listen(slide, 'keyup', (/** @type {KeyboardEvent} */ event) => {
-      if (view.kind !== 'armed') return rest();
-      event.preventDefault();
-      end(gesture.release(), event.timeStamp);
-    }),
-    listen(slide, 'blur', rest),
-    listen(slide, 'contextmenu', (event) => { if (view.kind === 'armed') event.preventDefault(); }),
-    () => clearTimeout(hinting),
-  ];
-  return { draw, stop: () => stops.forEach((stop) => stop()) };
+  #keys() {
+    const { slide, gesture } = this;
+    return [
+      listen(slide, 'keydown', (/** @type {KeyboardEvent} */ event) => {
+        if (!this.#isArmed || event.key === 'Tab') return;
+        event.preventDefault();
+        gesture.press(event.key, event.repeat, performance.now());
+        this.#watch();
+      }),
+      listen(slide, 'keyup', (/** @type {KeyboardEvent} */ event) => {
+        if (!this.#isArmed) return this.#rest();
+        event.preventDefault();
+        this.#end(gesture.release(), event.timeStamp);
+      }),
+    ];
+  }
 }

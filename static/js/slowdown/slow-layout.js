@@ -27,6 +27,15 @@ const BRIEF = 44;
 
 const STATES = /** @type {Record<string, string>} */ ({ not_available: 'NOT AVAILABLE', safe: 'NOT ARMED', armed: 'ARMED', ordered: 'SLOWING', holding: 'HOLDING' });
 
+/** The facts that decide how this page shows the slow-down now. @param {import('../core/store.js').Store} store @returns {Seen} */
+export function seenOf(store) {
+  const { frame, control } = store;
+  return {
+    now: frame?.decelerate ?? null, isSilent: store.isSilent, isViewer: store.isViewer, isReplay: frame?.replay !== undefined,
+    mayControl: store.fence !== null || !control?.holder, holder: control?.holder ?? null,
+  };
+}
+
 /** The one word of its state. @param {Seen} seen */
 export function stateWord({ now, isSilent }) {
   if (isSilent || !now) return 'NOT KNOWN';

@@ -2,8 +2,7 @@
 
 import { html, icon, setText, setWords, show, words } from '../core/dom.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
-import { sheetOf } from './slow-layout.js';
-import { seenOf } from './slowing.js';
+import { seenOf, sheetOf } from './slow-layout.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store

@@ -1,0 +1,54 @@
+// The key that releases the car from a slow-down, and the sheet that confirms it.
+
+import { field, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
+import { holdOf, releaseOf, seenOf } from './slow-layout.js';
+
+export class ReleaseKey {
+  /**
+   * @param {HTMLElement} root
+   * @param {import('../core/store.js').Store} store
+   * @param {import('../control/control.js').Control} control
+   * @param {import('../control/control.js').Say} say
+   */
+  constructor(root, store, control, say) {
+    this.store = store;
+    this.control = control;
+    this.say = say;
+    this.key = field(root, 'release');
+    this.label = field(root, 'release-words');
+    this.sheet = /** @type {HTMLDialogElement} */ (need(document, '#sheet-release'));
+    this.stops = [
+      listen(this.key, 'click', () => this.#confirm()),
+      listen(field(this.sheet, 'yes'), 'click', () => void this.#release()),
+      listen(field(this.sheet, 'no'), 'click', () => this.sheet.close()),
+    ];
+  }
+
+  /** @param {import('./slow-layout.js').Seen} seen @param {ReturnType<typeof holdOf>} hold */
+  draw(seen, hold) {
+    const { can, label } = releaseOf(seen);
+    show(this.key, hold !== null);
+    setText(this.label, label);
+    setAttribute(this.key, 'data-barred', !can || null);
+    if (this.sheet.open && (!hold || String(hold.number) !== this.sheet.dataset['order'] || !can)) this.sheet.close();
+  }
+
+  #confirm() {
+    const seen = seenOf(this.store);
+    const hold = holdOf(seen.now);
+    const { can, why } = releaseOf(seen);
+    if (!hold) return;
+    if (!can) return this.say(why, 'Not released', seen.isViewer ? undefined : { label: 'Ask for control', act: () => void this.control.order('request') });
+    this.sheet.dataset['order'] = String(hold.number);
+    const standing = this.store.frame?.alarms.filter((alarm) => alarm.priority === 'critical' && alarm.active) ?? [];
+    setWords(field(this.sheet, 'alarms'), standing.length ? `Still standing: ${standing.map(({ title }) => title).join(', ')}.` : '');
+    if (!this.sheet.open) this.sheet.showModal();
+  }
+
+  async #release() {
+    const number = Number(this.sheet.dataset['order']);
+    this.sheet.close();
+    const answer = await this.store.ask('release', { number });
+    if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Not released');
+  }
+}

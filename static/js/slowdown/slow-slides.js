@@ -1,0 +1,78 @@
+// The slides that order a slow-down: the one in the action bar and those in the sheets of alarms.
+
+import { field, setWords, show } from '../core/dom.js';
+import { SlideKey } from './slide.js';
+import { orderOf, seenOf, slideOf } from './slow-layout.js';
+
+/** Time limit of an answer [ms]. Later it is not known whether the car is slowed, and the frames show it. */
+export const ANSWER_MS = 2000;
+const SENDING = { kind: /** @type {const} */ ('go'), title: 'Sending', why: 'the order', label: 'The order to slow down is being sent' };
+
+/** @typedef {(sentence: string, title: string) => void} Tell */
+
+export class SlowSlides {
+  /** Until when an order of this page may be unanswered [ms]. */
+  #sending_ms = -Infinity;
+
+  /**
+   * @param {import('../core/store.js').Store} store
+   * @param {{say: import('../control/control.js').Say, openSheet: () => void, draw: () => void}} page
+   */
+  constructor(store, { say, openSheet, draw }) {
+    this.store = store;
+    this.redraw = draw;
+    this.slides = [.../** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('.slide[data-f="slow"]'))].map((slide) => {
+      const sheet = slide.closest('dialog');
+      const says = sheet && field(sheet, 'slow-says');
+      /** Shows a sentence where it is readable: an alarm's sheet covers the notices. @type {Tell} */
+      const tell = (sentence, title) => {
+        if (!says || !sheet?.open) return say(sentence, title);
+        show(says, true);
+        setWords(says, `${title}: ${sentence}`);
+      };
+      if (says) sheet.addEventListener('close', () => show(says, false));
+      return new SlideKey(slide, {
+        press: () => (sheet ? tell(this.#whyOff(), 'Not slowed') : openSheet()),
+        order: (at_ms) => void this.#order(at_ms, tell),
+      });
+    });
+    this.stops = this.slides.map((slide) => () => slide.stop());
+  }
+
+  /** @param {import('./slow-layout.js').Seen} seen */
+  draw(seen) {
+    const view = this.store.now() < this.#sending_ms && !orderOf(seen.now) ? SENDING : slideOf(seen);
+    for (const slide of this.slides) slide.draw(view);
+  }
+
+  /** The reason that an alarm's sheet shows when the slow-down cannot be used. */
+  #whyOff() {
+    const seen = seenOf(this.store);
+    const { state, why } = seen.now ?? {};
+    const because = seen.isSilent ? 'the server does not answer.'
+      : seen.isViewer ? 'viewers cannot use it.'
+        : state === 'safe' ? 'the slow-down is not armed; acknowledge the alarm, then arm it on Home.'
+          : why ?? 'it is not available.';
+    return `${because} Use the physical stop.`;
+  }
+
+  /** @param {number} at_ms when the slide was released @param {Tell} tell */
+  async #order(at_ms, tell) {
+    const { store } = this;
+    const { frame } = store;
+    if (!frame) return;
+    const ago_s = (performance.now() - at_ms) / 1000;
+    this.#sending_ms = store.now() + ANSWER_MS;
+    const asked = store.ask('slow_down', {
+      pressed_ago_s: ago_s >= 0 && ago_s < 60 ? ago_s : 0, // old browsers count the time of events from another moment
+      heard_ms: frame.server.time_ms, held_s: (store.now() - store.deadMan.heard_ms) / 1000,
+    }, ANSWER_MS);
+    this.redraw();
+    const answer = await asked;
+    if (!answer.ok) {
+      this.#sending_ms = -Infinity;
+      tell(`${answer.reason ?? 'Refused.'} Use the physical stop.`, 'NOT slowed');
+    }
+    this.redraw();
+  }
+}
