@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { heldWords } from '../../static/js/shell/connect.js';
+import { heldWords } from '../../static/js/shell/connect-layout.js';
 import { asked, dayWords, joined, lowest, tookWords } from '../../static/js/alarms/log-layout.js';
 import { dialogWords, loadWords, snackWords, standingWords } from '../../static/js/alarms/standing.js';
 

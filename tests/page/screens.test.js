@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { armWords, bare, foundIn, isSameCar, remembered } from '../../static/js/shell/connect.js';
+import { armWords, bare, foundIn, isSameCar, remembered } from '../../static/js/shell/connect-layout.js';
 import { screenOf } from '../../static/js/shell/router.js';
 import { details, headline, kindWords } from '../../static/js/home/signals.js';
 import { tabByHash, tabByKey } from '../../static/js/shell/tabs.js';

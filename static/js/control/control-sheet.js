@@ -11,79 +11,88 @@ import { addSheet, openSheet } from '../shell/sheet.js';
 
 /** @param {Store} store @param {Control} control */
 export function openControl(store, control) {
-  const key = (/** @type {string} */ label, /** @type {() => void} */ act, kind = 'key wide') => {
-    const button = html('button', { type: 'button', class: kind }, ...words(label));
-    button.addEventListener('click', act);
-    return button;
-  };
-  const title = html('h2', { id: 'control-title' });
-  const text = html('p', { class: 'sub', id: 'control-words', role: 'status' });
-  const people = html('ul', { class: 'menu-list people' });
-  const keys = html('div', { class: 'keys', 'data-f': 'keys' });
-  const reach = html('button', { type: 'button', class: 'reach' });
-  const close = html('div', { class: 'keys' }, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'));
-  const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-control', 'aria-labelledby': 'control-title', 'aria-describedby': 'control-words' },
-    html('div', { class: 'bd' }, title, text), keys, people, reach, close));
-  let shown = '';
-  let isConfirming = false;
+  new ControlSheet(store, control);
+}
 
-  /** @param {string} act @param {object} [fields] */
-  async function order(act, fields) {
-    const answer = await control.order(act, fields);
-    isConfirming = false;
-    if (answer.ok && act !== 'request') sheet.close();
-    else draw();
+class ControlSheet {
+  #drawn = '';
+  #isConfirming = false;
+
+  /** @param {Store} store @param {Control} control */
+  constructor(store, control) {
+    this.store = store;
+    this.control = control;
+    this.title = html('h2', { id: 'control-title' });
+    this.text = html('p', { class: 'sub', id: 'control-words', role: 'status' });
+    this.people = html('ul', { class: 'menu-list people' });
+    this.keys = html('div', { class: 'keys', 'data-f': 'keys' });
+    this.reach = html('button', { type: 'button', class: 'reach' });
+    const close = html('div', { class: 'keys' }, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'));
+    this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-control', 'aria-labelledby': 'control-title', 'aria-describedby': 'control-words' },
+      html('div', { class: 'bd' }, this.title, this.text), this.keys, this.people, this.reach, close));
+    const stops = [store.on('draw', () => this.#draw()), addSheet(this.sheet)];
+    this.reach.addEventListener('click', () => control.openPhone());
+    this.sheet.addEventListener('close', () => stops.forEach((stop) => stop()), { once: true });
+    openSheet(this.sheet);
+    this.#draw();
   }
 
-  function draw() {
-    const { control: now, page } = store;
-    const { frame } = store;
-    const told = frame?.replay ? frame.live?.reach : frame?.reach;
-    if (!now || !sheet.open) return;
-    const seen = sheetOf(now, told, page);
-    if (seen.state !== 'other' && seen.state !== 'asking') isConfirming = false;
-    const asksOver = isConfirming;
-    setText(title, asksOver ? `Take over from ${now.holder}?` : seen.title);
-    setWords(text, asksOver ? `${now.holder} may be about to act. Taking over is announced to everyone and logged.` : seen.text);
-    const line = reachOf(told);
-    reach.replaceChildren(icon(line.isBad ? 'bell-off' : 'bell', 's'), html('span', {}, html('b', {}, ...words(line.text)), ...(line.why ? [html('br'), html('span', { class: 'small sub' }, ...words(line.why))] : [])), icon('next', 's'));
-    const kind = JSON.stringify([seen.state, isConfirming, seen.handTo.map((one) => [one.page, one.name, one.can, one.why_text])]);
-    if (kind === shown) return;
-    shown = kind;
-    const had = keys.contains(document.activeElement);
-    keys.replaceChildren(...keysOf(seen.state, asksOver));
-    show(people, seen.handTo.length > 0);
-    people.replaceChildren(...seen.handTo.map((one) => {
-      const button = html('button', { type: 'button', 'data-page': one.page }, icon('operator'), html('span', {}, `Hand over to ${one.name}`, html('br'), html('span', { class: 'small sub' }, one.can ? 'can hear alarms' : `cannot hear alarms: ${one.why_text ?? 'unknown'}`)));
-      button.addEventListener('click', () => void order('hand_over', { to: one.page }));
-      return html('li', {}, button);
-    }));
-    if (had) /** @type {HTMLElement | null} */ (keys.querySelector('button'))?.focus();
+  #draw() {
+    const { control: now, frame, page } = this.store;
+    const alarmReach = frame?.replay ? frame.live?.reach : frame?.reach;
+    if (!now || !this.sheet.open) return;
+    const seen = sheetOf(now, alarmReach, page);
+    if (seen.state !== 'other' && seen.state !== 'asking') this.#isConfirming = false;
+    setText(this.title, this.#isConfirming ? `Take over from ${now.holder}?` : seen.title);
+    setWords(this.text, this.#isConfirming ? `${now.holder} may be about to act. Taking over is announced to everyone and logged.` : seen.text);
+    const line = reachOf(alarmReach);
+    this.reach.replaceChildren(icon(line.isBad ? 'bell-off' : 'bell', 's'), html('span', {}, html('b', {}, ...words(line.text)), ...(line.why ? [html('br'), html('span', { class: 'small sub' }, ...words(line.why))] : [])), icon('next', 's'));
+    const key = JSON.stringify([seen.state, this.#isConfirming, seen.handTo.map((one) => [one.page, one.name, one.can, one.why_text])]);
+    if (key === this.#drawn) return;
+    this.#drawn = key;
+    const hasFocus = this.keys.contains(document.activeElement);
+    this.keys.replaceChildren(...this.#keysOf(seen.state));
+    show(this.people, seen.handTo.length > 0);
+    this.people.replaceChildren(...seen.handTo.map((one) => this.#personRow(one)));
+    if (hasFocus) this.keys.querySelector('button')?.focus();
   }
 
-  /** @param {string} state @param {boolean} asksOver */
-  function keysOf(state, asksOver) {
-    if (state === 'free') return [key('Take control', () => void order('take'), 'main')];
-    if (state === 'you') return [key('Give control up', () => void order('release'))];
-    if (asksOver) return [key('Take over', () => void order('take_over'), 'main'), key('Back', confirm(false))];
+  /** @param {ReturnType<typeof sheetOf>['handTo'][number]} person */
+  #personRow({ page, name, can, why_text }) {
+    const hearing = can ? 'can hear alarms' : `cannot hear alarms: ${why_text ?? 'unknown'}`;
+    const button = html('button', { type: 'button', 'data-page': page }, icon('operator'), html('span', {}, `Hand over to ${name}`, html('br'), html('span', { class: 'small sub' }, hearing)));
+    button.addEventListener('click', () => void this.#order('hand_over', { to: page }));
+    return html('li', {}, button);
+  }
+
+  /** @param {string} state */
+  #keysOf(state) {
+    const key = (/** @type {string} */ label, /** @type {() => void} */ act, kind = 'key wide') => {
+      const button = html('button', { type: 'button', class: kind }, ...words(label));
+      button.addEventListener('click', act);
+      return button;
+    };
+    const order = (/** @type {string} */ act) => () => void this.#order(act);
+    if (state === 'free') return [key('Take control', order('take'), 'main')];
+    if (state === 'you') return [key('Give control up', order('release'))];
+    if (this.#isConfirming) return [key('Take over', order('take_over'), 'main'), key('Back', () => this.#confirm(false))];
     return [
-      ...(state === 'asking' ? [key('Cancel request', () => void order('withdraw'))] : [key('Ask for control', () => void order('request'), 'main')]),
-      key('Take over …', confirm(true)),
+      state === 'asking' ? key('Cancel request', order('withdraw')) : key('Ask for control', order('request'), 'main'),
+      key('Take over …', () => this.#confirm(true)),
     ];
   }
 
-  /** @param {boolean} wanted */
-  function confirm(wanted) {
-    return () => {
-      isConfirming = wanted;
-      draw();
-    };
+  /** @param {boolean} isConfirming */
+  #confirm(isConfirming) {
+    this.#isConfirming = isConfirming;
+    this.#draw();
   }
 
-  const stops = [store.on('draw', draw), addSheet(sheet)];
-  reach.addEventListener('click', () => control.openPhone());
-  sheet.addEventListener('close', () => stops.forEach((stop) => stop()), { once: true });
-  openSheet(sheet);
-  draw();
+  /** @param {string} act @param {object} [fields] */
+  async #order(act, fields) {
+    const answer = await this.control.order(act, fields);
+    this.#isConfirming = false;
+    if (answer.ok && act !== 'request') this.sheet.close();
+    else this.#draw();
+  }
 }
-

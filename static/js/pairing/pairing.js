@@ -8,18 +8,116 @@ import { digitsOf, PIN_DIGITS, pinShown, reasonWords, triedWords, waitWords } fr
 const TRY_MS = 8000;
 
 /**
- * @param {HTMLElement} root
- * @param {object} what
- * @param {import('./admission.js').Refusal} what.why
- * @param {string} what.name what this phone calls itself
- * @param {(me: {name: string, role: string}) => void} what.onPaired
+ * @typedef {object} Pairing
+ * @property {import('./admission.js').Refusal} why
+ * @property {string} name of this phone
+ * @property {(me: {name: string, role: string}) => void} onPaired
  */
-export function openPairing(root, { why, name, onPaired }) {
-  let token = linkToken();
-  let isBusy = false;
-  let waitUntil_ms = 0;
-  const reason = html('p', { class: 'block gone', role: 'alert' }, icon('warn'), html('b', {}, reasonWords(why)));
-  show(reason, reasonWords(why) !== '');
+
+/** @param {HTMLElement} root @param {Pairing} pairing */
+export function openPairing(root, pairing) {
+  const screen = new PairingScreen(root, pairing);
+  styled().then(() => screen.draw(), () => screen.draw());
+  screen.draw();
+  /** @type {HTMLElement | null} */ (root.querySelector('h1'))?.focus({ preventScroll: true });
+}
+
+class PairingScreen {
+  #token = linkToken();
+  #isBusy = false;
+  #waitUntil_ms = 0;
+
+  /** @param {HTMLElement} root @param {Pairing} pairing */
+  constructor(root, { why, name, onPaired }) {
+    this.onPaired = onPaired;
+    this.parts = build(root, reasonWords(why), name);
+    const { form, pad, pin } = this.parts;
+    listen(pin, 'input', () => this.#enter(digitsOf(pin.value)));
+    listen(pad, 'click', (event) => {
+      const key = /** @type {HTMLElement | null} */ (event.target.closest('button'));
+      if (!key) return;
+      const digits = digitsOf(pin.value);
+      this.#enter(key.dataset['digit'] ? `${digits}${key.dataset['digit']}`.slice(0, PIN_DIGITS) : digits.slice(0, -1));
+    });
+    listen(form, 'submit', (event) => {
+      event.preventDefault();
+      void this.#pair();
+    });
+    onLink(() => {
+      this.#token = linkToken();
+      setText(this.parts.says, '');
+      this.draw();
+    });
+  }
+
+  /** @param {string} digits */
+  #enter(digits) {
+    const { pin, says } = this.parts;
+    setText(says, '');
+    if (pinShown(digits) !== pin.value) pin.value = pinShown(digits);
+    this.draw();
+  }
+
+  async #pair() {
+    const { own, pin, says } = this.parts;
+    const digits = digitsOf(pin.value);
+    if (this.#isBusy || this.#waiting_s > 0) return;
+    if (this.#token === null && digits.length < PIN_DIGITS) {
+      setText(says, `The PIN has ${PIN_DIGITS} digits.`);
+      pin.focus();
+      return;
+    }
+    this.#isBusy = true;
+    this.draw();
+    const { status, body } = await request({ ...(this.#token === null ? { pin: digits } : { token: this.#token }), name: own.value.trim() });
+    this.#isBusy = false;
+    if (status === 200) {
+      this.onPaired(body);
+      return;
+    }
+    const { sentence, wait_s, isLinkOver } = triedWords(status, body);
+    if (isLinkOver) this.#token = null;
+    this.#waitUntil_ms = performance.now() + wait_s * 1000;
+    pin.value = '';
+    setWords(says, sentence);
+    this.draw();
+    says.scrollIntoView({ block: 'nearest' }); // on a small screen it is beneath the digits
+  }
+
+  /** How long the server accepts no PIN [s]. */
+  get #waiting_s() {
+    return this.#token === null ? Math.max(0, Math.ceil((this.#waitUntil_ms - performance.now()) / 1000)) : 0;
+  }
+
+  draw() {
+    const { byPin, go, where } = this.parts;
+    const left_s = this.#waiting_s;
+    show(byPin, this.#token === null);
+    setWords(where, this.#token === null
+      ? 'The server shows a PIN of 6 digits on its terminal, with a QR code that does the same. Who is paired as operator can show one too: Settings, Paired devices.'
+      : 'The code you scanned lets this phone in, once.');
+    setAttribute(go, 'data-busy', this.#isBusy || left_s > 0);
+    setWords(go, this.#isBusy ? 'Pairing' : left_s > 0 ? waitWords(left_s) : 'Pair this phone');
+    if (left_s > 0) setTimeout(() => this.draw(), 250);
+  }
+}
+
+/** Sends a pairing request; status 0: no answer. @param {object} what @returns {Promise<{status: number, body: any}>} */
+async function request(what) {
+  try {
+    const answer = await fetch('/api/pair', {
+      method: 'POST', cache: 'no-store', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(what), signal: AbortSignal.timeout(TRY_MS),
+    });
+    return { status: answer.status, body: await answer.json().catch(() => ({})) };
+  } catch {
+    return { status: 0, body: {} };
+  }
+}
+
+/** Builds the parts of the screen in `root`. @param {HTMLElement} root @param {string} why @param {string} name */
+function build(root, why, name) {
+  const reason = html('p', { class: 'block gone', role: 'alert' }, icon('warn'), html('b', {}, why));
+  show(reason, why !== '');
   const where = html('p', { class: 'say' });
   const own = /** @type {HTMLInputElement} */ (html('input', { id: 'pair-name', type: 'text', maxlength: 40, autocomplete: 'off', spellcheck: 'false', enterkeyhint: 'next', 'data-f': 'pair-name' }));
   own.value = name;
@@ -40,84 +138,5 @@ export function openPairing(root, { why, name, onPaired }) {
       byPin, says),
     html('div', { class: 'bottom' }, go));
   root.replaceChildren(html('header', { class: 'top' }, html('span', { class: 'link' }, 'catgraph')), form);
-
-  listen(pin, 'input', () => {
-    setText(says, '');
-    const digits = digitsOf(pin.value);
-    if (pinShown(digits) !== pin.value) pin.value = pinShown(digits);
-    draw();
-  });
-  listen(pad, 'click', (event) => {
-    const key = /** @type {HTMLElement | null} */ (event.target.closest('button'));
-    if (!key) return;
-    const digits = digitsOf(pin.value);
-    pin.value = pinShown(key.dataset['digit'] ? `${digits}${key.dataset['digit']}`.slice(0, PIN_DIGITS) : digits.slice(0, -1));
-    setText(says, '');
-    draw();
-  });
-  listen(form, 'submit', (event) => {
-    event.preventDefault();
-    pair();
-  });
-  onLink(() => {
-    token = linkToken();
-    setText(says, '');
-    draw();
-  });
-
-  async function pair() {
-    const digits = digitsOf(pin.value);
-    if (isBusy || waiting_s() > 0) return;
-    if (token === null && digits.length < PIN_DIGITS) {
-      setText(says, `The PIN has ${PIN_DIGITS} digits.`);
-      pin.focus();
-      return;
-    }
-    isBusy = true;
-    draw();
-    const words = token === null ? { pin: digits } : { token };
-    let status = 0;
-    /** @type {any} */
-    let body = {};
-    try {
-      const answer = await fetch('/api/pair', {
-        method: 'POST', cache: 'no-store', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify({ ...words, name: own.value.trim() }), signal: AbortSignal.timeout(TRY_MS),
-      });
-      body = await answer.json().catch(() => ({}));
-      status = answer.status;
-    } catch {
-      // no answer
-    }
-    isBusy = false;
-    if (status === 200) {
-      onPaired(body);
-      return;
-    }
-    const { sentence, wait_s, isLinkOver } = triedWords(status, body);
-    if (isLinkOver) token = null;
-    waitUntil_ms = performance.now() + wait_s * 1000;
-    pin.value = '';
-    setWords(says, sentence);
-    draw();
-    says.scrollIntoView({ block: 'nearest' }); // on a small screen it lies beneath the digits
-  }
-
-  function waiting_s() {
-    return token === null ? Math.max(0, Math.ceil((waitUntil_ms - performance.now()) / 1000)) : 0;
-  }
-
-  function draw() {
-    const left_s = waiting_s();
-    show(byPin, token === null);
-    setWords(where, token === null
-      ? 'The server shows a PIN of 6 digits on its terminal, with a QR code that does the same. Who is paired as operator can show one too: Settings, Paired devices.'
-      : 'The code you scanned lets this phone in, once.');
-    setAttribute(go, 'data-busy', isBusy || left_s > 0);
-    setWords(go, isBusy ? 'Pairing' : left_s > 0 ? waitWords(left_s) : 'Pair this phone');
-    if (left_s > 0) setTimeout(draw, 250);
-  }
-
-  styled().then(draw, draw);
-  draw();
-  /** @type {HTMLElement | null} */ (root.querySelector('h1'))?.focus({ preventScroll: true });
+  return { where, own, pin, says, go, pad, byPin, form };
 }

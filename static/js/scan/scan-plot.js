@@ -1,16 +1,18 @@
-// Draws the scan from above on a canvas. What stands still is drawn once and kept; a scan adds hatching and points.
+// Draws the scan from above on a canvas, over the grid of scan-grid.js.
 
 import { edgesOf, endOf } from './scan-corridor.js';
 import { bearingOf, rangeOf } from './scan-frame.js';
 import { codeWords, namedSectors, plotScale, pointsOf, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
+import { Hatching, ScanGrid, fit, penOf } from './scan-grid.js';
 import { fixed } from '../core/format.js';
 
 const NAMES_SHOWN = 4;
-const HATCH = { apart_px: 10, width_px: 2.5 };
 
 /**
  * @typedef {import('./scan-corridor.js').Point} Point
  * @typedef {ReturnType<typeof plotScale>} Scale
+ * @typedef {import('./scan-grid.js').Surface} Surface
+ * @typedef {import('./scan-grid.js').Pen} Pen
  *
  * @typedef {object} Around what is drawn beside the scan
  * @property {number} reach_m
@@ -27,17 +29,11 @@ const HATCH = { apart_px: 10, width_px: 2.5 };
  * @property {number} height [CSS px]
  * @property {number} dpr pixels of the canvas for one of CSS
  * @property {import('./scan-theme.js').Theme} theme
- *
- * @typedef {HTMLCanvasElement | OffscreenCanvas} Surface
- * @typedef {CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D} Pen
  */
 
 export class ScanPlot {
-  #ground = surface(1, 1);
-  #groundKey = '';
-  #hatchingKey = '';
-  /** @type {CanvasPattern | null} */
-  #hatching = null;
+  #grid = new ScanGrid();
+  #hatching = new Hatching();
   /** @type {import('./scan-theme.js').Theme['colour']} */
   #colour = /** @type {any} */ ({});
   #font = '';
@@ -51,20 +47,14 @@ export class ScanPlot {
   /** @param {Picture} picture */
   draw({ scan, around, width, height, dpr, theme }) {
     const [w, h] = [Math.round(width * dpr), Math.round(height * dpr)];
-    for (const canvas of [this.canvas, this.#ground]) {
-      if (canvas.width === w && canvas.height === h) continue;
-      canvas.width = w;
-      canvas.height = h;
-      this.#groundKey = '';
-    }
+    fit(this.canvas, w, h);
     const g = penOf(this.canvas, { alpha: false });
     if (!g) return;
     ({ colour: this.#colour, font: this.#font } = theme);
     this.#width = width;
     const { reach_m } = around;
-    this.#drawGround(width, height, dpr, reach_m, theme.key);
     g.setTransform(1, 0, 0, 1, 0, 0);
-    g.drawImage(this.#ground, 0, 0);
+    g.drawImage(this.#grid.draw({ width, height, dpr, reach_m, theme }), 0, 0);
     g.setTransform(dpr, 0, 0, dpr, 0, 0);
     const scale = plotScale(width, height, reach_m);
     const sectors = [...sectorsOf(scan), ...unseenOf(scan)];
@@ -79,34 +69,6 @@ export class ScanPlot {
     this.#nearest(g, scale, scan, reach_m);
     if (around.mark) this.#mark(g, scale, around.mark);
     this.#car(g, scale, height);
-  }
-
-  /** Rings and spokes. @param {number} width @param {number} height @param {number} dpr @param {number} reach_m @param {string} look */
-  #drawGround(width, height, dpr, reach_m, look) {
-    const key = `${width} ${height} ${dpr} ${reach_m} ${look}`;
-    if (key === this.#groundKey) return;
-    this.#groundKey = key;
-    const g = penOf(this.#ground);
-    if (!g) return;
-    const { cx, cy, k, at } = plotScale(width, height, reach_m);
-    g.setTransform(dpr, 0, 0, dpr, 0, 0);
-    g.fillStyle = this.#colour.panel;
-    g.fillRect(0, 0, width, height);
-    g.strokeStyle = this.#colour.line;
-    g.lineWidth = 1.5;
-    g.beginPath();
-    const rings = ringsOf(reach_m);
-    for (const r of rings) {
-      g.moveTo(cx - r * k, cy);
-      g.arc(cx, cy, r * k, Math.PI, 0);
-    }
-    const inner = rings[0] ?? reach_m / 4;
-    for (const degrees of [-90, -60, -30, 30, 60, 90]) {
-      const a = (degrees * Math.PI) / 180;
-      g.moveTo(...at(inner * Math.cos(a), inner * Math.sin(a)));
-      g.lineTo(...at(reach_m * Math.cos(a), reach_m * Math.sin(a)));
-    }
-    g.stroke();
   }
 
   /** The part of the corridor that the car needs to stop. @param {Pen} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number | null} stopping_m */
@@ -132,31 +94,9 @@ export class ScanPlot {
     }
     g.fillStyle = this.#colour.panel;
     g.fill();
-    const hatching = this.#hatchingOf(g, dpr, look);
+    const hatching = this.#hatching.of(g, dpr, this.#colour.hatch, look);
     if (hatching) g.fillStyle = hatching;
     g.fill();
-  }
-
-  /** Diagonal lines as a pattern, made once a theme. @param {Pen} g @param {number} dpr @param {string} look */
-  #hatchingOf(g, dpr, look) {
-    const key = `${dpr} ${look}`;
-    if (key === this.#hatchingKey) return this.#hatching;
-    const side = Math.round(HATCH.apart_px * dpr);
-    const tile = surface(side, side);
-    const t = penOf(tile);
-    if (!t) return null;
-    t.strokeStyle = this.#colour.hatch;
-    t.lineWidth = HATCH.width_px * dpr;
-    t.beginPath();
-    for (const shift of [-side, 0, side]) {
-      t.moveTo(shift - side, side * 2);
-      t.lineTo(shift + side * 2, -side);
-    }
-    t.stroke();
-    this.#hatching = g.createPattern(tile, 'repeat');
-    this.#hatching?.setTransform(new DOMMatrix().scale(1 / dpr));
-    this.#hatchingKey = key;
-    return this.#hatching;
   }
 
   /** @param {Pen} g @param {Scale} scale @param {import('./scan-corridor.js').Corridor} corridor @param {number} reach_m @param {number | null} stopping_m @param {number | null} limit_m */
@@ -299,19 +239,6 @@ export class ScanPlot {
     g.fillStyle = css;
     g.fillText(text, x, y);
   }
-}
-
-/** A canvas that nobody sees: a thread has no document. @param {number} width @param {number} height @returns {Surface} */
-function surface(width, height) {
-  if (typeof document === 'undefined') return new OffscreenCanvas(width, height);
-  const canvas = document.createElement('canvas');
-  [canvas.width, canvas.height] = [width, height];
-  return canvas;
-}
-
-/** @param {Surface} canvas @param {CanvasRenderingContext2DSettings} [how] */
-function penOf(canvas, how) {
-  return /** @type {Pen | null} */ (canvas.getContext('2d', how));
 }
 
 /** A line through points of the plane, its part behind the laser left out. @param {Pen} g @param {Scale} scale @param {Point[]} points */

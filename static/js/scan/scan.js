@@ -1,225 +1,172 @@
-// The scan's tab: the plot, what stands nearest in the corridor, the return that was tapped, and how far the plot reaches.
+// The scan's tab: the plot and how far it reaches, the return that was tapped; the texts are in scan-readout.js.
 
-import { field, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
-import { ABSENT, write } from '../core/ink.js';
+import { field, listen, setAttribute } from '../core/dom.js';
 import { THUMB_PX } from './scan-pick.js';
 import { ScanMark } from './scan-mark.js';
 import { ScanGlass } from './scan-glass.js';
+import { ScanReadout, scanInk } from './scan-readout.js';
 import { mountTouch } from './scan-touch.js';
-import { bearingOf } from './scan-frame.js';
-import { REACH_M, beamWords, pinched, placeOf, plotScale, reachWithin, sectorSentences, sectorsOf, unseenOf, zoomed } from './scan-layout.js';
-import { age, bearing, fixed } from '../core/format.js';
+import { REACH_M, pinched, placeOf, plotScale, reachWithin, zoomed } from './scan-layout.js';
 
-const REMEMBERED = 'catgraph.range';
-/** What a screen reader is told of the plot changes no faster than this [ms]: it would never end a sentence. */
-const TOLD_EVERY_MS = 2000;
+const STORED = 'catgraph.range';
 
 /**
  * @param {HTMLElement} root
  * @param {import('../core/store.js').Store} store
  */
 export function mount(root, store) {
+  const tab = new ScanTab(root, store);
   const at = (/** @type {string} */ name) => field(root, name);
-  const aim = at('aim');
-  const glass = new ScanGlass(/** @type {HTMLCanvasElement} */ (at('canvas')));
-  const mark = new ScanMark();
-  const keys = /** @type {HTMLElement[]} */ ([...root.querySelectorAll('[data-range]')]);
-  let reach_m = reachWithin(recall() ?? REACH_M.first);
-  let grasped_m = reach_m;
-  let isFront = false;
-  let told_ms = -Infinity;
-
+  const themed = () => {
+    tab.glass.readTheme();
+    tab.drawSoon();
+  };
+  let pinchedFrom_m = tab.reach_m;
   const stops = [
-    ...keys.map((key) => listen(key, 'click', () => reach(Number(key.dataset['range'])))),
-    listen(at('nearer'), 'click', () => reach(zoomed(reach_m, 1))),
-    listen(at('farther'), 'click', () => reach(zoomed(reach_m, -1))),
-    listen(root, 'keydown', pressed),
+    ...tab.ranges.map((key) => listen(key, 'click', () => tab.reach(Number(key.dataset['range'])))),
+    listen(at('nearer'), 'click', () => tab.zoom(1)),
+    listen(at('farther'), 'click', () => tab.zoom(-1)),
+    listen(root, 'keydown', (event) => tab.press(event)),
     listen(window, 'catgraph-theme', themed),
     listen(matchMedia('(prefers-color-scheme: light)'), 'change', themed),
-    listen(window, 'resize', drawSoon),
-    mountTouch(aim, {
-      grasp: () => { grasped_m = reach_m; },
-      pinch: (from_px, to_px) => reach(pinched(grasped_m, from_px, to_px)),
-      tap: touch,
-      wheel: (sign) => reach(zoomed(reach_m, sign)),
+    listen(window, 'resize', () => tab.drawSoon()),
+    mountTouch(at('aim'), {
+      grasp: () => { pinchedFrom_m = tab.reach_m; },
+      pinch: (from_px, to_px) => tab.reach(pinched(pinchedFrom_m, from_px, to_px)),
+      tap: (x_px, y_px) => tab.touch(x_px, y_px),
+      wheel: (sign) => tab.zoom(sign),
     }),
-    store.on('scan', heard),
-    store.on('draw', read),
+    store.on('scan', () => tab.receive()),
+    store.on('draw', () => tab.read()),
   ];
-  // The plot's words wait for their font, or the first picture would be set in another.
-  document.fonts.load('700 20px "catgraph numerals"').then(drawSoon, () => {});
-  reach(reach_m);
-  tellMark();
-
-  function themed() {
-    glass.readTheme();
-    drawSoon();
-  }
-
-  /** @param {number} metres */
-  function reach(metres) {
-    reach_m = metres;
-    for (const key of keys) setAttribute(key, 'aria-pressed', String(Math.abs(Number(key.dataset['range']) - metres) < 0.01));
-    setAttribute(at('nearer'), 'aria-disabled', metres <= REACH_M.least);
-    setAttribute(at('farther'), 'aria-disabled', metres >= REACH_M.most);
-    remember(metres);
-    drawSoon();
-  }
-
-  /** @param {KeyboardEvent} event */
-  function pressed(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const zoom = event.key === '+' || event.key === '=' ? 1 : event.key === '-' ? -1 : null;
-    if (zoom !== null) reach(zoomed(reach_m, zoom));
-    else if (event.target !== aim || !step(event.key)) return;
-    event.preventDefault();
-  }
-
-  /** @param {string} key */
-  function step(key) {
-    if (key === 'Escape' && mark.at) mark.clear();
-    else {
-      const side = /** @type {Record<string, 1 | -1 | 0>} */ ({ ArrowLeft: 1, ArrowRight: -1, Home: 0, Enter: 0, ' ': 0 })[key];
-      if (side === undefined || !store.scans.newest || !isLive()) return false;
-      mark.step(store.scans.newest, side, reach_m, store.scans.at_ms);
-    }
-    tellMark();
-    return true;
-  }
-
-  /** @param {number} x_px @param {number} y_px */
-  function touch(x_px, y_px) {
-    if (!store.scans.newest || !isLive()) return;
-    const scale = plotScale(glass.canvas.clientWidth, glass.canvas.clientHeight, reach_m);
-    const { x_m, y_m } = placeOf(scale, x_px, y_px);
-    mark.touch(store.scans.newest, x_m, y_m, THUMB_PX / scale.k, store.scans.at_ms);
-    tellMark();
-  }
-
-  /** By the operator's own doing, or because it is gone: told once, and not with every scan. @param {string} [instead] */
-  function tellMark(instead = '') {
-    const side = mark.at ? bearing(mark.at.bearing_rad) : null;
-    const degrees = mark.at ? Math.round((-mark.at.bearing_rad * 180) / Math.PI) : 0;
-    setAttribute(aim, 'aria-valuenow', Math.max(-90, Math.min(90, degrees)));
-    setAttribute(aim, 'aria-valuetext', side ? mark.words : instead || 'no return marked');
-    setText(at('said'), side ? mark.words : instead);
-    read();
-    drawSoon();
-  }
-
-  function heard() {
-    if (store.scans.newest && !mark.hear(store.scans.newest, store.scans.at_ms)) tellMark('the marked return is gone');
-    drawSoon();
-  }
-
-  function isLive() {
-    const { ink } = inkOfScan(store, glass.shown);
-    return store.scans.newest !== null && (ink === 'fresh' || ink === 'ageing');
-  }
-
-  function drawSoon() {
-    if (!isFront) return;
-    glass.draw(() => !isFront || !store.scans.newest ? null : {
-      scan: store.scans.newest,
-      at_ms: store.scans.at_ms,
-      around: {
-        reach_m, car: carOf(store), limit_m: store.limit('obstacle.standoff_m'),
-        mark: mark.at && { x_m: mark.at.x_m, y_m: mark.at.y_m, isSeen: mark.isSeen },
-      },
-    });
-  }
-
-  function read() {
-    if (!isFront) return;
-    const { ink, age_s } = inkOfScan(store, glass.shown);
-    const scan = store.scans.newest;
-    const isThere = scan !== null && ink !== 'never' && ink !== 'not_published';
-    const isNow = isThere && ink !== 'stale';
-    if (!isNow && mark.at) {
-      mark.clear();
-      tellMark('the marked return is gone: no data');
-    }
-    show(at('none'), !isNow);
-    show(glass.canvas, isThere);
-    show(aim, isThere);
-    show(at('late'), isNow && ink === 'ageing');
-    if (isNow && ink === 'ageing') setText(at('late'), `${age(age_s, 2)} s`);
-    const missing = isThere ? `STALE ${age(age_s)} s` : ink === 'fresh' || ink === 'ageing' ? 'waiting for a scan' : ABSENT[/** @type {'never'} */ (ink)] ?? 'no scan';
-    if (!isNow) setText(at('none-words'), missing);
-    const judged = isNow && scan ? scan.judged : null;
-    const side = judged?.beam != null && scan ? bearing(bearingOf(scan, judged.beam)) : null;
-    const live = isNow ? ink : 'fresh';
-    write(at('distance'), live, judged ? (judged.isBlind ? 'blind' : side ? fixed(judged.gap_m) : 'none') : '–', at('distance-unit'), side ? 'm' : '');
-    write(at('bearing'), live, side?.degrees ?? '–', at('side'), side?.side ?? '');
-    const stopping_m = judged?.stopping_m ?? null;
-    write(at('stops'), live, fixed(stopping_m), at('stops-unit'), stopping_m === null ? '' : 'm');
-    setWords(at('beams'), isThere && scan ? beamWords(scan) : '');
-    // The marked return takes the place of the count of beams: the keys below must not move.
-    show(at('marked'), mark.at !== null);
-    show(at('beams'), mark.at === null);
-    show(at('hint'), isNow && mark.at === null);
-    setWords(at('marked'), markedWords());
-    show(at('straight'), isThere && !isSteeringKnown(store));
-    tell(isNow, scan, missing);
-  }
-
-  function markedWords() {
-    if (!mark.at) return '';
-    const old_s = (store.now() - mark.seen_ms) / 1000 + (store.scans.newest?.age_s ?? 0);
-    return `Marked: ${mark.words}, ${mark.isSeen ? '' : 'not seen for '}${age(old_s, 2)} s${mark.isSeen ? ' ago' : ''}`;
-  }
-
-  /** The plot in words. @param {boolean} isNow @param {import('./scan-frame.js').Scan | null} scan @param {string} missing */
-  function tell(isNow, scan, missing) {
-    const key = isNow ? 'live' : missing.replace(/[\d.:]+ s/, '');
-    if (store.now() - told_ms < TOLD_EVERY_MS && at('told').dataset['key'] === key) return;
-    told_ms = store.now();
-    at('told').dataset['key'] = key;
-    if (!isNow || !scan) {
-      setAttribute(glass.canvas, 'aria-label', `Laser scan from above: ${missing === '' ? 'none' : missing}`);
-      setText(at('told'), '');
-      return;
-    }
-    const { beam, gap_m, isBlind } = scan.judged;
-    const side = beam === null ? null : bearing(bearingOf(scan, beam));
-    const nearest = isBlind ? 'the corridor cannot be seen' : side ? `nearest return in the corridor ${fixed(gap_m)} metres, ${side.degrees} ${side.side}` : 'no return in the corridor';
-    setAttribute(glass.canvas, 'aria-label', `Laser scan from above: ${nearest}`);
-    const sectors = sectorSentences([...sectorsOf(scan), ...unseenOf(scan)], 6);
-    setText(at('told'), `${beamWords(scan)}. ${sectors.length ? `No data from these sectors: ${sectors.join('; ')}.` : ''}`);
-  }
-
+  // The plot is drawn again once its font is there, or the first picture would stay in another one.
+  document.fonts.load('700 20px "catgraph numerals"').then(() => tab.drawSoon(), () => {});
+  tab.reach(tab.reach_m);
+  tab.announceMark();
   return {
     /**
      * In front, the scan is sent and drawn; otherwise it costs nothing.
      * @param {boolean} isNow
      */
-    setFront(isNow) {
-      if (isNow === isFront) return;
-      isFront = isNow;
-      store.scans.watch('scan tab', isNow);
-      read();
-      drawSoon();
-    },
+    setFront: (isNow) => tab.setFront(isNow),
     unmount() {
       for (const stop of stops) stop();
-      glass.stop();
+      tab.glass.stop();
     },
   };
 }
 
-/**
- * The scan on the glass came by its own frame: it is as old as that, whatever the state says of a newer one.
- * @param {import('../core/store.js').Store} store
- * @param {import('./scan-glass.js').Shown | null} shown null: none is drawn yet, and the newest will be
- */
-function inkOfScan(store, shown) {
-  const state = store.ink('scan');
-  if (!store.scans.newest || state.ink === 'never' || state.ink === 'not_published') return state;
-  const { age_s: then_s, at_ms } = shown ?? { age_s: store.scans.newest.age_s, at_ms: store.scans.at_ms };
-  const age_s = then_s + (store.now() - at_ms) / 1000;
-  // A server that does not know the laser's rate yet is patient with it; a picture of a moving world is not: ten periods.
-  const period_s = store.signal('scan')?.period_s ?? 0.1;
-  return { ink: age_s > Math.max(1, 10 * period_s) ? /** @type {const} */ ('stale') : state.ink, age_s };
+class ScanTab {
+  reach_m = reachWithin(recall() ?? REACH_M.first);
+  mark = new ScanMark();
+  #isFront = false;
+
+  /** @param {HTMLElement} root @param {import('../core/store.js').Store} store */
+  constructor(root, store) {
+    this.at = (/** @type {string} */ name) => field(root, name);
+    this.store = store;
+    this.glass = new ScanGlass(/** @type {HTMLCanvasElement} */ (this.at('canvas')));
+    this.readout = new ScanReadout(root, store, this.mark);
+    this.ranges = /** @type {HTMLElement[]} */ ([...root.querySelectorAll('[data-range]')]);
+  }
+
+  get #isLive() {
+    const { ink } = scanInk(this.store, this.glass.shown);
+    return this.store.scans.newest !== null && (ink === 'fresh' || ink === 'ageing');
+  }
+
+  /** @param {boolean} isFront */
+  setFront(isFront) {
+    if (isFront === this.#isFront) return;
+    this.#isFront = isFront;
+    this.store.scans.watch('scan tab', isFront);
+    this.read();
+    this.drawSoon();
+  }
+
+  /** @param {number} metres */
+  reach(metres) {
+    this.reach_m = metres;
+    for (const key of this.ranges) setAttribute(key, 'aria-pressed', String(Math.abs(Number(key.dataset['range']) - metres) < 0.01));
+    setAttribute(this.at('nearer'), 'aria-disabled', metres <= REACH_M.least);
+    setAttribute(this.at('farther'), 'aria-disabled', metres >= REACH_M.most);
+    remember(metres);
+    this.drawSoon();
+  }
+
+  /** @param {1 | -1} sign 1: nearer */
+  zoom(sign) {
+    this.reach(zoomed(this.reach_m, sign));
+  }
+
+  /** @param {KeyboardEvent} event */
+  press(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const zoom = event.key === '+' || event.key === '=' ? 1 : event.key === '-' ? -1 : null;
+    if (zoom !== null) this.zoom(zoom);
+    else if (event.target !== this.at('aim') || !this.#step(event.key)) return;
+    event.preventDefault();
+  }
+
+  /** Marks another return by key; false where the key has no meaning. @param {string} key */
+  #step(key) {
+    const { mark, store: { scans } } = this;
+    if (key === 'Escape' && mark.at) mark.clear();
+    else {
+      const side = /** @type {Record<string, 1 | -1 | 0>} */ ({ ArrowLeft: 1, ArrowRight: -1, Home: 0, Enter: 0, ' ': 0 })[key];
+      if (side === undefined || !scans.newest || !this.#isLive) return false;
+      mark.step(scans.newest, side, this.reach_m, scans.at_ms);
+    }
+    this.announceMark();
+    return true;
+  }
+
+  /** Marks the return at a point of the plot. @param {number} x_px @param {number} y_px */
+  touch(x_px, y_px) {
+    const { glass: { canvas }, store: { scans } } = this;
+    if (!scans.newest || !this.#isLive) return;
+    const scale = plotScale(canvas.clientWidth, canvas.clientHeight, this.reach_m);
+    const { x_m, y_m } = placeOf(scale, x_px, y_px);
+    this.mark.touch(scans.newest, x_m, y_m, THUMB_PX / scale.k, scans.at_ms);
+    this.announceMark();
+  }
+
+  /** Announces a change of the mark, by the operator or because the return is gone: once, not with every scan. @param {string} [instead] */
+  announceMark(instead) {
+    this.readout.announceMark(instead);
+    this.read();
+    this.drawSoon();
+  }
+
+  /** Follows the mark into a new scan. */
+  receive() {
+    const { newest, at_ms } = this.store.scans;
+    if (newest && !this.mark.hear(newest, at_ms)) this.announceMark('the marked return is gone');
+    this.drawSoon();
+  }
+
+  drawSoon() {
+    const { mark, store } = this;
+    if (!this.#isFront) return;
+    this.glass.draw(() => !this.#isFront || !store.scans.newest ? null : {
+      scan: store.scans.newest,
+      at_ms: store.scans.at_ms,
+      around: {
+        reach_m: this.reach_m, car: carOf(store), limit_m: store.limit('obstacle.standoff_m'),
+        mark: mark.at && { x_m: mark.at.x_m, y_m: mark.at.y_m, isSeen: mark.isSeen },
+      },
+    });
+  }
+
+  /** Writes what is read; a return of a scan that is not live is not marked any more. */
+  read() {
+    if (!this.#isFront) return;
+    if (this.mark.at && !this.#isLive) {
+      this.mark.clear();
+      this.announceMark('the marked return is gone: no data');
+    }
+    this.readout.draw(scanInk(this.store, this.glass.shown));
+  }
 }
 
 /** The car's measures as the obstacle check has them; null before they are known. @param {import('../core/store.js').Store} store */
@@ -228,16 +175,9 @@ function carOf(store) {
   return half_width_m == null || wheelbase_m == null || laser_ahead_m == null ? null : { half_width_m, wheelbase_m, laser_ahead_m };
 }
 
-/** Else the corridor is straight, because nobody can tell better. @param {import('../core/store.js').Store} store */
-function isSteeringKnown(store) {
-  const { ink } = store.ink('steering');
-  if (store.signal('steering')?.value?.tyre_rad == null) return false;
-  return ink === 'fresh' || ink === 'ageing';
-}
-
 function recall() {
   try {
-    return Number(localStorage.getItem(REMEMBERED)) || null;
+    return Number(localStorage.getItem(STORED)) || null;
   } catch {
     return null;
   }
@@ -246,8 +186,8 @@ function recall() {
 /** @param {number} metres */
 function remember(metres) {
   try {
-    localStorage.setItem(REMEMBERED, String(metres));
+    localStorage.setItem(STORED, String(metres));
   } catch {
-    // no storage: forgotten
+    // without storage the choice is lost
   }
 }

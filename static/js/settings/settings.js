@@ -11,7 +11,7 @@ import { openPreferences } from '../shell/preferences.js';
 import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { counted, timeOfDay } from '../core/format.js';
 
-/** Headings that stand open at first: what is set on the field. */
+/** How many headings are open at first: those that are set in the field. */
 const OPEN_AT_FIRST = 2;
 
 /**
@@ -22,103 +22,128 @@ const OPEN_AT_FIRST = 2;
  * @returns {() => void}
  */
 export function mount(panel, store, say, isShown) {
-  const model = settingsOf(store);
-  const search = /** @type {HTMLInputElement} */ (html('input', {
-    type: 'search', placeholder: 'Search', 'aria-label': 'Search the settings', autocomplete: 'off', autocapitalize: 'off', spellcheck: 'false', enterkeyhint: 'search', maxlength: 60,
-  }));
-  const undo = html('button', { type: 'button', class: 'key wide undo', disabled: true }, icon('replay'), html('span', {}, 'Undo'));
-  const state = html('p', { class: 'state', role: 'status' });
-  const groups = html('div', { class: 'groups' });
-  const none = html('p', { class: 'nothing', hidden: true });
-  const topics = new SettingsTopics(store, model);
-  const file = new SettingsFileKeys(store, model, say);
-  const mail = new SettingsMail(say);
-  const devices = new SettingsDevices(store, say);
-  const phone = html('button', { type: 'button', class: 'key wide' }, icon('phone'), 'Preferences of this phone');
-  const all = html('fieldset', { class: 'all' }, groups, none, topics.element, file.element);
-  const keys = html('div', { class: 'keys' }, phone);
-  panel.replaceChildren(
-    html('div', { class: 'find' }, html('div', { class: 'field' }, icon('search'), search), undo), state,
-    all, mail.element, devices.element, keys,
-  );
+  const tab = new SettingsTab(panel, store, say, isShown);
+  tab.draw();
+  return () => tab.stop();
+}
+
+class SettingsTab {
   /** @type {SettingsGroup[]} */
-  let shown = [];
-  let built = '';
-  let drawnQuery = '';
+  #groups = [];
+  #built = '';
+  #query = '';
 
-  function build() {
-    const { body } = model;
-    const key = body ? Object.keys(body.schema).join() : '';
-    if (!body || key === built) return;
-    built = key;
-    for (const group of shown) group.stop();
-    shown = groupsOf(body.schema).map((group, i) => new SettingsGroup(model, group, i < OPEN_AT_FIRST));
-    groups.replaceChildren(html('div', { class: 'sec' }, html('span', {}, 'Limits'), html('span', {}, 'apply at once, recorded')), ...shown.map((group) => group.element));
-    filter(true);
+  /**
+   * @param {HTMLElement} panel
+   * @param {import('../core/store.js').Store} store
+   * @param {(sentence: string, title?: string) => void} say
+   * @param {() => boolean} isShown
+   */
+  constructor(panel, store, say, isShown) {
+    const model = settingsOf(store);
+    this.panel = panel;
+    this.store = store;
+    this.say = say;
+    this.isShown = isShown;
+    this.model = model;
+    this.topics = new SettingsTopics(store, model);
+    this.file = new SettingsFileKeys(store, model, say);
+    this.mail = new SettingsMail(say);
+    this.devices = new SettingsDevices(store, say);
+    this.parts = this.#build();
+    const draw = () => this.draw();
+    this.stops = [
+      store.on('draw', draw),
+      listen(this.parts.search, 'input', () => this.#filter()),
+      listen(this.parts.undo, 'click', () => void this.#undo()),
+      listen(this.parts.phone, 'click', openPreferences),
+      listen(window, 'catgraph-units', draw),
+      store.on('log', (events) => this.#announce(events)),
+    ];
   }
 
-  function filter(isForced = false) {
-    const query = search.value.trim();
-    if (query === drawnQuery && !isForced) return;
-    drawnQuery = query;
-    const hits = shown.reduce((sum, group) => sum + group.filter(query), 0) + topics.filter(query) + file.filter(query) + mail.filter(query) + devices.filter(query);
-    show(keys, query === '');
-    if (!isForced) panel.scrollTop = 0;
-    show(none, hits === 0 && query !== '');
-    if (hits === 0) setText(none, `No setting matches “${query}”.`);
+  #build() {
+    const search = /** @type {HTMLInputElement} */ (html('input', {
+      type: 'search', placeholder: 'Search', 'aria-label': 'Search the settings', autocomplete: 'off', autocapitalize: 'off', spellcheck: 'false', enterkeyhint: 'search', maxlength: 60,
+    }));
+    const undo = html('button', { type: 'button', class: 'key wide undo', disabled: true }, icon('replay'), html('span', {}, 'Undo'));
+    const state = html('p', { class: 'state', role: 'status' });
+    const groups = html('div', { class: 'groups' });
+    const none = html('p', { class: 'nothing', hidden: true });
+    const all = html('fieldset', { class: 'all' }, groups, none, this.topics.element, this.file.element);
+    const phone = html('button', { type: 'button', class: 'key wide' }, icon('phone'), 'Preferences of this phone');
+    const keys = html('div', { class: 'keys' }, phone);
+    this.panel.replaceChildren(
+      html('div', { class: 'find' }, html('div', { class: 'field' }, icon('search'), search), undo), state,
+      all, this.mail.element, this.devices.element, keys,
+    );
+    return { search, undo, state, groups, none, all, phone, keys };
   }
 
-  function draw() {
+  stop() {
+    for (const stop of this.stops) stop();
+    for (const part of [...this.#groups, this.topics, this.file, this.mail, this.devices]) part.stop();
+    this.panel.replaceChildren();
+  }
+
+  draw() {
+    const { model, parts: { all, state, undo } } = this;
     model.look();
-    if (!isShown()) return;
-    build();
-    const isOpen = model.isOpen;
+    if (!this.isShown()) return;
+    this.#drawGroups();
+    const { isOpen } = model;
     setAttribute(all, 'disabled', !isOpen);
-    setWords(state, stateWords(store, model));
+    setWords(state, stateWords(this.store, model));
     setAttribute(state, 'data-bad', !isOpen);
-    filter();
-    for (const group of shown) group.draw();
-    topics.draw();
-    file.draw();
+    this.#filter();
+    for (const group of this.#groups) group.draw();
+    this.topics.draw();
+    this.file.draw();
     const lines = model.undoLines;
     setAttribute(undo, 'disabled', lines.length === 0 || !isOpen);
     setAttribute(undo, 'aria-label', lines.length ? `Undo ${lines.length > 1 ? counted(lines.length, 'change') : lines[0]}` : 'Undo');
   }
 
-  const stops = [
-    store.on('draw', draw),
-    listen(search, 'input', () => filter()),
-    listen(undo, 'click', async () => {
-      const lines = model.undoLines;
-      const outcome = await model.undo();
-      say(outcome.ok ? `${lines.join('. ')}.` : (outcome.reason ?? 'Refused.'), outcome.ok ? 'Taken back' : 'Not taken back');
-      draw();
-    }),
-    listen(phone, 'click', openPreferences),
-    listen(window, 'catgraph-units', draw),
-    store.on('log', (events) => heard(events)),
-  ];
-
-  /** What others change is said while it is looked at. @param {import('../core/protocol.js').AlarmEvent[]} events */
-  function heard(events) {
-    const others = events.filter(({ change, by }) => change === 'settings' && by !== null && by !== store.name);
-    if (others.length && isShown()) say(others.map(({ text }) => text).join('; '), `Changed by ${others.at(-1)?.by}`);
+  #drawGroups() {
+    const { model } = this;
+    const { body } = model;
+    const key = body ? Object.keys(body.schema).join() : '';
+    if (!body || key === this.#built) return;
+    this.#built = key;
+    for (const group of this.#groups) group.stop();
+    this.#groups = groupsOf(body.schema).map((group, i) => new SettingsGroup(model, group, i < OPEN_AT_FIRST));
+    this.parts.groups.replaceChildren(html('div', { class: 'sec' }, html('span', {}, 'Limits'), html('span', {}, 'apply at once, recorded')), ...this.#groups.map((group) => group.element));
+    this.#filter(true);
   }
 
-  draw();
-  return () => {
-    for (const stop of stops) stop();
-    for (const group of shown) group.stop();
-    topics.stop();
-    file.stop();
-    mail.stop();
-    devices.stop();
-    panel.replaceChildren();
-  };
+  #filter(isForced = false) {
+    const { search, keys, none } = this.parts;
+    const query = search.value.trim();
+    if (query === this.#query && !isForced) return;
+    this.#query = query;
+    const hits = [...this.#groups, this.topics, this.file, this.mail, this.devices].reduce((sum, part) => sum + part.filter(query), 0);
+    show(keys, query === '');
+    if (!isForced) this.panel.scrollTop = 0;
+    show(none, hits === 0 && query !== '');
+    if (hits === 0) setText(none, `No setting matches “${query}”.`);
+  }
+
+  async #undo() {
+    const lines = this.model.undoLines;
+    const outcome = await this.model.undo();
+    this.say(outcome.ok ? `${lines.join('. ')}.` : (outcome.reason ?? 'Refused.'), outcome.ok ? 'Taken back' : 'Not taken back');
+    this.draw();
+  }
+
+  /** Shows changes by others while the tab is in front. @param {import('../core/protocol.js').AlarmEvent[]} events */
+  #announce(events) {
+    const others = events.filter(({ change, by }) => change === 'settings' && by !== null && by !== this.store.name);
+    if (others.length && this.isShown()) this.say(others.map(({ text }) => text).join('; '), `Changed by ${others.at(-1)?.by}`);
+  }
 }
 
 /**
- * What stands above the settings: nothing while all is well.
+ * The state above the settings: empty while they can be changed.
  * @param {import('../core/store.js').Store} store
  * @param {import('./settings-model.js').SettingsModel} model
  */

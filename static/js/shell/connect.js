@@ -1,81 +1,12 @@
 // The first screen: where the car is, and what this phone must allow before its alarms can be heard.
 
 import { openPreferences } from './preferences.js';
+import { FoundVehicles } from './found-vehicles.js';
+import { addresses, armWords, bare, heldWords, isSameCar, keep } from './connect-layout.js';
 import { closeSheet, openSheet } from './sheet.js';
 import { field, html, icon, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { connectRow } from '../slowdown/slow-layout.js';
 import { age } from '../core/format.js';
-
-const KEY = 'catgraph.addresses';
-const KEPT = 8;
-const LOOK_EVERY_MS = 5000;
-
-/**
- * @typedef {import('../boot/arming.js').Armed} Armed
- * @typedef {{name: string, address: string | null, phase?: string}} Found
- */
-
-/**
- * How an item of the arming list stands.
- * @param {'sound' | 'screen' | 'position'} what
- * @param {Armed} state
- * @returns {{tag: string, kind: 'plain' | 'warn' | 'unk', cost: string}}
- */
-export function armWords(what, state) {
-  if (state === 'ready') return { tag: 'Ready', kind: 'plain', cost: '' };
-  if (state === 'asks') return { tag: 'Asks', kind: 'unk', cost: '' };
-  const cost = {
-    sound: 'alarms are seen, not heard',
-    screen: 'the phone may go dark and hide alarms',
-    position: 'phone–car will not be checked',
-  }[what];
-  if (state === 'refused') return { tag: 'Refused', kind: 'warn', cost: `Refused: ${cost}` };
-  const why = what === 'sound' ? 'This browser has no sound' : 'Needs HTTPS';
-  return { tag: 'Not available', kind: 'warn', cost: `${why}: ${cost}` };
-}
-
-/**
- * Put an address in front of those used before, each once.
- * @param {string[]} before
- * @param {string} address
- */
-export function remembered(before, address) {
-  return [address, ...before.filter((one) => one !== address)].slice(0, KEPT);
-}
-
-/**
- * What GET /api/vehicles lists, each address once: found ones first, then those the server watches already.
- * @param {any} answer
- * @returns {Found[]}
- */
-export function foundIn(answer) {
-  const all = [...(Array.isArray(answer?.found) ? answer.found : []), ...(Array.isArray(answer?.vehicles) ? answer.vehicles : [])];
-  const seen = new Set();
-  return all.filter((one) => typeof one?.address === 'string' && one.address && !seen.has(bare(one.address)) && seen.add(bare(one.address)))
-    .map((one) => ({ name: String(one.name ?? 'Vehicle'), address: one.address, phase: one.phase }));
-}
-
-/**
- * What stood when the server ended, and how to see it again.
- * @param {import('../core/protocol.js').Session['held']} held
- */
-export function heldWords(held) {
-  if (!held?.address || (!held.alarms && !held.paused)) return '';
-  const alarms = held.alarms ? `${held.alarms} ${held.alarms === 1 ? 'alarm stood' : 'alarms stood'}` : '';
-  const what = [alarms, held.paused ? 'monitoring was paused' : ''].filter(Boolean).join(' and ');
-  return `The server was restarted while it watched ${bare(held.address)}: ${what}. Connect to it to go on.`;
-}
-
-/** As an operator writes it: without the scheme rosbridge has anyway. @param {string} address */
-export function bare(address) {
-  return address.replace(/^ws:\/\//, '').replace(/\/$/, '');
-}
-
-/** Do both name one rosbridge, the usual port written or not? @param {string} one @param {string} other */
-export function isSameCar(one, other) {
-  const [a, b] = [one, other].map((address) => bare(address.trim()).replace(/^(\[[^\]]*\]|[^:/]+)$/, '$1:9090'));
-  return a === b;
-}
 
 /**
  * @param {HTMLElement} root
@@ -84,170 +15,165 @@ export function isSameCar(one, other) {
  * @param {import('../boot/arming.js').Arming} arming
  */
 export function mount(root, store, router, arming) {
+  const screen = new ConnectScreen(root, store, router, arming);
   const at = (/** @type {string} */ name) => field(root, name);
-  const input = /** @type {HTMLInputElement} */ (at('address'));
-  const [says, list, go] = [at('says'), at('found'), at('go')];
-  const historySheet = /** @type {HTMLDialogElement} */ (need(document, '#sheet-history'));
-  /** @type {Found[] | null} */
-  let found = null;
-  let asked_ms = -Infinity;
-  let isTyped = false;
-  let offered = '';
-  let isBusy = false;
-  let wasSilent = false;
-  let complaint = '';
-  let shownFound = '';
-  input.value = addresses()[0] ?? '';
-
   const stops = [
     listen(at('form'), 'submit', (event) => {
       event.preventDefault();
-      connect();
+      void screen.connect();
     }),
-    listen(input, 'input', () => {
-      isTyped = true;
-      complain('');
-      drawFound();
-    }),
-    listen(at('history'), 'click', () => openHistory()),
+    listen(screen.input, 'input', () => screen.typed()),
+    listen(at('history'), 'click', () => screen.openHistory()),
     listen(at('settings'), 'click', openPreferences),
-    listen(list, 'click', (event) => {
+    listen(at('found'), 'click', (event) => {
       const row = /** @type {HTMLElement | null} */ (event.target.closest('[data-address]'));
-      if (row) choose(row.dataset['address'] ?? '');
+      if (row) screen.choose(row.dataset['address'] ?? '');
     }),
-    store.on('draw', draw),
-    store.on('open', () => { asked_ms = -Infinity; }),
+    store.on('draw', () => screen.draw()),
+    store.on('open', () => screen.found.forget()),
   ];
+  show(at('insecure'), !window.isSecureContext);
+  screen.found.draw();
+  screen.draw();
+  return () => stops.forEach((stop) => stop());
+}
 
-  /** @param {string} address */
-  function choose(address) {
-    input.value = bare(address);
-    isTyped = true;
-    complain('');
-    drawFound();
+class ConnectScreen {
+  #isTyped = false;
+  #offered = '';
+  #isBusy = false;
+  #wasSilent = false;
+  #complaint = '';
+
+  /**
+   * @param {HTMLElement} root
+   * @param {import('../core/store.js').Store} store
+   * @param {import('./router.js').Router} router
+   * @param {import('../boot/arming.js').Arming} arming
+   */
+  constructor(root, store, router, arming) {
+    this.root = root;
+    this.store = store;
+    this.router = router;
+    this.arming = arming;
+    this.input = /** @type {HTMLInputElement} */ (field(root, 'address'));
+    this.input.value = addresses()[0] ?? '';
+    this.found = new FoundVehicles(field(root, 'found'), () => bare(this.input.value.trim()));
   }
 
-  async function connect() {
-    arming.ask(); // within the tap, and before anything is waited for
-    const address = input.value.trim();
-    if (isBack()) {
+  /** @param {string} address */
+  choose(address) {
+    this.input.value = bare(address);
+    this.typed();
+  }
+
+  typed() {
+    this.#isTyped = true;
+    this.#complain('');
+    this.found.draw();
+  }
+
+  async connect() {
+    const { arming, router, store } = this;
+    arming.ask(); // within the tap, and before anything is awaited
+    const address = this.input.value.trim();
+    if (this.#isBack) {
       router.chosen();
       return;
     }
-    isBusy = true;
-    complain('');
+    this.#isBusy = true;
+    this.#complain('');
     const answer = await store.ask('connect', { address });
-    isBusy = false;
-    if (address) keep(remembered(addresses(), address));
+    this.#isBusy = false;
+    if (address) keep(address);
     router.suggestion = answer.suggestion ?? null;
-    // A bad address opens the sheet of the failed connection, which says the same; what never went out is said here.
-    if (!answer.ok && store.frame?.session.phase !== 'failed') complain(answer.reason ?? 'Refused.');
-    isTyped = false;
+    // The sheet of a failed connection shows why an address is bad; here stands why nothing was sent.
+    if (!answer.ok && store.frame?.session.phase !== 'failed') this.#complain(answer.reason ?? 'Refused.');
+    this.#isTyped = false;
     router.chosen();
   }
 
-  /** Is the vehicle in the field being monitored all the while? Then nothing is dialled anew. */
-  function isBack() {
-    const address = store.frame?.session.address;
-    return store.isMonitoring && typeof address === 'string' && isSameCar(address, input.value);
+  /** Whether the vehicle in the field is being monitored: then there is nothing to connect. */
+  get #isBack() {
+    const address = this.store.frame?.session.address;
+    return this.store.isMonitoring && typeof address === 'string' && isSameCar(address, this.input.value);
   }
 
-  /** Is it the car the server was started for that would be dialled? */
-  function isConfigured() {
-    const configured = store.frame?.session.configured;
-    const here = bare(input.value.trim());
+  /** Whether the field names the car that the server was started for. */
+  get #isConfigured() {
+    const configured = this.store.frame?.session.configured;
+    const here = bare(this.input.value.trim());
     return typeof configured === 'string' && (here === '' || isSameCar(here, configured));
   }
 
   /** @param {string} sentence */
-  function complain(sentence) {
-    complaint = sentence;
-    drawSays();
-    setAttribute(input, 'aria-invalid', sentence !== '' || null);
+  #complain(sentence) {
+    this.#complaint = sentence;
+    this.#drawComplaint();
+    setAttribute(this.input, 'aria-invalid', sentence !== '' || null);
   }
 
-  function drawSays() {
-    const sentence = complaint || heldWords(store.frame?.session.held);
+  #drawComplaint() {
+    const says = field(this.root, 'says');
+    const sentence = this.#complaint || heldWords(this.store.frame?.session.held);
     setWords(says, sentence);
     show(says, sentence !== '');
   }
 
-  function openHistory() {
+  openHistory() {
+    const sheet = /** @type {HTMLDialogElement} */ (need(document, '#sheet-history'));
     const before = addresses();
-    show(field(historySheet, 'none'), before.length === 0);
-    field(historySheet, 'list').replaceChildren(...before.map((address) => {
+    show(field(sheet, 'none'), before.length === 0);
+    field(sheet, 'list').replaceChildren(...before.map((address) => {
       const button = html('button', { type: 'button' }, icon('clock'), html('span', { class: 'n' }, address));
       button.addEventListener('click', () => {
-        choose(address);
-        closeSheet(historySheet);
+        this.choose(address);
+        closeSheet(sheet);
       });
       return html('li', {}, button);
     }));
-    openSheet(historySheet);
+    openSheet(sheet);
   }
 
-  async function look() {
-    asked_ms = store.now();
-    try {
-      const answer = await fetch('/api/vehicles', { cache: 'no-store' });
-      found = answer.ok ? foundIn(await answer.json()) : null;
-    } catch {
-      found = null;
-    }
-    drawFound();
-  }
-
-  function drawFound() {
-    const here = bare(input.value.trim());
-    const key = JSON.stringify([found, here]);
-    if (key === shownFound) return;
-    shownFound = key;
-    if (!found?.length) {
-      list.replaceChildren(html('li', { class: 'none' }, html('span', { class: 'm' },
-        found ? 'None found. Enter the address of the car’s rosbridge.' : 'The server gives no list.')));
-      return;
-    }
-    list.replaceChildren(...found.map((one) => {
-      const address = bare(one.address ?? '');
-      const row = html('button', { type: 'button', 'data-address': address }, icon('car'), html('span', { class: 't' }, one.name),
-        html('span', { class: 'm' }, html('span', { class: 'n' }, address), one.phase && one.phase !== 'idle' ? ` · ${one.phase}` : ''));
-      if (address === here) row.append(html('span', { class: 'r' }, icon('ok')));
-      return html('li', {}, row);
-    }));
-  }
-
-  function draw() {
-    if (root.hidden) return;
-    if (store.now() - asked_ms > LOOK_EVERY_MS) look();
-    const { frame } = store;
-    const session = frame?.session;
+  draw() {
+    const { input, store } = this;
+    if (this.root.hidden) return;
+    void this.found.refresh(store.now());
+    const session = store.frame?.session;
     // What is dialled, or the car the server was started for, comes before what was typed on this phone some day;
     // what names the same car stays as the operator wrote it.
     const address = session?.address ?? session?.configured ?? '';
-    if (!isTyped && document.activeElement !== input && address && address !== offered && !isSameCar(address, input.value)) input.value = bare(address);
-    offered = address;
-    const isDialling = isBusy || session?.phase === 'connecting';
-    const isSame = session?.address ? isSameCar(session.address, input.value) : false;
-    setAttribute(go, 'data-busy', isDialling && (isSame || isBusy));
-    setWords(go, isDialling && (isSame || isBusy) ? `Connecting ${age(frame?.link.trying_for_s ?? 0)} s` : isBack() ? 'Back to monitoring' : isConfigured() ? `Connect to ${frame?.vehicle}` : 'Connect and arm alarms');
-    if (store.isSilent !== wasSilent) complain(store.isSilent ? 'The server does not answer; this page keeps trying.' : '');
-    wasSilent = store.isSilent;
-    drawSays();
-    const { arms } = arming;
-    for (const what of /** @type {const} */ (['sound', 'screen', 'position'])) {
-      const words = armWords(what, arms[what]);
-      tag(at(what), words.tag, words.kind);
-      setText(at(`${what}-cost`), words.cost);
-    }
-    const slow = connectRow(frame?.decelerate, store.isMonitoring);
-    tag(at('slowdown'), slow.tag, slow.kind);
-    setText(at('slowdown-cost'), slow.cost);
+    if (!this.#isTyped && document.activeElement !== input && address && address !== this.#offered && !isSameCar(address, input.value)) input.value = bare(address);
+    this.#offered = address;
+    this.#drawKey();
+    if (store.isSilent !== this.#wasSilent) this.#complain(store.isSilent ? 'The server does not answer; this page keeps trying.' : '');
+    this.#wasSilent = store.isSilent;
+    this.#drawComplaint();
+    this.#drawArming();
   }
 
-  show(at('insecure'), !window.isSecureContext);
-  drawFound();
-  draw();
-  return () => stops.forEach((stop) => stop());
+  #drawKey() {
+    const { input, store: { frame } } = this;
+    const session = frame?.session;
+    const go = field(this.root, 'go');
+    const isSame = session?.address ? isSameCar(session.address, input.value) : false;
+    const isDialling = this.#isBusy || (session?.phase === 'connecting' && isSame);
+    setAttribute(go, 'data-busy', isDialling);
+    setWords(go, isDialling ? `Connecting ${age(frame?.link.trying_for_s ?? 0)} s` : this.#isBack ? 'Back to monitoring' : this.#isConfigured ? `Connect to ${frame?.vehicle}` : 'Connect and arm alarms');
+  }
+
+  #drawArming() {
+    const { root, store } = this;
+    const { arms } = this.arming;
+    const rows = /** @type {[string, {tag: string, kind: 'plain' | 'warn' | 'unk', cost: string}][]} */ ([
+      .../** @type {const} */ (['sound', 'screen', 'position']).map((what) => [what, armWords(what, arms[what])]),
+      ['slowdown', connectRow(store.frame?.decelerate, store.isMonitoring)],
+    ]);
+    for (const [what, words] of rows) {
+      drawTag(field(root, what), words.tag, words.kind);
+      setText(field(root, `${what}-cost`), words.cost);
+    }
+  }
 }
 
 /**
@@ -255,29 +181,10 @@ export function mount(root, store, router, arming) {
  * @param {string} word
  * @param {'plain' | 'warn' | 'unk'} kind
  */
-function tag(element, word, kind) {
+function drawTag(element, word, kind) {
   const key = `${kind} ${word}`;
   if (element.dataset['key'] === key) return;
   element.dataset['key'] = key;
   element.className = kind === 'plain' ? 'tag' : `tag ${kind}`;
   element.replaceChildren(...(kind === 'plain' ? [icon('ok', 's')] : kind === 'warn' ? [icon('warn', 's')] : []), word);
-}
-
-/** @returns {string[]} */
-function addresses() {
-  try {
-    const kept = JSON.parse(localStorage.getItem(KEY) ?? '[]');
-    return Array.isArray(kept) ? kept.filter((one) => typeof one === 'string') : [];
-  } catch {
-    return [];
-  }
-}
-
-/** @param {string[]} all */
-function keep(all) {
-  try {
-    localStorage.setItem(KEY, JSON.stringify(all));
-  } catch {
-    // no storage: forgotten
-  }
 }

@@ -63,83 +63,97 @@ export function lossKey(frame, isSilent) {
  * @param {import('./router.js').Router} router
  */
 export function mount(store, router) {
-  const sheets = /** @type {Record<Dialog['kind'], HTMLDialogElement>} */ (Object.fromEntries(
+  const dialogs = new Dialogs(store, router);
+  const { alarm, lost, mute, failed } = dialogs.sheets;
+  const keys = /** @type {[HTMLElement, string, () => void][]} */ ([
+    [alarm, 'acknowledge', () => void dialogs.answer()],
+    [lost, 'retry', () => (store.chain.cut === 2 ? router.reconnect() : router.retry())],
+    [lost, 'change', () => router.choose()],
+    [lost, 'exit', () => router.exit()],
+    [mute, 'retry', () => router.reconnect()],
+    [mute, 'exit', () => router.exit()],
+    [failed, 'retry', () => router.retry()],
+    [failed, 'change', () => router.choose()],
+  ]);
+  const stops = [
+    store.on('draw', () => dialogs.draw()),
+    store.on('tick', () => document.hidden && dialogs.judge()),
+    ...Object.values(dialogs.sheets).flatMap((sheet) => [
+      // Escape and the phone's back key mean: I have seen it.
+      listen(sheet, 'cancel', (event) => {
+        event.preventDefault();
+        void dialogs.answer();
+      }),
+      listen(sheet, 'close', () => dialogs.closed(sheet)),
+    ]),
+    ...keys.map(([sheet, name, act]) => listen(field(sheet, name), 'click', act)),
+  ];
+  if (store.frame) dialogs.draw();
+  return () => stops.forEach((stop) => stop());
+}
+
+class Dialogs {
+  sheets = /** @type {Record<Dialog['kind'], HTMLDialogElement>} */ (Object.fromEntries(
     ['alarm', 'lost', 'mute', 'failed'].map((kind) => [kind, need(document, `#sheet-${kind}`)])));
   /** @type {Dialog | null} */
-  let standing = null;
-  /** @type {(() => void)[]} */
-  const stops = [store.on('draw', draw), store.on('tick', () => document.hidden && judge())];
+  #standing = null;
 
-  for (const sheet of Object.values(sheets)) {
-    // Escape and the phone's back key mean: I have seen it.
-    stops.push(listen(sheet, 'cancel', (event) => {
-      event.preventDefault();
-      answer();
-    }));
-    // Some browsers close without asking; what is not acknowledged comes back with the next frame.
-    stops.push(listen(sheet, 'close', () => {
-      if (!sheet.isConnected) return; // the page gave up and took it away: nobody answered
-      if (standing && sheets[standing.kind] === sheet && !store.painter.drawing.isFailed) answer();
-    }));
-  }
-  on(sheets.alarm, 'acknowledge', answer);
-  on(sheets.lost, 'retry', () => (store.chain.cut === 2 ? router.reconnect() : router.retry()));
-  on(sheets.lost, 'change', () => router.choose());
-  on(sheets.lost, 'exit', () => router.exit());
-  on(sheets.mute, 'retry', () => router.reconnect());
-  on(sheets.mute, 'exit', () => router.exit());
-  on(sheets.failed, 'retry', () => router.retry());
-  on(sheets.failed, 'change', () => router.choose());
-
-  /** @param {HTMLDialogElement} sheet @param {string} name @param {() => void} act */
-  function on(sheet, name, act) {
-    stops.push(listen(field(sheet, name), 'click', act));
+  /** @param {import('../core/store.js').Store} store @param {import('./router.js').Router} router */
+  constructor(store, router) {
+    this.store = store;
+    this.router = router;
   }
 
-  async function answer() {
-    if (!standing) return;
-    const { kind, alarm } = standing;
+  /** Acknowledges what the open dialog shows. */
+  async answer() {
+    if (!this.#standing) return;
+    const { router, store } = this;
+    const { kind, alarm } = this.#standing;
     if (kind !== 'alarm') router.answered = lossKey(store.frame, store.isSilent);
     if (alarm && store.isViewer) router.closeHere(alarm);
     else if (alarm) {
       const reply = await store.ask('acknowledge', { alarm: alarm.id, occurrence: alarm.occurrence });
       if (!reply.ok && kind === 'alarm') router.say(reply.reason ?? 'Refused.', 'Not acknowledged');
     }
-    draw();
+    this.draw();
   }
 
-  function judge() {
+  /** Some browsers close a dialog without `cancel`; what is not acknowledged opens again with the next frame. @param {HTMLDialogElement} sheet */
+  closed(sheet) {
+    if (!sheet.isConnected) return; // removed by a page that gave up: nobody acknowledged it
+    if (this.#standing && this.sheets[this.#standing.kind] === sheet && !this.store.painter.drawing.isFailed) void this.answer();
+  }
+
+  judge() {
+    const { router, store } = this;
     const key = lossKey(store.frame, store.isSilent);
     if (router.answered !== null && router.answered !== key && key === 'none') router.answered = null;
-    standing = store.painter.drawing.isFailed ? null : dialogOf({ // else undrawn.js names the alarms
+    this.#standing = store.painter.drawing.isFailed ? null : dialogOf({ // then undrawn.js names the alarms
       frame: router.unclosed(store.frame), isSilent: store.isSilent, silence_s: store.silence_s,
       isChoosing: router.isChoosing, isAnswered: router.answered === key,
     });
-    return standing;
+    return this.#standing;
   }
 
-  function draw() {
-    judge();
-    const wanted = standing ? sheets[standing.kind] : null;
+  draw() {
+    const standing = this.judge();
+    const wanted = standing ? this.sheets[standing.kind] : null;
     if (wanted && !wanted.open) {
       for (const sheet of /** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog[open]'))) {
         if (isAsked(sheet)) sheet.close();
       }
     }
-    for (const sheet of Object.values(sheets)) if (sheet !== wanted && sheet.open) sheet.close();
+    for (const sheet of Object.values(this.sheets)) if (sheet !== wanted && sheet.open) sheet.close();
     if (!standing || !wanted) return;
     if (standing.kind === 'alarm') fillAlarm(wanted, standing.alarm);
-    else fillLink(wanted, standing.kind, store);
+    else fillLink(wanted, standing.kind, this.store);
     if (standing.kind === 'lost') setText(field(wanted, 'title'), standing.alarm?.title ?? 'Connection lost');
-    if (standing.kind === 'failed') setWords(field(wanted, 'change'), router.suggestion ? `Use ${router.suggestion}` : 'Change the address');
+    if (standing.kind === 'failed') setWords(field(wanted, 'change'), this.router.suggestion ? `Use ${this.router.suggestion}` : 'Change the address');
     if (!wanted.open) {
       wanted.showModal();
       need(wanted, 'button').focus();
     }
   }
-
-  if (store.frame) draw();
-  return () => stops.forEach((stop) => stop());
 }
 
 /**

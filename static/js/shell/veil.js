@@ -45,17 +45,17 @@ export function mount(root, store) {
   const [title, sentence, then, recName, rec] = ['veil-title', 'veil-words', 'veil-then', 'veil-rec-name', 'veil-rec'].map((name) => field(root, name));
   const chain = field(veil, 'chain');
   if (!title || !sentence || !then || !recName || !rec) throw new Error('The template lacks the veil');
-  const sheets = ['#sheet-lost', '#sheet-mute'].map((id) => need(document, id)); // they say it all
+  const sheets = ['#sheet-lost', '#sheet-mute'].map((id) => need(document, id)); // they show the same
   mirror(veil, 'data-told', () => sheets.some((sheet) => sheet.hasAttribute('open')), sheets, { attributeFilter: ['open'] });
   const proof = new DrawProof();
   let beat = 0;
   /** @type {import('../core/protocol.js').State | null} */
   let seen = null;
-  let told = '';
+  let written = '';
   let isDrawn = false;
   const plate = need(veil, '.plate');
 
-  /** Everything was drawn: the page draws, and where it drew a fresh frame, its values are not covered for 2 s more. */
+  /** Restarts the cover's delay of 2 s after a completed drawing, if it drew a fresh frame. */
   function rewind() {
     if (!proof.isDrawn()) {
       store.painter.drawing.distrust();
@@ -74,21 +74,20 @@ export function mount(root, store) {
     const kind = veilOf(store);
     setAttribute(veil, 'data-on', kind);
     if (kind === null && plate.hidden && !isDrawn) {
-      isDrawn = true; // the first values come before what is said once they end: with the next drawing
+      isDrawn = true; // the first values come before the texts of the veil: those are drawn with the next frame
       return;
     }
     show(plate, true);
     const view = store.chain;
-    // While all is well the plate already says what it will have to say if this script hangs: then nobody knows where the chain is cut.
+    // While values arrive, the plate already holds the text for a script that hangs: then nobody knows where the chain is cut.
     const isUnsaid = kind === null || store.painter.drawing.isFailed;
     show(chain, !isUnsaid);
     drawBigChain(chain, view);
     setWords(title, isUnsaid || view.age_s === null ? 'Stale' : `${view.word === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
-    const bold = isUnsaid ? 'Nothing new has been drawn.' : view.sentence;
-    const plain = isUnsaid ? 'The page or the server has stopped. Watch the car.' : detailOf(view);
-    if (told !== `${bold}|${plain}`) {
+    const [bold, plain] = isUnsaid ? ['Nothing new has been drawn.', 'The page or the server has stopped. Watch the car.'] : [view.sentence, detailOf(view)];
+    if (written !== `${bold}|${plain}`) {
       sentence.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
-      told = `${bold}|${plain}`;
+      written = `${bold}|${plain}`;
     }
     setWords(then, thenWords(store.frame));
     const recording = RECORDED[store.frame?.recording.state ?? 'off'] ?? '';

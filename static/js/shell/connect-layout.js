@@ -1,0 +1,90 @@
+// The connect screen: its texts, and the addresses that it offers.
+
+const KEY = 'catgraph.addresses';
+const KEPT = 8;
+
+/**
+ * @typedef {import('../boot/arming.js').Armed} Armed
+ * @typedef {{name: string, address: string | null, phase?: string}} Found
+ */
+
+/**
+ * The texts of an item of the arming list.
+ * @param {'sound' | 'screen' | 'position'} what
+ * @param {Armed} state
+ * @returns {{tag: string, kind: 'plain' | 'warn' | 'unk', cost: string}}
+ */
+export function armWords(what, state) {
+  if (state === 'ready') return { tag: 'Ready', kind: 'plain', cost: '' };
+  if (state === 'asks') return { tag: 'Asks', kind: 'unk', cost: '' };
+  const cost = {
+    sound: 'alarms are seen, not heard',
+    screen: 'the phone may go dark and hide alarms',
+    position: 'phone–car will not be checked',
+  }[what];
+  if (state === 'refused') return { tag: 'Refused', kind: 'warn', cost: `Refused: ${cost}` };
+  const why = what === 'sound' ? 'This browser has no sound' : 'Needs HTTPS';
+  return { tag: 'Not available', kind: 'warn', cost: `${why}: ${cost}` };
+}
+
+/**
+ * The addresses used before with the newest one first, each once.
+ * @param {string[]} before
+ * @param {string} address
+ */
+export function remembered(before, address) {
+  return [address, ...before.filter((one) => one !== address)].slice(0, KEPT);
+}
+
+/**
+ * The vehicles of GET /api/vehicles, each address once: found ones first, then those the server watches already.
+ * @param {any} answer
+ * @returns {Found[]}
+ */
+export function foundIn(answer) {
+  const all = [...(Array.isArray(answer?.found) ? answer.found : []), ...(Array.isArray(answer?.vehicles) ? answer.vehicles : [])];
+  const seen = new Set();
+  return all.filter((one) => typeof one?.address === 'string' && one.address && !seen.has(bare(one.address)) && seen.add(bare(one.address)))
+    .map((one) => ({ name: String(one.name ?? 'Vehicle'), address: one.address, phase: one.phase }));
+}
+
+/**
+ * What was pending when the server ended, and how to return to it.
+ * @param {import('../core/protocol.js').Session['held']} held
+ */
+export function heldWords(held) {
+  if (!held?.address || (!held.alarms && !held.paused)) return '';
+  const alarms = held.alarms ? `${held.alarms} ${held.alarms === 1 ? 'alarm stood' : 'alarms stood'}` : '';
+  const what = [alarms, held.paused ? 'monitoring was paused' : ''].filter(Boolean).join(' and ');
+  return `The server was restarted while it watched ${bare(held.address)}: ${what}. Connect to it to go on.`;
+}
+
+/** An address as an operator writes it: without the scheme. @param {string} address */
+export function bare(address) {
+  return address.replace(/^ws:\/\//, '').replace(/\/$/, '');
+}
+
+/** Whether both are addresses of one rosbridge; the usual port may be left out. @param {string} one @param {string} other */
+export function isSameCar(one, other) {
+  const [a, b] = [one, other].map((address) => bare(address.trim()).replace(/^(\[[^\]]*\]|[^:/]+)$/, '$1:9090'));
+  return a === b;
+}
+
+/** The addresses used before on this phone, newest first. @returns {string[]} */
+export function addresses() {
+  try {
+    const kept = JSON.parse(localStorage.getItem(KEY) ?? '[]');
+    return Array.isArray(kept) ? kept.filter((one) => typeof one === 'string') : [];
+  } catch {
+    return [];
+  }
+}
+
+/** Stores an address as the newest one. @param {string} address */
+export function keep(address) {
+  try {
+    localStorage.setItem(KEY, JSON.stringify(remembered(addresses(), address)));
+  } catch {
+    // without storage the address is lost
+  }
+}
