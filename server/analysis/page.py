@@ -21,6 +21,7 @@ from server.analysis.report import Report, differences, name_of, not_checked
 from server.system.page_files import check_vendor, static_dir
 from server.version import catgraph_version
 
+_SCRIPTS = ("layout", "elements", "view", "alarms", "plots", "track", "overview")  # each imports earlier ones only
 _RIBBON_TEXTS = 400  # reasons in one file; more tell nobody anything
 
 
@@ -159,10 +160,12 @@ def _text(name: str) -> str:
 
 @cache
 def _script() -> str:
-    """uPlot and our own script as one module."""
+    """Join uPlot and our own modules to one module; a block keeps our names apart from those of uPlot."""
     plot = (static_dir() / "vendor" / "uPlot.esm.js").read_text(encoding="utf-8")
     plot = re.sub(r"export\s*\{\s*uPlot as default\s*\};?", "", plot)
-    return _no_end(f"{plot}\n{_text('report.js')}")
+    parts = [_text(name) for name in (*(f"report/{part}.js" for part in _SCRIPTS), "report.js")]
+    own = re.sub(r"^(import .*;$|export )", "", "\n".join(parts), flags=re.MULTILINE)
+    return _no_end(f"{plot}\n{{\n{own}}}\n")
 
 
 @cache
