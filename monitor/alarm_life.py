@@ -13,15 +13,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 from monitor.alarm import LEVEL, Alarm, Cause, Change, Transition, rebased, there, transition
 from monitor.check import Finding, Verdict
-from monitor.quick import changer
 
 ROUNDING_S = 1e-6  # delays are summed in steps
-
-_changed = changer(Alarm)  # an alarm that stands is judged at every message
 
 
 def advance(
@@ -94,7 +92,7 @@ class _Step:
         self._transitions: list[Transition] = []
 
     def result(self) -> tuple[Alarm, tuple[Transition, ...]]:
-        alarm = _changed(
+        alarm = replace(
             self._alarm,
             active=self._active,
             acknowledged=self._acknowledged,

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
-from monitor.quick import maker
 from monitor.snapshot import NotFresh, Snapshot
 
 __all__ = [
@@ -52,9 +51,8 @@ class Quantity:
     unit: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """What a check saw."""
+class Finding(NamedTuple):
+    """What a check found. A tuple, because every check makes one with each tick."""
 
     verdict: Verdict
     text: str  # what, how much, against what
@@ -66,14 +64,12 @@ class Finding:
     applies: bool = True  # False: there is nothing here to check (an optional signal that is not published)
 
 
-_finding = maker(Finding)  # every check makes one ten times a second
-
 OK = Finding(verdict=Verdict.OK, text="OK", brief="OK")
 
 
 def ok(text: str, *, measured: Quantity | None = None, limit: Quantity | None = None) -> Finding:
     """All is well; `text` says how well."""
-    return _finding(verdict=Verdict.OK, text=text, brief="OK", measured=measured, limit=limit)
+    return Finding(verdict=Verdict.OK, text=text, brief="OK", measured=measured, limit=limit)
 
 
 def fault(
@@ -87,7 +83,7 @@ def fault(
 ) -> Finding:
     """Something is wrong. `brief` follows the word FAULT on the tile ("12.6 m/s"); what does not fit is left out."""
     short = f"FAULT {brief}" if brief else "FAULT"
-    return _finding(
+    return Finding(
         verdict=Verdict.FAULT,
         text=text,
         brief=short if len(short) <= BRIEF_LETTERS else "FAULT",
@@ -101,12 +97,12 @@ def fault(
 def unknown(why: str, *, short: str = "") -> Finding:
     """It cannot be told. `short` (at most 8 letters: "no link", "stale") follows "not checked:" on the tile."""
     brief = f"not checked: {short}" if short else "not checked"
-    return _finding(verdict=Verdict.UNKNOWN, text=why, brief=brief if len(brief) <= BRIEF_LETTERS else "not checked")
+    return Finding(verdict=Verdict.UNKNOWN, text=why, brief=brief if len(brief) <= BRIEF_LETTERS else "not checked")
 
 
 def absent(why: str, *, brief: str = "not published") -> Finding:
     """There is nothing to check: unknown, but no reason to call the tile unknown."""
-    return _finding(verdict=Verdict.UNKNOWN, text=why, brief=brief, applies=False)
+    return Finding(verdict=Verdict.UNKNOWN, text=why, brief=brief, applies=False)
 
 
 class Limits(BaseModel):
@@ -166,13 +162,8 @@ class Check(Generic[L]):
     alarm: AlarmSpec
     limits: type[L]
     find: Callable[[Snapshot, L, bool], Finding]  # (snapshot, limits, was_active)
-    needs: frozenset[str] = (
-        frozenset()
-    )  # signals whose every message is judged at once; all checks are judged on the tick
-    # A quick look: True only where `find`, not yet active, could not say FAULT. Then it need not be asked until
-    # somebody reads its words. What comes of a message is looked at in the `State` itself, which has of `Snapshot`
-    # what such checks read.
-    is_harmless: Callable[[Any, L], bool] | None = None
+    needs: frozenset[str] = frozenset()  # signals that it reads
+    immediate: bool = False  # judged with each message of a signal it needs too; every check is judged on each tick
     group: str = ""  # name of its thresholds; a family shares one; "" = id
     tile: str = ""  # the tile of the home tab it belongs to; "" = label
     scope: Scope = Scope.CAR

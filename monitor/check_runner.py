@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from traceback import format_exception
-from typing import Any
+from typing import Any, NamedTuple
 
-from monitor.alarm import Alarm
 from monitor.catalog import AnyCheck
 from monitor.check import OK, Finding, Scope, fault, unknown
 from monitor.snapshot import NotFresh, Snapshot
@@ -26,22 +25,11 @@ class Crash:
     count: int  # ever; 1 is worth a line in the log
 
 
-class CheckRow:
-    """A check made ready to be looked at again and again."""
+class CheckRow(NamedTuple):
+    """A check and the limits in force for it."""
 
-    __slots__ = ("calm", "check", "id", "limits", "look")
-
-    def __init__(self, check: AnyCheck, limits: Any) -> None:
-        self.check = check
-        self.id = check.id
-        self.look: Callable[[Any, Any], bool] = check.is_harmless or _never
-        self.limits = limits
-        self.calm: Alarm | None = None  # its alarm, as it was last found at rest
-
-
-def _never(snapshot: Any, limits: Any) -> bool:
-    """The look of a check which has none: it is always asked."""
-    return False
+    check: AnyCheck
+    limits: Any
 
 
 class CheckRunner:

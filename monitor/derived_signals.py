@@ -7,15 +7,12 @@ from typing import Any
 from monitor.gps_watch import GpsFollower, GpsWatch
 from monitor.heading_fusion import HeadingFusion
 from monitor.motion import Slope, Standstill
-from monitor.quick import maker
 from monitor.reading import Reading
 from monitor.reading_table import ReadingTable
 from monitor.tracks import Track
 from monitor.values import Acceleration, GpsFix, Heading, Odometry, Twist, Value
 
 SOURCES = frozenset({Twist, GpsFix, Odometry, Heading})  # the values from which something else is derived
-
-_new_reading, _new_acceleration = maker(Reading), maker(Acceleration)
 
 
 class DerivedSignals:
@@ -50,7 +47,7 @@ class DerivedSignals:
                 self._headings.is_published = True
         if derived is None:
             return None
-        return name, _new_reading(
+        return name, Reading(
             value=derived,
             received_s=reading.received_s,
             stamp_s=reading.stamp_s,
@@ -80,4 +77,4 @@ class DerivedSignals:
         known = self._table.newest.get("acceleration")
         if known is not None and known.derived_from is None:
             return None
-        return _new_acceleration(acceleration_mps2=slope_mps2, source="speed")
+        return Acceleration(acceleration_mps2=slope_mps2, source="speed")

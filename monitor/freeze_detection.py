@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from monitor.motion import MOVES_ABOVE_MPS
-from monitor.quick import maker
 from monitor.values import Acceleration, GpsFix, Heading, LaserScan, Odometry, Twist
 
 STEP_AT_MOST_S = 1.0  # between two speeds farther apart the car may have done anything
@@ -28,7 +27,6 @@ class Repeats:
     liveliness: float | None = None  # share of the messages in motion that said something new; None: too few to tell
 
 
-_repeats = maker(Repeats)
 _NOTHING = Repeats()
 
 
@@ -113,7 +111,7 @@ class RepeatFollower:
         if not (self._value_n or self._stamp_n):
             return _NOTHING
         moved_s, moved_m = self._way
-        return _repeats(
+        return Repeats(
             value_n=self._value_n,
             value_s=wheels.moved_s - moved_s if self._value_n else 0.0,
             value_m=wheels.moved_m - moved_m if self._value_n else 0.0,

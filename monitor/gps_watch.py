@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from statistics import median
 
 from monitor.geo import Plane, offset_m
-from monitor.quick import maker
 from monitor.values import GpsFix
 
 ANCHOR_S = 2.0  # the anchor is the median of the first fixes at rest, this long
@@ -26,9 +25,6 @@ class GpsWatch:
     over_ground_mps: tuple[float, ...] = ()  # speed between the last fixes, newest last
     net_mps: float | None = None  # the same from the first to the last of them: noise goes back and forth
     sigma_m: float | None = None  # the receiver's own; None: it does not say
-
-
-_watch = maker(GpsWatch)
 
 
 class GpsFollower:
@@ -49,7 +45,7 @@ class GpsFollower:
             return GpsWatch()
         self._step(fix, at_s if stamp_s is None else stamp_s)
         self._rest(fix, at_s, standing_since_s)
-        return _watch(
+        return GpsWatch(
             drift_m=tuple(self._drift),
             anchored_s=self._since_s if self._anchor is not None else None,
             over_ground_mps=tuple(math.hypot(east, north) / span for east, north, span in self._steps),

@@ -6,8 +6,6 @@ from collections import deque
 from dataclasses import dataclass
 from statistics import median_low
 
-from monitor.quick import maker
-
 WINDOW_S = (
     5.0  # the measured rate looks back this far: long against Wi-Fi bunching, short against an operator's patience …
 )
@@ -34,9 +32,6 @@ class Rate:
     expected_hz: float | None  # None: neither declared, set nor learned
     settled: bool  # whether `expected_hz` may be held against the car
     learning: bool = False  # whether it may still settle; a signal without a default that never keeps a rate does not
-
-
-_new_rate = maker(Rate)
 
 
 class RateMeter:
@@ -127,7 +122,7 @@ class RateMeter:
         return self._declared_hz is not None and self._blocks >= DECIDED_BLOCKS
 
     def rate(self, now_s: float) -> Rate:
-        return _new_rate(
+        return Rate(
             measured_hz=self.measured_hz(now_s),
             expected_hz=self.expected_hz,
             settled=self.is_settled,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 
 from monitor import response
 from monitor.alarm import Alarm, Refused, Transition
@@ -13,17 +13,14 @@ from monitor.catalog import CHECKS, AllLimits, AnyCheck, compose
 from monitor.check import Finding, Scope, Verdict, unknown
 from monitor.check_runner import CheckRow, CheckRunner, Crash
 from monitor.inhibition import table_of
-from monitor.link import LinkFacts
 from monitor.restoring import numbered_on, restore
 from monitor.snapshot import Snapshot
-from monitor.state import State
 from monitor.tiles import Tile, places, tiles
 
 __all__ = ["Crash", "Monitor", "Refused", "Tile", "Transition"]
 
 IMPAIRED = "monitoring_impaired"
 KEPT_SETS = 200  # of signals that come together: there are a dozen
-ASKED_EVERY = 10  # ticks: within so many every check is really asked, so that one which fails is found out
 IMPAIRED_SPEC = AlarmSpec(
     title="Monitoring impaired",
     priority=Priority.WARNING,
@@ -43,19 +40,13 @@ class Monitor:
 
     The caller reads `findings` (by check id), `alarms` (by alarm id, which is the check's) and `crashes` (checks that
     fail now, by check id), and never writes to them.
-
-    Most checks find nothing, most of the time. Where a check's quick look shows that it cannot be a fault and its alarm
-    is at rest, it is not asked: no alarm can come of it. Its words are made when somebody reads them.
     """
 
     def __init__(self, checks: Sequence[AnyCheck] | None = None, limits: AllLimits | None = None) -> None:
         """Without `checks` all there are, without `limits` their defaults. Raises ValueError when the checks contradict
         each other: two of one id, a circle of inhibition."""
         declared = CHECKS if checks is None else tuple(checks)
-        self._findings: dict[str, Finding] = {}
-        self._asked: set[str] = set()  # since the last tick began
-        self._passed_on: Snapshot | None = None  # of which the others were not asked, because harmless
-        self._ticks = 0
+        self.findings: dict[str, Finding] = {}
         self._runner = CheckRunner(declared)
         self.crashes = self._runner.crashes
         self.failed_parts: tuple[str, ...] = ()  # of what feeds the checks; written by the caller before a step
@@ -81,95 +72,30 @@ class Monitor:
         self._rows = tuple(
             CheckRow(check, getattr(limits, check.limits_group, None) or check.limits()) for check in self._checks
         )
-        self._rows_by_signals: dict[Collection[str], tuple[CheckRow, ...]] = {}  # of the sets that were ever asked for
+        self._immediate_rows: dict[Collection[str], tuple[CheckRow, ...]] = {}  # by the signals that changed together
 
     def step(self, snapshot: Snapshot, changed: Collection[str] | None = None) -> tuple[Transition, ...]:
-        """Judge. None: a tick, all checks; else only those that need one of the `changed` signals.
+        """Judge. None: a tick, all checks; else only the immediate ones that need one of the `changed` signals.
 
         With the link idle every alarm ends: there is nothing to monitor.
         """
         if snapshot.link.phase == "idle":
             return self.end(snapshot.now_s)
-        if changed is None:
-            return self._tick(snapshot)
         transitions: list[Transition] = []
-        may_pass = self._may_pass(snapshot.link, snapshot.paused)
-        for row in self._needing(changed):
-            if may_pass and self._is_harmless(row, snapshot):
-                continue  # its words are the last tick's, for a moment
+        for row in self._rows if changed is None else self._immediate(changed):
             transitions += self._judge(row, snapshot)
-        if self.crashes:
+        if self.crashes or (changed is None and (self.failed_parts or not self.alarms[IMPAIRED].is_at_rest)):
             transitions += self._advance(IMPAIRED, self._runner.impaired(self.failed_parts), snapshot.now_s, ())
         return tuple(transitions)
 
-    @property
-    def findings(self) -> Mapping[str, Finding]:
-        """What each check last found, by its id."""
-        if self._passed_on is not None:
-            snapshot, self._passed_on = self._passed_on, None
-            for row in self._rows:
-                if row.id not in self._asked:
-                    self._findings[row.id] = self._runner.find(row, snapshot, is_active=self.alarms[row.id].active)
-        return self._findings
-
-    def _tick(self, snapshot: Snapshot) -> tuple[Transition, ...]:
-        self._ticks += 1
-        self._asked.clear()
-        may_pass = self._may_pass(snapshot.link, snapshot.paused) and self._ticks % ASKED_EVERY != 0
-        transitions: list[Transition] = []
-        alarms = self.alarms
-        for row in self._rows:
-            if may_pass and (row.calm is alarms[row.id] or self._is_calm(row)):
-                try:
-                    if row.look(snapshot, row.limits):
-                        continue
-                except Exception:  # as in `_find`: it is asked, and if it fails too, that is said
-                    pass
-            transitions += self._judge(row, snapshot)
-        self._passed_on = snapshot if may_pass else None
-        if self.crashes or self.failed_parts or not self.alarms[IMPAIRED].is_at_rest:
-            transitions += self._advance(IMPAIRED, self._runner.impaired(self.failed_parts), snapshot.now_s, ())
-        return tuple(transitions)
-
-    def _may_pass(self, link: LinkFacts, paused: bool) -> bool:
-        return link.phase == "monitoring" and not paused
-
-    def _is_calm(self, row: CheckRow) -> bool:
-        """Whether its alarm is at rest, so that a look is enough. Asked once: an alarm is replaced, not changed."""
-        alarm = self.alarms[row.id]
-        if not alarm.is_at_rest or self._causes.remembers(row.id):
-            return False
-        row.calm = alarm
-        return True
-
-    def _is_harmless(self, row: CheckRow, snapshot: Snapshot) -> bool:
-        try:
-            return self._is_calm(row) and row.look(snapshot, row.limits)
-        except Exception:  # as in `_find`: it is asked, and if it fails too, that is said
-            return False
+    def has_immediate(self, changed: Collection[str]) -> bool:
+        """Whether a step for these signals would judge anything."""
+        return bool(self._immediate(changed))
 
     @property
     def checks(self) -> tuple[AnyCheck, ...]:
         """What is judged, in the order of the home tab."""
         return self._declared
-
-    def heeds(self, changed: tuple[str, ...], state: State) -> bool:
-        """Whether a step for these signals could find anything; where not, there is no need of a snapshot."""
-        rows = self._rows_by_signals.get(changed)
-        if rows is None:
-            rows = self._needing(changed)
-        if not rows:
-            return False
-        if self.crashes or state.paused or state.link_facts.phase != "monitoring":
-            return True
-        alarms = self.alarms
-        try:
-            for row in rows:
-                if not ((row.calm is alarms[row.id] or self._is_calm(row)) and row.look(state, row.limits)):
-                    return True
-        except Exception:  # as in `_find`: it will be asked, and if it fails too, that is said
-            return True
-        return False
 
     def end(self, now_s: float) -> tuple[Transition, ...]:
         """Monitoring ends by the operator's wish: nothing is judged and nothing stands any more."""
@@ -177,12 +103,9 @@ class Monitor:
         for alarm_id, alarm in self.alarms.items():
             self.alarms[alarm_id], happened = end(alarm, now_s, ENDED)
             transitions += happened
-        self._findings.clear()
-        self._passed_on = None
+        self.findings.clear()
         self.crashes.clear()
         self._causes.clear()
-        for row in self._rows:
-            row.calm = None
         return tuple(transitions)
 
     def restore(self, transitions: Iterable[Transition]) -> None:
@@ -228,29 +151,29 @@ class Monitor:
         self.alarms[alarm_id], transitions = act(alarm)
         return transitions
 
-    def _needing(self, changed: Collection[str]) -> tuple[CheckRow, ...]:
+    def _immediate(self, changed: Collection[str]) -> tuple[CheckRow, ...]:
         together = changed if type(changed) is tuple else frozenset(changed)
-        found = self._rows_by_signals.get(together)
+        found = self._immediate_rows.get(together)
         if found is None:
-            wanted = frozenset(together)
-            found = tuple(row for row in self._rows if not wanted.isdisjoint(row.check.needs))
-            if len(self._rows_by_signals) < KEPT_SETS:
-                self._rows_by_signals[together] = found
+            found = tuple(row for row in self._rows if row.check.immediate and not row.check.needs.isdisjoint(together))
+            if len(self._immediate_rows) < KEPT_SETS:
+                self._immediate_rows[together] = found
         return found
 
     def _judge(self, row: CheckRow, snapshot: Snapshot) -> tuple[Transition, ...]:
-        check, finding = row.check, self._runner.find(row, snapshot, is_active=self.alarms[row.id].active)
-        self._asked.add(check.id)
+        check, alarm = row.check, self.alarms[row.check.id]
+        finding = self._runner.find(row, snapshot, is_active=alarm.active)
         by = self._causes.holding(check.id, snapshot.now_s)
-        if not by and finding.verdict is not Verdict.FAULT and not snapshot.paused:
-            if row.calm is self.alarms[check.id] or self._is_calm(row):
-                self._findings[check.id] = finding
-                return ()  # by far the most frequent case
-        if by and finding.verdict is Verdict.FAULT:
+        is_fault = finding.verdict is Verdict.FAULT
+        if not is_fault and not by and not snapshot.paused and alarm.is_at_rest:  # by far the most frequent case
+            self.findings[check.id] = finding
+            self._causes.note(alarm, snapshot.now_s)
+            return ()
+        if by and is_fault:
             why = self.alarms[by[0]].spec.title
-            self._findings[check.id] = unknown(f"Not judged yet: {why}", short="waiting")
+            self.findings[check.id] = unknown(f"Not judged yet: {why}", short="waiting")
         else:
-            self._findings[check.id] = finding
+            self.findings[check.id] = finding
         if snapshot.paused and check.scope is Scope.CAR:
             by = ("paused", *by)
         return self._advance(check.id, finding, snapshot.now_s, by)

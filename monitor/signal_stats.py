@@ -6,14 +6,11 @@ import math
 from typing import Any
 
 from monitor.freeze_detection import COMPARED, RepeatFollower, Wheels
-from monitor.quick import maker
 from monitor.rates import RateMeter
 from monitor.reading import Reading
 from monitor.reading_history import ReadingHistory
 from monitor.signals import Signal
 from monitor.stamps import StampFollower
-
-_new_reading = maker(Reading)
 
 
 class SignalStats:
@@ -45,7 +42,7 @@ class SignalStats:
         else:
             self.jump_s = stamps.receive(stamp_s, received_s)
             stamp_change_s = stamps.change_s
-        reading = _new_reading(
+        reading = Reading(
             value=value,
             received_s=received_s,
             stamp_s=stamp_s,

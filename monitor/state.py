@@ -10,10 +10,8 @@ from typing import Any
 from monitor.components import Components
 from monitor.derived_signals import SOURCES, DerivedSignals
 from monitor.freeze_detection import Wheels
-from monitor.gps_watch import GpsWatch
 from monitor.link import LinkFacts, Phase
 from monitor.phones import Phones, PhoneWord
-from monitor.quick import maker
 from monitor.rates import Rate
 from monitor.reach import ReachFacts
 from monitor.reading import Extent, Freshness, Reading
@@ -28,14 +26,12 @@ from monitor.snapshot import NotFresh, Snapshot
 from monitor.stamps import MANY_WRITERS, ClockJump, merged
 from monitor.tracks import TrackPoint
 from monitor.unusable import Unusable, refused, without
-from monitor.values import Diagnostics, Distance, GpsFix, LaserScan, Twist, Value
+from monitor.values import Diagnostics, GpsFix, Twist, Value
 
 __all__ = ["Extent", "Freshness", "LinkFacts", "NotFresh", "Phase", "Reading", "Snapshot", "State", "TrackPoint"]
 
 CLOCK_BACK_S = 0.5
 RATES_EVERY_S = 0.5  # a rate over 5 s does not change faster
-
-_new_snapshot = maker(Snapshot)
 
 
 class State:
@@ -140,30 +136,9 @@ class State:
         self._rides = phone
         self._phones.ride(phone, now_s)
 
-    # What `Snapshot` says of the newest moment, without a snapshot.
-
     def get(self, signal: str) -> Reading[Any] | None:
+        """The newest reading of a signal, whatever its age."""
         return self._table.newest.get(signal)
-
-    @property
-    def now_s(self) -> float:
-        return self._latest_s
-
-    @property
-    def gps(self) -> GpsWatch:
-        return self._derived.gps
-
-    @property
-    def scan_before(self) -> Reading[LaserScan] | None:
-        return self._scan_history.before
-
-    @property
-    def distance_before(self) -> Reading[Distance] | None:
-        return self._distance_history.before
-
-    @property
-    def standing_since_s(self) -> float | None:
-        return self._derived.standstill.since_s if self._table.is_fresh("speed", self._latest_s) else None
 
     def phones(self, now_s: float) -> int:
         """How many phones were heard within the last minute."""
@@ -181,10 +156,6 @@ class State:
     def recorder(self, facts: RecorderFacts) -> None:
         """What is now known of the recorder."""
         self._recorder = facts
-
-    @property
-    def slowing(self) -> SlowingFacts:
-        return self._slowing
 
     def slow(self, facts: SlowingFacts) -> None:
         """What is now known of an order to slow the car."""
@@ -206,7 +177,7 @@ class State:
         if self.paused and self._paused_since_s is None:
             self._paused_since_s = now_s
         derived, table = self._derived, self._table
-        return _new_snapshot(
+        return Snapshot(
             now_s=now_s,
             readings=table.readings(),
             link=self.link_facts,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from monitor.check import BRIEF_LETTERS, Check, Finding, Verdict, unknown
-from monitor.quick import maker
 
 NOT_YET = unknown("Not checked yet")
 
@@ -22,9 +21,6 @@ class Tile:
     text: str
     brief: str  # at most 21 letters
     checks: tuple[str, ...]  # ids
-
-
-_tile = maker(Tile)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +58,7 @@ def _tile_at(place: Place, findings: Mapping[str, Finding]) -> Tile:
 
 
 def _saying(place: Place, verdict: Verdict, text: str, brief: str) -> Tile:
-    return _tile(id=place.id, label=place.label, verdict=verdict, text=text, brief=brief, checks=place.checks)
+    return Tile(id=place.id, label=place.label, verdict=verdict, text=text, brief=brief, checks=place.checks)
 
 
 def _worst(findings: Sequence[Finding]) -> Verdict:

@@ -71,8 +71,7 @@ def test_no_shell_and_no_code_from_text() -> None:
         if pattern is None or path.parts[0] not in ("server", "monitor", "static"):
             continue
         found += [f"{path.as_posix()}: {hit[0]}" for hit in pattern.finditer(text_of(path) or "")]
-    compiled = [  # names enter as quoted text only, and into the first the names of our own fields
-        f"{path}.py: exec("
-        for path in ("monitor/quick", "server/recording/read/decode", "server/recording/read/encode")
+    compiled = [  # names enter as quoted text only
+        f"{path}.py: exec(" for path in ("server/recording/read/decode", "server/recording/read/encode")
     ]
     assert sorted(found) == compiled

@@ -43,15 +43,6 @@ def find(snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
     )
 
 
-def is_harmless(snapshot: Snapshot, limits: SlowLimits) -> bool:
-    """So few are slow that it does not matter which of them count."""
-    share, slow = limits.slow_below_percent / 100.0, 0
-    for rate in snapshot.rates.values():
-        if rate.measured_hz and rate.expected_hz and rate.measured_hz / rate.expected_hz < share:
-            slow += 1
-    return slow < AT_LEAST
-
-
 def _shares(snapshot: Snapshot, limits: SlowLimits) -> list[float]:
     """How much of its expected rate each signal keeps that has one; a silent signal has its own alarm."""
     readings = snapshot.readings
@@ -90,6 +81,5 @@ CHECKS = (
         ),
         limits=SignalLimits,
         find=find,
-        is_harmless=is_harmless,
     ),
 )

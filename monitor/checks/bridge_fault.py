@@ -28,10 +28,6 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     return fault(text, brief=link.behind_mark or "fault", causes=("car",))
 
 
-def is_harmless(snapshot: Snapshot, limits: Limits) -> bool:
-    return snapshot.link.behind_title is None
-
-
 CHECKS = (
     Check(
         id="bridge_fault",
@@ -50,7 +46,6 @@ CHECKS = (
         ),
         limits=Limits,
         find=find,
-        is_harmless=is_harmless,
         scope=Scope.LINK,
     ),
 )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -19,9 +17,8 @@ from monitor.check import (
     unknown,
 )
 from monitor.inhibition import GRACE_S
-from monitor.signals import SIGNALS
 from monitor.snapshot import Snapshot
-from monitor.staleness import BRIDGE_WITHIN_S, FAST_HORIZON_S, silence
+from monitor.staleness import BRIDGE_WITHIN_S, silence
 
 
 def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
@@ -49,21 +46,6 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     )
 
 
-def is_harmless(snapshot: Snapshot, limits: Limits) -> bool:
-    """One fast signal comes."""
-    now_s, opened_s = snapshot.now_s, snapshot.link.opened_s or -math.inf
-    for name, reading in snapshot.readings.items():
-        if (
-            reading.horizon_s <= FAST_HORIZON_S
-            and reading.received_s >= opened_s
-            and reading.is_coming(now_s)
-            and reading.derived_from is None
-            and not SIGNALS[name].event_like
-        ):
-            return True
-    return False
-
-
 CHECKS = (
     Check(
         id="car_silent",
@@ -85,6 +67,5 @@ CHECKS = (
         ),
         limits=Limits,
         find=find,
-        is_harmless=is_harmless,
     ),
 )

@@ -110,28 +110,6 @@ def differs(snapshot: Snapshot, limits: ClockLimits, was_active: bool) -> Findin
     return ok(text)
 
 
-def has_not_jumped(snapshot: Snapshot, limits: ClockLimits) -> bool:
-    return snapshot.clock_jump is None
-
-
-def agrees(snapshot: Snapshot, limits: ClockLimits) -> bool:
-    """One signal is in time, or none carries any."""
-    is_stamped = False
-    wall_zero_s = snapshot.link.wall_zero_s
-    for reading in snapshot.readings.values():
-        change_s, stamp_s = reading.stamp_change_s, reading.stamp_s
-        if change_s is None or stamp_s is None:
-            continue
-        is_stamped = True
-        if abs(change_s) > limits.late_s or not reading.is_fresh(snapshot.now_s):
-            continue
-        if reading.repeats is not None and reading.repeats.stamp_n >= STUCK_AFTER:
-            continue
-        if wall_zero_s is None or abs(stamp_s - reading.received_s - wall_zero_s) <= limits.offset_s:
-            return True
-    return not is_stamped
-
-
 def _changed(change_s: float, limits: ClockLimits) -> Finding:
     by_s = abs(change_s)
     return fault(
@@ -203,7 +181,6 @@ CHECKS = (
         ),
         limits=ClockLimits,
         find=jumps,
-        is_harmless=has_not_jumped,
     ),
     Check(
         id="clock_offset",
@@ -220,6 +197,5 @@ CHECKS = (
         ),
         limits=ClockLimits,
         find=differs,
-        is_harmless=agrees,
     ),
 )

@@ -29,10 +29,6 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     return absent("Connecting", brief="connecting")
 
 
-def is_harmless(snapshot: Snapshot, limits: Limits) -> bool:
-    return snapshot.link.phase != "failed"
-
-
 CHECKS = (
     Check(
         id="connect_failed",
@@ -51,7 +47,6 @@ CHECKS = (
         ),
         limits=Limits,
         find=find,
-        is_harmless=is_harmless,
         scope=Scope.LINK,
     ),
 )

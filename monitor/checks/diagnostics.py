@@ -47,11 +47,6 @@ def find(levels: Collection[int], snapshot: Snapshot, limits: Limits, was_active
     )
 
 
-def is_harmless(levels: Collection[int], snapshot: Snapshot, limits: Limits) -> bool:
-    reading = snapshot.get("diagnostics")
-    return reading is None or not any(component.level in levels for component in reading.value.components)
-
-
 def _text(bad: list[Component]) -> str:
     told = [
         f"{component.name[:60]} {WORDS[component.level]}{f': {component.message[:80]}' if component.message else ''}"
@@ -80,7 +75,6 @@ def _check(id: str, label: str, title: str, levels: Collection[int], priority: P
         ),
         limits=Limits,
         find=partial(find, frozenset(levels)),
-        is_harmless=partial(is_harmless, frozenset(levels)),
         needs=frozenset({"diagnostics"}),
     )
 

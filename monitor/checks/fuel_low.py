@@ -49,11 +49,6 @@ def find(snapshot: Snapshot, limits: FuelLimits, was_active: bool) -> Finding:
     return fault(text, brief=f"{level.value:.0f} %", measured=measured, limit=limit, causes=("fuel",))
 
 
-def is_harmless(snapshot: Snapshot, limits: FuelLimits) -> bool:
-    fuel = snapshot.get("fuel")
-    return fuel is None or fuel.value.value >= limits.low_percent
-
-
 CHECKS = (
     Check(
         id="fuel_low",
@@ -72,7 +67,6 @@ CHECKS = (
         ),
         limits=FuelLimits,
         find=find,
-        is_harmless=is_harmless,
         needs=frozenset({"fuel"}),
     ),
 )

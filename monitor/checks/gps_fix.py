@@ -58,17 +58,6 @@ def has_fix(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
     return ok(text, measured=measured, limit=limit)
 
 
-def is_plainly_good(snapshot: Snapshot, limits: FixLimits) -> bool:
-    """For both checks of this file."""
-    position = snapshot.get("position")
-    if position is None:
-        return True
-    fix = position.value
-    if fix.status < 0:
-        return False
-    return limits.strict < 1.0 if fix.sigma_m is None else fix.sigma_m <= limits.worst_sigma_m
-
-
 def knows_its_quality(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
     if snapshot.get("position") is None and "position" not in snapshot.link.published:
         return absent("Position is not published")
@@ -104,7 +93,6 @@ CHECKS = (
         ),
         limits=FixLimits,
         find=has_fix,
-        is_harmless=is_plainly_good,
         needs=frozenset({"position"}),
     ),
     Check(
@@ -126,7 +114,6 @@ CHECKS = (
         ),
         limits=FixLimits,
         find=knows_its_quality,
-        is_harmless=is_plainly_good,
         needs=frozenset({"position"}),
     ),
 )

@@ -82,13 +82,6 @@ def drifts(snapshot: Snapshot, limits: DriftLimits, was_active: bool) -> Finding
     return ok(text, measured=measured, limit=limit)
 
 
-def does_not_drift(snapshot: Snapshot, limits: DriftLimits) -> bool:
-    if snapshot.standing_since_s is None:
-        return True
-    drift_m = snapshot.gps.drift_m
-    return len(drift_m) < FIXES or min(drift_m) <= limits.least_m
-
-
 def jumps(snapshot: Snapshot, limits: JumpLimits, was_active: bool) -> Finding:
     why_not = _why_not(snapshot)
     if why_not is not None:
@@ -107,14 +100,6 @@ def jumps(snapshot: Snapshot, limits: JumpLimits, was_active: bool) -> Finding:
     if slowest_mps > speed_mps + limits.margin_mps * (0.8 if was_active else 1.0):
         return fault(text, brief=f"{watch.net_mps:.0f} m/s", measured=measured, limit=limit, causes=("position",))
     return ok(text, measured=measured, limit=limit)
-
-
-def does_not_jump(snapshot: Snapshot, limits: JumpLimits) -> bool:
-    over_ground_mps = snapshot.gps.over_ground_mps
-    speed = snapshot.get("speed")
-    if len(over_ground_mps) < FIXES or speed is None:
-        return True
-    return min(over_ground_mps) <= abs(speed.value.speed_mps) + limits.margin_mps
 
 
 CHECKS = (
@@ -136,7 +121,6 @@ CHECKS = (
         ),
         limits=DriftLimits,
         find=drifts,
-        is_harmless=does_not_drift,
         needs=frozenset({"position"}),
     ),
     Check(
@@ -157,7 +141,6 @@ CHECKS = (
         ),
         limits=JumpLimits,
         find=jumps,
-        is_harmless=does_not_jump,
         needs=frozenset({"position"}),
     ),
 )

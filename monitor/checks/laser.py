@@ -65,25 +65,6 @@ def sees(snapshot: Snapshot, limits: BlindLimits, was_active: bool) -> Finding:
     return ok(text, measured=measured, limit=limit)
 
 
-def plainly_sees(snapshot: Snapshot, limits: BlindLimits) -> bool:
-    scan = snapshot.get("scan")
-    if scan is None:
-        return True
-    sight = look(scan.value, CORRIDOR, LOOK_AHEAD_M)
-    return sight.beams > 0 and 100.0 * sight.blind <= limits.blind_percent * sight.beams
-
-
-def plainly_agrees(snapshot: Snapshot, limits: Limits) -> bool:
-    reading = snapshot.get("scan")
-    if reading is None:
-        return True
-    scan = reading.value
-    steps, beams = _steps(scan), scan.beams
-    if not (0.0 <= steps < math.inf) or round(steps) + 1 != beams:
-        return False
-    return scan.scan_time_s <= 0.0 or (beams - 1) * scan.time_increment_s <= SWEEP_SLACK * scan.scan_time_s
-
-
 def _steps(scan: LaserScan) -> float:
     """From the first beam to the last; NaN, infinite or negative where the angles contradict each other."""
     if scan.angle_increment_rad == 0.0:
@@ -142,7 +123,6 @@ CHECKS = (
             actions=(Action.ACKNOWLEDGE,),  # it explains why obstacles are not checked: never hidden
         ),
         limits=BlindLimits,
-        is_harmless=plainly_sees,
         find=sees,  # on the tick: it must hold for a second anyway, and 75 looks a second are not free
     ),
     Check(
@@ -156,7 +136,6 @@ CHECKS = (
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
         ),
         limits=Limits,
-        is_harmless=plainly_agrees,
         find=agrees,
         needs=frozenset({"scan"}),
     ),

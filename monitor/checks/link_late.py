@@ -77,11 +77,6 @@ def _judge(snapshot: Snapshot, limit_s: float, was_active: bool) -> Finding:
     )
 
 
-def is_harmless(snapshot: Snapshot, limits: LateLimits) -> bool:
-    late_s = snapshot.link.late_s
-    return late_s is None or late_s <= min(limits.late_s, limits.critical_s)
-
-
 def _alarm(priority: Priority, place: Place, sound: Sound, advice: str, *, by: tuple[str, ...]) -> AlarmSpec:
     return AlarmSpec(
         title="The link is too slow",
@@ -114,7 +109,6 @@ CHECKS = (
         ),
         limits=LateLimits,
         find=late,
-        is_harmless=is_harmless,
         scope=Scope.LINK,
     ),
     Check(
@@ -132,7 +126,6 @@ CHECKS = (
         ),
         limits=LateLimits,
         find=late_moving,
-        is_harmless=is_harmless,
         scope=Scope.LINK,
     ),
 )

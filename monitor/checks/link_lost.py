@@ -36,10 +36,6 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     return unknown("Not connected", short="no link")
 
 
-def is_harmless(snapshot: Snapshot, limits: Limits) -> bool:
-    return snapshot.link.phase != "lost"
-
-
 CHECKS = (
     Check(
         id="link_lost",
@@ -60,7 +56,6 @@ CHECKS = (
         ),
         limits=Limits,
         find=find,
-        is_harmless=is_harmless,
         scope=Scope.LINK,
     ),
 )

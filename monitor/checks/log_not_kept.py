@@ -27,10 +27,6 @@ def find(snapshot: Snapshot, limits: LogLimits, was_active: bool) -> Finding:
     return ok("The alarm log is kept") if trouble is None else fault(trouble, brief="not kept")
 
 
-def is_harmless(snapshot: Snapshot, limits: LogLimits) -> bool:
-    return snapshot.link.log_trouble is None
-
-
 CHECKS = (
     Check(
         id="log_not_kept",
@@ -49,7 +45,6 @@ CHECKS = (
         ),
         limits=LogLimits,
         find=find,
-        is_harmless=is_harmless,
         scope=Scope.SERVER,
     ),
 )

@@ -53,11 +53,6 @@ def _words(bridge_answers: bool, topics: int) -> str:
     return f"The bridge answers, the car publishes nothing. {spoke}"
 
 
-def is_harmless(snapshot: Snapshot, limits: Limits) -> bool:
-    heard_s, opened_s = snapshot.heard_s, snapshot.link.opened_s
-    return heard_s is not None and opened_s is not None and heard_s >= opened_s
-
-
 CHECKS = (
     Check(
         id="no_message",
@@ -77,7 +72,6 @@ CHECKS = (
         ),
         limits=Limits,
         find=find,
-        is_harmless=is_harmless,
         scope=Scope.LINK,
     ),
 )

@@ -77,15 +77,6 @@ def find(snapshot: Snapshot, limits: ResponseLimits, was_active: bool) -> Findin
     )
 
 
-def is_harmless(snapshot: Snapshot, limits: ResponseLimits) -> bool:
-    """Nothing orders the car to brake."""
-    command, speed = snapshot.get("command"), snapshot.get("speed")
-    if command is None or speed is None:
-        return True
-    ordered_mps = command.value.speed_mps
-    return ordered_mps is None or speed.value.speed_mps - max(0.0, ordered_mps) <= limits.margin_mps
-
-
 CHECKS = (
     Check(
         id="no_response",
@@ -106,7 +97,7 @@ CHECKS = (
         ),
         limits=ResponseLimits,
         find=find,
-        is_harmless=is_harmless,
         needs=frozenset({"command"}),
+        immediate=True,
     ),
 )

@@ -45,11 +45,6 @@ def find(snapshot: Snapshot, limits: NotMovingLimits, was_active: bool) -> Findi
     )
 
 
-def is_harmless(snapshot: Snapshot, limits: NotMovingLimits) -> bool:
-    since_s = snapshot.standing_since_s
-    return since_s is None or snapshot.now_s - since_s < limits.after_s
-
-
 CHECKS = (
     Check(
         id="not_moving",
@@ -67,6 +62,5 @@ CHECKS = (
         ),
         limits=NotMovingLimits,
         find=find,
-        is_harmless=is_harmless,  # of time, so judged by the tick alone
     ),
 )

@@ -7,7 +7,6 @@ collision at the speed at which the gap closes (SAE J2944: undefined while it do
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from monitor.check import (
     Action,
@@ -50,7 +49,7 @@ def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Fi
         closing_mps = _closing(sight.gap_m, gap_before_m, span_s, speed_mps)
     found = _judge(sight.gap_m, sight.bearing_rad, speed_mps, closing_mps, limits, was_active, cause="scan")
     if tyre_angle_rad(snapshot) is None:
-        found = replace(found, text=f"{found.text}; steering unknown, looked straight ahead")
+        found = found._replace(text=f"{found.text}; steering unknown, looked straight ahead")
     return found
 
 
@@ -71,57 +70,6 @@ def by_estimator(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -
     gap_before_m = before.value.distance_m if before is not None else None
     closing_mps = _closing(distance.distance_m, gap_before_m, span_s, speed_mps)
     return _judge(distance.distance_m, bearing_rad, speed_mps, closing_mps, limits, was_active, cause="distance")
-
-
-def laser_is_clear(snapshot: Snapshot, limits: ObstacleLimits) -> bool:
-    scan = snapshot.get("scan")
-    if scan is None:
-        return True
-    corridor = corridor_ahead(snapshot, limits)
-    gap_m = look_ahead(scan.value, corridor).gap_m
-    if gap_m is None or _is_far(gap_m, snapshot, limits):
-        return True
-    before = snapshot.scan_before
-    before_m = None if before is None else look_ahead(before.value, corridor).gap_m
-    span_s = 0.0 if before is None else scan.received_s - before.received_s
-    return _is_clear(gap_m, before_m, span_s, snapshot, limits)
-
-
-def estimator_is_clear(snapshot: Snapshot, limits: ObstacleLimits) -> bool:
-    distance = snapshot.get("distance")
-    if distance is None:
-        return True
-    gap_m = distance.value.distance_m
-    if gap_m is None:
-        return True
-    before = snapshot.distance_before
-    if before is None:
-        return _is_clear(gap_m, None, 0.0, snapshot, limits)
-    return _is_clear(gap_m, before.value.distance_m, distance.received_s - before.received_s, snapshot, limits)
-
-
-def _is_far(gap_m: float, snapshot: Snapshot, limits: ObstacleLimits) -> bool:
-    """Farther than anything that the car or another could meet soon."""
-    speed_mps = _newest_speed(snapshot)
-    return gap_m >= max(limits.standoff_m, stopping_m(speed_mps, limits), _soon_m(speed_mps, limits))
-
-
-def _is_clear(gap_m: float, before_m: float | None, span_s: float, snapshot: Snapshot, limits: ObstacleLimits) -> bool:
-    speed_mps = _newest_speed(snapshot)
-    if not (gap_m >= limits.standoff_m and gap_m >= stopping_m(speed_mps, limits)):
-        return False
-    reach_m = limits.time_to_collision_s * speed_mps
-    if before_m is not None and span_s > 0.0:
-        shrunk_mps = (before_m - gap_m) / span_s
-        if shrunk_mps > speed_mps:
-            reach_m = limits.time_to_collision_s * shrunk_mps
-    return gap_m >= reach_m
-
-
-def _newest_speed(snapshot: Snapshot) -> float:
-    """Whatever its age: a stale one counts for nothing in the checks, so it may only make them be asked."""
-    speed = snapshot.get("speed")
-    return 0.0 if speed is None else abs(speed.value.speed_mps)
 
 
 def _speed(snapshot: Snapshot) -> float | None:
@@ -207,8 +155,8 @@ CHECKS = (
         alarm=_alarm("Obstacle ahead", ("laser_blind",)),
         limits=ObstacleLimits,
         find=by_laser,
-        is_harmless=laser_is_clear,
         needs=frozenset({"scan"}),
+        immediate=True,
     ),
     Check(
         id="obstacle_nearest",
@@ -220,7 +168,7 @@ CHECKS = (
         alarm=_alarm("Object too near", ("obstacle",)),
         limits=ObstacleLimits,
         find=by_estimator,
-        is_harmless=estimator_is_clear,
         needs=frozenset({"distance"}),
+        immediate=True,
     ),
 )

@@ -52,10 +52,6 @@ def find(snapshot: Snapshot, limits: PausedLimits, was_active: bool) -> Finding:
     )
 
 
-def is_harmless(snapshot: Snapshot, limits: PausedLimits) -> bool:
-    return not snapshot.paused
-
-
 CHECKS = (
     Check(
         id="paused_long",
@@ -72,7 +68,6 @@ CHECKS = (
         ),
         limits=PausedLimits,
         find=find,
-        is_harmless=is_harmless,
         scope=Scope.SERVER,
     ),
 )

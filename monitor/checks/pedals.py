@@ -56,15 +56,6 @@ def find(snapshot: Snapshot, limits: PedalLimits, was_active: bool) -> Finding:
     return ok(text, measured=measured, limit=limit)
 
 
-def is_harmless(snapshot: Snapshot, limits: PedalLimits) -> bool:
-    """One foot off its pedal will do."""
-    brake, accelerator = snapshot.get("brake"), snapshot.get("accelerator")
-    if brake is None or accelerator is None:
-        return True
-    pressed = limits.pressed_percent
-    return brake.value.percent <= pressed or accelerator.value.percent <= pressed
-
-
 CHECKS = (
     Check(
         id="pedals",
@@ -83,7 +74,7 @@ CHECKS = (
         ),
         limits=PedalLimits,
         find=find,
-        is_harmless=is_harmless,
         needs=frozenset({"brake", "accelerator"}),
+        immediate=True,
     ),
 )

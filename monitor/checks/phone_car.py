@@ -26,7 +26,7 @@ from monitor.check import (
 from monitor.figures import beside
 from monitor.motion import MOVES_ABOVE_MPS
 from monitor.phone_words import name_of, why_words
-from monitor.phones import FIX_LIVES_S, NO_PHONE
+from monitor.phones import FIX_LIVES_S
 from monitor.snapshot import Snapshot
 
 FAULTS = 3  # of the newest five comparisons
@@ -73,10 +73,6 @@ def _why_not(snapshot: Snapshot, was_active: bool) -> Finding | None:
         words = why_words(reason, view, now_s, name_of(view))
         return unknown(words.sentence, short=words.short)
     return None
-
-
-def is_harmless(snapshot: Snapshot, limits: AgreementLimits) -> bool:
-    return snapshot.phone is NO_PHONE
 
 
 def agree(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -> Finding:
@@ -166,7 +162,6 @@ CHECKS = (
         ),
         limits=AgreementLimits,
         find=agree,
-        is_harmless=is_harmless,
     ),
     Check(
         id="phone_tracks",
@@ -187,6 +182,5 @@ CHECKS = (
         ),
         limits=AgreementLimits,
         find=move_as_one,
-        is_harmless=is_harmless,
     ),
 )

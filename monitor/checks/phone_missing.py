@@ -24,7 +24,7 @@ from monitor.check import (
     unknown,
 )
 from monitor.phone_words import name_of, why_words
-from monitor.phones import FIX_LIVES_S, NO_PHONE
+from monitor.phones import FIX_LIVES_S
 from monitor.snapshot import Snapshot
 
 
@@ -64,10 +64,6 @@ def _none(why: str, was_active: bool) -> Finding:
     return ok(why) if was_active else absent(why, brief="no phone")  # else the alarm would stand for ever
 
 
-def is_harmless(snapshot: Snapshot, limits: MissingLimits) -> bool:
-    return snapshot.phone is NO_PHONE
-
-
 CHECKS = (
     Check(
         id="phone_missing",
@@ -87,6 +83,5 @@ CHECKS = (
         ),
         limits=MissingLimits,
         find=find,
-        is_harmless=is_harmless,
     ),
 )

@@ -60,10 +60,6 @@ def moves(snapshot: Snapshot, was_active: bool) -> bool:
     return fast or (was_active and snapshot.standing_since_s is None)
 
 
-def is_harmless(snapshot: Snapshot, limits: ReachLimits) -> bool:
-    return snapshot.reach is None or snapshot.reach.can > 0
-
-
 CHECKS = (
     Check(
         id="reach",
@@ -83,7 +79,6 @@ CHECKS = (
         ),
         limits=ReachLimits,
         find=find,
-        is_harmless=is_harmless,
         scope=Scope.SERVER,
     ),
 )

@@ -118,11 +118,6 @@ def keeps_up(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> F
     return ok("All that comes is recorded", measured=measured, limit=limit)
 
 
-def is_up_to_date(snapshot: Snapshot, limits: RecordingLimits) -> bool:
-    facts = snapshot.recorder
-    return facts.dropped_s is None and facts.behind_s <= limits.behind_s
-
-
 def has_room(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> Finding:
     facts = snapshot.recorder
     if facts.state not in ("recording", "saving", "held"):
@@ -138,11 +133,6 @@ def has_room(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> F
     return ok(text, measured=measured, limit=limit)
 
 
-def is_roomy(snapshot: Snapshot, limits: RecordingLimits) -> bool:
-    left_gb = snapshot.recorder.left_gb
-    return left_gb is None or left_gb >= limits.warn_gb
-
-
 def goes_on(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> Finding:
     facts = snapshot.recorder
     if facts.state == "stopped":
@@ -150,10 +140,6 @@ def goes_on(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> Fi
     if facts.state == "off":
         return absent("Nothing is to be recorded", brief="not recording")
     return ok("It is recorded" if facts.state != "held" else "What was recorded is saved")
-
-
-def is_going(snapshot: Snapshot, limits: RecordingLimits) -> bool:
-    return snapshot.recorder.state != "stopped"
 
 
 CHECKS = (
@@ -175,7 +161,6 @@ CHECKS = (
         ),
         limits=RecordingLimits,
         find=goes_on,
-        is_harmless=is_going,
         scope=Scope.SERVER,
     ),
     Check(
@@ -198,7 +183,6 @@ CHECKS = (
         ),
         limits=RecordingLimits,
         find=keeps_up,
-        is_harmless=is_up_to_date,
         scope=Scope.SERVER,
     ),
     Check(
@@ -221,7 +205,6 @@ CHECKS = (
         ),
         limits=RecordingLimits,
         find=has_room,
-        is_harmless=is_roomy,
         scope=Scope.SERVER,
     ),
 )

@@ -106,13 +106,6 @@ def _frozen(signal: Signal, what: str, held_s: float, limits: SlowLimits) -> Fin
     )
 
 
-def is_harmless(name: str, snapshot: Snapshot, limits: SlowLimits) -> bool:
-    reading = snapshot.readings.get(name)
-    if reading is None or reading.repeats is None:
-        return True
-    return reading.repeats.value_s < limits.frozen_after_s and reading.repeats.stamp_s < limits.frozen_after_s
-
-
 def check(signal: Signal) -> Check[Limits]:
     # A speed that is frozen says nothing of how far the car has come, by which the others are judged.
     explains = signal.name == "speed"
@@ -138,7 +131,6 @@ def check(signal: Signal) -> Check[Limits]:
         ),
         limits=SignalLimits,
         find=partial(find, signal),
-        is_harmless=partial(is_harmless, signal.name),
     )
 
 

@@ -58,15 +58,6 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
     )
 
 
-def is_harmless(name: str, snapshot: Snapshot, limits: SlowLimits) -> bool:
-    rate = snapshot.rates.get(name)
-    if name in snapshot.link.throttled:
-        return True
-    if rate is None or rate.expected_hz is None or rate.measured_hz is None or not rate.settled:
-        return True
-    return rate.measured_hz >= rate.expected_hz * limits.slow_below_percent / 100.0
-
-
 def _brief(signal: Signal, hz: float) -> str:
     long = f"{signal.label} {hz:.0f} Hz"
     return long if len(f"FAULT {long}") <= BRIEF_LETTERS else signal.label
@@ -95,7 +86,6 @@ def check(signal: Signal) -> Check[Limits]:
         ),
         limits=SignalLimits,
         find=partial(find, signal),
-        is_harmless=partial(is_harmless, signal.name),
     )
 
 

@@ -63,14 +63,6 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
     )
 
 
-def is_harmless(name: str, snapshot: Snapshot, limits: SlowLimits) -> bool:
-    """It comes, or is not on the car."""
-    reading = snapshot.readings.get(name)
-    if reading is None or reading.derived_from is not None:
-        return name not in snapshot.link.published
-    return reading.is_coming(snapshot.now_s)
-
-
 def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Finding:
     is_wanted = not signal.optional or set_hz(limits, signal.name) > 0.0
     if signal.name not in snapshot.link.published:
@@ -127,7 +119,6 @@ def check(signal: Signal) -> Check[Limits]:
         ),
         limits=SignalLimits,
         find=partial(find, signal),
-        is_harmless=partial(is_harmless, signal.name),
     )
 
 

@@ -81,14 +81,6 @@ def find_all(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     )
 
 
-def is_harmless(name: str, snapshot: Snapshot, limits: Limits) -> bool:
-    return name not in snapshot.unusable
-
-
-def is_all_harmless(snapshot: Snapshot, limits: Limits) -> bool:
-    return len(snapshot.unusable) < CROWD
-
-
 def check(signal: Signal) -> Check[Limits]:
     return Check(
         id=f"signal_unusable.{signal.name}",
@@ -109,7 +101,6 @@ def check(signal: Signal) -> Check[Limits]:
         ),
         limits=Limits,
         find=partial(find, signal),
-        is_harmless=partial(is_harmless, signal.name),
     )
 
 
@@ -135,6 +126,5 @@ CHECKS = (
         ),
         limits=Limits,
         find=find_all,
-        is_harmless=is_all_harmless,
     ),
 )

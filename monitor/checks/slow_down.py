@@ -182,18 +182,6 @@ def goes_on(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Fin
     return ok(f"The car is held for {max(0.0, left_s):.0f} s more")
 
 
-def is_not_ordered(snapshot: Snapshot, limits: SlowDownLimits) -> bool:
-    return snapshot.slowing.ordered_s is None
-
-
-def has_no_rival(snapshot: Snapshot, limits: SlowDownLimits) -> bool:
-    return not snapshot.slowing.rivals
-
-
-def has_not_ended(snapshot: Snapshot, limits: SlowDownLimits) -> bool:
-    return snapshot.slowing.ended_at_longest_s is None
-
-
 CHECKS = (
     Check(
         id="slow_down_unconfirmed",
@@ -215,7 +203,6 @@ CHECKS = (
         limits=SlowDownLimits,
         find=obeys,
         needs=frozenset({"speed"}),
-        is_harmless=is_not_ordered,
     ),
     Check(
         id="slow_down_hold_ended",
@@ -234,7 +221,6 @@ CHECKS = (
         ),
         limits=SlowDownLimits,
         find=goes_on,
-        is_harmless=has_not_ended,
     ),
     Check(
         id="slow_down_rivals",
@@ -254,6 +240,5 @@ CHECKS = (
         ),
         limits=SlowDownLimits,
         find=is_alone,
-        is_harmless=has_no_rival,
     ),
 )

@@ -51,11 +51,6 @@ def find(snapshot: Snapshot, limits: SpeedLimits, was_active: bool) -> Finding:
     return fault(text, brief=f"{speed_mps:.1f} m/s", measured=measured, limit=limit, causes=("speed",))
 
 
-def is_harmless(snapshot: Snapshot, limits: SpeedLimits) -> bool:
-    speed = snapshot.get("speed")
-    return speed is None or abs(speed.value.speed_mps) <= limits.max_mps
-
-
 CHECKS = (
     Check(
         id="speed_limit",
@@ -74,7 +69,7 @@ CHECKS = (
         ),
         limits=SpeedLimits,
         find=find,
-        is_harmless=is_harmless,
         needs=frozenset({"speed"}),
+        immediate=True,
     ),
 )

@@ -71,7 +71,7 @@ def _settings(report: Report) -> dict[str, Any]:
     """By which settings it was judged."""
     run = report.run
     return {
-        "file": run.wishes.name or None,
+        "file": run.override.name or None,
         "profile": run.tuning.profile.name,
         "changed": {name: value for name, _, value, _ in report.settings()},
         "topics": dict(run.tuning.settings.topics),
@@ -172,7 +172,9 @@ def episode_json(episode: Episode) -> dict[str, Any]:
 
 def _compared(report: Report, before: Rehearsed) -> dict[str, Any]:
     return {
-        "with": "the recording without the injected faults" if report.run.faults else before.wishes.name or "defaults",
+        "with": "the recording without the injected faults"
+        if report.run.faults
+        else before.override.name or "defaults",
         "settings": [
             {"label": label, "before": old, "after": new, "unit": unit}
             for label, old, new, unit in differences(before, report.run)

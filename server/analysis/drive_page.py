@@ -11,10 +11,6 @@ from server.analysis.page import page
 from server.analysis.recorded_events import told_by
 from server.analysis.rehearse import rehearse
 from server.analysis.report import Report
-from server.analysis.thresholds import Wishes
-from server.judge import profiles
-from server.judge.settings import salvage
-from server.recording.export.drive import settings_at_start
 from server.recording.export.outcome import Outcome
 from server.recording.read.read import Recording
 
@@ -31,7 +27,6 @@ def write_drive_page(
     told = told_by(recording)
     run = rehearse(
         recording,
-        wishes=_wishes(recording),
         with_traces=True,
         on_progress=lambda at_s: progress(min(1.0, at_s / length_s)),
     )
@@ -44,11 +39,3 @@ def write_drive_page(
         for topic, count in sorted(recording.rejected.items())
     ]
     return Outcome(entries=run.messages, notes=notes + ([] if run.broke_off is None else [f"{run.broke_off}."]))
-
-
-def _wishes(recording: Recording) -> Wishes:
-    toml = settings_at_start(recording)
-    if toml is None:
-        return Wishes()
-    settings, _ = salvage(toml, profiles.load())
-    return Wishes(name="as recorded", values=settings.values, topics=settings.topics, profile=settings.profile)

@@ -78,10 +78,10 @@ def _facts(report: Report) -> dict[str, Any]:
         "unchecked": not_checked(run),
         "signals": [row for row in report.signals() if row.topic is not None or not row.optional],
         "settings": report.settings(),
-        "settings_name": name_of(run.wishes),
+        "settings_name": name_of(run.override),
         "changes": report.changes,
         "differences": [] if report.before is None else differences(report.before, run),
-        "before_name": "" if report.before is None else name_of(report.before.wishes),
+        "before_name": "" if report.before is None else name_of(report.before.override),
         "load_words": {"bearable": "bearable", "demanding": "demanding", "flood": "a flood"}[run.load.verdict],
         "chattering": [run.titles[name] for name in run.load.chattering],
     }

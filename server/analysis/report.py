@@ -12,7 +12,7 @@ from monitor.signals import SIGNALS
 from server.analysis.compare import Change, compare
 from server.analysis.recorded_events import Told
 from server.analysis.rehearse import Rehearsed
-from server.analysis.thresholds import Wishes
+from server.judge.settings_override import SettingsOverride
 from server.recording.read.read import Recording
 
 
@@ -133,8 +133,8 @@ def not_checked(run: Rehearsed) -> list[tuple[str, list[str]]]:
     return list(by_reason.items())
 
 
-def name_of(wishes: Wishes) -> str:
-    return wishes.name or "the defaults"
+def name_of(override: SettingsOverride) -> str:
+    return override.name or "the defaults"
 
 
 def _row(run: Rehearsed, name: str) -> SignalRow:

@@ -34,7 +34,7 @@ def _head(report: Report) -> Iterator[str]:
     if run.messages and (run.from_s > 0.05 or run.to_s < recording.duration_s - 0.05):
         yield f"  Judged from {clock(run.from_s)} to {clock(run.to_s)}: {counted(run.messages, 'message')}"
     settings = report.settings()
-    by = f"{printable(name_of(run.wishes))}" + (f": {len(settings)} of them changed" if settings else "")
+    by = f"{printable(name_of(run.override))}" + (f": {len(settings)} of them changed" if settings else "")
     yield f"  Taken for: {run.tuning.profile.title}. Settings: {by}"
     for _, label, value, unit in settings:
         yield f"    {label} {value:g} {unit}".rstrip()
@@ -146,7 +146,7 @@ def _comparison(report: Report) -> Iterator[str]:
     if run.faults:
         yield "Compared with the recording as it is"
     else:
-        yield f"{printable(name_of(before.wishes))} → {printable(name_of(run.wishes))}"
+        yield f"{printable(name_of(before.override))} → {printable(name_of(run.override))}"
         for label, old, new, unit in differences(before, run):
             yield f"  {label}: {old:g} → {new:g} {unit}".rstrip()
     if not report.changes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -11,10 +10,9 @@ from typing import Any
 from monitor import catalog
 from monitor.signals import SIGNALS
 from server.judge import profiles
-from server.judge.active_settings import Tuning
-from server.judge.message import RosVersion
 from server.judge.profiles import GENERIC
-from server.judge.settings import AUTO, BadSetting, Settings, SettingsFile, change
+from server.judge.settings import AUTO, BadSetting, Settings, change
+from server.judge.settings_override import SettingsOverride
 from server.storage import bounded_toml
 
 _SECTIONS = ("version", "profile", "topics", "limits")
@@ -28,17 +26,7 @@ class BadSettingsFile(Exception):
         self.sentences = sentences
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Wishes:
-    """What a file asks for; everything else stays as the car's profile has it."""
-
-    name: str = ""  # of the file
-    values: Mapping[str, float] = field(default_factory=dict)  # "speed_limit.max_mps": 9.0
-    topics: Mapping[str, str] = field(default_factory=dict)  # signal → topic
-    profile: str = AUTO
-
-
-def read_wishes(path: Path) -> Wishes:
+def read_override(path: Path) -> SettingsOverride:
     """A file of [group] tables, or a file that catgraph exported, where they are below [limits].
 
     Raises BadSettingsFile.
@@ -53,18 +41,7 @@ def read_wishes(path: Path) -> Wishes:
         wrong.append(f"{path}: profile: there is {_listed(known)}, not {_shown(profile)}.")
     if wrong:
         raise BadSettingsFile(*wrong)
-    return Wishes(name=path.name, values=values, topics=topics, profile=str(profile))
-
-
-def tuning_for(wishes: Wishes, topics: Mapping[str, str], ros: RosVersion) -> Tuning:
-    """How a car with these topics is judged: its profile as live recognises it, then the wishes."""
-    tuning = Tuning(SettingsFile(None))
-    tuning.recognise(topics, ros)
-    if wishes.topics or wishes.profile != AUTO:
-        tuning.change(values={}, topics=dict(wishes.topics), profile=wishes.profile, version=None)
-    if wishes.values:  # after the profile: what is kept of them is what differs from its defaults
-        tuning.change(values=dict(wishes.values), topics={}, profile=None, version=None)
-    return tuning
+    return SettingsOverride(name=path.name, values=values, topics=topics, profile=str(profile))
 
 
 def _body(path: Path) -> dict[str, Any]:

@@ -19,9 +19,10 @@ from server.analysis.as_json import as_json
 from server.analysis.faults import CannotInject, Faults
 from server.analysis.rehearse import Extract, Rehearsed, rehearse
 from server.analysis.report import Report
-from server.analysis.thresholds import BadSettingsFile, Wishes, read_wishes
+from server.analysis.thresholds import BadSettingsFile, read_override
 from server.cli.progress import Progress
 from server.judge.settings import BadSetting
+from server.judge.settings_override import SettingsOverride
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 from server.simulator.scenarios import Planned, UnknownScenario, planned
 from server.storage import output_file
@@ -70,12 +71,10 @@ def run(args: argparse.Namespace) -> int:
     began_s = time.perf_counter()
     try:
         _demand_sense(args)
-        wishes = [read_wishes(path) for path in args.compare or ([args.settings] if args.settings else [])] or [
-            Wishes()
-        ]
+        overrides = [read_override(path) for path in args.compare or ([args.settings] if args.settings else [])]
         with bounded_memory(), _prompt_threads(), open_recording(args.files) as recording:
             _demand_extract(recording, args)
-            report = _report(recording, wishes, args, began_s)
+            report = _report(recording, overrides or [None], args, began_s)
             _write(report, args)
     except BadSettingsFile as error:
         for sentence in error.sentences:
@@ -117,24 +116,32 @@ class _Impossible(Exception):
     """What was asked for cannot be done. The text is one sentence."""
 
 
-def _report(recording: Recording, wishes: Sequence[Wishes], args: argparse.Namespace, began_s: float) -> Report:
+def _report(
+    recording: Recording, overrides: Sequence[SettingsOverride | None], args: argparse.Namespace, began_s: float
+) -> Report:
     extract = Extract(start_s=args.start, duration_s=args.duration)
     faults: list[Planned] = args.inject
     with_traces = args.html is not None
     open_s = time.perf_counter() - began_s
     before: Rehearsed | None = None
-    if len(wishes) == 2:
-        before = _rehearse(recording, wishes[0], extract, faults, "First settings", with_traces=False)
+    if len(overrides) == 2:
+        before = _rehearse(recording, overrides[0], extract, faults, "First settings", with_traces=False)
     elif faults:
-        before = _rehearse(recording, wishes[0], extract, (), "Without faults", with_traces=False)
-    found = _rehearse(recording, wishes[-1], extract, faults, "Checking", with_traces=with_traces)
+        before = _rehearse(recording, overrides[0], extract, (), "Without faults", with_traces=False)
+    found = _rehearse(recording, overrides[-1], extract, faults, "Checking", with_traces=with_traces)
     return Report(
         files=[str(path) for path in args.files], recording=recording, run=found, before=before, open_s=open_s
     )
 
 
 def _rehearse(
-    recording: Recording, wishes: Wishes, extract: Extract, faults: Sequence[Planned], what: str, *, with_traces: bool
+    recording: Recording,
+    override: SettingsOverride | None,
+    extract: Extract,
+    faults: Sequence[Planned],
+    what: str,
+    *,
+    with_traces: bool,
 ) -> Rehearsed:
     end_s = min(recording.duration_s, extract.start_s + extract.duration_s)
     progress = Progress(extract.start_s, end_s, what)
@@ -142,7 +149,7 @@ def _rehearse(
     try:
         return rehearse(
             recording,
-            wishes=wishes,
+            override=override,
             extract=extract,
             faults=faults,
             with_traces=with_traces,

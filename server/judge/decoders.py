@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from monitor.quick import maker
 from monitor.values import (
     Acceleration,
     Bearing,
@@ -50,9 +49,6 @@ FARTHEST_SCAN_M = 10_000.0  # a range_max beyond is "no end", which drivers writ
 WIDEST_RAD = 4 * math.pi  # two turns: no laser sweeps more
 
 # What comes a hundred times a second is made quickly.
-_twist, _effort, _steering = maker(Twist), maker(Effort), maker(Steering)
-_distance, _bearing = maker(Distance), maker(Bearing)
-_fix, _odometry = maker(GpsFix), maker(Odometry)
 
 
 def _speed(value: float) -> float:
@@ -69,7 +65,7 @@ def _percent(value: float) -> float:
 
 def twist(message: Any) -> Twist:
     yaw_rate = number(message, "angular", "z") if isinstance(message, Mapping) and "angular" in message else math.nan
-    return _twist(speed_mps=_speed(finite(message, "linear", "x")), yaw_rate_radps=known(yaw_rate))
+    return Twist(speed_mps=_speed(finite(message, "linear", "x")), yaw_rate_radps=known(yaw_rate))
 
 
 def twist_stamped(message: Any) -> Twist:
@@ -96,7 +92,7 @@ def speed_of_float(message: Any) -> Twist:
 
 def effort(message: Any) -> Effort:
     """Percent in force.x of a Wrench, as the car's pedals have it."""
-    return _effort(percent=_percent(finite(message, "force", "x")))
+    return Effort(percent=_percent(finite(message, "force", "x")))
 
 
 def effort_of_float(message: Any) -> Effort:
@@ -105,7 +101,7 @@ def effort_of_float(message: Any) -> Effort:
 
 def steering(message: Any) -> Steering:
     """Percent in torque.z of a Wrench, negative = left."""
-    return _steering(percent=_percent(finite(message, "torque", "z")))
+    return Steering(percent=_percent(finite(message, "torque", "z")))
 
 
 def steering_of_float(message: Any) -> Steering:
@@ -117,15 +113,15 @@ def distance(message: Any) -> Distance:
     if value < 0:
         raise Rejected("a distance below zero")
     if value >= FARTHEST_M or abs(value - NONE_REAL_M) < 1e-3 or abs(value - NONE_SIMULATED_M) < 1e-3:
-        return _distance(distance_m=None, none_in_range=True)
-    return _distance(distance_m=value, none_in_range=False)
+        return Distance(distance_m=None, none_in_range=True)
+    return Distance(distance_m=value, none_in_range=False)
 
 
 def bearing(message: Any) -> Bearing:
     value = finite(message, "data")
     if abs(value) > 2 * math.pi:
         raise Rejected("an angle beyond a full turn")
-    return _bearing(bearing_rad=value)
+    return Bearing(bearing_rad=value)
 
 
 def nav_sat_fix(message: Any) -> GpsFix:
@@ -144,7 +140,7 @@ def nav_sat_fix(message: Any) -> GpsFix:
     kind = number(message, "position_covariance_type")
     kind_is_known = kind in (1, 2, 3)
     spread = _spread(message.get("position_covariance")) if kind_is_known else None
-    return _fix(
+    return GpsFix(
         lat_deg=latitude,
         lon_deg=(longitude + 180) % 360 - 180 if abs(longitude) > 180 else longitude,
         alt_m=known(number(message, "altitude")),
@@ -178,7 +174,7 @@ def odometry(message: Any) -> Odometry:
     body = inner(inner(message, "twist"), "twist")
     x, y = number(body, "linear", "x"), number(body, "linear", "y")
     speed = math.hypot(x, 0.0 if math.isnan(y) else y)
-    return _odometry(
+    return Odometry(
         x_m=finite(pose, "position", "x"),
         y_m=finite(pose, "position", "y"),
         z_m=known(number(pose, "position", "z")),

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from monitor.quick import maker
-
 Json = Mapping[str, Any]
 RosVersion = Literal[1, 2]
 
@@ -26,6 +24,3 @@ class Message:
     topic: str
     type: str  # "geometry_msgs/Twist" in ROS 1, "geometry_msgs/msg/Twist" in ROS 2
     message: Json
-
-
-message_of = maker(Message)  # a recording makes them by the thousand

@@ -14,7 +14,7 @@ from server.judge.profiles import Profile
 from server.judge.reception_stats import Reception
 from server.judge.topics import Source
 
-TICK_S = 0.1  # time judges this often
+TICK_S = 0.05  # every check is judged this often
 
 ByTopic = Mapping[str, tuple[Source, ...]]
 
@@ -83,7 +83,7 @@ def steered(signal: Steering, profile: Profile, tyre_rad_per_unit: float) -> Ste
 def judge(
     monitor: Monitor, state: State, now_s: float, changed: tuple[str, ...] | None = None
 ) -> tuple[Transition, ...]:
-    """Judges what changed, at once; None: time passed, everything."""
-    if changed is not None and not monitor.heeds(changed, state):
+    """Judge the immediate checks of what changed, or with None every check."""
+    if changed is not None and not monitor.has_immediate(changed):
         return ()
     return monitor.step(state.snapshot(now_s), changed)

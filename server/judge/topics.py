@@ -22,7 +22,8 @@ class Topic:
     by_type: tuple[
         str, ...
     ] = ()  # types that only this signal has: taken under any name when none of the names is there
-    # Messages the bridge keeps for us in a burst: few, for what waits there grows old unseen; 1 for what is large.
+    # Messages the bridge keeps for us in a burst: what comes in a quarter of a second, for what waits there grows old
+    # unseen, and what does not fit is lost; 1 for what is large.
     queue_length: int = 5
     compression: str = "none"
 
@@ -69,6 +70,7 @@ TOPICS = (
     ),
     Topic(
         signal="distance",
+        queue_length=20,
         names=(
             "/DistanceEstimator/dist",
             "/catvehicle/distanceEstimator/dist",
@@ -78,6 +80,7 @@ TOPICS = (
     ),
     Topic(
         signal="bearing",
+        queue_length=20,
         names=(
             "/DistanceEstimator/angle",
             "/catvehicle/distanceEstimator/angle",
@@ -118,6 +121,7 @@ TOPICS = (
     ),
     Topic(
         signal="command",
+        queue_length=20,
         names=("/catvehicle/cmd_vel", "/cmd_vel"),
         types={"geometry_msgs/Twist": decode.command, "geometry_msgs/TwistStamped": decode.command_stamped},
     ),

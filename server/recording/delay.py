@@ -97,6 +97,12 @@ class RecordedDelay:
         return self._links[place - 1] if place else LinkDelay()
 
 
+def recorded_delay(recording: Recording) -> RecordedDelay | None:
+    """None where the recording says nothing of it."""
+    delay = RecordedDelay(recording)
+    return delay if delay.is_known else None
+
+
 def _link_of(row: Mapping[str, Any], before: LinkDelay) -> LinkDelay:
     late_s: Any = row.get("late_s")
     link = replace(before, late_s=float(late_s) if _is_delay(late_s) else None)

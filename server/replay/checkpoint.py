@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any, cast
 
 from monitor.catalog import CHECKS
-from server.replay.run_state import RunState
+from server.judge.run_state import RunState
 
 _BY_ID = {check.id: check for check in CHECKS}
 _IDS = {id(check): check.id for check in CHECKS}

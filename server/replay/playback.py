@@ -11,12 +11,13 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from server.analysis.own_events import read_recorded_events
+from server.judge.drive import Drive
+from server.judge.offline import OfflineRun
 from server.protocol import serialize
+from server.recording.delay import recorded_delay
 from server.recording.read.read import Recording, RecordingUnreadable
 from server.replay import replay_frames
-from server.replay.drive import Drive
-from server.replay.recorded_events import read_recorded_events
-from server.replay.run import Run
 from server.replay.timeline import Index
 from server.vehicle import queries
 
@@ -42,10 +43,12 @@ class Playback:
         at_s: float = 0.0,
     ) -> None:
         self._recording = recording
-        self.drive = Drive(recording, read_recorded_events(recording), settings)
+        self.drive = Drive(
+            recording, read_recorded_events(recording), delay=recorded_delay(recording), fallback=settings
+        )
         self._index_recording = open_again()
         self.index = Index(self._index_recording, self.drive)
-        self._run = Run(recording, self.drive)
+        self._run = OfflineRun(recording, self.drive)
         self.is_playing = False
         self.rate = 1.0
         self.reached_rate: float | None = None  # where it does not keep the pace; None: it does
@@ -162,11 +165,11 @@ class Playback:
         if is_ahead and (kept is None or kept[0] <= here_s) and target_s - here_s <= REACH_S:
             pass  # what is known already leads there soonest
         elif kept is not None and target_s - kept[0] <= max(WARM_UP_S, 2 * self.index.every_s):
-            self._run = Run(self._recording, self.drive, run_state=kept[1]())
+            self._run = OfflineRun(self._recording, self.drive, run_state=kept[1]())
             self.is_settled = True
         else:
             from_s = max(0.0, target_s - WARM_UP_S)
-            self._run = Run(self._recording, self.drive, from_s=from_s)
+            self._run = OfflineRun(self._recording, self.drive, from_s=from_s)
             self.is_settled = from_s == 0.0
         self._target_s = target_s
         self._keep_pace_from(target_s, now_s)

@@ -8,16 +8,16 @@ from typing import Any
 from monitor.alarm import Alarm
 from monitor.alarm_order import standing
 from monitor.check import Verdict
+from server.judge.offline import OfflineRun
+from server.judge.run_state import RunState
 from server.protocol import serialize
-from server.replay.run import Run
-from server.replay.run_state import RunState
 from server.vehicle.scan_feed import judged
 from server.vehicle.state_frame import Facts, state_frame
 
 TRENDS_A_FRAME = 4
 
 
-def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_number: int) -> dict[str, Any]:
+def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, track_number: int) -> dict[str, Any]:
     """The state of docs/protocol.md at this moment, without `server`, `replay` and `live`. Looking changes nothing
     of what is judged later."""
     run_state, epoch = run.run_state, run.epoch
@@ -66,7 +66,7 @@ def frame(run: Run, *, vehicle: str, name: str, settings_version: int, track_num
     return shown
 
 
-def scan_bytes(run: Run) -> bytes | None:
+def scan_bytes(run: OfflineRun) -> bytes | None:
     """The newest scan as the page gets it; None before the first."""
     run_state = run.run_state
     snapshot = run_state.state.glance(run_state.at_s)

@@ -14,12 +14,12 @@ from monitor.alarm import Transition
 from monitor.catalog import CHECKS
 from monitor.runner import IMPAIRED, IMPAIRED_SPEC
 from monitor.state import State
+from server.judge.drive import Drive
+from server.judge.offline import Observer, OfflineRun
+from server.judge.run_state import RunState
 from server.protocol import serialize
 from server.recording.read.read import Recording
 from server.replay.checkpoint import restore, save
-from server.replay.drive import Drive
-from server.replay.run import Run
-from server.replay.run_state import RunState
 
 BUCKETS = 360  # of the speed: two pixels each on a phone
 LEAST_BUCKET_S = 0.5
@@ -29,7 +29,7 @@ LEAST_KEYFRAME_S = 10.0
 MOST_MARKS = 400  # more alarms than a person can look at: the most urgent are kept
 
 
-class Index:
+class Index(Observer):
     """Times are seconds since the beginning of the recording."""
 
     def __init__(self, recording: Recording, drive: Drive) -> None:
@@ -45,19 +45,12 @@ class Index:
         self._kept: list[bytes] = []
         self.is_done = False
         self.broke_off: str | None = None  # why the recording could not be read to its end
-        told = drive.recorded.has_alarms
         self._specs = {check.id: check.alarm for check in CHECKS} | {IMPAIRED: IMPAIRED_SPEC}
-        if told:
+        if drive.recorded.has_alarms:
             for at_s, word in drive.recorded.words:
                 if isinstance(word, Transition):
                     self._mark(word, at_s)
-        self._run = Run(
-            recording,
-            drive,
-            on_judged=(lambda _: None) if told else self._judged,
-            on_changed=self._changed,
-            on_message=self._message,
-        )
+        self._run = OfflineRun(recording, drive, observer=self)
 
     @property
     def every_s(self) -> float:
@@ -86,7 +79,7 @@ class Index:
         """There is no more to come."""
         if not self.is_done:
             self.is_done = True
-            self._message(self._drive.length_s)
+            self.message_received("", self._drive.length_s)
 
     def before(self, at_s: float) -> tuple[float, Callable[[], RunState]] | None:
         """The newest moment kept that is not later, and how to get what was known then."""
@@ -107,9 +100,11 @@ class Index:
             "marks_left_out": len(self._marks) + self._lost_marks - len(marks),
         }
 
-    def _judged(self, transitions: Sequence[Transition]) -> None:
-        for transition in transitions:
-            self._mark(transition, transition.at_s)
+    def judged(self, transitions: Sequence[Transition], now_s: float) -> None:
+        """Alarms are marked where the recording does not hold them."""
+        if not self._drive.recorded.has_alarms:
+            for transition in transitions:
+                self._mark(transition, transition.at_s)
 
     def _mark(self, transition: Transition, at_s: float) -> None:
         spec = self._specs.get(transition.alarm_id)
@@ -127,7 +122,8 @@ class Index:
         }
         self._marks.append((spec.priority.rank, at_s, mark))
 
-    def _changed(self, changed: tuple[str, ...], state: State, now_s: float) -> None:
+    def signals_changed(self, changed: tuple[str, ...], state: State, now_s: float) -> None:
+        """The highest speed of each bucket is kept."""
         if "speed" not in changed:
             return
         reading = state.get("speed")
@@ -137,7 +133,8 @@ class Index:
             before = self._speed[place]
             self._speed[place] = abs(speed) if before is None else max(before, abs(speed))
 
-    def _message(self, now_s: float) -> None:
+    def message_received(self, topic: str, now_s: float) -> None:
+        """Where none comes for long is a gap."""
         if now_s - self._heard_s > GAP_S:
             self._gaps.append((self._heard_s, now_s))
         self._heard_s = max(self._heard_s, now_s)

@@ -1,4 +1,4 @@
-"""One tick of a session, ten a second: each part looks at the others, then every check is judged."""
+"""One tick of a session: each part receives what the others know, then every check is judged."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from server.vehicle.tick_parts import LogKeeper, OpenFilesWatch, TickParts
 
 log = logging.getLogger("catgraph.session")
 
+FRAME_TICKS = 2  # a state is put on the bus with every second tick, ten a second
 READ_UP_S = 0.1  # to read what waits after the loop stood still
 TELL_STALL_S = 2.0  # a page that was covered for so long is told why
 SICK_LOOP_S = 0.25  # a loop later than this lets one heartbeat fall: a sign of life from a sick server is a lie
@@ -41,6 +42,7 @@ class Tick:
         self._parts = parts
         self._attempts = attempts
         self._now = now
+        self._count = 0
         self._ended_s = now()  # when the newest tick came to its end
         self.lag_s = 0.0  # how late the newest one began
         self._wall_ms = wall_ms
@@ -70,7 +72,8 @@ class Tick:
                 await self._catch_up()
             await self._parts.slow_down.go_first()
             try:
-                self.run(self._now(), put=self.lag_s <= SICK_LOOP_S)
+                self._count += 1
+                self.run(self._now(), put=self.lag_s <= SICK_LOOP_S and self._count % FRAME_TICKS == 0)
                 self._ended_s = self._now()
             except Exception:  # the one net: a fault in a tick must not end the ticking
                 log.exception("a tick of %s failed", self._vehicle)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -234,7 +234,7 @@ def test_the_delays_are_what_they_say(day: list[tuple[float, Finding]], delay_s:
         if finding.verdict is not last:
             last, since_s = finding.verdict, now_s
         was_active = alarm.active
-        alarm, _ = advance(alarm, replace(finding, causes=(), level=0), now_s)
+        alarm, _ = advance(alarm, finding._replace(causes=(), level=0), now_s)
         if finding.verdict is Verdict.FAULT and now_s - since_s >= delay_s:
             assert alarm.active
         if finding.verdict is Verdict.OK:

@@ -21,7 +21,7 @@ from tests.monitor.test_runner import BAD, Script, at, check
 
 PATIENT = replace(SPEC, on_delay_s=0.0, off_delay_s=1.0, needs_ack=True)
 LIMIT = Quantity(label="Limit", value=11.0, unit="m/s")
-TRIP = replace(fault("12.6 m/s", causes=("a",)), measured=Quantity(label="Speed", value=12.6, unit="m/s"), limit=LIMIT)
+TRIP = fault("12.6 m/s", causes=("a",))._replace(measured=Quantity(label="Speed", value=12.6, unit="m/s"), limit=LIMIT)
 
 
 def lived(*findings: Finding, spec: AlarmSpec = PATIENT, each_s: float = 1.0) -> tuple[Alarm, list[Transition]]:
@@ -142,7 +142,7 @@ def test_an_acknowledged_alarm_whose_cause_is_still_there_is_not_announced_again
     alarm = restored([*told, *happened])
     assert (alarm.state, alarm.acknowledged_by) == (AlarmState.ACKED, "Ann")
     assert advance(alarm, TRIP, 60.0)[1] == ()
-    worse = replace(TRIP, causes=("a", "b"))
+    worse = TRIP._replace(causes=("a", "b"))
     assert [t.change for t in advance(alarm, worse, 60.0)[1]] == ["recaused"]
 
 

@@ -44,23 +44,36 @@ def at(now_s: float, phase: str = "monitoring", paused: bool = False) -> Snapsho
 BAD = fault("it is bad")
 
 
-def test_a_tick_runs_all_and_an_event_only_who_needs_it() -> None:
-    a, b = Script(), Script()
-    monitor = Monitor([check("a", a, needs=frozenset({"speed", "brake"})), check("b", b)])
+def test_a_tick_judges_all_and_a_message_the_immediate_checks_that_need_it() -> None:
+    a, b, c = Script(), Script(), Script()
+    monitor = Monitor(
+        [
+            check("a", a, needs=frozenset({"speed", "brake"}), immediate=True),
+            check("b", b, immediate=True),
+            check("c", c, needs=frozenset({"speed"})),
+        ]
+    )
     monitor.step(at(0.0))
-    assert (a.asked, b.asked) == (1, 1)
+    assert (a.asked, b.asked, c.asked) == (1, 1, 1)
     monitor.step(at(0.1), ("speed",))
-    assert (a.asked, b.asked) == (2, 1)
+    assert (a.asked, b.asked, c.asked) == (2, 1, 1)
     monitor.step(at(0.2), ("speed", "acceleration", "brake"))
-    assert (a.asked, b.asked) == (3, 1)
+    assert (a.asked, b.asked, c.asked) == (3, 1, 1)
     monitor.step(at(0.3), ("scan",))
     monitor.step(at(0.3), ())
-    assert (a.asked, b.asked) == (3, 1)
+    assert (a.asked, b.asked, c.asked) == (3, 1, 1)
+    assert monitor.has_immediate(("speed",))
+    assert not monitor.has_immediate(("scan",))
+
+
+def test_what_hurts_within_a_moment_is_judged_with_each_message() -> None:
+    immediate = {check.id for check in catalog.CHECKS if check.immediate and check.needs}
+    assert immediate == {"speed_limit", "obstacle", "obstacle_nearest", "pedals", "no_response"}
 
 
 def test_an_event_raises_in_the_same_pass() -> None:
     script = Script()
-    monitor = Monitor([check("a", script, needs=frozenset({"speed"}))])
+    monitor = Monitor([check("a", script, needs=frozenset({"speed"}), immediate=True)])
     script.finding = BAD
     (raised,) = monitor.step(at(0.05), ("speed",))
     assert (raised.alarm_id, raised.change, raised.at_s, raised.announces) == ("a", "raised", 0.05, True)
@@ -120,7 +133,7 @@ def test_one_more_broken_check_is_announced_and_a_repaired_one_clears() -> None:
 
 
 def test_a_check_that_breaks_on_an_event_is_told_at_once() -> None:
-    monitor = Monitor([check("a", Script(RuntimeError("a")), needs=frozenset({"speed"}))])
+    monitor = Monitor([check("a", Script(RuntimeError("a")), needs=frozenset({"speed"}), immediate=True)])
     assert [t.alarm_id for t in monitor.step(at(0.0), ("speed",))] == [IMPAIRED]
 
 
@@ -220,7 +233,7 @@ def test_thresholds_may_change_while_running() -> None:
         return OK
 
     speed = next(check for check in catalog.CHECKS if check.id == "speed_limit")
-    monitor = Monitor([replace(speed, find=find, is_harmless=None)])
+    monitor = Monitor([replace(speed, find=find)])
     monitor.step(at(0.0))
     monitor.limits = catalog.changed(AllLimits(), {"speed_limit.max_mps": 5.0})
     monitor.step(at(0.1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from functools import cache
 from itertools import takewhile
@@ -9,11 +10,13 @@ from typing import Any
 
 import pytest
 
+from monitor.alarm import Transition
 from monitor.stamps import StampFollower
-from server.analysis.rehearse import Extract, _Run
-from server.analysis.thresholds import Wishes
 from server.cli.replay import Rounds
+from server.judge.drive import Drive
 from server.judge.message import Message
+from server.judge.offline import Observer, OfflineRun
+from server.judge.recorded_events import RecordedEvents
 from server.recording.read.read import TopicInfo
 from server.rosbridge_server.stamps import moved
 from server.simulator.car import SimulatedCar
@@ -85,16 +88,17 @@ def test_a_replay_again_and_again_has_no_clock_that_jumps_and_no_negative_age(
     rounds = max(3, round(HORIZON_S / ((ROUND_S - start_s) / rate)))
     watched: Any = Watched(recorded, rate=rate, start_s=start_s, rounds=rounds, now_s=now_s)
     ages: list[float] = []
-    run = _Run(watched, Wishes(), Extract(), (), False, None)
-    judge = run._judge
+    raised: set[str] = set()
 
-    def judged(at_s: float, changed: Any) -> None:
-        judge(at_s, changed)
-        ages.extend(reading.age_s(at_s) for reading in run._state.snapshot(at_s).readings.values())
+    class Ages(Observer):
+        def judged(self, transitions: Sequence[Transition], now_s: float) -> None:
+            raised.update(one.alarm_id for one in transitions if one.change == "raised")
 
-    run._judge = judged  # type: ignore[method-assign]
-    found = run.run()
-    raised = sorted({one.alarm_id for one in found.transitions if one.change == "raised"})
+        def ticked(self, run: OfflineRun, now_s: float) -> None:
+            ages.extend(reading.age_s(now_s) for reading in run.run_state.state.snapshot(now_s).readings.values())
+
+    run = OfflineRun(watched, Drive(watched, RecordedEvents()), opens_with_message=True, observer=Ages())
+    run.advance(math.inf, to_last_message=True)
     assert min(ages) >= 0.0
     assert len(ages) > 1000
     assert "clock_jump" not in raised, raised

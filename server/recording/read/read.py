@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import orjson
 
-from server.judge.message import Json, Message, RosVersion, message_of
+from server.judge.message import Json, Message, RosVersion
 from server.recording.mcap.mcap_file import McapFile, is_bag2
 from server.recording.mcap.truncated import CutMcapFile, is_cut
 from server.recording.own import PREFIX
@@ -117,7 +117,7 @@ class Recording:
     def messages(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Message]:
         """All messages in time order, from `start_s` after the beginning on, read as they are asked for; see `rows`."""
         return (
-            message_of(at_s=at_s, topic=topic, type=type, message=message)
+            Message(at_s=at_s, topic=topic, type=type, message=message)
             for at_s, topic, type, message in self.rows(start_s, topics)
         )
 

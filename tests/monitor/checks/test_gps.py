@@ -180,7 +180,7 @@ def test_the_real_fault_of_2016_07_28_is_a_jump_within_half_a_second(recordings:
         state.receive("speed", Twist(speed_mps=0.0, yaw_rate_radps=None), at_s - 0.01)
         fix = GpsFix(lat_deg=float(row["latitude"]), lon_deg=float(row["longitude"]), covariance_type=2)
         state.receive("position", fix, at_s, stamp_s)
-        for transition in monitor.step(state.snapshot(at_s), {"position"}):
+        for transition in monitor.step(state.snapshot(at_s)):
             if transition.alarm_id == "gps_jump" and transition.change == "raised":
                 raised_s = at_s - 1.0
     assert raised_s is not None

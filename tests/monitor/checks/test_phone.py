@@ -300,11 +300,3 @@ def test_where_and_how_they_are_told() -> None:
     assert specs["phone_tracks"].inhibited_by == ("phone_car",)
     assert specs["phone_car"].inhibited_by == ("gps_jump", "gps_drift")
     assert {check_of(check).tile_label for check in CHECKS} == {"Phone–car", "Tracks"}
-
-
-def test_the_quick_look_is_true_only_without_a_phone() -> None:
-    for check in map(check_of, CHECKS):
-        assert check.is_harmless is not None
-        limits = check.limits()
-        assert check.is_harmless(replace(known(NOW_S, position=CAR), phone=NO_PHONE), limits)
-        assert not check.is_harmless(replace(known(NOW_S, position=CAR), phone=view()), limits)

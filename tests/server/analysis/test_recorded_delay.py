@@ -8,12 +8,13 @@ from typing import Any
 
 import pytest
 
+from server.analysis.own_events import read_recorded_events
 from server.analysis.rehearse import rehearse
 from server.app.config import Config
-from server.recording.delay import DelayWriter, LinkDelay, RecordedDelay
+from server.judge.drive import Drive
+from server.judge.offline import OfflineRun
+from server.recording.delay import DelayWriter, LinkDelay, RecordedDelay, recorded_delay
 from server.recording.read.read import open_recording
-from server.replay.recorded_events import read_recorded_events
-from server.replay.run import Drive, Run
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
@@ -76,7 +77,7 @@ async def test_a_session_over_a_slow_link_is_judged_again_as_it_was(bridge: RosB
         for alarm in ("link_late", "link_late_moving"):
             print(f"{alarm}: {raised[alarm]:.3f} s, judged again {again[alarm]:.3f} s")
             assert again[alarm] == pytest.approx(raised[alarm], abs=TICK_S), alarm
-        run = Run(recording, Drive(recording, read_recorded_events(recording), ""))
+        run = OfflineRun(recording, Drive(recording, read_recorded_events(recording), delay=recorded_delay(recording)))
         run.advance(raised["link_late_moving"])
         reading = run.run_state.state.get("speed")
         assert reading is not None

@@ -70,7 +70,7 @@ def test_the_token_itself_stands_only_in_the_code() -> None:
 
 def test_without_https_it_says_what_the_phone_will_lack() -> None:
     said = text(Announcement(config=Config(host="0.0.0.0", tls=Tls(mode="off")), url="http://192.168.4.1:8000/"))
-    for part in ("no position", "screen awake", "installs nothing", "shares files", "copies text", "read along"):
+    for part in ("no position", "screen awake", "installs nothing", "shares files", "copies text", "eavesdrop"):
         assert part in said
 
 

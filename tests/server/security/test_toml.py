@@ -12,12 +12,12 @@ from pathlib import Path
 import httpx
 import pytest
 
-from server.analysis.thresholds import BadSettingsFile, read_wishes
+from server.analysis.own_events import MOST_SETTINGS, read_recorded_events
+from server.analysis.thresholds import BadSettingsFile, read_override
 from server.app.config import Config
 from server.judge.settings import BadSetting, SettingsFile, from_toml, salvage
 from server.mail.settings import MailSettingsFile
 from server.recording.catalog.survey import _chosen
-from server.replay.recorded_events import MOST_SETTINGS, read_recorded_events
 from server.storage.bounded_toml import MAX_BYTES, MAX_ENTRIES, MAX_LINE, MAX_NESTING, MAX_PARTS, BadToml, loads
 from server.web.maps.mbtiles import MapRefused
 from server.web.maps.site_image import site_image
@@ -150,7 +150,7 @@ def test_every_reader_of_toml_is_bounded(tmp_path: Path) -> None:
     file = tmp_path / "settings.toml"
     file.write_text(DOTTED)
     with pytest.raises(BadSettingsFile, match="4096 characters"):
-        read_wishes(file)
+        read_override(file)
     kept = SettingsFile(file)
     kept.read()
     assert "4096 characters" in (kept.complaint or "")

@@ -10,7 +10,7 @@ from monitor.runner import Monitor
 from monitor.state import State
 from monitor.trends import Trends
 from server.judge.reception_stats import Reception
-from server.replay.recorded_slowdown import Slowed
+from server.judge.recorded_slowdown import Slowed
 
 
 @dataclass(slots=True, kw_only=True)

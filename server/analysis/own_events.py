@@ -1,55 +1,25 @@
-"""What a recording of our own tells beside the car's messages: alarms as they were told, pauses, settings, phones."""
+"""Reads the channels of our own of a recording: alarms, pauses, settings, phones, slow-downs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
 from pydantic import ValidationError
 
-from monitor.alarm import Transition
 from monitor.phones import PhoneWord
+from server.judge import recorded_slowdown
+from server.judge.recorded_events import NewSettings, Pause, RecordedEvents, Word
 from server.protocol.commands import Position
 from server.recording.read.read import Recording
 from server.recording.standing import read_standing
-from server.replay import recorded_slowdown
-from server.replay.recorded_slowdown import SlowDownTold
 from server.vehicle import phone
 from server.vehicle.restore import transition_of
 
 ALARMS, PHONE, SETTINGS = "/catgraph/alarms", "/catgraph/phone", "/catgraph/settings"
 MOST_SETTINGS = 200  # changes of the settings: each is a file to read
 MOST = 50_000  # rows of one channel: a day of a phone; a file that holds more is not of our making
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pause:
-    """Monitoring was paused or went on."""
-
-    is_paused: bool
-    by: str | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NewSettings:
-    """The settings from here on, as the file of all of them."""
-
-    toml: str
-
-
-Word = Transition | Pause | NewSettings | PhoneWord | SlowDownTold
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RecordedEvents:
-    """Everything of one recording, in the order of time. Times are seconds since its beginning."""
-
-    words: tuple[tuple[float, Word], ...] = ()
-    has_alarms: bool = False  # its own alarm channel: what the operator was told
-    settings: str | None = None  # that were in force at its beginning; None: it does not say
-    notes: tuple[str, ...] = field(default=())
 
 
 def read_recorded_events(recording: Recording) -> RecordedEvents:

@@ -1,0 +1,37 @@
+"""Settings that a recording is judged with, laid over the car's profile."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from server.judge.active_settings import Tuning
+from server.judge.message import RosVersion
+from server.judge.settings import AUTO, SettingsFile, from_toml
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SettingsOverride:
+    """Settings of a file or a recording; everything else stays as the car's profile has it."""
+
+    name: str = ""  # of the file
+    values: Mapping[str, float] = field(default_factory=dict)  # "speed_limit.max_mps": 9.0
+    topics: Mapping[str, str] = field(default_factory=dict)  # signal → topic
+    profile: str = AUTO
+
+
+def override_of(toml: str) -> SettingsOverride:
+    """A file of all settings, as a recording holds it. Raises BadSetting."""
+    read = from_toml(toml)
+    return SettingsOverride(name="as recorded", values=read.values, topics=read.topics, profile=read.profile)
+
+
+def tuning_for(override: SettingsOverride, topics: Mapping[str, str], ros: RosVersion) -> Tuning:
+    """How a car with these topics is judged: its profile as live recognises it, then the override."""
+    tuning = Tuning(SettingsFile(None))
+    tuning.recognise(topics, ros)
+    if override.topics or override.profile != AUTO:
+        tuning.change(values={}, topics=dict(override.topics), profile=override.profile, version=None)
+    if override.values:  # after the profile: what is kept of them is what differs from its defaults
+        tuning.change(values=dict(override.values), topics={}, profile=None, version=None)
+    return tuning
