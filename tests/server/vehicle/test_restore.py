@@ -80,8 +80,7 @@ def test_a_life_written_and_read_again_is_the_same(
 
 
 def test_the_values_at_the_trip_come_through_the_log() -> None:
-    trip = replace(
-        fault("12.6 m/s", causes=("x",), level=2),
+    trip = fault("12.6 m/s", causes=("x",), level=2)._replace(
         measured=Quantity(label="Speed", value=12.6, unit="m/s"),
         limit=Quantity(label="Limit", value=11.0, unit="m/s"),
     )

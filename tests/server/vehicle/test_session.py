@@ -71,7 +71,7 @@ async def test_events_reach_a_page_before_a_state_is_made(bridge: RosBridge) -> 
     after = [
         next(one for one in happened[i:] if one != "events") for i, kind in enumerate(happened) if kind == "events"
     ]
-    assert set(after) == {"told"}
+    assert set(after) == {"told"}, happened
 
 
 async def test_a_killed_bridge_is_said_at_once_and_data_flow_again(bridge: RosBridge, server: str) -> None:
