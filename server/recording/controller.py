@@ -38,9 +38,9 @@ class SessionRecording:
         now: Callable[[], float],
         wall_ms: Callable[[], int],
         told: Callable[[Path], None] = lambda _: None,
-        unreadable: Callable[[str], None] = lambda _: None,
+        unreadable: Callable[[str, str], None] = lambda *_: None,
     ) -> None:
-        """`unreadable(why)` is called for each message that came unparsed and could not be read."""
+        """`unreadable(topic, why)` is called for each message that came unparsed and could not be read."""
         self._folder = folder
         self._now = now
         self._settings = RecordingSettings(tuning)

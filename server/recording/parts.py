@@ -42,7 +42,7 @@ class RecordingParts:
         now: Callable[[], float],
         wall_ms: Callable[[], int],
         on_finished: Callable[[Path], None],
-        on_unreadable: Callable[[str], None],
+        on_unreadable: Callable[[str, str], None],
     ) -> None:
         self.recorder: Recorder | None = None
         self.early = EarlyEntries()

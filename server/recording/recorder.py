@@ -42,7 +42,7 @@ class Recorder:
         call: Callable[..., Any],
         on_finished: Callable[[Path], None],
         allowance: Allowance,
-        on_unreadable: Callable[[str], None] = lambda _: None,
+        on_unreadable: Callable[[str, str], None] = lambda *_: None,
     ) -> None:
         self._queue = RecorderQueue()
         self._thread = RecorderThread(

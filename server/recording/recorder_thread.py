@@ -70,7 +70,7 @@ class RecorderThread:
         *,
         call: Callable[..., Any],
         on_finished: Callable[[Path], None],
-        on_unreadable: Callable[[str], None],
+        on_unreadable: Callable[[str, str], None],
         allowance: Allowance,
     ) -> None:
         self.allowance = allowance
@@ -158,7 +158,7 @@ class RecorderThread:
         try:
             writer.message(item.topic, item.type, item.at_ns, item.message)
         except Unreadable as why:
-            self._call(self._on_unreadable, str(why))
+            self._call(self._on_unreadable, item.topic, str(why))
         except Exception:  # nothing is known that does it; it may cost its message and not the recording
             self._queue.drop(item.now_s)
             if not self._stumbled:

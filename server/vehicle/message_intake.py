@@ -57,6 +57,12 @@ class MessageIntake:
         if why == "binary noise" and self._scans.is_empty and self._connection is not None:
             self._connection.subscriptions.binary_noise()
 
+    def recorded_unreadable(self, topic: str, why: str) -> None:
+        """Counts a message that the recorder could not read; its topic is received as JSON from now on."""
+        self._judgement.reception.junk(why)
+        if self._connection is not None:
+            self._connection.subscriptions.unreadable(topic, why)
+
     def frame_received(self, frame: RawFrame) -> bool:
         """A message that is only recorded goes to the recorder as it came: parsing it is no work for the loop."""
         connection = self._connection

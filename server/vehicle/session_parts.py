@@ -93,7 +93,7 @@ def session_parts(
         now=now,
         wall_ms=wall_ms,
         told=on_finished,
-        unreadable=lambda why: intake.junk_received(why),
+        unreadable=lambda topic, why: intake.recorded_unreadable(topic, why),
     )
     event_log = Logbook(vehicle, bus, settings, wall_ms=wall_ms, also=recording.events)
     slow_down = Slowing(

@@ -101,10 +101,14 @@ class SubscriptionTable:
             if row.type is None and self._delivery.never_heard(row.topic):
                 self._renew(row.topic)
 
+    def is_cbor(self, topic: str) -> bool:
+        """Whether a topic is subscribed to as CBOR."""
+        return any(row.topic == topic and row.compression == "cbor" for row in self.rows)
+
     def renew(self, topic: str) -> bool:
         """A subscription that another client spoilt comes alive; one as CBOR is to be made as JSON: then `subscribe` is
         still to be called, and the answer is true."""
-        if any(row.topic == topic and row.compression == "cbor" for row in self.rows):
+        if self.is_cbor(topic):
             self.cbor.did_not_arrive(topic)
             return True
         self._renew(topic)

@@ -123,11 +123,8 @@ class Subscriptions:
     @property
     def missing(self) -> Missing:
         """What is offered and does not come to be recorded."""
-        return Missing(
-            left_out=self.table.recorded.left_out,
-            not_received=self._missing.not_received,
-            too_large=self.table.large.left,
-        )
+        left_out, too_large = self.table.recorded.left_out, self.table.large.left
+        return Missing(left_out=left_out, not_received=self._missing.not_received, too_large=too_large)
 
     def published(self) -> frozenset[str]:
         """The signals that the car has in a form that can be read; not yet one whose publisher has only just come."""
@@ -160,13 +157,9 @@ class Subscriptions:
         """Subscribes to less where the link is late, and to more once it is in time; True where that changed."""
         changed, left = self.table.look_at_load(late_s)
         self._note_left(left)
-        if not changed:
-            return False
-        if self._offer is not None:
-            self._subscribe()
-        elif self._link is not None and self.by_topic:
-            self._subscribe_by_name()
-        return True
+        if changed:
+            self.map_again()
+        return changed
 
     def record(self, also: Also) -> None:
         """Which topics are to be recorded beyond those that carry signals; nobody judges them."""
@@ -176,7 +169,7 @@ class Subscriptions:
                 self._subscribe()
 
     def map_again(self) -> None:
-        """After a change of settings or of what is published."""
+        """After a change of settings, of what is published, or of what the link bears."""
         if self._offer is not None:
             self._map(self._offer)
         elif self._link is not None and self.by_topic:
@@ -207,6 +200,12 @@ class Subscriptions:
             else:
                 self._link.unsubscribe(topic)
             self._noted(self.table.large.sentence(topic))
+
+    def unreadable(self, topic: str, why: str) -> None:
+        """A message of a recorded topic could not be read: as JSON its text is recorded, whatever it holds."""
+        if self._offer is not None and self.table.is_cbor(topic):
+            self._subscribe_anew(topic)
+            self._noted(f"{topic} is received as JSON from now on: {why} could not be read, and is not recorded.")
 
     def fell_silent(self) -> None:
         """The link was given up because the bridge did not answer."""

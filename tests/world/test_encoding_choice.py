@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import time
 from pathlib import Path
@@ -9,9 +10,15 @@ from typing import Any
 
 import pytest
 
+from server.app.config import Config
 from server.judge.message import RosVersion
 from server.judge.topics import TOPICS
 from server.vehicle.encoding_choice import fit_for_cbor
+from server.vehicle.vehicle import Vehicle
+from tests.server.cars import driving
+from tests.server.conftest import serving
+from tests.server.rosbridge_server.conftest import bridging
+from tests.server.viewer import viewer
 from tests.tree import RECORDINGS
 
 TRANSCRIPTS = RECORDINGS / "rosbridge"
@@ -120,3 +127,27 @@ def test_a_definition_that_holds_too_much_is_not_fit_and_takes_no_time() -> None
         began_s = time.process_time()
         assert fit_for_cbor(["car_msgs/Thing"], {"car_msgs/Thing": definition}, 1) == set()
         assert time.process_time() - began_s < 5.0
+
+
+async def test_what_holds_too_much_to_be_read_as_cbor_is_recorded_as_json(tmp_path: Path) -> None:
+    """A path of 9000 poses, or a polygon of 60 000 points: it was counted as unreadable, and named nowhere."""
+    polygon = {"points": [{"x": 1.0, "y": 2.0, "z": 0.5}] * 60_000}
+
+    async with bridging(ros_version=1, like="real") as (bridge, port):
+        bridge.advertise("/catvehicle/vel", "geometry_msgs/Twist")
+        bridge.advertise("/polygon", "geometry_msgs/Polygon")
+
+        async def draw() -> None:
+            while True:
+                await asyncio.sleep(1.0)
+                bridge.publish("/polygon", polygon)
+
+        config = Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{port}"),), data=tmp_path)
+        async with driving(bridge), serving(config) as base, viewer(base) as one:
+            drawing = asyncio.create_task(draw())
+            try:
+                await one.state(lambda s: s["recording"]["as_json"] >= 2, 60.0)
+            finally:
+                drawing.cancel()
+            assert one.states[-1]["link"]["unreadable_frames"] >= 1
+            assert any(event["text"].startswith("/polygon is received as JSON") for event in one.events)
