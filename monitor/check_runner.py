@@ -32,6 +32,13 @@ class CheckRow(NamedTuple):
     limits: Any
 
 
+def blind_to_the_car(snapshot: Snapshot) -> Finding | None:
+    """Why nothing of the car can be judged now; None: it can."""
+    if snapshot.link.phase != "monitoring":
+        return NO_LINK
+    return PAUSED if snapshot.paused else None
+
+
 class CheckRunner:
     """Asks checks for their findings, and keeps which of them fail."""
 
@@ -42,14 +49,14 @@ class CheckRunner:
         self._failed: dict[str, int] = {}  # how often ever, by check id
         self.crashes: dict[str, Crash] = {}  # checks that fail now, by check id
 
-    def find(self, row: CheckRow, snapshot: Snapshot, *, is_active: bool) -> Finding:
-        """What the check finds; `is_active`: whether its alarm is. A check that fails finds UNKNOWN."""
+    def find(self, row: CheckRow, snapshot: Snapshot, blind: Finding | None, *, is_active: bool) -> Finding:
+        """What the check finds; `is_active`: whether its alarm is. A check that fails finds UNKNOWN.
+
+        `blind`: what every check of the car finds, see `blind_to_the_car`.
+        """
         check = row.check
-        if check.scope is Scope.CAR:
-            if snapshot.link.phase != "monitoring":
-                return NO_LINK
-            if snapshot.paused:
-                return PAUSED
+        if blind is not None and check.scope is Scope.CAR:
+            return blind
         try:
             finding = check.find(snapshot, row.limits, is_active)
             if type(finding) is not Finding:

@@ -11,7 +11,7 @@ from monitor.alarm_order import standing, suppressed
 from monitor.alarm_spec import Action, AlarmSpec, Place, Priority, Sound
 from monitor.catalog import CHECKS, AllLimits, AnyCheck, compose
 from monitor.check import Finding, Scope, Verdict, unknown
-from monitor.check_runner import CheckRow, CheckRunner, Crash
+from monitor.check_runner import CheckRow, CheckRunner, Crash, blind_to_the_car
 from monitor.inhibition import table_of
 from monitor.restoring import numbered_on, restore
 from monitor.snapshot import Snapshot
@@ -82,8 +82,9 @@ class Monitor:
         if snapshot.link.phase == "idle":
             return self.end(snapshot.now_s)
         transitions: list[Transition] = []
+        blind = blind_to_the_car(snapshot)
         for row in self._rows if changed is None else self._immediate(changed):
-            transitions += self._judge(row, snapshot)
+            transitions += self._judge(row, snapshot, blind)
         if self.crashes or (changed is None and (self.failed_parts or not self.alarms[IMPAIRED].is_at_rest)):
             transitions += self._advance(IMPAIRED, self._runner.impaired(self.failed_parts), snapshot.now_s, ())
         return tuple(transitions)
@@ -160,9 +161,10 @@ class Monitor:
                 self._immediate_rows[together] = found
         return found
 
-    def _judge(self, row: CheckRow, snapshot: Snapshot) -> tuple[Transition, ...]:
-        check, alarm = row.check, self.alarms[row.check.id]
-        finding = self._runner.find(row, snapshot, is_active=alarm.active)
+    def _judge(self, row: CheckRow, snapshot: Snapshot, blind: Finding | None) -> tuple[Transition, ...]:
+        check = row.check
+        alarm = self.alarms[check.id]
+        finding = self._runner.find(row, snapshot, blind, is_active=alarm.active)
         by = self._causes.holding(check.id, snapshot.now_s)
         is_fault = finding.verdict is Verdict.FAULT
         if not is_fault and not by and not snapshot.paused and alarm.is_at_rest:  # by far the most frequent case
