@@ -6,7 +6,7 @@ import { INKS, colour, make, must } from './elements.js';
 import { clock, indexAt, joined } from './layout.js';
 import { GUTTER, SIDE, data, followers, lay, redraws, repaints, timeline, view } from './view.js';
 
-/** @typedef {import('./layout.js').Panel} Panel */
+/** @import { Panel } from './layout.js' */
 
 const REASONS = { ok: 'in order', fault: '', unknown: 'not checked' };
 

@@ -6,7 +6,8 @@ import { within } from './layout.js';
 export const GUTTER = 52; // as in report.css
 export const SIDE = 16;
 
-/** @type {import('./layout.js').Data} */
+/** @import { Data } from './layout.js' */
+/** @type {Data} */
 export const data = JSON.parse(must('data').textContent ?? '');
 const worst = data.episodes.find((bar) => bar.priority === 'critical') ?? data.episodes[0];
 export const view = { from: data.from, to: data.to, at: worst ? worst.from : (data.from + data.to) / 2 };
