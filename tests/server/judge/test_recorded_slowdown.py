@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from monitor.checks.slow_down import SlowDownLimits
-from server.judge.recorded_slowdown import Slowed
 from server.judge import recorded_slowdown
+from server.judge.recorded_slowdown import Slowed
 
 START_S = 1_790_000_000.0
 LIMITS = SlowDownLimits()
