@@ -22,7 +22,7 @@ class Topic:
     by_type: tuple[
         str, ...
     ] = ()  # types that only this signal has: taken under any name when none of the names is there
-    # Messages the bridge keeps for us in a burst: what comes in a fifth of a second, for what waits there grows old
+    # Messages the bridge keeps for us in a burst: what comes in some 0.15 s or more, for what waits there grows old
     # unseen, and what does not fit is lost; 1 for what is large.
     queue_length: int = 5
     compression: str = "none"
@@ -70,7 +70,7 @@ TOPICS = (
     ),
     Topic(
         signal="distance",
-        queue_length=15,
+        queue_length=10,
         names=(
             "/DistanceEstimator/dist",
             "/catvehicle/distanceEstimator/dist",
@@ -80,7 +80,7 @@ TOPICS = (
     ),
     Topic(
         signal="bearing",
-        queue_length=15,
+        queue_length=10,
         names=(
             "/DistanceEstimator/angle",
             "/catvehicle/distanceEstimator/angle",
@@ -121,7 +121,7 @@ TOPICS = (
     ),
     Topic(
         signal="command",
-        queue_length=15,
+        queue_length=10,
         names=("/catvehicle/cmd_vel", "/cmd_vel"),
         types={"geometry_msgs/Twist": decode.command, "geometry_msgs/TwistStamped": decode.command_stamped},
     ),

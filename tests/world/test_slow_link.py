@@ -50,7 +50,7 @@ def streams(rng: random.Random) -> list[Stream]:
         one("/vel", 20, 190),
         one("/brake", 20, 190),
         one("/steering", 20, 190),
-        one("/dist", 75, 75, queue_length=rng.choice([1, 5, 15])),
+        one("/dist", 75, 75, queue_length=rng.choice([1, 5, 10])),
         one("/gps", 10, 400, stamped=True),
         one("/odom", 20, 1100, stamped=True, queue_length=rng.choice([1, 50])),
         one("/scan", rng.choice([10, 30, 75]), rng.choice([900, 4600]), stamped=True),

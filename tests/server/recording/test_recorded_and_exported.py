@@ -31,7 +31,7 @@ from tests.server.recording.bags import Drive, Row, write_ros1, write_ros2
 from tests.tree import PROJECT
 
 BAG, MCAP = "catvehicle_2016-06-01.bag", "catvehicle_2016-06-01_mcap"
-QUICKER = 2  # times true speed: the bridge keeps a burst of a fifth of a second of it
+QUICKER = 2  # times true speed: the bridge keeps a burst of 0.13 s of it
 REORDERED_WITHIN_S = 0.005
 
 
