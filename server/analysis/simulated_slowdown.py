@@ -33,7 +33,7 @@ class WouldSlow:
         self.slowed: list[Slowed] = []
 
     def look(self, alarms: Mapping[str, Alarm], now_s: float) -> None:
-        """Ten times a second, after the alarms were judged."""
+        """Call with each tick, after the alarms were judged."""
         if not self._is_on:
             return
         due = self._triggers.look(alarms, self._limits, now_s)

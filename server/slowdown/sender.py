@@ -142,7 +142,7 @@ class Slowing:
     # -- time --------------------------------------------------------------------------------------------------------
 
     def tick(self, way: Way, alarms: Mapping[str, Alarm], *, ros_version: int | None, is_paused: bool) -> SlowingFacts:
-        """Ten times a second: the way to the car, the rules, the proof. What the checks are to know."""
+        """With each tick: the way to the car, the rules, the proof. What the checks are to know."""
         now_s = self._now()
         self._ros_version = ros_version or self._ros_version
         self._watch_steering()

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from monitor.recorder import RecorderFacts
 
-LATE_TICK_S = 1.0  # ten ticks
+LATE_TICK_S = 1.0  # twenty ticks
 LATE_STATE_S = 2.0  # pages cover their values by then
 LATE_RECORDER_S = 2.0
 
