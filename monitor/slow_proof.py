@@ -159,6 +159,8 @@ def _before(speeds: list[tuple[float, float]], since_s: float) -> _Before | None
         late = times >= -span_s
         if LEAST_BEFORE <= int(late.sum()) < len(times):
             lines.append(line(times[late], values[late], NOISE_FLOOR_MPS))
+    if len(lines) == 1:  # speeds come seldom: the newest of them say how the motion changed lately
+        lines.append(line(times[-LEAST_BEFORE:], values[-LEAST_BEFORE:], NOISE_FLOOR_MPS))
     return _Before(sign=sign, times_s=times, speeds_mps=values, lines=tuple(lines))
 
 
@@ -226,7 +228,12 @@ def _slows(motion: _Before, times: Floats, values: Floats, step: float, decelera
     least_mps2 = max(LEAST_EXTRA_MPS2, LEAST_EXTRA_SHARE * deceleration_mps2)
     if extra_mps2 > -least_mps2 or slope_mps2 > -SHARE * deceleration_mps2:
         return False
-    since = times[times >= fit.changed_s]
+    is_since = times >= fit.changed_s
+    since = times[is_since]
+    if line(since, values[is_since], NOISE_FLOOR_MPS).slope_mps2 > -least_mps2:
+        return (
+            False  # a motion that changed more often before than the fit allows: by themselves the speeds do not fall
+        )
     lasted_s = float(times[-1]) - fit.changed_s
     error_mps2 = sigma / math.sqrt(float(((since - since.mean()) ** 2).sum())) + step / (2 * lasted_s)
     drop_mps = -slope_mps2 * lasted_s

@@ -60,6 +60,22 @@ def test_of_cars_that_obey_it_is_shown_within_a_second_of_the_response() -> None
     assert len(late_proofs(200, seed=2)) <= 4  # by chance more come in one of 20 seeds where one in a hundred is late
 
 
+STARTS_AND_EASES_OFF = replace(
+    CAR, manner="eases off", speed_mps=2.841910404760974, own_mps2=1.4898226767768399, began_s=0.549252902389668,
+    deceleration_mps2=1.0, rate_hz=50.0, noise_mps=0.0, seed=2845948577,
+)  # fmt: skip
+BRAKES_AND_COMES_SELDOM = replace(
+    CAR, manner="begins to brake", speed_mps=0.9126344840089977, own_mps2=0.9283947873670612,
+    began_s=0.9756251640553849,
+    deceleration_mps2=3.0, rate_hz=10.0, noise_mps=0.05, dropout=0.3, seed=4111232568,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("car", [STARTS_AND_EASES_OFF, BRAKES_AND_COMES_SELDOM], ids=["slows", "stopped"])
+def test_a_motion_that_changed_twice_or_lately_before_the_order_shows_nothing(car: SlowCar) -> None:
+    assert car.judged().shown is None
+
+
 @pytest.mark.soak
 @pytest.mark.timeout(7200)
 def test_no_false_proof_in_a_hundred_thousand_runs() -> None:
