@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -29,13 +28,10 @@ from server.slowdown.note import Note, never_raising, recording_safely
 from server.slowdown.order import BY_HAND, DESERTED_S, LATE_S, Car, Order, SlowDown, Stands
 from server.slowdown.publisher import Mouth
 from server.slowdown.twist import message
-from server.slowdown.urgency import Urgency
 
 log = logging.getLogger("catgraph.slowing")
 
-WATCHED_S = 0.0025  # before a command is due the loop is asked again and again: its timers know whole milliseconds
-KEPT_S = 0.001  # and at last kept, so that nothing is begun that would not be over in time
-A_TICK_S = 0.01  # a tick of the judge, with the state it makes, holds up the loop for less than this
+TIMER_S = 0.001  # timers of the event loop know whole milliseconds
 PERIOD_S = 0.05  # the obstacle stopper lets a command count for 0.2 s
 DOUBT_S = 0.3
 FIRST_SPEED_S = 0.5
@@ -46,7 +42,6 @@ STEERING_NOT_KNOWN = (
 )
 NO_STEERING = "No steering has come from the car: a command would turn its wheels."
 STALL_S = 0.1  # a turn so late was our own fault: what the bridge said meanwhile is still unread
-_URGENCY = Urgency()  # the loop's thread is one for all vehicles
 
 
 class Slowing:
@@ -186,27 +181,17 @@ class Slowing:
             if self._life.order is None:
                 self._ordered.clear()
                 await self._ordered.wait()
-            with _URGENCY.held():
-                await self._speak_on()
+            await self._speak_on()
 
     async def _speak_on(self) -> None:
         """As long as an order stands."""
         while self._life.order is not None:
             left_s = self._due_s - self._now()
-            if left_s > KEPT_S:
-                await asyncio.sleep(max(0.0, left_s - WATCHED_S))
+            if left_s > TIMER_S:
+                await asyncio.sleep(left_s)
                 continue  # one that was ordered meanwhile has its own time
-            _keep(left_s)
             self._due_s = max(self._due_s + PERIOD_S, self._now())
             self._speak_safely()
-
-    async def go_first(self) -> None:
-        """Waits where a command is due before a tick would be over: its evenness is worth a later look at the car."""
-        if self._life.order is None:
-            return
-        left_s = self._due_s - self._now()
-        if 0.0 < left_s < A_TICK_S:
-            await asyncio.sleep(left_s + 0.001)  # by then the command, which is watched for, has gone
 
     async def beat(self) -> None:
         """The operator's heartbeat for the guard, 5 times a second, as long as this server is itself healthy."""
@@ -528,13 +513,6 @@ class Slowing:
             },
             "longest_s": serialize.plain(self.limits.longest_s, 0),
         }
-
-
-def _keep(seconds: float) -> None:
-    """Lets the loop do nothing else: to sleep, and to be woken, takes longer than is left."""
-    ends_s = time.perf_counter() + seconds
-    while time.perf_counter() < ends_s:
-        pass
 
 
 def _said(order: Order) -> str:

@@ -70,7 +70,6 @@ class Tick:
             self.lag_s = max(0.0, loop.time() - due_s)
             if self.lag_s > SICK_LOOP_S and self._parts.connection.phase == "monitoring":
                 await self._catch_up()
-            await self._parts.slow_down.go_first()
             try:
                 self._count += 1
                 self.run(self._now(), put=self.lag_s <= SICK_LOOP_S and self._count % FRAME_TICKS == 0)

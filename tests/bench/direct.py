@@ -15,7 +15,6 @@ import orjson
 
 from server.app.process import uvloop_runner
 from server.simulator.messages import SCAN, VEL
-from server.slowdown.urgency import Urgency
 from tests.bench.lean_socket import LeanSocket, open_socket
 from tests.bench.orders import obey, options
 
@@ -107,11 +106,10 @@ class Direct:
             socket.send(orjson.dumps({"op": "advertise", "topic": topic, "type": "geometry_msgs/Twist"}))
             due_s = loop.time()
             ends_s = due_s + seconds
-            with Urgency().held():
-                while due_s < ends_s:
-                    await asyncio.sleep(max(0.0, due_s - loop.time()))
-                    socket.send(orjson.dumps({"op": "publish", "topic": topic, "msg": _STANDING}))
-                    due_s += period_s
+            while due_s < ends_s:
+                await asyncio.sleep(max(0.0, due_s - loop.time()))
+                socket.send(orjson.dumps({"op": "publish", "topic": topic, "msg": _STANDING}))
+                due_s += period_s
         finally:
             socket.abort()
 

@@ -111,7 +111,7 @@ def _evenness(where: str, held: Held) -> tuple[Row, Row]:
             unit="ms",
             catgraph=_share(ours, 0.99),
             floor=_share(bare, 0.99),
-            reach=2,
+            reach=10,
             digits=2,
         ),
         Row(what=f"off 50 ms, {where}, max", unit="ms", catgraph=max(ours), floor=max(bare), digits=1),
