@@ -8,7 +8,8 @@ VENV := .venv
 PY := $(VENV)/bin/python
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
-PYTEST := PYTHONASYNCIODEBUG=1 $(PY) -m pytest --durations=10
+PYTEST := $(PY) -m pytest
+LOGS := fast slow browser
 FAST := not browser and not slow and not soak
 
 help: ## this list
@@ -21,15 +22,19 @@ test: $(VENV)/.ready-test static/built/built.json ## all of the tests: what must
 	$(PY) -m tests.chromium
 	$(PY) -m tests.vehicle.ros2_environment
 	$(MAKE) --no-print-directory format lint types imports tsc node
+	rm -f $(LOGS:%=out/tests/%.jsonl)
 	status=0; \
-	$(PYTEST) -n 2 -m "$(FAST)" || status=$$?; \
-	$(PYTEST) -n 2 -m "slow and not browser and not soak" || status=$$?; \
-	$(PYTEST) -m "browser and not soak" || status=$$?; \
+	PYTHONASYNCIODEBUG=1 $(PYTEST) --report-log=out/tests/fast.jsonl -n 3 -m "$(FAST)" || status=$$?; \
+	$(PYTEST) --report-log=out/tests/slow.jsonl -n 4 -m "slow and not browser and not soak" || status=$$?; \
+	$(PYTEST) --report-log=out/tests/browser.jsonl -n 2 --dist loadfile -m "browser and not soak" || status=$$?; \
+	$(PY) -m tests.summary $(LOGS:%=out/tests/%.jsonl) || status=$$?; \
 	exit $$status
 
 check: $(VENV)/.ready-test ## the fast half of the tests, without a browser
 	$(MAKE) --no-print-directory format lint types imports tsc node
-	$(PYTEST) -q -n 2 -m "$(FAST)"
+	rm -f out/tests/fast.jsonl
+	status=0; PYTHONASYNCIODEBUG=1 $(PYTEST) -q --report-log=out/tests/fast.jsonl -n 3 -m "$(FAST)" || status=$$?; \
+	$(PY) -m tests.summary out/tests/fast.jsonl && exit $$status
 
 world: $(VENV)/.ready-test static/built/built.json ## what failed on real bridges and for real operators, by its points (docs/world.md)
 	$(PY) -m tests.chromium

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, CDPSession, Page
+from playwright.async_api import Error as PlaywrightError
 
 from tests.page.canned import Canned, alarm
 from tests.page.conftest import PHONE
@@ -19,6 +20,8 @@ from tests.page.conftest import PHONE
 BREAKER = (Path(__file__).parent / "broken.js").read_text(encoding="utf-8")
 TITLE = "Speed above limit"
 LANES = 3
+ANSWER_S = 10.0  # an answer of Chromium about one page; it comes within milliseconds, or never
+ATTEMPTS = 3
 Functions = tuple[tuple[str, str, str], ...]
 # Owner, name and how: broken throws, never does not call back, idle does nothing, set throws in the setter.
 
@@ -78,6 +81,19 @@ class Glass:
         return cls(page, await page.context.new_cdp_session(page))
 
     async def look(self, script: str = LOOK) -> dict[str, Any]:
+        """What is seen; tried again where the document was replaced meanwhile, for then Chromium may never answer."""
+        problems: list[Exception] = []
+        while len(problems) < ATTEMPTS:
+            try:
+                async with asyncio.timeout(ANSWER_S):
+                    if problems:
+                        self._cdp = await self.page.context.new_cdp_session(self.page)
+                    return await self._look(script)
+            except (TimeoutError, PlaywrightError) as problem:
+                problems.append(problem)
+        raise AssertionError(f"The page could not be looked at: {problems}")
+
+    async def _look(self, script: str) -> dict[str, Any]:
         frame = (await self._cdp.send("Page.getFrameTree"))["frameTree"]["frame"]["id"]
         world = await self._cdp.send("Page.createIsolatedWorld", {"frameId": frame})
         asked = {"expression": script, "contextId": world["executionContextId"], "returnByValue": True}
@@ -85,7 +101,9 @@ class Glass:
         return dict(json.loads(value)) if isinstance(value, str) else {}
 
     async def do(self, script: str) -> None:
-        answer = await self._cdp.send("Runtime.evaluate", {"expression": script, "returnByValue": True})
+        """Runs a script in the page itself."""
+        async with asyncio.timeout(ANSWER_S):
+            answer = await self._cdp.send("Runtime.evaluate", {"expression": script, "returnByValue": True})
         assert "exceptionDetails" not in answer, answer
 
     async def until(self, is_so: Any, within_s: float) -> dict[str, Any] | None:
@@ -219,7 +237,7 @@ async def live_in_lanes(browser: Browser, functions: Functions) -> list[str]:
 
 
 @pytest.mark.world(n=14)
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(300)
 async def test_whatever_breaks_while_the_page_is_live_no_old_value_looks_live(browser: Browser) -> None:
     """And once it is mended, what is shown is true: nothing that failed to be written is taken for written."""
     assert await live_in_lanes(browser, IN_EACH_ROUND) == []
@@ -254,7 +272,7 @@ async def before_in_lanes(browser: Browser, served: Canned, functions: Functions
 
 
 @pytest.mark.world(n=14)
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(300)
 async def test_whatever_is_broken_before_the_page_begins_it_says_so(browser: Browser, canned: Canned) -> None:
     assert await before_in_lanes(browser, canned, FUNCTIONS[::6]) == []
 

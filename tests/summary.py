@@ -1,0 +1,115 @@
+"""Prints what the stages of `make test` gave: counts, the slowest tests, what was retried, failed or never ended.
+
+    python -m tests.summary out/tests/fast.jsonl out/tests/slow.jsonl …
+
+Each file is the log of one stage as pytest-reportlog writes it: a line of JSON for each phase of each test. What failed
+and what never ended goes to the error output, as the last lines there.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+SLOWEST = 10
+LONGEST_REASON = 200  # characters
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One stage's tests by how they ended, the seconds that each took, and the stage's own length in seconds."""
+
+    name: str
+    length_s: float
+    seconds: dict[str, float] = field(default_factory=dict)
+    outcomes: dict[str, str] = field(default_factory=dict)
+    failed: dict[str, str] = field(default_factory=dict)
+    retried: dict[str, str] = field(default_factory=dict)
+    unfinished: tuple[str, ...] = ()
+
+
+def read_stage(path: Path) -> Stage:
+    """A stage from its log; an empty stage where there is no such file, for then it never began."""
+    reports = list(_reports(path.read_text(encoding="utf-8").splitlines())) if path.is_file() else []
+    begun = [float(one["start"]) for one in reports]
+    stage = Stage(path.stem, max((float(one["stop"]) for one in reports), default=0.0) - min(begun, default=0.0))
+    open_tests: dict[str, None] = {}
+    for one in reports:
+        name, when, outcome = one["nodeid"], one["when"], one["outcome"]
+        stage.seconds[name] = stage.seconds.get(name, 0.0) + float(one["duration"])
+        if when == "setup":
+            open_tests[name] = None
+        if when == "teardown":
+            open_tests.pop(name, None)
+        if outcome == "rerun":
+            stage.retried[name] = _reason(one)
+        elif outcome == "failed":
+            stage.failed[name] = _reason(one)
+            stage.outcomes[name] = outcome
+        elif when == "call" or outcome == "skipped":
+            stage.outcomes[name] = outcome
+    return Stage(
+        stage.name, stage.length_s, stage.seconds, stage.outcomes, stage.failed, stage.retried, tuple(open_tests)
+    )
+
+
+def _reports(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
+    """The reports of tests. A last line that was cut off, as by a kill, is left out."""
+    for line in lines:
+        try:
+            one = json.loads(line)
+        except ValueError:
+            continue
+        if one.get("$report_type") == "TestReport":
+            yield one
+
+
+def _reason(report: dict[str, Any]) -> str:
+    """The first line of why a test failed."""
+    why = report.get("longrepr")
+    text = why.get("reprcrash", {}).get("message", "") if isinstance(why, dict) else str(why or "")
+    return str(text).partition("\n")[0][:LONGEST_REASON]
+
+
+def summary(stages: Iterable[Stage]) -> list[str]:
+    """The lines of the table, the slowest tests and the retried ones."""
+    stages = tuple(stages)
+    lines = ["", "stage      passed  skipped  failed  retried  minutes"]
+    for stage in stages:
+        counts = Counter(stage.outcomes.values())
+        row = (counts["passed"], counts["skipped"], counts["failed"], len(stage.retried))
+        lines.append(f"{stage.name:9}{row[0]:8}{row[1]:9}{row[2]:8}{row[3]:9}{stage.length_s / 60:9.1f}")
+    lines.append(f"{'total':9}{sum(stage.length_s for stage in stages) / 60:42.1f}")
+    seconds = {name: s for stage in stages for name, s in stage.seconds.items()}
+    lines += ["", f"the {SLOWEST} slowest"]
+    lines += [f"{s:7.1f} s  {name}" for name, s in sorted(seconds.items(), key=lambda one: -one[1])[:SLOWEST]]
+    retried = [f"{name}: {why}" for stage in stages for name, why in stage.retried.items()]
+    return lines + (["", "retried", *retried] if retried else [])
+
+
+def faults(stages: Iterable[Stage]) -> list[str]:
+    """A line for each test that failed, never ended, and for each stage without any test."""
+    lines = []
+    for stage in stages:
+        lines += [f"FAILED {name}: {why}" for name, why in stage.failed.items()]
+        lines += [f"NEVER ENDED {name}" for name in stage.unfinished]
+        lines += [] if stage.seconds else [f"NO TESTS in stage {stage.name}"]
+    return lines
+
+
+def main(paths: list[str]) -> int:
+    stages = [read_stage(Path(path)) for path in paths]
+    print("\n".join(summary(stages)), flush=True)
+    wrong = faults(stages)
+    if wrong:
+        print("\n".join(wrong), file=sys.stderr, flush=True)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,61 @@
+"""What `make test` prints at its end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.summary import main, read_stage, summary
+
+
+def report(name: str, when: str, outcome: str, start: float, stop: float, why: str = "") -> str:
+    longrepr = {"reprcrash": {"message": why}} if why else None
+    kind = {"$report_type": "TestReport", "nodeid": name, "when": when, "outcome": outcome, "longrepr": longrepr}
+    return json.dumps(kind | {"start": start, "stop": stop, "duration": stop - start})
+
+
+def whole(name: str, start: float, s: float, outcome: str = "passed", why: str = "") -> list[str]:
+    end = start + s
+    return [
+        report(name, "setup", "passed", start, start),
+        report(name, "call", outcome, start, end, why),
+        report(name, "teardown", "passed", end, end),
+    ]
+
+
+def write(path: Path, lines: list[str]) -> str:
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return str(path)
+
+
+def test_each_way_a_test_ends_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    retried = [report("t::c", "call", "rerun", 3, 4, "too late\nand more"), *whole("t::c", 4, 1)]
+    lines = whole("t::a", 0, 2) + whole("t::b", 2, 1, "failed", "assert 1 == 2") + retried
+    assert main([write(tmp_path / "fast.jsonl", lines)]) == 1
+    shown = capsys.readouterr()
+    assert "fast            2        0       1        1      0.1" in shown.out
+    assert "t::c: too late" in shown.out
+    assert "and more" not in shown.out
+    assert shown.err == "FAILED t::b: assert 1 == 2\n"
+
+
+def test_a_test_that_never_ended_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its process was ended, with the last line of the log cut off."""
+    lines = [*whole("t::a", 0, 1), report("t::hangs", "setup", "passed", 1, 1), '{"$report_type": "Test']
+    assert main([write(tmp_path / "browser.jsonl", lines)]) == 1
+    assert capsys.readouterr().err == "NEVER ENDED t::hangs\n"
+
+
+def test_a_stage_that_did_not_begin_is_no_success(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path / "slow.jsonl")]) == 1
+    assert capsys.readouterr().err == "NO TESTS in stage slow\n"
+
+
+def test_the_slowest_come_first_and_the_total_is_of_all_stages(tmp_path: Path) -> None:
+    one = read_stage(Path(write(tmp_path / "fast.jsonl", whole("t::a", 0, 60) + whole("t::b", 60, 120))))
+    other = read_stage(Path(write(tmp_path / "slow.jsonl", whole("t::c", 0, 90))))
+    lines = summary([one, other])
+    assert [line.split()[-1] for line in lines if " s  " in line] == ["t::b", "t::c", "t::a"]
+    assert [line.split()[-1] for line in lines if line.startswith("total")] == ["4.5"]
