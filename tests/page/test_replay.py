@@ -74,7 +74,9 @@ async def test_a_link_leads_to_a_moment_and_one_tap_back_to_live(phone: Phone, w
     await expect(page.locator(".replay-line")).to_contain_text("Speed above limit")
     await expect(page.locator(".replay-line")).to_contain_text("re-evaluated")
     await expect(page).to_have_title(re.compile("REPLAY"))
-    icon = page.locator('link[rel="icon"]')  # another one while the live car has an alarm, as one does on a busy machine
+    icon = page.locator(
+        'link[rel="icon"]'
+    )  # another one while the live car has an alarm, as one does on a busy machine
     await expect(icon).to_have_attribute("href", re.compile("catgraph-replay"), timeout=30_000)
     await expect(page.locator("#monitor > .rail")).to_be_hidden()
     assert not await page.locator("#sheet-alarm[open]").count(), "what was an alarm then asks nobody now"
