@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import secrets
 from pathlib import Path
 from typing import Any
 
 import orjson
+
+from server.storage import durable_file
 
 _MOST_BYTES = 1024 * 1024
 
@@ -34,23 +34,7 @@ def read(path: Path) -> Any:
 def write(path: Path, content: Any) -> None:
     """Puts it there: after a loss of power either the old or the new stands in it. Raises OSError."""
     folder(path.parent)
-    new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
-    try:
-        with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600), "wb") as file:
-            os.fchmod(file.fileno(), 0o600)  # whatever the umask took
-            file.write(orjson.dumps(content, option=orjson.OPT_INDENT_2))
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(new, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(new)
-        raise
-    descriptor = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    durable_file.write(path, orjson.dumps(content, option=orjson.OPT_INDENT_2), mode=0o600)
 
 
 def folder(path: Path) -> None:

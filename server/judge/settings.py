@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,7 +20,7 @@ from monitor.catalog import AllLimits
 from monitor.signals import SIGNALS
 from server.judge import profiles
 from server.judge.profiles import GENERIC, Profile
-from server.storage import bounded_toml
+from server.storage import bounded_toml, durable_file
 from server.storage.set_aside import set_aside
 
 log = logging.getLogger("catgraph.settings")
@@ -302,19 +301,4 @@ class SettingsFile:
                 log.warning("%s could not be read and is set aside as %s", self._path, set_aside(self._path))
             self._is_unread = False
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        new = self._path.with_suffix(".new")
-        try:
-            with open(new, "w", encoding="utf-8") as file:
-                file.write(to_toml(settings))
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(new, self._path)
-        except OSError:
-            with contextlib.suppress(OSError):
-                new.unlink()  # half a file, on a disk that is full
-            raise
-        folder = os.open(self._path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+        durable_file.write(self._path, to_toml(settings).encode())

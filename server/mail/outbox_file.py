@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from server.mail.settings import sync_folder
+from server.storage.durable_file import sync_folder
 
 log = logging.getLogger("catgraph.mail")
 

@@ -15,8 +15,9 @@ from urllib.parse import quote
 from server.mail import address, compose, mail_text
 from server.mail.order import Composed, Letter, Prepared, Way
 from server.mail.pack import NoRoom, Pack, cut, need_room, pack
-from server.mail.settings import MailSettings, sync_folder
+from server.mail.settings import MailSettings
 from server.mail.source import Source
+from server.storage.durable_file import sync_folder
 
 T = TypeVar("T")
 MAX_PARTS = 60

@@ -17,7 +17,7 @@ import tomli_w
 
 from server.mail import address
 from server.mail.header_text import is_one_line
-from server.storage import bounded_toml
+from server.storage import bounded_toml, durable_file
 from server.storage.set_aside import set_aside
 
 Security = Literal["starttls", "tls", "none"]
@@ -261,27 +261,5 @@ class MailSettingsFile:
             with contextlib.suppress(FileNotFoundError):
                 set_aside(self._path)
             self._is_unread = False
-        new = self._path.with_suffix(".new")
-        with contextlib.suppress(FileNotFoundError):
-            new.unlink()
-        try:
-            with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-                os.fchmod(file.fileno(), 0o600)  # whatever the umask took
-                file.write(tomli_w.dumps({**asdict(settings), "allowed": list(settings.allowed)}).encode())
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(new, self._path)
-        except OSError:
-            with contextlib.suppress(OSError):
-                new.unlink()
-            raise
-        sync_folder(self._path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """What was named in a folder stays named so after a loss of power. Raises OSError."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        content = tomli_w.dumps({**asdict(settings), "allowed": list(settings.allowed)})
+        durable_file.write(self._path, content.encode(), mode=0o600)

@@ -36,8 +36,8 @@ from mcap.records import (
 from server.recording import space
 from server.recording.folder import DAMAGED, FINISHED, RECOVERING, RecordingsFolder, id_of
 from server.recording.mcap.chunks import MAGIC, BadChunk, Walk, WholeChunk
-from server.recording.mcap.write import sync_folder
 from server.recording.own import METADATA
+from server.storage.durable_file import sync_folder
 
 _TORN = 1024 * 1024  # bytes at the end that a kill may have left half-written; more of them are kept aside
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import orjson
 
+from server.storage import durable_file
 from server.storage.set_aside import set_aside
 from server.version import catgraph_version
 
@@ -88,9 +89,8 @@ class DataFolder:
                 raise self._newer(f"{name} has format {found}", known)
         if number != FORMAT:
             with contextlib.suppress(OSError):  # a full disk keeps nobody from watching the car
-                new = file.with_name(f".{FORMAT_FILE}.new")
-                new.write_bytes(orjson.dumps({"format": FORMAT, "catgraph": catgraph_version()}))
-                os.replace(new, file)
+                content = orjson.dumps({"format": FORMAT, "catgraph": catgraph_version()})
+                durable_file.write(file, content)
 
     def _newer(self, what: str, known: int) -> DataFolderRefused:
         return DataFolderRefused(

@@ -10,7 +10,6 @@ import datetime as dt
 import logging
 import os
 import secrets
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
+from server.storage import durable_file
 from server.tls.ranges import DOMAINS, RANGES
 
 log = logging.getLogger("catgraph.tls")
@@ -144,20 +144,7 @@ def _unusable(path: Path, why: str) -> TlsRefused:
 
 def _keep(path: Path, authority: Authority) -> None:
     """Writes it whole or not at all, and where another server made one at the same time, that one stays."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".authority-")  # mode 0600
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(private_pem(authority.key) + authority.pem)
-            file.flush()
-            os.fsync(file.fileno())
-        try:
-            os.link(name, path)
-        except FileExistsError:
-            return
-        except OSError:  # a disk without links, such as FAT
-            os.replace(name, path)
-    finally:
-        Path(name).unlink(missing_ok=True)
+    durable_file.create(path, private_pem(authority.key) + authority.pem, mode=0o600)
 
 
 def private_pem(key: ec.EllipticCurvePrivateKey) -> bytes:

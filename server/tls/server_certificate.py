@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime as dt
 import ipaddress
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
+from server.storage import durable_file
 from server.tls.authority import BACK as AUTHORITY_BACK
 from server.tls.authority import Authority, clock, private_pem
 from server.tls.names import IpAddress, Names
@@ -104,11 +104,7 @@ def load(folder: Path) -> Leaf | None:
 def keep(folder: Path, leaf: Leaf) -> Path:
     """Writes it, readable for its owner only, and returns where. Raises OSError."""
     path = folder / FILE
-    part = folder / f".{FILE}.new"
-    part.unlink(missing_ok=True)
-    with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-        file.write(leaf.pem)
-    os.replace(part, path)
+    durable_file.write(path, leaf.pem, mode=0o600)
     return path
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import tempfile
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -12,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import orjson
+
+from server.storage import durable_file
 
 MAX_TITLE = 120  # letters
 MAX_NOTE = 4000
@@ -75,18 +74,7 @@ def write(recording: Path, annotations: Annotations) -> None:
     if path.exists() and not _is_ours(path):  # somebody else's: it is not lost
         path.rename(path.with_name(f"{path.name}.other"))
     body = orjson.dumps(asdict(annotations), option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
-    number, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:100]}.", suffix=".new")
-    try:
-        with os.fdopen(number, "wb") as file:
-            file.write(body)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(name)
-        raise
+    durable_file.write(path, body, mode=0o644)
 
 
 def changed(

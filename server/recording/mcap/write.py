@@ -22,6 +22,7 @@ from server.recording.folder import writing_path
 from server.recording.mcap.chunk_index import ChunkIndexes
 from server.recording.own import LIBRARY, METADATA
 from server.recording.read.schemas import Schema
+from server.storage.durable_file import sync_folder
 from server.version import catgraph_version
 
 CHUNK_BYTES = 32 * 1024
@@ -188,12 +189,3 @@ def make_folder(folder: Path) -> None:
     for each in reversed(missing):
         each.mkdir(exist_ok=True)
         sync_folder(each.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Waits until the disk knows the names in a folder. Raises OSError."""
-    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -190,7 +192,14 @@ def test_a_file_that_cannot_be_used_is_set_aside_and_told(tmp_path: Path, conten
 def test_a_folder_that_takes_nothing_keeps_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "settings.toml"
     MailSettingsFile(path).write(OLD)
-    (tmp_path / "settings.new").mkdir()  # whoever runs the tests may write everywhere; into a folder nobody can
-    with pytest.raises(OSError, match=r"."):
-        MailSettingsFile(path).write(MailSettings())
+    script = (
+        "import resource, signal, sys; from pathlib import Path\n"
+        "from server.mail.settings import MailSettings, MailSettingsFile\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"  # every write is refused, for root too
+        "MailSettingsFile(Path(sys.argv[1])).write(MailSettings())\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=False)
+    assert "OSError: [Errno 27] File too large" in ended.stderr
+    assert os.listdir(tmp_path) == ["settings.toml"]
     assert MailSettingsFile(path).read() == OLD

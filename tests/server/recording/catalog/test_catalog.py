@@ -389,7 +389,7 @@ async def test_a_folder_that_may_not_be_written_says_so(tmp_path: Path, monkeypa
             raise OSError(30, "Read-only file system")
 
         monkeypatch.setattr("os.rename", refuse)
-        monkeypatch.setattr("tempfile.mkstemp", refuse)
+        monkeypatch.setattr("os.replace", refuse)
         with pytest.raises(Refused, match="It cannot be moved: read-only file system"):
             one.delete(id)
         with pytest.raises(Refused, match="It cannot be kept: read-only file system"):
