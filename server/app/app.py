@@ -70,12 +70,12 @@ def create_app(
     wrote it, AssetsMissing when the page's files are not there,
     MapRefused when a map file cannot be shown.
     """
-    running, journal = build(config, now=now, wall_ms=wall_ms, checks=checks)
+    running, journal, storage = build(config, now=now, wall_ms=wall_ms, checks=checks)
     app = _Served(
         title="catgraph",
         version=running.version,
         description="Operator control unit for a test vehicle: its state, its alarms, its connection.",
-        lifespan=lambda _: lifespan(running, journal),
+        lifespan=lambda _: lifespan(running, journal, storage),
         docs_url=None,  # FastAPI's own page loads its scripts from the internet
         redoc_url=None,
     )

@@ -20,6 +20,7 @@ from server.recording.export.jobs import Exports
 from server.recording.folder import RecordingsFolder
 from server.replay.manager import ReplayManager
 from server.storage.data_folder import DataFolder
+from server.storage.storage_thread import StorageThread
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
 from server.version import catgraph_version
@@ -31,12 +32,13 @@ from server.web.services import Services
 
 def build(
     config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int], checks: Sequence[AnyCheck] | None
-) -> tuple[Services, Journal]:
-    """What the routes use, and the journal below its bus. Raises as `create_app` does."""
+) -> tuple[Services, Journal, StorageThread]:
+    """What the routes use, the journal below its bus, and the thread that writes it. Raises as `create_app` does."""
     ground = Ground(config.maps, config.site_image, _upstream(config, now=now, wall_ms=wall_ms))
     folder = DataFolder(config.data) if config.data is not None else None
-    journal = Journal(config.data / "events.sqlite" if config.data is not None else None)
-    bus = LocalBus(journal, now=now)
+    storage = StorageThread()
+    journal = Journal(config.data / "events.sqlite" if config.data is not None else None, thread=storage)
+    bus = LocalBus(journal, now=now, storage=storage)
     replays = ReplayManager(lambda id: _recording(running, id), now=now)
     running = Services(
         is_open=config.is_open,
@@ -61,7 +63,7 @@ def build(
         running.exports = _exports(config.data, running.recordings, now=now, wall_ms=wall_ms)
     for vehicle in config.vehicles:
         running.sessions[vehicle.name] = _session(vehicle, running, config, checks)
-    return running, journal
+    return running, journal, storage
 
 
 def _session(vehicle: Vehicle, running: Services, config: Config, checks: Sequence[AnyCheck] | None) -> Session:

@@ -12,14 +12,18 @@ from server.bus.journal import Journal
 from server.recording.folder import RecordingsFolder
 from server.recording.recover import Recovered
 from server.recording.recovery import recover_left
+from server.storage.storage_thread import StorageThread
 from server.web.services import Services
 
 log = logging.getLogger("catgraph.app")
 
 
 @asynccontextmanager
-async def lifespan(running: Services, journal: Journal) -> AsyncIterator[None]:
-    """From the start-up of a server to its shut-down; the journal is closed after all that writes to it."""
+async def lifespan(running: Services, journal: Journal, storage: StorageThread) -> AsyncIterator[None]:
+    """From the start-up of a server to its shut-down; the journal is closed after all that writes to it.
+
+    A disk that hangs holds the shut-down: what waits for it is written first.
+    """
     recovering = await _start(running)
     try:
         yield
@@ -27,10 +31,15 @@ async def lifespan(running: Services, journal: Journal) -> AsyncIterator[None]:
         if recovering is not None:
             recovering.cancel()  # what it was at is done again at the next start
         await _stop(running)
-        journal.close()
+        await asyncio.to_thread(_close, storage, journal)
         running.ground.close()
         if running.folder is not None:
             running.folder.close()
+
+
+def _close(storage: StorageThread, journal: Journal) -> None:
+    storage.close()
+    journal.close()
 
 
 async def _start(running: Services) -> asyncio.Task[None] | None:

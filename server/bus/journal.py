@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import logging
 import sqlite3
+import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -18,22 +20,36 @@ from typing import Any, TypeVar
 import orjson
 
 from server.bus import journal_db
+from server.storage.storage_thread import StorageThread
 
 log = logging.getLogger("catgraph.journal")
 
 _PORTION = 100  # events a transaction: one that is refused has cost little
 RECENT = 200  # events of a vehicle that are told from memory: every page asks for each of them as it comes
 MAX_UNSAVED = 10_000  # events of a vehicle that wait in memory for the disk; some 5 MB
+SLOW_DISK_S = 5.0  # a disk that takes longer for one portion is reported
 T = TypeVar("T")
 
 
 class Journal:
-    """Appends and reads events; one connection, used from the event loop (an append is some 30 µs). Never raises for
-    what the disk does."""
+    """Appends and reads events. Never raises for what the disk does.
 
-    def __init__(self, path: Path | None) -> None:
-        """At `path`, or in memory where it is None."""
+    `append` is for one thread and waits for no disk where there is a storage thread; the others are for any thread.
+    """
+
+    def __init__(
+        self, path: Path | None, *, thread: StorageThread | None = None, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        """At `path`, or in memory where it is None; written by `thread`, else by the caller. `now`: in seconds."""
         opened = journal_db.open_at(path)
+        self._thread = thread
+        self._now = now
+        self.on_saved: Callable[[], None] = lambda: None  # called by the writing thread, whatever became of it
+        self._memory = threading.Lock()  # guards what waits for the disk; never held during a write
+        self._writing = threading.Lock()  # one portion at a time
+        self._connection = threading.RLock()  # guards the database
+        self._is_scheduled = False
+        self._write_began_s: float | None = None
         self._database = opened.database
         self.complaint = opened.complaint  # what was found wrong at the start and put right, for the log
         self._last = dict(opened.last)
@@ -47,12 +63,16 @@ class Journal:
     @property
     def trouble(self) -> str | None:
         """Why what happens now is not kept on the disk, as a sentence; None: it is."""
-        if self._why is None:
+        why, began_s = self._why, self._write_began_s
+        if why is None and began_s is not None and (slow_s := self._now() - began_s) > SLOW_DISK_S:
+            why = f"the disk has not answered for {slow_s:.0f} s"
+        if why is None:
             return None
-        waiting = sum(len(events) for events in self._unsaved.values())
+        with self._memory:
+            waiting = sum(len(events) for events in self._unsaved.values())
         in_memory = f" {_events(waiting)} in memory only." if waiting else ""
         lost = f" {_events(self._lost)} lost." if self._lost else ""
-        return f"The alarm log is not kept: {self._why}.{in_memory}{lost}"
+        return f"The alarm log is not kept: {why}.{in_memory}{lost}"
 
     def last(self, vehicle: str) -> int:
         """The number of the newest event, 0 where there is none."""
@@ -64,28 +84,62 @@ class Journal:
         if numbered:
             self._last[vehicle] = numbered[-1]["n"]
             self._recent.setdefault(vehicle, deque(maxlen=RECENT)).extend(numbered)
-            waiting = self._unsaved.setdefault(vehicle, deque())
-            waiting.extend(numbered)
-            self.save()
-            while len(waiting) > MAX_UNSAVED:
-                waiting.popleft()
-                self._lost += 1
+            with self._memory:
+                waiting = self._unsaved.setdefault(vehicle, deque())
+                waiting.extend(numbered)
+            self.save_soon()
+            with self._memory:
+                while len(waiting) > MAX_UNSAVED:
+                    waiting.popleft()
+                    self._lost += 1
         return numbered
 
-    def save(self) -> None:
+    def saved(self, vehicle: str) -> int:
+        """The number up to which no event of the vehicle waits for the disk."""
+        with self._memory:
+            waiting = self._unsaved.get(vehicle)
+            return waiting[0]["n"] - 1 if waiting else self.last(vehicle)
+
+    def save_soon(self) -> None:
         """Tries to keep what waits in memory; to be called now and then while there is trouble."""
-        while waiting := self._next():
-            if not self._try(partial(self._write, waiting), False):
-                return
-            for vehicle, _ in waiting:
-                self._unsaved[vehicle].popleft()
-            if self._why is not None:
-                log.warning("the alarm log is kept again")
-                self._why = None
+        if self._thread is None:
+            self.save()
+        elif not self._is_scheduled:
+            self._is_scheduled = True
+            self._thread.submit(self._save_scheduled)
+
+    def _save_scheduled(self) -> None:
+        self._is_scheduled = False  # before it looks: what is appended from now on schedules the next
+        self.save()
+        self.on_saved()
+
+    def save(self) -> None:
+        """As `save_soon`, at once and in the calling thread."""
+        with self._writing:
+            while waiting := self._next():
+                self._write_began_s = self._now()
+                is_written = self._try(partial(self._write, waiting), False)
+                self._write_began_s = None
+                if not is_written:
+                    return
+                with self._memory:
+                    for vehicle, event in waiting:
+                        unsaved = self._unsaved[vehicle]
+                        while unsaved and unsaved[0]["n"] <= event["n"]:
+                            unsaved.popleft()
+                if self._why is not None:
+                    log.warning("the alarm log is kept again")
+                    self._why = None
 
     def _next(self) -> list[tuple[str, dict[str, Any]]]:
-        every = ((vehicle, event) for vehicle, events in self._unsaved.items() for event in events)
-        return list(islice(every, _PORTION))
+        with self._memory:
+            every = ((vehicle, event) for vehicle, events in self._unsaved.items() for event in events)
+            return list(islice(every, _PORTION))
+
+    def _waiting(self, vehicle: str) -> list[dict[str, Any]]:
+        """What is not on the disk; to be copied before the disk is read, so that no event is in neither."""
+        with self._memory:
+            return list(self._unsaved.get(vehicle, ()))
 
     def _write(self, events: Sequence[tuple[str, Mapping[str, Any]]]) -> bool:
         if self._database is None:
@@ -100,14 +154,24 @@ class Journal:
 
     def after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
         """The events that follow number `n`, in order, at most `limit`."""
+        recent = self.recent_after(vehicle, n, limit)
+        return self.stored_after(vehicle, n, limit) if recent is None else recent
+
+    def stored_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
+        """As `after`, from the disk and what waits for it."""
+        waiting = self._waiting(vehicle)
+        found = self._read("vehicle = ? AND n > ? ORDER BY n LIMIT ?", (vehicle, n, limit))
+        newest = found[-1]["n"] if found else n
+        return [*found, *(event for event in waiting if event["n"] > newest)][:limit]
+
+    def recent_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]] | None:
+        """As `after`, from memory alone; None where the disk must be read. For the thread that appends."""
         if n >= self.last(vehicle):
             return []
         recent = self._recent.get(vehicle, ())
         if recent and recent[0]["n"] <= n + 1:
             return [event for event in recent if event["n"] > n][:limit]
-        found = self._read("vehicle = ? AND n > ? ORDER BY n LIMIT ?", (vehicle, n, limit))
-        waiting = [event for event in self._unsaved.get(vehicle, ()) if event["n"] > n]
-        return [*found, *waiting][:limit]
+        return None
 
     def find(
         self,
@@ -140,7 +204,7 @@ class Journal:
             conditions.append("unlikely(alarm IS NULL)")
         waiting = [
             event
-            for event in reversed(self._unsaved.get(vehicle, ()))
+            for event in reversed(self._waiting(vehicle))
             if (before is None or event["n"] < before)
             and (alarm is None or (event.get("alarm") or "") == alarm)
             and (change is None or event["change"] == change)
@@ -148,12 +212,13 @@ class Journal:
             and (until_ms is None or event["at_ms"] < until_ms)
         ]
         found = self._read(f"{' AND '.join(conditions)} ORDER BY n DESC LIMIT ?", (*values, limit))
-        return [*waiting, *found][:limit]
+        written = {event["n"] for event in found}
+        return [*(event for event in waiting if event["n"] not in written), *found][:limit]
 
     def alarms(self, vehicle: str) -> list[str]:
         """The ids of all alarms that anything was ever told of."""
         database = self._database
-        waiting = {event["alarm"] for event in self._unsaved.get(vehicle, ()) if event.get("alarm")}
+        waiting = {event["alarm"] for event in self._waiting(vehicle) if event.get("alarm")}
         if database is None:
             return sorted(waiting)
 
@@ -173,8 +238,11 @@ class Journal:
         return sorted(self._try(walk, none) | waiting)
 
     def close(self) -> None:
+        """Saves what waits, and closes the file."""
+        self.save()
         if self._database is not None:
-            self._database.close()
+            with self._connection:
+                self._database.close()
 
     def _read(self, which: str, values: Iterable[str | int]) -> list[dict[str, Any]]:
         database = self._database
@@ -185,6 +253,10 @@ class Journal:
 
     def _try(self, work: Callable[[], T], else_: T) -> T:
         """What the database answers; where it does not, why is kept, and `else_` is the answer."""
+        with self._connection:
+            return self._try_alone(work, else_)
+
+    def _try_alone(self, work: Callable[[], T], else_: T) -> T:
         try:
             return work()
         except (sqlite3.Error, orjson.JSONDecodeError) as error:

@@ -71,7 +71,9 @@ def open_at(path: Path | None) -> Opened:
 
 
 def _open(path: Path | None) -> Opened:
-    database = sqlite3.connect(str(path) if path else ":memory:", isolation_level=None, timeout=0)
+    database = sqlite3.connect(
+        str(path) if path else ":memory:", isolation_level=None, timeout=0, check_same_thread=False
+    )
     refused: str | None = None
     try:
         try:

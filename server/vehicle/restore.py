@@ -60,8 +60,8 @@ def recall(bus: LocalBus, vehicle: str, *, now_s: float, wall_ms: int) -> Past:
         return now_s + min((until_ms - wall_ms) / 1000, SHELVE_AT_MOST_MIN * 60)
 
     address, paused = _monitored(bus, vehicle)
-    newest = bus.find_events(vehicle, limit=1)
-    alarms = [_since_rest(bus, vehicle, alarm) for alarm in bus.alarms_told(vehicle)]
+    newest = bus.past_events(vehicle, limit=1)
+    alarms = [_since_rest(bus, vehicle, alarm) for alarm in bus.logged_alarms(vehicle)]
     told = [
         transition
         for events in alarms
@@ -82,7 +82,7 @@ def recall(bus: LocalBus, vehicle: str, *, now_s: float, wall_ms: int) -> Past:
 
 def _order(bus: LocalBus, vehicle: str, wall_ms: int) -> Mapping[str, Any] | None:
     """The newest word of a slow-down that nobody has released, if it is not older than anything is ever held."""
-    for event in bus.find_events(vehicle, change="slow_down", limit=_PORTION):
+    for event in bus.past_events(vehicle, change="slow_down", limit=_PORTION):
         if event.get("step") in ORDER_ENDED:
             return None
         if event.get("step") in ORDER_STANDS:
@@ -92,7 +92,7 @@ def _order(bus: LocalBus, vehicle: str, wall_ms: int) -> Mapping[str, Any] | Non
 
 def phone_chosen(bus: LocalBus, vehicle: str) -> str | None:
     """The phone that rides in the car, as the operator said last."""
-    newest = bus.find_events(vehicle, change="ride", limit=1)
+    newest = bus.past_events(vehicle, change="ride", limit=1)
     return _text(newest[0].get("phone")) if newest else None
 
 
@@ -136,7 +136,7 @@ def _since_rest(bus: LocalBus, vehicle: str, alarm: str) -> list[dict[str, Any]]
 def _backwards(bus: LocalBus, vehicle: str, alarm: str | None) -> Iterator[dict[str, Any]]:
     """Events of one alarm, of none (""), or all (None), newest first."""
     before: int | None = None
-    while events := bus.find_events(vehicle, alarm=alarm, before=before, limit=_PORTION):
+    while events := bus.past_events(vehicle, alarm=alarm, before=before, limit=_PORTION):
         yield from events
         before = events[-1]["n"]
 

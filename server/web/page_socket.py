@@ -27,11 +27,13 @@ from server.protocol.rate_limit import MAX_DEPTH, SLOW_DOWN, Allowance, Limits, 
 from server.replay import commands as orders
 from server.replay.manager import NoReplay, ReplayManager
 from server.replay.view_source import ViewSource
+from server.web.event_feed import EventFeed
 from server.web.fair_wakeup import Turns
 
 log = logging.getLogger("catgraph.hub")
 
 EVENTS_A_BATCH = 100
+HELLO_WITHIN_S = 1.0  # until then no event is sent: the page's hello tells which it has
 MAX_PAGES = 500
 MAX_COMPLAINTS = 200  # a page that sends nothing sensible is let go
 LONGEST_SLOW_DOWN = 400  # letters of an order to slow the car
@@ -80,6 +82,7 @@ class Page:
         self._take = False  # the page asked for the newest
         self._replies: list[dict[str, Any]] = []
         self._event = bus.last_event(vehicle)  # the last number sent
+        self._feed = EventFeed(bus, vehicle, on_read=lambda: self._something_new("events"))
         self._events_due = False
         self._events_unanswered = False
         self._said_hello = False
@@ -89,6 +92,7 @@ class Page:
         self._complaints = 0
         self._is_leaving = False
         self._now = now
+        self._since_s = now()
         self._turns = turns
         self._messages = Allowance(limits.messages, now())
         self._orders = Allowance(limits.commands, now())
@@ -114,6 +118,7 @@ class Page:
             self._is_leaving = True
             reader.cancel()
             unwatch()
+            self._feed.close()
             self._turns.leave(self._wake)
             if self._opening is not None:
                 self._opening.cancel()
@@ -350,7 +355,8 @@ class Page:
         replies, self._replies = self._replies, []
         for reply in replies:
             await self._send(reply)
-        if self._events_due and not self._events_unanswered:
+        has_begun = self._said_hello or self._now() >= self._since_s + HELLO_WITHIN_S
+        if self._events_due and has_begun and not self._events_unanswered:
             await self._send_events()
         if self._take:
             self._take = False
@@ -362,7 +368,7 @@ class Page:
 
     async def _send_events(self) -> None:
         self._events_due = False
-        events = self._bus.events_after(self._vehicle, self._event, EVENTS_A_BATCH)
+        events = self._feed.after(self._event, EVENTS_A_BATCH)
         if events:
             self._events_unanswered = True
             self._event = events[-1]["n"]

@@ -27,7 +27,7 @@ async def events(
 ) -> Response:
     app = services(request)
     name = vehicle_of(app, vehicle)
-    return as_json({"events": app.bus.events_after(name, after, limit), "last": app.bus.last_event(name)})
+    return as_json({"events": await app.bus.events_after(name, after, limit), "last": app.bus.last_event(name)})
 
 
 @router.get("/api/alarms", summary="The alarms that stand, most urgent first")

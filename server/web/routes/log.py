@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
+from collections.abc import AsyncIterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -81,7 +81,7 @@ async def log_page(
     to come: after 2000 events that do not fit, looking further is another request."""
     app = services(request)
     name = vehicle_of(app, vehicle)
-    events, more = _page(app.bus, name, which, before, limit)
+    events, more = await _page(app.bus, name, which, before, limit)
     body = {"events": events, "next_before": more, "last": app.bus.last_event(name)}
     return Response(orjson.dumps(body), media_type="application/json")
 
@@ -108,13 +108,13 @@ async def log_json(request: Request, which: Wanted, vehicle: VehicleName = None)
     )
 
 
-def _page(
+async def _page(
     bus: LocalBus, vehicle: str, which: Which, before: int | None, limit: int
 ) -> tuple[list[dict[str, Any]], int | None]:
     """Newest first, and where the next page begins."""
     found: list[dict[str, Any]] = []
     for _ in range(_LOOKED_THROUGH // _PAGE):
-        portion = bus.find_events(
+        portion = await bus.find_events(
             vehicle,
             before=before,
             limit=_PAGE,
@@ -138,19 +138,19 @@ def _attachment(name: str) -> dict[str, str]:
     return {"Content-Disposition": f'attachment; filename="{name}"'}
 
 
-def _all(bus: LocalBus, vehicle: str, which: Which) -> Iterator[list[dict[str, Any]]]:
-    """In portions; the generators that use it are asynchronous, so that they run on the loop, as the log does."""
+async def _all(bus: LocalBus, vehicle: str, which: Which) -> AsyncIterator[list[dict[str, Any]]]:
+    """All events of a vehicle that fit, oldest first, in portions."""
     n = 0
-    while events := bus.events_after(vehicle, n, _PAGE):
+    while events := await bus.events_after(vehicle, n, _PAGE):
         n = events[-1]["n"]
         yield [event for event in events if which.has(event)]
 
 
-async def _csv(portions: Iterable[list[dict[str, Any]]]) -> AsyncIterator[str]:
+async def _csv(portions: AsyncIterator[list[dict[str, Any]]]) -> AsyncIterator[str]:
     text = io.StringIO()
     rows = csv.writer(text)
     rows.writerow(COLUMNS)
-    for events in portions:
+    async for events in portions:
         for event in events:
             rows.writerow(event_row(event))
         yield text.getvalue()
@@ -159,10 +159,10 @@ async def _csv(portions: Iterable[list[dict[str, Any]]]) -> AsyncIterator[str]:
     yield text.getvalue()  # the columns, where there is no event
 
 
-async def _json(portions: Iterable[list[dict[str, Any]]]) -> AsyncIterator[bytes]:
+async def _json(portions: AsyncIterator[list[dict[str, Any]]]) -> AsyncIterator[bytes]:
     yield b"["
     first = True
-    for events in portions:
+    async for events in portions:
         for event in events:
             yield (b"" if first else b",\n") + orjson.dumps(event)
             first = False

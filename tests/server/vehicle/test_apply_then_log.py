@@ -45,11 +45,11 @@ async def test_a_limit_counts_although_the_log_fails_and_its_event_comes_later(
                 )
             )
         async with asyncio.timeout(10):
-            while not bus.find_events("car", change="raised", alarm="speed_limit"):
+            while not bus.past_events("car", change="raised", alarm="speed_limit"):
                 await asyncio.sleep(0.05)
-        changes = [event["changes"] for event in bus.find_events("car", change="settings")]
+        changes = [event["changes"] for event in bus.past_events("car", change="settings")]
         assert [change["speed_limit.max_mps"][1] for change in changes if "speed_limit.max_mps" in change] == [2.0]
-        raised = bus.find_events("car", change="raised", alarm="speed_limit")
+        raised = bus.past_events("car", change="raised", alarm="speed_limit")
         assert len(raised) == 1  # delivered once, and late
 
 

@@ -64,7 +64,7 @@ async def test_events_reach_a_page_before_a_state_is_made(bridge: RosBridge) -> 
             while "state" not in happened:
                 await asyncio.sleep(0.02)
             speeds["now"] = 12.6
-            while not bus.find_events("car", change="raised", alarm="speed_limit"):
+            while not bus.past_events("car", change="raised", alarm="speed_limit"):
                 await asyncio.sleep(0.02)
         await asyncio.sleep(0.3)
         writer.cancel()

@@ -46,13 +46,15 @@ def bus() -> LocalBus:
     ids=repr,
 )
 @pytest.mark.parametrize("limit", [1, 3, 500])
-def test_page_by_page_every_event_that_fits_comes_once(bus: LocalBus, which: Which, count: int, limit: int) -> None:
+async def test_page_by_page_every_event_that_fits_comes_once(
+    bus: LocalBus, which: Which, count: int, limit: int
+) -> None:
     if count > 100 * limit:
         pytest.skip("too many pages to be worth the time")
     before: int | None = None
     seen: list[int] = []
     for _ in range(count // limit + EVENTS // 2000 + 2):
-        events, more = _page(bus, "car", which, before, limit)
+        events, more = await _page(bus, "car", which, before, limit)
         assert len(events) <= limit
         assert all(which.has(one) for one in events)
         seen += [one["n"] for one in events]

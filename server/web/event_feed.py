@@ -1,0 +1,45 @@
+"""The events that a page has not got yet, read without holding up its other frames."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from server.bus.bus import LocalBus
+
+
+class EventFeed:
+    """Of one page and vehicle. `on_read` is called when events that were not in memory have been read."""
+
+    def __init__(self, bus: LocalBus, vehicle: str, on_read: Callable[[], None]) -> None:
+        self._bus = bus
+        self._vehicle = vehicle
+        self._on_read = on_read
+        self._reading: asyncio.Task[list[dict[str, Any]]] | None = None
+        self._reading_after = 0
+
+    def after(self, n: int, limit: int) -> list[dict[str, Any]]:
+        """The events after number `n`; none yet where the disk must be read, for which `on_read` is called."""
+        recent = self._bus.recent_events(self._vehicle, n, limit)
+        if recent is not None:
+            return recent
+        reading = self._reading
+        if reading is None:
+            self._reading_after = n
+            self._reading = asyncio.create_task(self._bus.events_after(self._vehicle, n, limit))
+            self._reading.add_done_callback(self._read)
+            return []
+        if not reading.done():
+            return []
+        self._reading = None
+        return reading.result() if self._reading_after == n else self.after(n, limit)
+
+    def _read(self, reading: asyncio.Task[list[dict[str, Any]]]) -> None:
+        if not reading.cancelled():
+            self._on_read()
+
+    def close(self) -> None:
+        """Ends a reading that is under way."""
+        if self._reading is not None:
+            self._reading.cancel()
