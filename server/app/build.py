@@ -62,11 +62,13 @@ def build(
     if running.recordings is not None and config.data is not None:
         running.exports = _exports(config.data, running.recordings, now=now, wall_ms=wall_ms)
     for vehicle in config.vehicles:
-        running.sessions[vehicle.name] = _session(vehicle, running, config, checks)
+        running.sessions[vehicle.name] = _session(vehicle, running, config, checks, storage)
     return running, journal, storage
 
 
-def _session(vehicle: Vehicle, running: Services, config: Config, checks: Sequence[AnyCheck] | None) -> Session:
+def _session(
+    vehicle: Vehicle, running: Services, config: Config, checks: Sequence[AnyCheck] | None, storage: StorageThread
+) -> Session:
     data = config.data
     return Session(
         vehicle,
@@ -79,6 +81,7 @@ def _session(vehicle: Vehicle, running: Services, config: Config, checks: Sequen
         settings=SettingsFile(data / "settings" / f"{vehicle.name}.toml" if data else None),
         recordings=RecordingsFolder(data / "recordings") if data else None,
         on_finished=running.recordings.add if running.recordings is not None else lambda _: None,
+        storage=storage,
     )
 
 

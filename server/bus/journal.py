@@ -49,7 +49,7 @@ class Journal:
         self._writing = threading.Lock()  # one portion at a time
         self._connection = threading.RLock()  # guards the database
         self._is_scheduled = False
-        self._write_began_s: float | None = None
+        self._waits_since_s: float | None = None  # for how long nothing of what waits was written
         self._database = opened.database
         self.complaint = opened.complaint  # what was found wrong at the start and put right, for the log
         self._last = dict(opened.last)
@@ -63,8 +63,8 @@ class Journal:
     @property
     def trouble(self) -> str | None:
         """Why what happens now is not kept on the disk, as a sentence; None: it is."""
-        why, began_s = self._why, self._write_began_s
-        if why is None and began_s is not None and (slow_s := self._now() - began_s) > SLOW_DISK_S:
+        why, since_s = self._why, self._waits_since_s
+        if why is None and since_s is not None and (slow_s := self._now() - since_s) > SLOW_DISK_S:
             why = f"the disk has not answered for {slow_s:.0f} s"
         if why is None:
             return None
@@ -87,6 +87,8 @@ class Journal:
             with self._memory:
                 waiting = self._unsaved.setdefault(vehicle, deque())
                 waiting.extend(numbered)
+                if self._waits_since_s is None:
+                    self._waits_since_s = self._now()
             self.save_soon()
             with self._memory:
                 while len(waiting) > MAX_UNSAVED:
@@ -117,16 +119,14 @@ class Journal:
         """As `save_soon`, at once and in the calling thread."""
         with self._writing:
             while waiting := self._next():
-                self._write_began_s = self._now()
-                is_written = self._try(partial(self._write, waiting), False)
-                self._write_began_s = None
-                if not is_written:
+                if not self._try(partial(self._write, waiting), False):
                     return
                 with self._memory:
                     for vehicle, event in waiting:
                         unsaved = self._unsaved[vehicle]
                         while unsaved and unsaved[0]["n"] <= event["n"]:
                             unsaved.popleft()
+                    self._waits_since_s = self._now() if any(self._unsaved.values()) else None
                 if self._why is not None:
                     log.warning("the alarm log is kept again")
                     self._why = None

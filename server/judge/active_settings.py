@@ -54,9 +54,22 @@ class Tuning:
         profile: str | None,
         version: int | None,
     ) -> list[str]:
-        """Puts changes in force and keeps them; what changed, a line each. Raises BadSetting, Conflict, OSError."""
+        """Stores changes and puts them in force; what changed, a line each. Raises BadSetting, Conflict, OSError."""
+        new = self.prepare(values=values, topics=topics, profile=profile, version=version)
+        self.store(new)
+        return self.adopt(new)
+
+    def prepare(
+        self,
+        *,
+        values: Mapping[str, float | None],
+        topics: Mapping[str, str | None],
+        profile: str | None,
+        version: int | None,
+    ) -> Settings:
+        """The settings with changes, for `store` and then `adopt`. Raises BadSetting, Conflict."""
         self._demand(version)
-        new = change(
+        return change(
             self.settings,
             self._profile_named(profile or self.settings.profile),  # a default of the new kind of car is not kept
             values=values,
@@ -64,17 +77,14 @@ class Tuning:
             profile_name=profile,
             known_profiles=self._profiles,
         )
-        return self._adopt(new)
 
     def read(self, toml: str) -> Settings:
-        """The settings in a file, for `replace`; takes some 30 ms at most, on any thread. Raises BadSetting."""
+        """The settings in a file, for `prepare_all`; takes some 30 ms at most, on any thread. Raises BadSetting."""
         return from_toml(toml, self._recognised, self._profiles)
 
-    def replace(self, read: Settings) -> list[str]:
-        """As `change`, with all settings from a file that was read."""
-        return self._adopt(
-            Settings(version=self.settings.version + 1, profile=read.profile, values=read.values, topics=read.topics)
-        )
+    def prepare_all(self, read: Settings) -> Settings:
+        """As `prepare`, with all settings from a file that was read."""
+        return replace(read, version=self.settings.version + 1)
 
     def number_on(self, version: int) -> bool:
         """Counts on from a version that the log knows: a number names one set of settings for ever. True where what
@@ -119,12 +129,20 @@ class Tuning:
     def _profile_named(self, name: str) -> Profile:
         return self._recognised if name == AUTO else self._profiles.get(name, self._recognised)
 
-    def _adopt(self, new: Settings) -> list[str]:
-        lines = differences(self.settings, new, self.profile, self._profile_named(new.profile))
+    def store(self, new: Settings) -> None:
+        """Writes prepared settings, on any thread: what is in force later is what a restart finds. Raises OSError."""
+        if self._differences(new):
+            self._file.write(new)
+
+    def adopt(self, new: Settings) -> list[str]:
+        """Puts stored settings in force; what changed, a line each."""
+        lines = self._differences(new)
         if lines:
-            self._file.write(new)  # first kept, then in force: what is in force is what a restart finds
             self.settings = new
         return lines
+
+    def _differences(self, new: Settings) -> list[str]:
+        return differences(self.settings, new, self.profile, self._profile_named(new.profile))
 
     def _demand(self, version: int | None) -> None:
         if version is not None and version != self.settings.version:

@@ -9,8 +9,10 @@ from typing import Any
 
 from monitor.alarm import Refused
 from server.control.authorization import Caller
+from server.judge.settings import Settings
 from server.protocol import commands, serialize
 from server.rosbridge.address import BadAddress
+from server.storage.storage_thread import StorageThread
 from server.vehicle import phone, queries
 from server.vehicle.session_parts import SessionActions, SessionParts
 
@@ -32,7 +34,11 @@ class CommandHandler:
         *,
         now: Callable[[], float],
         wall_ms: Callable[[], int],
+        storage: StorageThread | None = None,
     ) -> None:
+        """`storage`: the thread that writes settings; None: the caller waits for the disk."""
+        self._storage = storage
+        self._changing = asyncio.Lock()
         self._vehicle = vehicle
         self._parts = parts
         self._actions = actions
@@ -56,8 +62,15 @@ class CommandHandler:
             if isinstance(command, commands.Import):  # a file may take a while to read, and control may pass meanwhile
                 read = await asyncio.to_thread(parts.settings.read, command.toml)
                 parts.authorization.admit(command, caller, self._now())
-                self._actions.settings_changed(parts.settings.replace(read), by=by)
-                parts.publisher.put()
+                await self._change_settings(lambda: parts.settings.prepare_all(read), by)
+            elif isinstance(command, commands.Set):
+                values, topics = command.values, command.topics
+                await self._change_settings(
+                    lambda: parts.settings.prepare(
+                        values=values, topics=topics, profile=command.profile, version=command.version
+                    ),
+                    by,
+                )
             else:
                 self._obey(command, caller)
             if isinstance(command, commands.Record):
@@ -72,6 +85,24 @@ class CommandHandler:
         version = {"version": parts.settings.settings.version} if commands.is_of_settings(command) else {}
         fence = parts.authorization.fence_of(caller)
         return {"ok": True} | version | ({} if fence is None else {"fence": fence})
+
+    async def _change_settings(self, prepare: Callable[[], Settings], by: str) -> None:
+        """Stores settings and puts them in force; both happen though the caller waits no longer.
+
+        Raises BadSetting, Conflict, OSError.
+        """
+        await asyncio.shield(asyncio.create_task(self._store_and_adopt(prepare, by), name="change settings"))
+
+    async def _store_and_adopt(self, prepare: Callable[[], Settings], by: str) -> None:
+        settings = self._parts.settings
+        async with self._changing:  # one after the other: each is prepared from what the one before put in force
+            new = prepare()
+            if self._storage is None:
+                settings.store(new)
+            else:
+                await self._storage.run(lambda: settings.store(new))
+            self._actions.settings_changed(settings.adopt(new), by=by)
+            self._parts.publisher.put()
 
     def _query(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
         """The answer to a query; None: it is a command."""
@@ -135,11 +166,6 @@ class CommandHandler:
                 self._actions.recording_ordered()
             case commands.Acknowledge() | commands.Shelve() | commands.Unshelve():
                 self._respond(command, now_s, by)
-            case commands.Set():
-                lines = parts.settings.change(
-                    values=command.values, topics=command.topics, profile=command.profile, version=command.version
-                )
-                self._actions.settings_changed(lines, by=by)
             case commands.TakeControl():
                 parts.authorization.obey(command, caller, now_s)
             case commands.Ride():

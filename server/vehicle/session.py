@@ -19,6 +19,7 @@ from server.rosbridge import address
 from server.rosbridge.address import BadAddress
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.link import RosLink
+from server.storage.storage_thread import StorageThread
 from server.system.supervision import Supervisor
 from server.vehicle import facts
 from server.vehicle.command_handler import CommandHandler
@@ -50,8 +51,12 @@ class Session:
         settings: SettingsFile | None = None,
         recordings: RecordingsFolder | None = None,
         on_finished: Callable[[Path], None] = lambda _: None,
+        storage: StorageThread | None = None,
     ) -> None:
-        """`recordings` None: nothing is recorded. `on_finished` is called with each part that is."""
+        """`recordings` None: nothing is recorded. `on_finished` is called with each part that is.
+
+        `storage`: the thread that writes settings; None: the session does.
+        """
         self.vehicle = vehicle
         self._bus = bus
         self._now = now
@@ -76,7 +81,9 @@ class Session:
         )
         self._tick = Tick(vehicle.name, self._parts, attempts, bus, now=now, wall_ms=wall_ms)
         self._restoration = Restoration(vehicle.name, bus, self._parts, now=now, wall_ms=wall_ms)
-        self._commands = CommandHandler(vehicle.name, self._parts, self, self.frame, now=now, wall_ms=wall_ms)
+        self._commands = CommandHandler(
+            vehicle.name, self._parts, self, self.frame, now=now, wall_ms=wall_ms, storage=storage
+        )
 
     # -- life --------------------------------------------------------------------------------------------------------
 

@@ -113,7 +113,7 @@ async def test_a_hung_disk_is_trouble_that_is_reported(disk: Disk, monkeypatch: 
 
     monkeypatch.setattr(disk.journal, "_write", hang)
     disk.bus.append("car", [event()])
-    assert began.wait(5)
+    assert await asyncio.to_thread(began.wait, 5)
     assert disk.bus.save_events() is None
     disk.now_s += SLOW_DISK_S + 1
     trouble = disk.bus.save_events() or ""
