@@ -13,7 +13,7 @@ from server.access import pending_invitations, secret_file
 from server.access.active_connections import Visits
 from server.access.cookie import Cookies
 from server.access.devices import Device, Devices
-from server.access.identity import LOCAL, Role, Who
+from server.access.identity import LOCAL, Principal, Role
 from server.access.invitations import PIN_DIGITS, Invitation, Invitations
 from server.access.keys import Keys
 from server.access.names import Names
@@ -39,7 +39,7 @@ class NotPaired(Exception):
 class Known:
     """Who sent a request, by what it carries."""
 
-    who: Who
+    who: Principal
     by: str  # "local", "key" or "cookie"
     is_to_renew: str | None = None  # the Set-Cookie of a cookie that grows old
 
@@ -206,7 +206,7 @@ class Access:
             asyncio.get_running_loop().run_in_executor(None, write)
         is_secure = self.is_secure(scheme, headers.get("host", ""))
         renewed = self._cookies.header(id, secret, is_secure=is_secure) if is_old else None
-        return Known(who=Who(id=device.id, name=device.name, role=device.role), by="cookie", is_to_renew=renewed)
+        return Known(who=Principal(id=device.id, name=device.name, role=device.role), by="cookie", is_to_renew=renewed)
 
     def why_unknown(self, headers: Mapping[str, str], *, scheme: str) -> tuple[str, str]:
         """A word and a sentence for who is not known: a device that was removed is told so."""
@@ -235,11 +235,11 @@ class Access:
 
     # -- tickets -----------------------------------------------------------------------------------------------------
 
-    def ticket(self, who: Who) -> str:
+    def ticket(self, who: Principal) -> str:
         """A ticket for one socket of `who`, within 5 s."""
         return self._tickets.new(who.id, now_s=self._now())
 
-    def use_ticket(self, ticket: str, who: Who) -> bool:
+    def use_ticket(self, ticket: str, who: Principal) -> bool:
         """Whether `who` may open a socket with it; it is used up."""
         return self._tickets.use(ticket, who.id, now_s=self._now())
 

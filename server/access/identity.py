@@ -24,7 +24,7 @@ class Role(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Who:
+class Principal:
     """A device or program that was let in."""
 
     id: str  # stable over restarts, never shown as a secret: safe in logs
@@ -37,13 +37,14 @@ class Who:
         return self.role is Role.OPERATOR
 
 
-LOCAL = Who(id="local", name="this machine", role=Role.OPERATOR)  # everybody, where the server listens on loopback only
+# Everybody, where the server listens on the loopback interface only.
+LOCAL = Principal(id="local", name="this machine", role=Role.OPERATOR)
 
 
-def who_of(connection: Connection) -> Who:
+def principal_of(connection: Connection) -> Principal:
     """Who sent this request or opened this socket. Raises KeyError where nobody looked: that is a mistake of ours, and
     it must not be taken for a permission."""
-    found: Who = connection.scope[SCOPE_KEY]
+    found: Principal = connection.scope[SCOPE_KEY]
     return found
 
 

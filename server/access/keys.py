@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.access.identity import Role, Who
+from server.access.identity import Principal, Role
 
 SHORTEST = 20  # letters: `openssl rand -hex 16` gives 32
 _LONGEST = 512
@@ -26,7 +26,7 @@ class Keys:
 
     hashes: tuple[tuple[bytes, Role], ...] = ()
 
-    def who(self, authorization: str) -> Who | None:
+    def who(self, authorization: str) -> Principal | None:
         """The program whose key this header holds. All are compared, in a time that tells nothing."""
         scheme, _, key = authorization.partition(" ")
         if scheme.lower() != "bearer" or len(key) > _LONGEST:
@@ -36,7 +36,7 @@ class Keys:
         for known, role in self.hashes:
             if hmac.compare_digest(known, given):
                 found = role
-        return None if found is None else Who(id=f"key-{found}", name=f"{found} key", role=found, is_program=True)
+        return None if found is None else Principal(id=f"key-{found}", name=f"{found} key", role=found, is_program=True)
 
 
 def keys_of(keys: Mapping[Role, str]) -> Keys:

@@ -24,9 +24,9 @@ from server.storage.storage_thread import StorageThread
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
 from server.version import catgraph_version
+from server.web.hub import Hub
 from server.web.maps.layers import Ground
 from server.web.maps.tile_proxy import Upstream
-from server.web.page_socket import Hub
 from server.web.services import Services
 
 

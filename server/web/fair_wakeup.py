@@ -1,11 +1,11 @@
-"""Many who wait for the same thing go one after another, so that a crowd delays nothing else."""
+"""Many who wait for the same thing go one after another, so that many delay nothing else."""
 
 from __future__ import annotations
 
 import asyncio
 
 
-class Turns:
+class FairWakeup:
     """Sets events one by one, each in a turn of the loop of its own: between two of them timers and sockets are served.
 
     Who is in line already keeps the place, unless it became urgent. On one loop.

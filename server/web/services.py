@@ -21,8 +21,8 @@ from server.vehicle.vehicle import Vehicle
 from server.vehicle.vitals import problems
 from server.web.assets.bundle import find
 from server.web.assets.service_worker import build_of
+from server.web.hub import Hub
 from server.web.maps.layers import Ground
-from server.web.page_socket import Hub
 
 
 @dataclass(slots=True)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.access.identity import LOCAL, SCOPE_KEY, Who
+from server.access.identity import LOCAL, SCOPE_KEY, Principal
 from server.protocol.rate_limit import Allowance, Limits, Rate
 from server.web.middleware.errors import problem
 
@@ -73,7 +73,7 @@ class Throttle:
         return receive_bounded
 
     def _allowance(self, scope: Scope) -> Allowance:
-        who: Who | None = scope.get(SCOPE_KEY)
+        who: Principal | None = scope.get(SCOPE_KEY)
         peer = scope.get("client")
         key = f"device {who.id}" if who is not None else f"address {peer[0] if peer else ''}"
         is_slow_down = scope["type"] == "http" and scope["path"].startswith(SLOW_DOWN_PATH)
@@ -88,7 +88,7 @@ class Throttle:
             )
         return found
 
-    def _rate(self, who: Who | None) -> Rate:
+    def _rate(self, who: Principal | None) -> Rate:
         return self._limits.local_requests if who is LOCAL else self._limits.requests
 
     def _forget(self) -> None:

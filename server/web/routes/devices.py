@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from server.access.access import NotPaired
 from server.access.access import this_task as answering
 from server.access.devices import Device
-from server.access.identity import Role, Who, who_of
+from server.access.identity import Principal, Role, principal_of
 from server.access.invitations import LASTS_S
 from server.access.tickets import LASTS_S as TICKET_LASTS_S
 from server.system.loopback import is_loopback
@@ -66,7 +66,7 @@ class DeviceChange(BaseModel):
     name: Annotated[str, Field(min_length=1, max_length=200)] | None = None
 
 
-def _me(who: Who) -> Me:
+def _me(who: Principal) -> Me:
     return Me(id=who.id, name=who.name, role=who.role)
 
 
@@ -74,7 +74,7 @@ def _me(who: Who) -> Me:
 async def pair(request: Request, response: Response, body: Annotated[PairRequest, Body()]) -> Me:
     access = services(request).access
     if access.is_open:
-        return _me(who_of(request))
+        return _me(principal_of(request))
     if (body.token is None) == (body.pin is None):
         raise HTTPException(422, "Either a token or a PIN lets a device in.")
     peer = request.client.host if request.client is not None else ""
@@ -101,19 +101,19 @@ def _not_paired(why: NotPaired) -> Problem:
 
 @router.get("/api/me", tags=["access"], summary="Who asks, as the server knows it")
 async def me(request: Request) -> Me:
-    return _me(who_of(request))
+    return _me(principal_of(request))
 
 
 @router.post("/api/ticket", tags=["access"], summary="A ticket for one socket, within 5 s: /ws?ticket=…")
 async def ticket(request: Request) -> Ticket:
-    return Ticket(ticket=services(request).access.ticket(who_of(request)))
+    return Ticket(ticket=services(request).access.ticket(principal_of(request)))
 
 
 @router.get("/api/devices", tags=["access"], summary="The paired devices, newest first")
 async def devices(request: Request) -> dict[str, Any]:
     access = services(request).access
     return {
-        "you": who_of(request).id,
+        "you": principal_of(request).id,
         "open": access.is_open,
         "devices": [_listed(request, device) for device in access.devices.all()],
     }
@@ -142,7 +142,7 @@ async def change(request: Request, id: DeviceId, body: Annotated[DeviceChange, B
 @router.delete("/api/devices/{id}", tags=["access"], summary="It may not come any more, and what it has open ends now")
 async def remove(request: Request, id: DeviceId) -> dict[str, bool]:
     access = services(request).access
-    who = who_of(request)
+    who = principal_of(request)
     try:
         _there(access.remove(id, by="itself" if who.id == id else who.name, but=answering()))
     except OSError as why:

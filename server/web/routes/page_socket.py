@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter, WebSocket
 
-from server.access.identity import who_of
+from server.access.identity import principal_of
 from server.replay import commands
 from server.web.services import services
 
@@ -21,6 +21,6 @@ async def page_socket(
     if name not in app.sessions:
         await socket.close(code=1008, reason="no such vehicle")
         return
-    who = who_of(socket)
-    hello = app.hello(name) | {"who": {"id": who.id, "name": who.name, "role": who.role}}
-    await app.hub.serve(socket, name, hello, who=who, replay=commands.opening(replay, t))
+    principal = principal_of(socket)
+    hello = app.hello(name) | {"who": {"id": principal.id, "name": principal.name, "role": principal.role}}
+    await app.hub.serve(socket, name, hello, principal=principal, replay=commands.opening(replay, t))

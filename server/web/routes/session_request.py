@@ -8,7 +8,7 @@ import orjson
 from fastapi import HTTPException, Query, Request, Response
 from pydantic import BaseModel
 
-from server.access.identity import who_of
+from server.access.identity import principal_of
 from server.bus.bus import NotServed
 from server.control import display_name
 from server.replay.manager import NoReplay
@@ -58,7 +58,7 @@ def _sender(request: Request) -> dict[str, Any]:
     """Who sent a request, and by which lease of control: a number, where it gives one."""
     fence = request.headers.get(FENCE_HEADER, "")
     return {
-        "who": who_of(request).id,
+        "who": principal_of(request).id,
         "page": None,
         "fence": int(fence) if fence.isascii() and fence.isdigit() and len(fence) < 16 else None,
         "console": services(request).is_open,

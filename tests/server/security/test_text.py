@@ -11,11 +11,10 @@ import pytest
 
 from server.app.config import Config
 from server.bus.event_table import safe_cell
-from server.protocol import commands
+from server.protocol import commands, replies
 from server.rosbridge_server.server import RosBridge
 from server.system.clean_text import clean, cleaned
 from server.vehicle.vehicle import Vehicle
-from server.web.page_socket import Page
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.viewer import viewer
@@ -118,9 +117,7 @@ async def test_what_the_server_asks_of_a_session_is_refused_to_a_page(kind: obje
         assert answer == {"kind": "reply", "id": answer["id"], "ok": False, "reason": "There is no such command."}
 
 
-def test_an_answer_overwrites_neither_kind_nor_id() -> None:
-    page = Page.__new__(Page)
-    page._replies = []
-    page._wake = type("Event", (), {"set": lambda self: None})()  # type: ignore[assignment]
-    page._reply("7", {"kind": "state", "id": "8", "ok": True})
-    assert page._replies == [{"kind": "reply", "id": "7", "ok": True}]
+def test_no_key_of_an_answer_replaces_one_of_the_envelope() -> None:
+    answer = {"kind": "state", "id": "8", "ok": True, "version": 3}
+    assert replies.reply("7", answer) == {"kind": "reply", "id": "7", "ok": True, "version": 3}
+    assert replies.reply("7", {"ok": "yes"})["ok"] is False, "only True is an agreement"

@@ -15,7 +15,7 @@ from server.app.app import create_app
 from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
-from server.web.fair_wakeup import Turns
+from server.web.fair_wakeup import FairWakeup
 from tests.server import scan_frames
 from tests.server.cars import driving, scan, twist
 from tests.server.conftest import serving, serving_app
@@ -42,7 +42,7 @@ async def test_events_reach_a_page_before_a_state_is_made(bridge: RosBridge) -> 
     """To make a state takes milliseconds: an alarm does not wait for it."""
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
     app, speeds = create_app(config), {"now": 4.2}
-    turns, due = Turns(), asyncio.Event()  # a page as the hub wakes it
+    turns, due = FairWakeup(), asyncio.Event()  # a page as the hub wakes it
     happened: list[str] = []
 
     def watch(kind: str) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 import time
 
-from server.web.fair_wakeup import Turns
+from server.web.fair_wakeup import FairWakeup
 
 
-async def order_of(turns: Turns, events: dict[str, asyncio.Event]) -> list[str]:
+async def order_of(turns: FairWakeup, events: dict[str, asyncio.Event]) -> list[str]:
     """In which order they are woken, with a mark for each turn of the loop that others have between."""
     woken: list[str] = []
 
@@ -23,7 +23,7 @@ async def order_of(turns: Turns, events: dict[str, asyncio.Event]) -> list[str]:
 
 
 async def test_each_is_woken_once_in_the_order_in_which_it_came_and_what_is_urgent_first() -> None:
-    turns, events = Turns(), {name: asyncio.Event() for name in "abcd"}
+    turns, events = FairWakeup(), {name: asyncio.Event() for name in "abcd"}
     for name in "abca":
         turns.queue(events[name])
     turns.queue(events["d"], is_urgent=True)
@@ -35,7 +35,7 @@ async def test_each_is_woken_once_in_the_order_in_which_it_came_and_what_is_urge
 
 
 async def test_who_left_is_not_woken() -> None:
-    turns, left, stays = Turns(), asyncio.Event(), asyncio.Event()
+    turns, left, stays = FairWakeup(), asyncio.Event(), asyncio.Event()
     turns.queue(left)
     turns.queue(stays)
     turns.leave(left)
@@ -46,7 +46,7 @@ async def test_who_left_is_not_woken() -> None:
 
 async def test_a_crowd_lets_a_timer_through() -> None:
     """Each of 200 works for 1 ms as it is woken: together they would hold up a timer for 200 ms."""
-    turns = Turns()
+    turns = FairWakeup()
 
     async def work(event: asyncio.Event) -> None:
         await event.wait()

@@ -1,0 +1,90 @@
+"""All pages of one server."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from starlette.websockets import WebSocket
+
+from server.access.identity import LOCAL, Principal
+from server.bus.bus import LocalBus
+from server.protocol.rate_limit import Limits
+from server.replay import commands as replay_commands
+from server.replay.manager import ReplayManager
+from server.web.fair_wakeup import FairWakeup
+from server.web.page_socket import Page
+
+MAX_PAGES = 500
+
+
+class Hub:
+    """Serves each page, and limits how many there are."""
+
+    def __init__(
+        self,
+        bus: LocalBus,
+        *,
+        replays: ReplayManager,
+        server: Callable[[], Mapping[str, Any]],
+        limits: Limits,
+        now: Callable[[], float],
+    ) -> None:
+        """`server`: what a state tells of the server; `now` is a monotonic clock in seconds."""
+        self._bus = bus
+        self._limits = limits
+        self._now = now
+        self._replays = replays
+        self._server = server
+        self._pages: set[Page] = set()
+        self._wakeup = FairWakeup()
+        self._by_device: Counter[str] = Counter()
+
+    @property
+    def pages(self) -> int:
+        """How many pages are connected."""
+        return len(self._pages)
+
+    @property
+    def skipped(self) -> int:
+        """Frames that were replaced by newer ones before a page took them, of all pages that are connected."""
+        return sum(page.skipped for page in self._pages)
+
+    async def serve(
+        self,
+        socket: WebSocket,
+        vehicle: str,
+        hello: Mapping[str, Any],
+        *,
+        principal: Principal,
+        replay: replay_commands.Open | None = None,
+    ) -> None:
+        """Serves one page until it leaves; `replay`: the recording it begins with."""
+        await socket.accept()
+        if len(self._pages) >= MAX_PAGES or self._has_too_many(principal):
+            await socket.close(code=1013, reason="too many pages")
+            return
+        page = Page(
+            socket,
+            self._bus,
+            vehicle,
+            hello=hello,
+            principal=principal,
+            replays=self._replays,
+            server=self._server,
+            limits=self._limits,
+            now=self._now,
+            wakeup=self._wakeup,
+            replay=replay,
+        )
+        self._pages.add(page)
+        self._by_device[principal.id] += 1
+        try:
+            await page.serve()
+        finally:
+            self._pages.discard(page)
+            self._by_device -= Counter((principal.id,))
+
+    def _has_too_many(self, principal: Principal) -> bool:
+        return principal is not LOCAL and self._by_device[principal.id] >= self._limits.pages
