@@ -26,7 +26,7 @@ test: $(VENV)/.ready-test static/built/built.json ## all of the tests: what must
 	status=0; \
 	PYTHONASYNCIODEBUG=1 $(PYTEST) --report-log=out/tests/fast.jsonl -n 3 -m "$(FAST)" || status=$$?; \
 	$(PYTEST) --report-log=out/tests/slow.jsonl -n 4 -m "slow and not browser and not soak" || status=$$?; \
-	$(PYTEST) --report-log=out/tests/browser.jsonl -n 2 --dist loadfile -m "browser and not soak" || status=$$?; \
+	$(PYTEST) --report-log=out/tests/browser.jsonl -m "browser and not soak" || status=$$?; \
 	$(PY) -m tests.summary $(LOGS:%=out/tests/%.jsonl) || status=$$?; \
 	exit $$status
 

@@ -36,8 +36,8 @@ class Stage:
 def read_stage(path: Path) -> Stage:
     """A stage from its log; an empty stage where there is no such file, for then it never began."""
     reports = list(_reports(path.read_text(encoding="utf-8").splitlines())) if path.is_file() else []
-    begun = [float(one["start"]) for one in reports]
-    stage = Stage(path.stem, max((float(one["stop"]) for one in reports), default=0.0) - min(begun, default=0.0))
+    times_s = [float(one[when]) for one in reports for when in ("start", "stop") if one[when]]  # 0: its worker crashed
+    stage = Stage(path.stem, max(times_s) - min(times_s) if times_s else 0.0)
     open_tests: dict[str, None] = {}
     for one in reports:
         name, when, outcome = one["nodeid"], one["when"], one["outcome"]

@@ -54,8 +54,8 @@ def test_a_stage_that_did_not_begin_is_no_success(tmp_path: Path, capsys: pytest
 
 
 def test_the_slowest_come_first_and_the_total_is_of_all_stages(tmp_path: Path) -> None:
-    one = read_stage(Path(write(tmp_path / "fast.jsonl", whole("t::a", 0, 60) + whole("t::b", 60, 120))))
-    other = read_stage(Path(write(tmp_path / "slow.jsonl", whole("t::c", 0, 90))))
+    one = read_stage(Path(write(tmp_path / "fast.jsonl", whole("t::a", 1, 60) + whole("t::b", 61, 120))))
+    other = read_stage(Path(write(tmp_path / "slow.jsonl", whole("t::c", 1, 90))))
     lines = summary([one, other])
     assert [line.split()[-1] for line in lines if " s  " in line] == ["t::b", "t::c", "t::a"]
     assert [line.split()[-1] for line in lines if line.startswith("total")] == ["4.5"]

@@ -67,7 +67,7 @@ async def test_a_stalled_page_delays_nobody(bridge: RosBridge, server: str) -> N
 async def test_events_come_exactly_once_over_a_reconnection(bridge: RosBridge, server: str) -> None:
     async with driving(bridge):
         async with viewer(server, have_event=0) as one:
-            await one.until(lambda: one.events)
+            await one.until(lambda: any(event["change"] == "connected" for event in one.events))
             assert (await one.ask(kind="pause"))["ok"]
             await one.until(lambda: any(event["change"] == "paused" for event in one.events))
             seen = [event["n"] for event in one.events]
