@@ -23,9 +23,7 @@ FOLDERS = ("server", "monitor", "vehicle", "static/js")
 # Of import circles the entry counts the modules of a package that are part of one.
 ALLOWED: dict[str, int] = {
     "file server/rosbridge/link.py": 754,
-    "file server/slowdown/sender.py": 542,
     "class server/rosbridge/link.py RosLink": 378,
-    "class server/slowdown/sender.py Slowing": 479,
 }
 
 Sizes = dict[str, int]

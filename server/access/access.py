@@ -36,7 +36,7 @@ class NotPaired(Exception):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Known:
+class Admitted:
     """Who sent a request, by what it carries."""
 
     who: Principal
@@ -186,14 +186,14 @@ class Access:
 
     # -- who asks ----------------------------------------------------------------------------------------------------
 
-    def known(self, headers: Mapping[str, str], *, scheme: str) -> Known | None:
+    def known(self, headers: Mapping[str, str], *, scheme: str) -> Admitted | None:
         """Who sends these headers; None: nobody that is known. `scheme`: http or https."""
         if self.is_open:
-            return Known(who=LOCAL, by="local")
+            return Admitted(who=LOCAL, by="local")
         authorization = headers.get("authorization")
         if authorization is not None:
             program = self._keys.who(authorization)
-            return None if program is None else Known(who=program, by="key")
+            return None if program is None else Admitted(who=program, by="key")
         read = self._read_cookie(headers, scheme)
         if read is None:
             return None
@@ -206,7 +206,9 @@ class Access:
             asyncio.get_running_loop().run_in_executor(None, write)
         is_secure = self.is_secure(scheme, headers.get("host", ""))
         renewed = self._cookies.header(id, secret, is_secure=is_secure) if is_old else None
-        return Known(who=Principal(id=device.id, name=device.name, role=device.role), by="cookie", is_to_renew=renewed)
+        return Admitted(
+            who=Principal(id=device.id, name=device.name, role=device.role), by="cookie", is_to_renew=renewed
+        )
 
     def why_unknown(self, headers: Mapping[str, str], *, scheme: str) -> tuple[str, str]:
         """A word and a sentence for who is not known: a device that was removed is told so."""

@@ -19,7 +19,7 @@ from server.analysis.faults import Faults, Laid
 from server.analysis.own_events import read_recorded_events
 from server.analysis.simulated_slowdown import Slowed, WouldSlow
 from server.analysis.traces import Traces
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
 from server.judge.offline import Observer, OfflineRun
 from server.judge.pipeline import TICK_S
@@ -46,7 +46,7 @@ class Extract:
 class Rehearsed:
     """All that one run found. Times are seconds since the beginning of the recording."""
 
-    tuning: Tuning  # at the end
+    tuning: ActiveSettings  # at the end
     override: SettingsOverride
     from_s: float  # the first message judged
     to_s: float  # the last

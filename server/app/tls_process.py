@@ -26,7 +26,7 @@ from server.tls.certificate_renewal import GivenCertificate, OwnCertificate, kee
 from server.tls.host_addresses import Outside
 from server.tls.names import Names, addresses_now, host_now, names_of
 from server.tls.setup import Whereabouts, explaining, leading
-from server.tls.tls_sniffer import Doorway, Factory
+from server.tls.tls_sniffer import Factory, TlsSniffer
 from server.web.middleware import http_protocol
 
 log = logging.getLogger("catgraph.tls")
@@ -142,7 +142,7 @@ async def serve_secured(
         begun = asyncio.create_task(server.begun.wait())
         await asyncio.wait([serving, begun], return_when=asyncio.FIRST_COMPLETED)
         begun.cancel()
-        doorway = Doorway(
+        doorway = TlsSniffer(
             listening,
             context.ssl,
             secure=_pages(server),

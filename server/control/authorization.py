@@ -54,7 +54,7 @@ class Caller:
         return None if self.page is None else Operator(page=self.page, who=self.who, name=self.name)
 
 
-class Gate:
+class Authorization:
     """Time is an argument; it must not go back."""
 
     def __init__(self, note: Note, *, fence: int) -> None:

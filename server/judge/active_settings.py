@@ -15,7 +15,7 @@ from server.judge.settings import AUTO, Conflict, Settings, SettingsFile, change
 PERCENT_A_RAD = -1 / 0.00536  # the CATVehicle's steering: measured on its recordings, negative percent = left
 
 
-class Tuning:
+class ActiveSettings:
     """The one owner of a vehicle's settings."""
 
     def __init__(self, file: SettingsFile) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from server.judge import pipeline
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.message import Json, RosVersion
 from server.judge.recorded_events import NewSettings, RecordedEvents
 from server.judge.ros_names import BadName, canonical_name
@@ -62,7 +62,7 @@ class LinkHistory(pipeline.Delays, Protocol):
 class SettingsEpoch:
     """How a recording is judged under one version of the settings."""
 
-    tuning: Tuning
+    tuning: ActiveSettings
     sources: Mapping[str, Source]  # by signal
     listeners: Mapping[str, tuple[Source, ...]]  # by topic as the recording spells it
 

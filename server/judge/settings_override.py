@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.message import RosVersion
 from server.judge.settings import AUTO, SettingsFile, from_toml
 
@@ -26,9 +26,9 @@ def override_of(toml: str) -> SettingsOverride:
     return SettingsOverride(name="as recorded", values=read.values, topics=read.topics, profile=read.profile)
 
 
-def tuning_for(override: SettingsOverride, topics: Mapping[str, str], ros: RosVersion) -> Tuning:
+def tuning_for(override: SettingsOverride, topics: Mapping[str, str], ros: RosVersion) -> ActiveSettings:
     """How a car with these topics is judged: its profile as live recognises it, then the override."""
-    tuning = Tuning(SettingsFile(None))
+    tuning = ActiveSettings(SettingsFile(None))
     tuning.recognise(topics, ros)
     if override.topics or override.profile != AUTO:
         tuning.change(values={}, topics=dict(override.topics), profile=override.profile, version=None)

@@ -13,7 +13,7 @@ from typing import Any
 
 from monitor.recorder import RecorderFacts
 from monitor.runner import Refused
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.recording.delay import LinkDelay
 from server.recording.folder import RecordingsFolder
 from server.recording.own import Own
@@ -33,7 +33,7 @@ class SessionRecording:
         self,
         vehicle: str,
         folder: RecordingsFolder | None,
-        tuning: Tuning,
+        tuning: ActiveSettings,
         *,
         now: Callable[[], float],
         wall_ms: Callable[[], int],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from monitor.check import Limits
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.recording.space import Allowance
 
 GB = 1e9
@@ -14,7 +14,7 @@ GB = 1e9
 class RecordingSettings:
     """Read anew each time: settings change while a car is recorded."""
 
-    def __init__(self, tuning: Tuning) -> None:
+    def __init__(self, tuning: ActiveSettings) -> None:
         self._tuning = tuning
 
     def value(self, name: str) -> float:

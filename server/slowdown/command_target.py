@@ -1,4 +1,4 @@
-"""The way to the car: on which topic it is commanded, and what speaks against it."""
+"""The topic on which the car is commanded, and why it cannot be."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ GUARD_RELEASE = "/ocu_guard/release"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Way:
+class CommandTarget:
     """`problem`: why nothing can be ordered, as a sentence; None: it can."""
 
     topic: str = ""
@@ -26,21 +26,21 @@ class Way:
     problem: str | None = None
 
 
-def way_of(*, phase: str, sources: Mapping[str, Source], offered: Mapping[str, str] | None) -> Way:
+def target_of(*, phase: str, sources: Mapping[str, Source], offered: Mapping[str, str] | None) -> CommandTarget:
     """`sources` by signal; `offered` topic → type of all that the car has, None while its bridge does not say."""
     if phase not in ("monitoring", "lost"):
-        return Way(problem="No car is connected.")
+        return CommandTarget(problem="No car is connected.")
     if offered is None:
-        return Way(problem="The bridge does not say which topics the car has, so the type is not confirmed.")
+        return CommandTarget(problem="The bridge does not say which topics the car has, so the type is not confirmed.")
     has_guard = GUARD_STATE in offered and kind_of(offered.get(GUARD_CMD, "")) is not None
     source = sources.get("command")
     if not has_guard and source is None:
-        return Way(problem="The car has no command topic: pick one for Command in Settings.")
+        return CommandTarget(problem="The car has no command topic: pick one for Command in Settings.")
     topic = GUARD_CMD if has_guard or source is None else source.topic
     type = offered.get(topic) or (None if source is None else source.type)
     kind = kind_of(type or "")
     if kind is None:
-        return Way(topic=topic, type=type, problem=f"{topic} is {type or 'of unknown type'}, no Twist.")
+        return CommandTarget(topic=topic, type=type, problem=f"{topic} is {type or 'of unknown type'}, no Twist.")
     if not is_topic(topic):
-        return Way(topic=topic, type=type, problem=f"{topic} is not a topic name that ROS accepts.")
-    return Way(topic=topic, type=type, kind=kind, has_guard=has_guard)
+        return CommandTarget(topic=topic, type=type, problem=f"{topic} is not a topic name that ROS accepts.")
+    return CommandTarget(topic=topic, type=type, kind=kind, has_guard=has_guard)

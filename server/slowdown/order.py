@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from monitor.alarm import Refused
-from server.slowdown.command_target import Way
+from server.slowdown.command_target import CommandTarget
 from server.slowdown.ramp import Ramp
 
 LATE_S = 0.3  # what was pressed longer ago is not obeyed any more
@@ -67,18 +67,18 @@ class SlowDown:
         self.ended_at_longest_s: float | None = None
         self._operators_s: float | None = None  # a page of an operator was last heard; None: none since it was armed
 
-    def state(self, way: Way, now_s: float) -> State:
+    def state(self, target: CommandTarget, now_s: float) -> State:
         if self.order is not None:
             at_zero = self.order.last is not None and self.order.last.speed_mps == 0.0
             return "holding" if at_zero and self.order.ramp is not None else "ordered"
-        if way.problem is not None:
+        if target.problem is not None:
             return "not_available"
         return "safe" if self.armed_by is None else "armed"
 
-    def arm(self, way: Way, by: str) -> bool:
+    def arm(self, target: CommandTarget, by: str) -> bool:
         """Whether it was not armed before. Raises Refused."""
-        if way.problem is not None:
-            raise Refused(f"Slow-down is not available: {way.problem}")
+        if target.problem is not None:
+            raise Refused(f"Slow-down is not available: {target.problem}")
         was = self.armed_by
         self.armed_by = was or by
         return was is None
@@ -103,15 +103,22 @@ class SlowDown:
         return was is not None
 
     def begin(
-        self, way: Way, *, by: str, why: str, deceleration_mps2: float, now_s: float, pressed_s: float | None
+        self,
+        target: CommandTarget,
+        *,
+        by: str,
+        why: str,
+        deceleration_mps2: float,
+        now_s: float,
+        pressed_s: float | None,
     ) -> Order | None:
         """A new order; None: one stands already, and goes on. Raises Refused."""
         if self.order is not None:
             return None
         if self.armed_by is None:
             raise Refused("Slow-down is not armed.")
-        if way.problem is not None:
-            raise Refused(f"Slow-down is not available: {way.problem}")
+        if target.problem is not None:
+            raise Refused(f"Slow-down is not available: {target.problem}")
         self._number += 1
         self.ended_at_longest_s = None
         self.order = Order(

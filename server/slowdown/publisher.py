@@ -9,7 +9,7 @@ from server.rosbridge.link import LinkDown, RosLink
 ADVERTISE_ID = "catgraph:slow-down"
 
 
-class Mouth:
+class CommandPublisher:
     """Advertises once an opening, publishes now or not at all, and remembers nothing for later."""
 
     def __init__(self) -> None:

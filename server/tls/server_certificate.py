@@ -25,7 +25,7 @@ RENEW = dt.timedelta(days=60)  # before the end: a server that is switched on on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Leaf:
+class ServerCertificate:
     """A certificate for this server and its key."""
 
     cert: x509.Certificate
@@ -37,7 +37,7 @@ class Leaf:
         return private_pem(self.key) + self.cert.public_bytes(serialization.Encoding.PEM)
 
 
-def make(authority: Authority, names: Names, *, now: dt.datetime) -> Leaf:
+def make(authority: Authority, names: Names, *, now: dt.datetime) -> ServerCertificate:
     """A new certificate for `names`, by a clock that says `now`."""
     key = ec.generate_private_key(ec.SECP256R1())
     start = _clock(authority, now).replace(microsecond=0) - BACK
@@ -58,10 +58,10 @@ def make(authority: Authority, names: Names, *, now: dt.datetime) -> Leaf:
         .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
         .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(authority.key.public_key()), critical=False)
     )
-    return Leaf(cert=builder.sign(authority.key, hashes.SHA256()), key=key)
+    return ServerCertificate(cert=builder.sign(authority.key, hashes.SHA256()), key=key)
 
 
-def why_renew(leaf: Leaf, authority: Authority, names: Names, *, now: dt.datetime) -> str | None:
+def why_renew(leaf: ServerCertificate, authority: Authority, names: Names, *, now: dt.datetime) -> str | None:
     """Why this certificate does not do any more, in words for the log; None: it does."""
     at = _clock(authority, now)
     try:
@@ -80,14 +80,14 @@ def why_renew(leaf: Leaf, authority: Authority, names: Names, *, now: dt.datetim
     return None
 
 
-def addresses_of(leaf: Leaf) -> list[IpAddress]:
+def addresses_of(leaf: ServerCertificate) -> list[IpAddress]:
     """The addresses it is for."""
     names = leaf.cert.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     found = names.get_values_for_type(x509.IPAddress)
     return [ip for ip in found if isinstance(ip, ipaddress.IPv4Address | ipaddress.IPv6Address)]
 
 
-def load(folder: Path) -> Leaf | None:
+def load(folder: Path) -> ServerCertificate | None:
     """The one kept in `folder`; None where there is none that can be read: a new one costs nothing."""
     try:
         text = (folder / FILE).read_bytes()
@@ -98,10 +98,10 @@ def load(folder: Path) -> Leaf | None:
         return None
     if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != cert.public_key():
         return None
-    return Leaf(cert=cert, key=key)
+    return ServerCertificate(cert=cert, key=key)
 
 
-def keep(folder: Path, leaf: Leaf) -> Path:
+def keep(folder: Path, leaf: ServerCertificate) -> Path:
     """Writes it, readable for its owner only, and returns where. Raises OSError."""
     path = folder / FILE
     durable_file.write(path, leaf.pem, mode=0o600)

@@ -28,7 +28,7 @@ DECIDE_S = 10.0  # a browser opens spare connections and says nothing on them: t
 Factory = Callable[[], asyncio.Protocol]
 
 
-class Doorway:
+class TlsSniffer:
     """Accepts on a listening socket and leads each connection to one of two protocols."""
 
     def __init__(

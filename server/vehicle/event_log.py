@@ -9,7 +9,7 @@ from typing import Any
 
 from monitor.alarm import Alarm, Transition
 from server.bus.bus import LocalBus
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.protocol import serialize
 from server.system.clean_text import cleaned
 
@@ -18,7 +18,7 @@ log = logging.getLogger("catgraph.logbook")
 MAX_WAITING = 1000  # events that the log refused and that are tried again
 
 
-class Logbook:
+class EventLog:
     """Every event carries the version of the settings in force. `wall_ms` is the time of day in ms since 1970;
     `also` is called with each event and its number.
 
@@ -30,7 +30,7 @@ class Logbook:
         self,
         vehicle: str,
         bus: LocalBus,
-        tuning: Tuning,
+        tuning: ActiveSettings,
         *,
         wall_ms: Callable[[], int],
         also: Callable[[list[dict[str, Any]]], None] = lambda _: None,

@@ -7,7 +7,7 @@ from typing import Any
 
 from monitor.state import LinkFacts
 from server.rosbridge.connection_errors import Problem
-from server.vehicle.restore import Past
+from server.vehicle.restore import RestoredState
 from server.vehicle.session_parts import SessionParts
 from server.vehicle.state_frame import Facts
 
@@ -59,7 +59,7 @@ def frame_facts(
     wall_ms: int,
     server: Mapping[str, Any],
     configured: str | None,
-    held: Past | None,
+    held: RestoredState | None,
     log_trouble: str | None,
 ) -> Facts:
     """What a state is made of. `configured`: the address of the car the session was started for; `held`: what stood

@@ -15,7 +15,7 @@ from monitor.state import Snapshot, State
 from monitor.transport import TransportDelay
 from monitor.trends import Trends
 from server.judge import pipeline
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.reception_stats import Reception
 from server.judge.topics import Source
 
@@ -31,7 +31,7 @@ class Judgement:
     def __init__(
         self,
         checks: Sequence[AnyCheck] | None,
-        tuning: Tuning,
+        tuning: ActiveSettings,
         *,
         now: Callable[[], float],
         on_transitions: Callable[[Collection[Transition]], None],

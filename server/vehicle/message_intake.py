@@ -9,7 +9,7 @@ from server.bus.bus import LocalBus
 from server.recording.controller import SessionRecording
 from server.rosbridge.raw_frame import RawFrame
 from server.slowdown.command_target import GUARD_STATE
-from server.slowdown.sender import Slowing
+from server.slowdown.controller import SlowDownController
 from server.vehicle.connection import Connection
 from server.vehicle.judgement import Judgement
 from server.vehicle.scan_feed import ScanFeed
@@ -28,7 +28,7 @@ class MessageIntake:
         bus: LocalBus,
         judgement: Judgement,
         recording: SessionRecording,
-        slow_down: Slowing,
+        slow_down: SlowDownController,
         tick_parts: TickParts,
         *,
         now: Callable[[], float],
@@ -86,7 +86,7 @@ class MessageIntake:
         topics.received(topic)
         if self._recording.is_on and connection.link is not None:
             self._record(connection, topic, message, now_s, connection.link.frame_bytes)
-        if self._slow_down.heard(topic, message) or topics.took(topic, message):
+        if self._slow_down.receive(topic, message) or topics.took(topic, message):
             return
         if topic in topics.others:
             return  # subscribed to be recorded: what is judged must not depend on what is recorded

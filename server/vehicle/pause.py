@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from monitor.state import State
-from server.vehicle.event_log import Logbook
-from server.vehicle.restore import Past
+from server.vehicle.event_log import EventLog
+from server.vehicle.restore import RestoredState
 
 
 class Pause:
     """At most one at a time. `since_s` is on the session's monotonic clock; None: monitoring is on."""
 
-    def __init__(self, logbook: Logbook) -> None:
+    def __init__(self, logbook: EventLog) -> None:
         self._logbook = logbook
         self.since_s: float | None = None
         self.by: str | None = None
@@ -34,7 +34,7 @@ class Pause:
         """The car is not monitored any more."""
         self.since_s = self.by = None
 
-    def go_on(self, state: State, before: Past, now_s: float, wall_ms: int) -> None:
+    def go_on(self, state: State, before: RestoredState, now_s: float, wall_ms: int) -> None:
         """A pause outlasts a restart: who ordered it counts on silence. It is said anew, and shown as ever."""
         if before.paused_s is not None:
             self.since_s, self.by = before.paused_s, before.paused_by

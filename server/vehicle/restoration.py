@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from server.bus.bus import LocalBus
 from server.vehicle import restore
-from server.vehicle.restore import Past
+from server.vehicle.restore import RestoredState
 from server.vehicle.session_parts import SessionParts
 
 
@@ -27,7 +27,7 @@ class Restoration:
         self._parts = parts
         self._now = now
         self._wall_ms = wall_ms
-        self.held: Past | None = None  # what stood when the server ended, until a car is monitored again
+        self.held: RestoredState | None = None  # what stood when the server ended, until a car is monitored again
 
     def begin(self) -> None:
         """At the start: reads the log; numbers of occurrences and settings count on."""
@@ -45,7 +45,7 @@ class Restoration:
             self.held = before
             event_log.note("restarted", before.words(judgement.monitor.alarms))
 
-    def of(self, url: str) -> Past | None:
+    def of(self, url: str) -> RestoredState | None:
         """Before a car is dialled: the past of that very car, where the server ended while it was monitored. Its
         alarms stand again; so do those of another car, which end with its monitoring."""
         if self.held is None:
@@ -58,5 +58,5 @@ class Restoration:
         self._parts.recording.remember(before.stood)
         return before
 
-    def _recall(self) -> Past:
+    def _recall(self) -> RestoredState:
         return restore.recall(self._bus, self._vehicle, now_s=self._now(), wall_ms=self._wall_ms())

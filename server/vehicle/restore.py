@@ -22,7 +22,7 @@ _CHANGES = frozenset(get_args(Change))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Past:
+class RestoredState:
     """Moments are on the clock that runs now; those of before it began are negative."""
 
     address: str | None = None  # of the car that was monitored when the server ended; None: none was
@@ -49,7 +49,7 @@ class Past:
         return f"The server was restarted; what happened meanwhile was not watched.{stood}{car}{paused}"
 
 
-def recall(bus: LocalBus, vehicle: str, *, now_s: float, wall_ms: int) -> Past:
+def recall(bus: LocalBus, vehicle: str, *, now_s: float, wall_ms: int) -> RestoredState:
     """Reads the log; `wall_ms` is the time of day at `now_s`. Ages across the restart are by the time of day."""
 
     def moment_s(at_ms: float) -> float:
@@ -68,7 +68,7 @@ def recall(bus: LocalBus, vehicle: str, *, now_s: float, wall_ms: int) -> Past:
         for event in events
         if (transition := transition_of(event, moment_s, shelf_s)) is not None
     ]
-    return Past(
+    return RestoredState(
         address=address,
         paused_s=moment_s(_number(paused.get("since_ms"), paused["at_ms"])) if paused else None,
         paused_by=_text(paused.get("by")) if paused else None,

@@ -10,7 +10,7 @@ from monitor.alarm import Transition
 from monitor.catalog import AnyCheck
 from monitor.load import AlarmLoad
 from server.bus.bus import LocalBus
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.reception_stats import Tally
 from server.judge.settings import SettingsFile
 from server.recording.folder import RecordingsFolder
@@ -72,7 +72,7 @@ class Session:
             supervisor=self._supervisor,
             attempts=attempts,
             checks=checks,
-            settings=Tuning(settings or SettingsFile(None)),
+            settings=ActiveSettings(settings or SettingsFile(None)),
             recordings=recordings,
             on_finished=on_finished,
             frame=self.frame,
@@ -93,8 +93,8 @@ class Session:
         self._tick.restart()
         self._parts.publisher.restart()
         self._supervisor.keep("judge", self._tick.loop)
-        self._supervisor.keep("slow-down", self._parts.slow_down.speak)
-        self._supervisor.keep("heartbeat", self._parts.slow_down.beat)
+        self._supervisor.keep("slow-down", self._parts.slow_down.sender.send_loop)
+        self._supervisor.keep("heartbeat", self._parts.slow_down.heartbeat_loop)
         self._parts.recording.prepare()
         self._restoration.begin()
         if self.vehicle.address:

@@ -10,15 +10,15 @@ from typing import Any, Protocol
 from monitor.alarm import Transition
 from monitor.catalog import AnyCheck
 from server.bus.bus import LocalBus
-from server.control.authorization import Gate
-from server.judge.active_settings import Tuning
+from server.control.authorization import Authorization
+from server.judge.active_settings import ActiveSettings
 from server.recording.controller import SessionRecording
 from server.recording.folder import RecordingsFolder
 from server.rosbridge.link import RosLink
-from server.slowdown.sender import Slowing
+from server.slowdown.controller import SlowDownController
 from server.system.supervision import Supervisor
 from server.vehicle.connection import Connection, ConnectionObserver
-from server.vehicle.event_log import Logbook
+from server.vehicle.event_log import EventLog
 from server.vehicle.judgement import Judgement
 from server.vehicle.message_intake import MessageIntake
 from server.vehicle.pause import Pause
@@ -31,14 +31,14 @@ from server.vehicle.tick_parts import TickParts
 class SessionParts:
     """Each has one job and is testable without the others."""
 
-    settings: Tuning
+    settings: ActiveSettings
     connection: Connection
     judgement: Judgement
     recording: SessionRecording
-    event_log: Logbook
-    authorization: Gate
+    event_log: EventLog
+    authorization: Authorization
     pause: Pause
-    slow_down: Slowing
+    slow_down: SlowDownController
     publisher: StatePublisher
     intake: MessageIntake
 
@@ -77,7 +77,7 @@ def session_parts(
     supervisor: Supervisor,
     attempts: TickParts,
     checks: Sequence[AnyCheck] | None,
-    settings: Tuning,
+    settings: ActiveSettings,
     recordings: RecordingsFolder | None,
     on_finished: Callable[[Path], None],
     frame: Callable[[], dict[str, Any]],
@@ -95,8 +95,8 @@ def session_parts(
         told=on_finished,
         unreadable=lambda topic, why: intake.recorded_unreadable(topic, why),
     )
-    event_log = Logbook(vehicle, bus, settings, wall_ms=wall_ms, also=recording.events)
-    slow_down = Slowing(
+    event_log = EventLog(vehicle, bus, settings, wall_ms=wall_ms, also=recording.events)
+    slow_down = SlowDownController(
         event_log.note, now=now, wall_ms=wall_ms, snapshot=judgement.snapshot,
         record=lambda sent: recording.own("commands", sent), number=bus.last_event(vehicle),
     )  # fmt: skip
@@ -122,7 +122,7 @@ def session_parts(
         judgement=judgement,
         recording=recording,
         event_log=event_log,
-        authorization=Gate(event_log.note, fence=bus.last_event(vehicle)),
+        authorization=Authorization(event_log.note, fence=bus.last_event(vehicle)),
         pause=Pause(event_log),
         slow_down=slow_down,
         publisher=StatePublisher(vehicle, bus, frame, now=now),

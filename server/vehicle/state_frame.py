@@ -20,7 +20,7 @@ from server.rosbridge import connection_errors
 from server.rosbridge.address import Address
 from server.rosbridge.connection_errors import Problem
 from server.vehicle import phone
-from server.vehicle.restore import Past
+from server.vehicle.restore import RestoredState
 
 if TYPE_CHECKING:  # a replay shows states too, and has no use for all that dials
     from server.rosbridge.link import RosLink
@@ -47,7 +47,7 @@ class Facts:
     connected_s: float | None
     paused_since_s: float | None
     paused_by: str | None
-    held: Past | None  # what stood when the server ended, while no car is monitored yet
+    held: RestoredState | None  # what stood when the server ended, while no car is monitored yet
     load: AlarmLoad
     log_trouble: str | None
     profile: str  # the kind of car it is taken for
@@ -127,7 +127,7 @@ def _session(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
     }
 
 
-def _held(before: Past | None) -> dict[str, Any] | None:
+def _held(before: RestoredState | None) -> dict[str, Any] | None:
     if before is None:
         return None
     return {"address": before.address, "alarms": len(before.standing), "paused": before.paused_s is not None}

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Mapping
 
 from server.judge import pipeline
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.topics import Source, could_carry
 from server.recording.recorded_topics import Also, Missing
 from server.rosbridge.connection_errors import Problem
@@ -33,7 +33,7 @@ class Subscriptions:
     def __init__(
         self,
         link: RosLink | None,
-        tuning: Tuning,
+        tuning: ActiveSettings,
         *,
         now: Callable[[], float],
         proved: Callable[[], None],

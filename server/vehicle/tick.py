@@ -11,7 +11,7 @@ from monitor.state import LinkFacts
 from server.bus.bus import LocalBus
 from server.judge.pipeline import TICK_S
 from server.recording.delay import LinkDelay
-from server.slowdown.command_target import GUARD_STATE, way_of
+from server.slowdown.command_target import GUARD_STATE, target_of
 from server.vehicle import facts
 from server.vehicle.link_load import RESTORE_BELOW_S
 from server.vehicle.session_parts import SessionParts
@@ -148,9 +148,9 @@ class Tick:
         """What slows the car learns what the judge knows, and the other way round."""
         parts, topics, slow_down = self._parts, self._parts.connection.subscriptions, self._parts.slow_down
         monitor = parts.judgement.monitor
-        target = way_of(phase=parts.connection.phase, sources=topics.signals.sources, offered=topics.offered)
+        target = target_of(phase=parts.connection.phase, sources=topics.signals.sources, offered=topics.offered)
         slow_down.limits = monitor.limits.slow_down
-        slow_down.rivals = topics.ros.publishers
+        slow_down.competing_publishers = topics.ros.publishers
         slow_down.is_steering_known = monitor.limits.steering.tyre_rad_per_unit != 0.0
         slow_down.watch_operators(parts.authorization.heard_s())
         is_paused = parts.pause.since_s is not None

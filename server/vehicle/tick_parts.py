@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from server.bus.bus import LocalBus
 from server.system import open_files
-from server.vehicle.event_log import Logbook
+from server.vehicle.event_log import EventLog
 
 log = logging.getLogger("catgraph.session")
 
@@ -44,7 +44,7 @@ class TickParts:
 class LogKeeper:
     """Asks now and then whether the event log is kept."""
 
-    def __init__(self, event_log: Logbook, bus: LocalBus) -> None:
+    def __init__(self, event_log: EventLog, bus: LocalBus) -> None:
         self._event_log = event_log
         self._bus = bus
         self._looked_s = -EVERY_S

@@ -21,7 +21,7 @@ from fastapi.staticfiles import StaticFiles
 from fastapi.templating import Jinja2Templates
 
 from monitor.tracks import TrackPoint
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.settings import SettingsFile
 from server.judge.topics import candidates
 from server.recording.catalog.sketch import sketch
@@ -310,7 +310,7 @@ class Canned:
 
         @self.app.get("/api/settings")
         async def settings() -> Json:
-            return Tuning(SettingsFile(None)).as_json()
+            return ActiveSettings(SettingsFile(None)).as_json()
 
         @self.app.get("/api/signals")
         async def signals() -> Json:

@@ -18,17 +18,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.interfaces import Nodetype
 
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.settings import SettingsFile
 from server.judge.topics import Source
 from server.recording.read.schemas import standard
 from server.rosbridge.address import parse
 from server.rosbridge.link import LinkDown, RosLink, Subscription
 from server.rosbridge.outgoing import PUBLISHED, SERVICES, NotAllowed, Outgoing
-from server.slowdown.command_target import way_of
-from server.slowdown.guard_client import GuardWatch
-from server.slowdown.publisher import Mouth
-from server.slowdown.sender import Slowing
+from server.slowdown.command_target import target_of
+from server.slowdown.controller import SlowDownController
+from server.slowdown.guard_client import GuardClient
+from server.slowdown.publisher import CommandPublisher
 from server.slowdown.twist import message
 from server.vehicle import discovery
 from server.vehicle.subscriptions import Subscriptions
@@ -253,7 +253,7 @@ def test_any_command_of_a_slow_down_is_refused_or_harmless(
 ) -> None:
     async def run() -> list[bytes]:
         link, wire = wired()
-        mouth = Mouth()
+        mouth = CommandPublisher()
         mouth.attach(link)
         kind: Any = type.rpartition("/")[2]
         said = message(kind, speed, tyre, stamp_ns=stamp_ns, ros_version=version)
@@ -273,15 +273,15 @@ def test_any_command_of_a_slow_down_is_refused_or_harmless(
 def test_heartbeat_and_release_of_the_guard_are_refused_or_harmless(hold: Any, beats: int) -> None:
     async def run() -> list[bytes]:
         link, wire = wired()
-        mouth = Mouth()
+        mouth = CommandPublisher()
         mouth.attach(link)
-        guard = GuardWatch(mouth)
+        guard = GuardClient(mouth)
         guard.tick(True, 0.0)
         guard._count = 2**32 - 3
         for _ in range(beats):
-            guard.beat(0.0)
+            guard.send_heartbeat(0.0)
         guard.release(hold)
-        guard.farewell()
+        guard.end()
         return wire.sent
 
     check_harmless(asyncio.run(run()))
@@ -308,7 +308,7 @@ def test_a_whole_slow_down_on_any_command_topic_sends_nothing_harmful(
             is_fresh=lambda now_s: True,
         )
         snapshot = SimpleNamespace(get=lambda name: reading, now_s=10.0, link=SimpleNamespace(), readings={})
-        slowing = Slowing(
+        slowing = SlowDownController(
             lambda *what, **more: None,
             now=lambda: 10.0,
             wall_ms=lambda: -5,
@@ -317,15 +317,15 @@ def test_a_whole_slow_down_on_any_command_topic_sends_nothing_harmful(
             number=0,
         )
         source = Source(signal="command", topic=topic, type=type, decode=None, note=None)
-        way = way_of(phase="monitoring", sources={"command": source}, offered={topic: type})
+        way = target_of(phase="monitoring", sources={"command": source}, offered={topic: type})
         slowing.link_opened(link)
-        slowing._way = way
+        slowing.sender.target = way
         if way.problem is None:
-            slowing._announce_way()
+            slowing.sender.announce()
             slowing._life.arm(way, "x")
             with contextlib.suppress(ValueError):  # a ramp begins at a speed
                 slowing._begin("x", "by hand", 10.0, pressed_s=None)
-                slowing._speak()
+                slowing.sender.send()
         return wire.sent
 
     sent = asyncio.run(run())
@@ -350,7 +350,7 @@ def test_whatever_a_bridge_offers_nothing_harmful_is_asked_of_it(
 
     async def run() -> list[bytes]:
         link, wire = wired(answer)
-        tuning = Tuning(SettingsFile(None))
+        tuning = ActiveSettings(SettingsFile(None))
         talk = Subscriptions(link, tuning, now=time.monotonic, proved=lambda: None, recognised=lambda title: None)
         talk.record(also)
         await talk._look(link, link)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from monitor.values import Steering
-from server.judge.active_settings import PERCENT_A_RAD, Tuning
+from server.judge.active_settings import PERCENT_A_RAD, ActiveSettings
 from server.judge.message_fields import stamp_s
 from server.judge.profiles import load as load_profiles
 from server.judge.reception_stats import Reception
@@ -40,7 +40,7 @@ class Drive:
         self.settings = _settings(self.settings_toml)
         self.reception = Reception()
         offered = _offered(recording)
-        tuning = Tuning(SettingsFile(None))
+        tuning = ActiveSettings(SettingsFile(None))
         tuning.recognise(offered, recording.ros_version)
         if self.settings.profile != AUTO:
             tuning.change(values={}, topics={}, profile=self.settings.profile, version=None)

@@ -14,7 +14,7 @@ from starlette.datastructures import MutableHeaders
 from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.access.access import Access, Known
+from server.access.access import Access, Admitted
 from server.access.active_connections import Visit
 from server.access.identity import SCOPE_KEY
 from server.access.rules import Needs, is_enough, needs_of
@@ -84,7 +84,7 @@ class Guard:
                 if not has_begun:
                     await problem(401, because, code="removed")(scope, receive, send)
 
-    def _let_in(self, scope: Scope) -> Known | None:
+    def _let_in(self, scope: Scope) -> Admitted | None:
         """Who sends it; None: nobody who is known, and nobody need be. Raises _Refused."""
         method, path = scope["method"], scope["path"]
         headers = self._headers(scope)
@@ -135,7 +135,7 @@ class Guard:
                 with contextlib.suppress(RuntimeError, OSError):  # it may have been closing by itself
                     await send({"type": "websocket.close", "code": ENDED, "reason": reason})
 
-    def _let_socket_in(self, scope: Scope) -> Known:
+    def _let_socket_in(self, scope: Scope) -> Admitted:
         """Who opens it. Raises _Refused."""
         scheme = "https" if scope["scheme"] == "wss" else "http"
         headers = self._headers(scope)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from monitor.runner import Refused
-from server.control.authorization import Caller, Gate
+from server.control.authorization import Authorization, Caller
 from server.control.lease import NotInControl
 from server.protocol import commands
 
@@ -21,7 +21,7 @@ class Vehicle:
 
     def __init__(self) -> None:
         self.log: list[dict[str, Any]] = []
-        self.gate = Gate(self._note, fence=100)
+        self.gate = Authorization(self._note, fence=100)
 
     def _note(self, change: str, text: str, *, by: str | None = None, **more: Any) -> None:
         assert change == "control"

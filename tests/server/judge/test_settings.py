@@ -16,7 +16,7 @@ import websockets
 
 from server.app.config import Config
 from server.judge import profiles
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.profiles import GENERIC
 from server.judge.settings import BadSetting, Settings, SettingsFile, change, differences, from_toml, salvage, to_toml
 from server.judge.topics import candidates
@@ -196,7 +196,7 @@ def _read_only(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("place", [_a_file_in_the_way, _read_only])
 def test_a_folder_that_takes_nothing_is_told_and_nothing_is_in_force(tmp_path: Path, place: Any) -> None:
-    tuning = Tuning(SettingsFile(place(tmp_path)))
+    tuning = ActiveSettings(SettingsFile(place(tmp_path)))
     with pytest.raises(OSError, match=r"\w") as refused:
         tuning.change(values={LIMIT: 9.0}, topics={}, profile=None, version=None)
     assert tuning.limits.speed_limit.max_mps == 11.0
@@ -243,7 +243,7 @@ def test_killed_while_writing_the_old_or_the_new_is_found_never_a_broken_one(tmp
 
 
 def test_a_default_of_the_new_kind_of_car_is_not_kept() -> None:
-    tuning = Tuning(SettingsFile(None))
+    tuning = ActiveSettings(SettingsFile(None))
     lines = tuning.change(values={LIMIT: 9.0}, topics={}, profile="catvehicle", version=0)
     assert lines == [
         "Tyre angle per unit of steering: 0 → -0.00536 rad",
@@ -259,7 +259,7 @@ def test_a_default_of_the_new_kind_of_car_is_not_kept() -> None:
 
 
 def test_thresholds_are_made_once_and_again_with_each_change_and_each_kind_of_car() -> None:
-    tuning = Tuning(SettingsFile(None))
+    tuning = ActiveSettings(SettingsFile(None))
     first = tuning.limits
     assert tuning.limits is first
     tuning.change(values={LIMIT: 9.0}, topics={}, profile=None, version=None)

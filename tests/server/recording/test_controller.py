@@ -13,7 +13,7 @@ import pytest
 
 from server.analysis.recorded_events import told_by
 from server.app.config import Config
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.settings import SettingsFile
 from server.recording.controller import SessionRecording
 from server.recording.folder import RecordingsFolder
@@ -332,7 +332,7 @@ async def test_a_version_of_ros_that_becomes_known_later_begins_another_part(tmp
     recording = SessionRecording(
         "car",
         RecordingsFolder(tmp_path),
-        Tuning(SettingsFile(None)),
+        ActiveSettings(SettingsFile(None)),
         now=lambda: clock["s"],
         wall_ms=lambda: 1_700_000_000_000 + round(clock["s"] * 1000),
     )

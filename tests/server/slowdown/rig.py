@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from monitor.slowing import SlowingFacts
 from monitor.state import Snapshot, State
 from monitor.values import Steering, Twist
 from server.protocol import commands
-from server.slowdown.command_target import Way
-from server.slowdown.sender import PERIOD_S, Slowing
+from server.slowdown.command_target import CommandTarget
+from server.slowdown.controller import SlowDownController
+from server.slowdown.sender import PERIOD_S
 
-WAY = Way(topic="/cmd_vel", type="geometry_msgs/Twist", kind="Twist")
+WAY = CommandTarget(topic="/cmd_vel", type="geometry_msgs/Twist", kind="Twist")
 STRAIGHT = Steering(percent=0.0, tyre_rad=0.0)
 
 
@@ -46,13 +47,14 @@ class Rig:
     def __init__(self, *, steering: Steering | None = STRAIGHT) -> None:
         self.fails: set[str] = set()
         self.now_s = 50.0
+        self.clock: Callable[[], float] = lambda: self.now_s
         self.notes: list[str] = []
         self.link = Link()
         self.steering = steering  # as it comes with each speed
         self.state = State()
-        self.slowing = Slowing(
+        self.slowing = SlowDownController(
             self._note,
-            now=lambda: self.now_s,
+            now=lambda: self.clock(),
             wall_ms=lambda: 1_700_000_000_000,
             snapshot=self._snapshot,
             record=self._record,
@@ -92,7 +94,7 @@ class Rig:
                 self.state.slow(self.tick())
             except RuntimeError:
                 assert "snapshot" in self.fails
-            self.slowing._speak_safely()
+            self.slowing.sender.send_safely()
 
     def obey(self, kind: str) -> None:
         self.slowing.obey(commands.read({"kind": kind}), by="Ann")  # type: ignore[arg-type]

@@ -36,11 +36,11 @@ def test_what_fails_beside_it_neither_stops_nor_delays_it(fails: tuple[str, ...]
 
 async def test_its_task_goes_on_after_a_cancellation_that_nobody_ordered() -> None:
     rig = Rig()
-    rig.slowing._now = asyncio.get_running_loop().time
-    rig.now_s = rig.slowing._now()
+    rig.clock = asyncio.get_running_loop().time
+    rig.now_s = rig.clock()
     rig.link.heard_s = float("inf")
     supervisor = Supervisor("test")
-    supervisor.keep("slow-down", rig.slowing.speak)
+    supervisor.keep("slow-down", rig.slowing.sender.send_loop)
     try:
         rig.tick()
         rig.obey("arm")

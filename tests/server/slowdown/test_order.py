@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from monitor.alarm import Refused
 from server.judge.topics import Source
-from server.slowdown.command_target import Way, way_of
+from server.slowdown.command_target import CommandTarget, target_of
 from server.slowdown.order import Car, SlowDown
 from server.slowdown.ramp import Ramp
 from server.slowdown.twist import kind_of, message
 
-WAY = Way(topic="/cmd_vel", type="geometry_msgs/Twist", kind="Twist")
-NO_WAY = Way(problem="No car is connected.")
+WAY = CommandTarget(topic="/cmd_vel", type="geometry_msgs/Twist", kind="Twist")
+NO_WAY = CommandTarget(problem="No car is connected.")
 DRIVES = Car(speed_mps=6.0, tyre_rad=0.1)
 
 
@@ -122,7 +122,7 @@ def source(topic: str, type: str | None) -> Source:
 def test_the_way_is_known_or_its_problem_said(
     phase: str, sources: dict[str, Source], offered: dict[str, str] | None, topic: str, problem: str | None
 ) -> None:
-    way = way_of(phase=phase, sources=sources, offered=offered)
+    way = target_of(phase=phase, sources=sources, offered=offered)
     assert way.topic == topic
     assert (way.problem is None) == (problem is None)
     assert (problem or "") in (way.problem or "")

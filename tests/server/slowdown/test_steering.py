@@ -12,12 +12,12 @@ from monitor.obstacle_view import corridor_ahead
 from monitor.state import State
 from monitor.values import Steering, Twist
 from server.judge import pipeline, profiles
-from server.judge.active_settings import Tuning
+from server.judge.active_settings import ActiveSettings
 from server.judge.profiles import GENERIC, Profile
 from server.judge.reception_stats import Reception
 from server.judge.settings import Settings, SettingsFile, from_toml
 from server.judge.topics import map_signals
-from server.slowdown.sender import NO_STEERING, STEERING_NOT_KNOWN
+from server.slowdown.controller import NO_STEERING, STEERING_NOT_KNOWN
 from tests.monitor.checks.known import known
 from tests.monitor.test_corridor import sweep
 from tests.server.slowdown.rig import Rig
@@ -150,7 +150,7 @@ def test_the_corridor_is_straight_and_says_so_where_the_steering_is_not_known() 
 
 
 def test_choosing_the_kind_of_car_makes_its_steering_known() -> None:
-    tuning = Tuning(SettingsFile(None))
+    tuning = ActiveSettings(SettingsFile(None))
     assert tuning.limits.steering.tyre_rad_per_unit == 0.0
     tuning.change(values={}, topics={}, profile="catvehicle", version=None)
     assert tuning.limits.steering.tyre_rad_per_unit == -0.00536

@@ -17,7 +17,7 @@ from monitor.restoring import restore
 from server.bus.bus import LocalBus
 from server.bus.journal import Journal
 from server.protocol import serialize
-from server.vehicle.restore import Past, recall
+from server.vehicle.restore import RestoredState, recall
 from tests.monitor.test_alarm import SPEC
 from tests.monitor.test_alarm_properties import DAY, SPECS, Judge, Tap, happen
 from tests.monitor.test_restoring import lived, same
@@ -42,7 +42,7 @@ def note(one: LocalBus, change: str, at_ms: int = WALL_MS, **more: Any) -> None:
     one.append("car", [{"at_ms": at_ms, "alarm": None, "change": change, "text": "", "by": None, **more}])
 
 
-def read(one: LocalBus, *, now_s: float = 0.0, after_s: float = 0.0) -> Past:
+def read(one: LocalBus, *, now_s: float = 0.0, after_s: float = 0.0) -> RestoredState:
     return recall(one, "car", now_s=now_s, wall_ms=WALL_MS + round(after_s * 1000))
 
 
