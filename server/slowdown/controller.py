@@ -12,15 +12,15 @@ from monitor.alarm import Alarm, Refused
 from monitor.checks.slow_down import SlowDownLimits
 from monitor.slowing import SlowingFacts
 from monitor.state import Snapshot
-from server.protocol import commands, serialize
+from server.protocol import commands
 from server.rosbridge.link import RosLink
 from server.slowdown.command_target import CommandTarget
 from server.slowdown.countdown import Countdown
+from server.slowdown.frame import facts, slow_down_frame
 from server.slowdown.guard_client import GuardClient
 from server.slowdown.measured_car import MeasuredCar
 from server.slowdown.note import Note, never_raising, recording_safely
 from server.slowdown.order import BY_HAND, DESERTED_S, LATE_S, SlowDown
-from server.slowdown.order_frame import order_frame
 from server.slowdown.order_log import OrderLog, commanded
 from server.slowdown.response import Response
 from server.slowdown.sender import Sender
@@ -55,8 +55,8 @@ class SlowDownController:
         self._snapshot = snapshot
         self._life = life = SlowDown(number)
         self._order_log = order_log = OrderLog(note, lambda: self.sender.target)
-        self._car = MeasuredCar(snapshot)
-        self.sender = Sender(life, order_log, self._car, now=now, wall_ms=wall_ms, record=recording_safely(record))
+        self.car = MeasuredCar(snapshot)
+        self.sender = Sender(life, order_log, self.car, now=now, wall_ms=wall_ms, record=recording_safely(record))
         self._response = Response(life, order_log)
         self._countdown = Countdown(note)
         self._guard = GuardClient(self.sender.publisher)
@@ -64,20 +64,11 @@ class SlowDownController:
         self.limits = SlowDownLimits()
         self.competing_publishers: tuple[str, ...] | None = None  # on the command topic; None: not known
 
-    @property
-    def is_steering_known(self) -> bool:
-        """Whether an angle of the tyres follows from the steering signal."""
-        return self._car.is_steering_known
-
-    @is_steering_known.setter
-    def is_steering_known(self, known: bool) -> None:
-        self._car.is_steering_known = known
-
     # -- the link ----------------------------------------------------------------------------------------------------
 
     def link_opened(self, link: RosLink) -> None:
         """An order that stands goes on."""
-        self._car.opened_s = self._now()
+        self.car.opened_s = self._now()
         self.sender.attach(link)
 
     def link_closed(self) -> None:
@@ -94,7 +85,7 @@ class SlowDownController:
             self.sender.publisher.unadvertise_all()
         self.sender.detach()
         self.competing_publishers = None
-        self._car.tyre_rad = None
+        self.car.tyre_rad = None
         self._countdown.forget()
         return has_released_guard
 
@@ -103,7 +94,7 @@ class SlowDownController:
         life = self._life
         life.armed_by = str(order.get("by") or "before the restart")
         tyre_rad = order.get("tyre_rad")  # held then, and until one is measured
-        self._car.tyre_rad = float(tyre_rad) if isinstance(tyre_rad, int | float) else None
+        self.car.tyre_rad = float(tyre_rad) if isinstance(tyre_rad, int | float) else None
         life.begin(
             CommandTarget(),
             by=life.armed_by,
@@ -161,7 +152,7 @@ class SlowDownController:
 
     def _watch_steering(self) -> None:
         """Keeps the last known tyre angle, and notes during an order when it is not measured any more."""
-        is_measured = self._car.update()
+        is_measured = self.car.update()
         order, was_old = self._life.order, self._is_steering_old
         self._is_steering_old = order is not None and not is_measured
         if order is not None and self._is_steering_old and not was_old:
@@ -172,9 +163,9 @@ class SlowDownController:
         """The same, or why nothing can be ordered: a command carries a tyre angle, and 0 would turn the wheels."""
         if target.problem is not None:
             return target
-        if not self.is_steering_known:
+        if not self.car.is_steering_known:
             return replace(target, problem=STEERING_NOT_KNOWN)
-        return replace(target, problem=NO_STEERING) if self._car.tyre_rad is None else target
+        return replace(target, problem=NO_STEERING) if self.car.tyre_rad is None else target
 
     def _watch_target(self, target: CommandTarget) -> None:
         """A topic that is another, or has another type, disarms: it was not confirmed. An order goes on."""
@@ -210,7 +201,9 @@ class SlowDownController:
             case commands.Arm():
                 if self._life.arm(self.sender.target, by):
                     self.sender.announce()
-                    text = f"Slow-down armed on {self.sender.target.topic}.{self._competitors_text()}"
+                    text = (
+                        f"Slow-down armed on {self.sender.target.topic}.{_competitors_text(self.competing_publishers)}"
+                    )
                     self._note("armed", text, by=by)
             case commands.Disarm():
                 if self._life.disarm():
@@ -270,40 +263,25 @@ class SlowDownController:
     # -- what others see ---------------------------------------------------------------------------------------------
 
     def _facts(self) -> SlowingFacts:
-        order = self._life.order
-        return SlowingFacts(
-            is_armed=self._life.armed_by is not None,
-            topic=self.sender.target.topic,
-            rivals=self.competing_publishers or (),
-            ordered_s=order.ordered_s if order else None,
-            sending_s=order.sending_s if order else None,
-            deceleration_mps2=order.deceleration_mps2 if order else 0.0,
-            commanded_mps=order.last.speed_mps if order and order.last else None,
-            ended_at_longest_s=self._life.ended_at_longest_s,
-        )
-
-    def _competitors_text(self) -> str:
-        names = self.competing_publishers
-        if names is None:
-            return " Who else publishes there is not known."
-        return f" {', '.join(names)} also publish{'es' if len(names) == 1 else ''} there." if names else ""
+        return facts(self._life, self.sender.target, self.competing_publishers)
 
     def frame(self) -> dict[str, Any]:
         """The `decelerate` of a state frame."""
         now_s = self._now()
-        target, order, life, limits = self.sender.target, self._life.order, self._life, self.limits
-        names, is_missing = self.competing_publishers, self._response.is_missing
-        return {
-            "state": life.state(target, now_s),
-            "why": target.problem if order is None else None,
-            "topic": target.topic or None,
-            "type": target.type,
-            "rivals": None if names is None else list(names),
-            "armed_by": life.armed_by,
-            "deceleration_mps2": serialize.plain(limits.deceleration_mps2, 2),
-            "order": None
-            if order is None
-            else order_frame(order, now_s, self._wall_ms(), is_response_missing=is_missing, longest_s=limits.longest_s),
-            "countdown": self._countdown.frame(now_s),
-            "guard": self._guard.frame(now_s),
-        }
+        shown = slow_down_frame(
+            self._life,
+            self.sender.target,
+            self.limits,
+            self.competing_publishers,
+            is_response_missing=self._response.is_missing,
+            now_s=now_s,
+            wall_ms=self._wall_ms(),
+        )
+        return shown | {"countdown": self._countdown.frame(now_s), "guard": self._guard.frame(now_s)}
+
+
+def _competitors_text(names: tuple[str, ...] | None) -> str:
+    """Who else publishes on the command topic; None: not known."""
+    if names is None:
+        return " Who else publishes there is not known."
+    return f" {', '.join(names)} also publish{'es' if len(names) == 1 else ''} there." if names else ""

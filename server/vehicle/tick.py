@@ -151,7 +151,7 @@ class Tick:
         target = target_of(phase=parts.connection.phase, sources=topics.signals.sources, offered=topics.offered)
         slow_down.limits = monitor.limits.slow_down
         slow_down.competing_publishers = topics.ros.publishers
-        slow_down.is_steering_known = monitor.limits.steering.tyre_rad_per_unit != 0.0
+        slow_down.car.is_steering_known = monitor.limits.steering.tyre_rad_per_unit != 0.0
         slow_down.watch_operators(parts.authorization.heard_s())
         is_paused = parts.pause.since_s is not None
         found = slow_down.tick(target, monitor.alarms, ros_version=topics.ros_version, is_paused=is_paused)

@@ -60,7 +60,7 @@ class Rig:
             record=self._record,
             number=0,
         )
-        self.slowing.is_steering_known = True
+        self.slowing.car.is_steering_known = True
         self.slowing.link_opened(self.link)  # type: ignore[arg-type]
         self.pass_time(1.0)
 

@@ -84,7 +84,7 @@ def test_settings_of_before_are_read_and_the_kind_of_car_says_the_rest() -> None
 
 def test_where_the_steering_is_not_known_it_cannot_be_armed_and_says_why() -> None:
     rig = Rig(steering=Steering(percent=3.0))
-    rig.slowing.is_steering_known = False
+    rig.slowing.car.is_steering_known = False
     rig.pass_time(0.1)
     frame = rig.slowing.frame()
     assert (frame["state"], frame["why"]) == ("not_available", STEERING_NOT_KNOWN)
