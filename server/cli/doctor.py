@@ -14,8 +14,10 @@ from server.judge.topics import BY_SIGNAL, TOPICS, Source, map_signals
 from server.rosbridge.address import Address, BadAddress, parse
 from server.rosbridge.connection_errors import LOGIN_WANTED, ROSAPI_ENDED, ROSAPI_MISSING, Problem, not_proved
 from server.rosbridge.diagnosis import SILENT_S, Diagnosis
-from server.rosbridge.link import LinkDown, RosLink, Subscription
+from server.rosbridge.link import RosLink
+from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.rosapi_client import Questions
+from server.rosbridge.subscription import Subscription
 from server.vehicle import discovery
 from server.vehicle.undelivered import BLOCKED_AFTER_S, CLIENT_COUNT, Passing
 

@@ -14,7 +14,8 @@ from typing import Any, Protocol
 
 from server.rosbridge.connection_errors import LOGIN_WANTED, Problem
 from server.rosbridge.diagnosis import Diagnosis
-from server.rosbridge.link import CallFailed, LinkDown, Refusal, RosLink
+from server.rosbridge.link import RosLink
+from server.rosbridge.link_errors import CallFailed, LinkDown, Refusal
 
 GIVE_UP_S = 6.0  # a quick question that is so old will not be answered on this connection
 GIVE_UP_LONG_S = 30.0  # the same of a question with a long answer, which a slow link takes long to carry

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from server.rosbridge.link import LinkDown, RosLink
+from server.rosbridge.link import RosLink
+from server.rosbridge.link_errors import LinkDown
 
 ADVERTISE_ID = "catgraph:slow-down"
 

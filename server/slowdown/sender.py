@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from server.rosbridge.link import LinkDown, RosLink
+from server.rosbridge.link import RosLink
+from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.outgoing import NotAllowed
 from server.slowdown.command_target import CommandTarget
 from server.slowdown.measured_car import MeasuredCar

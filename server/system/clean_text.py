@@ -32,5 +32,10 @@ def cleaned(value: Any) -> Any:
     return value
 
 
+def short_text(value: Any, limit: int) -> str:
+    """A text of at most `limit` letters, clean; of another value the name of its type, of None nothing."""
+    return clean(value[:limit]) if isinstance(value, str) else "" if value is None else f"({type(value).__name__})"
+
+
 # Ends of lines, tabs and blanks of other widths part words; all else that is not seen parts nothing.
 _BLANK = {"Cc": " ", "Zs": " ", "Zl": " ", "Zp": " "}

@@ -12,7 +12,8 @@ from monitor.state import Phase
 from server.rosbridge import connection_errors
 from server.rosbridge.address import Address, BadAddress
 from server.rosbridge.connection_errors import Problem
-from server.rosbridge.link import Marks, RosLink
+from server.rosbridge.link import RosLink
+from server.rosbridge.link_listener import Marks
 from server.rosbridge.raw_frame import RawFrame
 from server.system.supervision import Supervisor
 from server.vehicle.subscriptions import Subscriptions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from server.rosbridge.link import MAX_MESSAGE_BYTES
+from server.rosbridge.websocket import MAX_MESSAGE_BYTES
 
 LARGE_TRIES = 2  # messages that are too large, before the topic is left
 

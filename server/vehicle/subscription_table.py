@@ -6,7 +6,8 @@ from collections.abc import Callable, Collection, Mapping
 
 from server.judge.topics import Source
 from server.recording.recorded_topics import Also
-from server.rosbridge.link import RosLink, Subscription
+from server.rosbridge.link import RosLink
+from server.rosbridge.subscription import Subscription
 from server.vehicle import wanted_topics
 from server.vehicle.cbor_use import CborUse
 from server.vehicle.delivery import Delivery

@@ -10,7 +10,8 @@ from server.judge.active_settings import ActiveSettings
 from server.judge.topics import Source, could_carry
 from server.recording.recorded_topics import Also, Missing
 from server.rosbridge.connection_errors import Problem
-from server.rosbridge.link import LinkDown, RosLink
+from server.rosbridge.link import RosLink
+from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.rosapi_client import Asks
 from server.vehicle import discovery
 from server.vehicle.missing_watch import MissingWatch

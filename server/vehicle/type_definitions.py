@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Mapping
 
 from server.judge.message import RosVersion
-from server.rosbridge.link import CallFailed, LinkDown
+from server.rosbridge.link_errors import CallFailed, LinkDown
 from server.rosbridge.rosapi_client import Asks
 from server.vehicle import discovery
 from server.vehicle.encoding_choice import fit_for_cbor

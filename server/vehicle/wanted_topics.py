@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from server.judge.topics import BY_SIGNAL, TOPICS, Source
 from server.recording import recorded_topics
 from server.recording.recorded_topics import Also
-from server.rosbridge.link import Subscription
+from server.rosbridge.subscription import Subscription
 from server.vehicle.link_load import LinkLoad
 
 Compression = Callable[[str, bool], str]  # topic and whether its type is fit for CBOR → "cbor" or "none"

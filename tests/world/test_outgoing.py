@@ -23,8 +23,10 @@ from server.judge.settings import SettingsFile
 from server.judge.topics import Source
 from server.recording.read.schemas import standard
 from server.rosbridge.address import parse
-from server.rosbridge.link import LinkDown, RosLink, Subscription
+from server.rosbridge.link import RosLink
+from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.outgoing import PUBLISHED, SERVICES, NotAllowed, Outgoing
+from server.rosbridge.subscription import Subscription
 from server.slowdown.command_target import target_of
 from server.slowdown.controller import SlowDownController
 from server.slowdown.guard_client import GuardClient
@@ -74,7 +76,7 @@ class Wire:
         if operation.get("op") == "call_service" and self.link is not None:
             values = self.answer(operation)
             asyncio.get_running_loop().call_soon(
-                self.link._answered, {"id": operation["id"], "values": values, "result": values is not None}
+                self.link._calls.answered, {"id": operation["id"], "values": values, "result": values is not None}
             )
 
     def dropConnection(self, abort: bool = False) -> None:

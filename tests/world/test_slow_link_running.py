@@ -13,7 +13,8 @@ import pytest
 
 from server.app.config import Config
 from server.recording.read.read import open_recording
-from server.rosbridge.link import RosLink, Subscription
+from server.rosbridge.link import RosLink
+from server.rosbridge.subscription import Subscription
 from server.rosbridge_server.server import RosBridge
 from server.vehicle import link_load
 from server.vehicle.vehicle import Vehicle

@@ -11,7 +11,7 @@ import pytest
 
 from server.app.config import Config
 from server.rosbridge.large_message import ENDS_BYTES, topic_of
-from server.rosbridge.link import MAX_MESSAGE_BYTES
+from server.rosbridge.websocket import MAX_MESSAGE_BYTES
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving

@@ -15,9 +15,11 @@ from typing import Any
 import psutil
 import pytest
 
-from server.rosbridge import link as link_module
+from server.rosbridge import dialer, service_calls
 from server.rosbridge.address import parse
-from server.rosbridge.link import CallFailed, LinkDown, RosLink, Subscription
+from server.rosbridge.link import RosLink
+from server.rosbridge.link_errors import CallFailed, LinkDown
+from server.rosbridge.subscription import Subscription
 from tests.server.ear import Ear, accept, answering, bridging, linked, until
 from tests.server.loops import on_both_loops
 
@@ -269,7 +271,7 @@ async def test_what_a_dropped_link_still_held_is_never_delivered() -> None:
 
 @on_both_loops
 async def test_hurried_while_waiting_it_dials_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "FIRST_RETRY_S", 60.0)
+    monkeypatch.setattr(dialer, "FIRST_RETRY_S", 60.0)
     ear = Ear()
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
@@ -317,8 +319,8 @@ async def test_hurried_in_the_very_moment_of_closing_it_goes_on_trying() -> None
 
 @on_both_loops
 async def test_the_wait_between_two_tries_grows_to_its_limit_and_not_beyond(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "FIRST_RETRY_S", 0.02)
-    monkeypatch.setattr(link_module, "LAST_RETRY_S", 0.1)
+    monkeypatch.setattr(dialer, "FIRST_RETRY_S", 0.02)
+    monkeypatch.setattr(dialer, "LAST_RETRY_S", 0.1)
     ear = Ear()
     times_s: list[float] = []
     ear.dial_failed = lambda problem: times_s.append(time.monotonic())  # type: ignore[method-assign]
@@ -402,7 +404,7 @@ async def test_ended_just_before_the_handshake_is_done() -> None:
 
 @on_both_loops
 async def test_ended_while_waiting_for_the_next_try(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "FIRST_RETRY_S", 60.0)
+    monkeypatch.setattr(dialer, "FIRST_RETRY_S", 60.0)
     ear = Ear()
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
@@ -556,7 +558,7 @@ async def test_unanswered_calls_are_bounded_and_a_cancelled_one_is_forgotten() -
         await ear.hears("opened")
         calls = [
             asyncio.create_task(link.call("/rosapi/get_time", timeout_s=5))
-            for _ in range(link_module.MAX_PENDING_CALLS)
+            for _ in range(service_calls.MAX_PENDING_CALLS)
         ]
         await until(lambda: len(bridge.operations) == len(calls))
         with pytest.raises(CallFailed, match="too many"):

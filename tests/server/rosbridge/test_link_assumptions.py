@@ -1,4 +1,4 @@
-"""What server/rosbridge/link.py assumes of roslibpy and of autobahn below it: another version fails here."""
+"""What the link assumes of roslibpy and of autobahn below it: another version fails here."""
 
 from __future__ import annotations
 

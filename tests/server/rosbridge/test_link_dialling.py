@@ -19,7 +19,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 
-from server.rosbridge import link as link_module
+from server.rosbridge import dialer
 from tests.server.ear import Ear, Handler, accept, answering, bridging, linked, until
 from tests.server.loops import on_both_loops
 
@@ -27,10 +27,10 @@ from tests.server.loops import on_both_loops
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """The product's own patience is for radio links."""
-    monkeypatch.setattr(link_module, "DIAL_TIMEOUT_S", 1.0)
-    monkeypatch.setattr(link_module, "HANDSHAKE_TIMEOUT_S", 0.4)
-    monkeypatch.setattr(link_module, "LOOKUP_TIMEOUT_S", 0.3)
-    monkeypatch.setattr(link_module, "FIRST_RETRY_S", 0.05)
+    monkeypatch.setattr(dialer, "DIAL_TIMEOUT_S", 1.0)
+    monkeypatch.setattr(dialer, "HANDSHAKE_TIMEOUT_S", 0.4)
+    monkeypatch.setattr(dialer, "LOOKUP_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(dialer, "FIRST_RETRY_S", 0.05)
 
 
 def saying(answer: bytes, *, hang_up: bool = False, first: bool = False) -> Handler:

@@ -15,7 +15,7 @@ import psutil
 import pytest
 
 from server.rosbridge import link as link_module
-from server.rosbridge.link import MAX_MESSAGE_BYTES, MAX_SKIPPED_BYTES
+from server.rosbridge.websocket import MAX_MESSAGE_BYTES, MAX_SKIPPED_BYTES
 from tests.server.ear import Ear, accept, answering, bridging, linked, text_frame
 from tests.server.loops import on_both_loops
 from tests.tree import PROJECT
@@ -274,7 +274,7 @@ async def test_a_listener_that_stumbles_over_a_failed_dial_does_not_end_the_dial
 NOISY = """
 import asyncio, logging, sys, time
 from tests.server.ear import *
-from server.rosbridge.link import Subscription
+from server.rosbridge.subscription import Subscription
 
 logging.basicConfig(level=logging.INFO)
 logging.getLogger("websockets").propagate = False  # the other side, which is only here in the test

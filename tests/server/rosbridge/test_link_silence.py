@@ -14,7 +14,7 @@ import pytest
 from websockets.asyncio.server import ServerConnection
 from websockets.frames import Frame, Opcode
 
-from server.rosbridge.link import Subscription
+from server.rosbridge.subscription import Subscription
 from tests.server.ear import Bridge, Ear, accept, answering, bridging, linked, text_frame
 from tests.server.loops import on_both_loops
 
