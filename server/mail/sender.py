@@ -116,23 +116,23 @@ class Sender:
             await joined(under_way.task)
         except asyncio.CancelledError:
             is_ended = True
-        task, trouble = under_way.task, None
+        task, trouble, now_ms = under_way.task, None, self._wall_ms()
         if task.cancelled():
             if is_ended:
                 raise asyncio.CancelledError  # it is sent again at the next start
             outcome = Outcome(state="cancelled", said="", recipients=mail.recipients)
         elif (error := task.exception()) is None:
             answers, of_mail = task.result()
-            outcome = attempt.answered(mail, answers, of_mail, self._wall_ms(), self._pause_s)
+            outcome = attempt.answered(mail, answers, of_mail, now_ms, self._pause_s)
             self._failures = 0
         else:
             trouble = error if isinstance(error, Trouble) else self._fault(mail, error)
-            outcome = self._troubled(mail, trouble, under_way)
+            outcome = self._troubled(mail, trouble, under_way, now_ms)
         await asyncio.shield(self._settle(mail, outcome))
         if is_ended:
             raise asyncio.CancelledError
         if trouble is not None and trouble.is_of_account:
-            await self._account_refused(trouble)
+            await self._account_refused(trouble, now_ms)
         connection = under_way.connection
         if connection is not None and (trouble is not None or task.cancelled() or not connection.is_open):
             connection.drop()
@@ -144,9 +144,9 @@ class Sender:
         log.error("mail %d could not be sent", mail.letter, exc_info=error)
         return Trouble(f"The server made a mistake ({type(error).__name__}), which is in its log.")
 
-    def _troubled(self, mail: Mail, trouble: Trouble, under_way: Underway) -> Outcome:
+    def _troubled(self, mail: Mail, trouble: Trouble, under_way: Underway, now_ms: int) -> Outcome:
         is_doubtful = under_way.connection is not None and under_way.connection.is_doubtful
-        return attempt.troubled(mail, trouble, is_doubtful=is_doubtful, now_ms=self._wall_ms(), pause_s=self._pause_s)
+        return attempt.troubled(mail, trouble, is_doubtful=is_doubtful, now_ms=now_ms, pause_s=self._pause_s)
 
     async def _hand_over(self, mail: Mail, under_way: Underway) -> Any:
         if under_way.connection is None or not under_way.connection.is_open:
@@ -180,13 +180,14 @@ class Sender:
                 return f"{one.address} is not among the allowed recipients."
         return None
 
-    async def _account_refused(self, trouble: Trouble) -> None:
-        """What holds for one mail holds for all: the server is not asked once for each."""
+    async def _account_refused(self, trouble: Trouble, now_ms: int) -> None:
+        """What holds for one mail holds for all: the server is not asked once for each. The pause is counted from
+        the end of the attempt, `now_ms`, however long the disk took since."""
         if trouble.is_permanent:
-            await self._folder.ask(lambda outbox: outbox.queue.refuse_all(str(trouble), self._wall_ms()))
+            await self._folder.ask(lambda outbox: outbox.queue.refuse_all(str(trouble), now_ms))
             return
         self._failures += 1
-        self._held = self._wall_ms() + round(1000 * self._pause_s(self._failures)), str(trouble)
+        self._held = now_ms + round(1000 * self._pause_s(self._failures)), str(trouble)
         await self._hold()
 
     async def _hold(self) -> None:
