@@ -2,15 +2,20 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo test check world format lint types imports tsc node bench soak sbom screenshots clean vendor-missing
+.PHONY: help demo test check world format lint types imports tsc node bench soak mutation sbom screenshots clean vendor-missing
 
 VENV := .venv
 PY := $(VENV)/bin/python
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# Compiled modules are kept, whatever this machine's own setting: without them each start of a server takes twice the time.
+export PYTHONDONTWRITEBYTECODE :=
 PYTEST := $(PY) -m pytest
 LOGS := fast slow browser
-FAST := not browser and not slow and not soak
+# asyncio's debug mode is on here only, and in the tests' own process only.
+FAST := --asyncio-debug --ignore=tests/page -n 2 --dist worksteal -m "not browser and not slow and not soak"
+BROWSER := tests/page tests/recipes -m "browser and not soak"
+SLOW := --ignore=tests/page -n 3 --dist worksteal -m "slow and not browser and not soak"
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
@@ -21,19 +26,19 @@ demo: $(VENV)/.ready static/built/built.json ## a simulated car, its bridge and 
 test: $(VENV)/.ready-test static/built/built.json ## all of the tests: what must pass before a change goes in
 	$(PY) -m tests.chromium
 	$(PY) -m tests.vehicle.ros2_environment
-	$(MAKE) --no-print-directory format lint types imports tsc node
+	$(MAKE) --no-print-directory -j 2 --output-sync format lint types imports tsc node
 	rm -f $(LOGS:%=out/tests/%.jsonl)
 	status=0; \
-	PYTHONASYNCIODEBUG=1 $(PYTEST) --report-log=out/tests/fast.jsonl -n 3 -m "$(FAST)" || status=$$?; \
-	$(PYTEST) --report-log=out/tests/slow.jsonl -n 4 -m "slow and not browser and not soak" || status=$$?; \
-	$(PYTEST) --report-log=out/tests/browser.jsonl -m "browser and not soak" || status=$$?; \
+	$(PYTEST) --report-log=out/tests/fast.jsonl $(FAST) || status=$$?; \
+	$(PYTEST) --report-log=out/tests/slow.jsonl $(SLOW) || status=$$?; \
+	$(PYTEST) --report-log=out/tests/browser.jsonl $(BROWSER) || status=$$?; \
 	$(PY) -m tests.summary $(LOGS:%=out/tests/%.jsonl) || status=$$?; \
 	exit $$status
 
 check: $(VENV)/.ready-test ## the fast half of the tests, without a browser
-	$(MAKE) --no-print-directory format lint types imports tsc node
+	$(MAKE) --no-print-directory -j 2 --output-sync format lint types imports tsc node
 	rm -f out/tests/fast.jsonl
-	status=0; PYTHONASYNCIODEBUG=1 $(PYTEST) -q --report-log=out/tests/fast.jsonl -n 3 -m "$(FAST)" || status=$$?; \
+	status=0; $(PYTEST) -q --report-log=out/tests/fast.jsonl $(FAST) || status=$$?; \
 	$(PY) -m tests.summary out/tests/fast.jsonl && exit $$status
 
 world: $(VENV)/.ready-test static/built/built.json ## what failed on real bridges and for real operators, by its points (docs/world.md)
@@ -44,9 +49,14 @@ world: $(VENV)/.ready-test static/built/built.json ## what failed on real bridge
 bench: $(VENV)/.ready-test static/built/built.json ## latency, bytes and load, beside a bare client and one bridge connection a page
 	$(PY) -m tests.bench
 
-soak: $(VENV)/.ready-test static/built/built.json ## the long proofs
+soak: $(VENV)/.ready-test static/built/built.json ## the long proofs, one at a time, and a table of what each measured
 	$(PY) -m tests.chromium
-	$(PYTEST) -m soak --timeout 7200 -o faulthandler_timeout=7300
+	rm -f out/tests/soak.jsonl
+	status=0; $(PYTEST) --report-log=out/tests/soak.jsonl -m soak --timeout 7200 -o faulthandler_timeout=7300 || status=$$?; \
+	$(PY) -m tests.summary --each out/tests/soak.jsonl && exit $$status
+
+mutation: $(VENV)/.ready-test ## which small changes of the judge, the lease and the slow-down no test sees; SAMPLE=1500 for so many
+	$(PY) -m tests.mutation $(if $(SAMPLE),--sample $(SAMPLE))
 
 sbom: $(VENV)/.ready-test ## what is shipped of other people's work, as CycloneDX JSON in out/catgraph.cdx.json
 	@mkdir -p out

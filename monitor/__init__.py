@@ -1,6 +1,6 @@
-"""The judge: what is known of a vehicle, what is wrong with it, and what the operator is told.
+"""State, checks and alarms of a vehicle.
 
-Pure Python, numpy and pydantic: no clock, no input or output, no logging; time is an argument everywhere. The way round
-is `State.receive` → `State.snapshot` → `Monitor.step` → transitions; `Monitor.standing`, `.findings` and `.tiles` are
-what to show.
+Pure Python, numpy and pydantic: no clock, no input or output, no logging; time is always an argument. The data flow is
+`State.receive` → `State.snapshot` → `Monitor.step` → transitions; `Monitor.standing`, `.findings` and `.tiles` are for
+display.
 """

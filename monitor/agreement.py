@@ -17,8 +17,8 @@ LEVER_ARM_M = 2.0  # between the car's antenna and a phone somewhere in the car,
 def phone_sigma_m(accuracy_m: float) -> float:
     """One-sigma error [m] per axis of a phone that states `accuracy_m`.
 
-    The Geolocation standard says 95 %, Android and iOS mean the radius of 68 %: √(−2 ln 0.32) = 1.51 sigmas. No phone
-    is better than 2 m, whatever it states.
+    The Geolocation standard defines 95 %, but Android and iOS use the radius of 68 %: √(−2 ln 0.32) = 1.51 sigmas. No
+    phone is better than 2 m.
     """
     return max(PHONE_SIGMA_FLOOR_M, accuracy_m / RADIUS_68_SIGMAS)
 
@@ -73,9 +73,9 @@ class Tracks:
 def correlate(pairs: Sequence[Pair]) -> Tracks:
     """The pooled correlation of two tracks, r = Σ dp·dq / √(Σ|dp|² Σ|dq|²).
 
-    p and q are the places of phone and car, east and north in metres about one origin; dp, dq their differences from
-    their means; both axes are pooled, so that r does not depend on where the road leads. It is blind to a constant
-    offset, which is for the gate to find, and says nothing of tracks that are shorter than the errors.
+    p and q are the positions of phone and car, east and north [m] from one origin; dp, dq their differences from the
+    means; both axes are pooled, so that r does not depend on the direction of the road. r ignores a constant offset,
+    which the gate detects, and is meaningless for tracks shorter than the errors.
     """
     if not pairs:
         return Tracks(pairs=0, span_s=0.0, car_spread_m=0.0, phone_spread_m=0.0, phone_sigma_m=0.0, correlation=None)

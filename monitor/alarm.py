@@ -10,7 +10,18 @@ from typing import Literal
 from monitor.alarm_spec import Action, AlarmSpec, Place, Sound
 from monitor.check import Finding
 
-Change = Literal["raised", "cleared", "acknowledged", "recaused", "shelved", "unshelved", "suppressed", "unsuppressed"]
+Change = Literal[
+    "raised",
+    "cleared",
+    "acknowledged",
+    "recaused",
+    "shelved",
+    "unshelved",
+    "silenced",
+    "unsilenced",
+    "suppressed",
+    "unsuppressed",
+]
 
 
 CLOCK_BACK_S = 0.5  # less is a message that waited a moment, not a clock that went back
@@ -19,7 +30,7 @@ LEVEL = "level "  # begins the name of a cause that is a degree of badness
 
 class AlarmState(StrEnum):
     NORMAL = "NORMAL"
-    UNACKED = "UNACKED"  # the condition stands, nobody has said that they saw it
+    UNACKED = "UNACKED"  # the condition is active and not acknowledged
     ACKED = "ACKED"
     RTN_UNACKED = "RTN_UNACKED"  # returned to normal, unseen
     SHELVED = "SHELVED"  # hidden by the operator for a time
@@ -28,7 +39,7 @@ class AlarmState(StrEnum):
 
 
 class Refused(Exception):
-    """A wish of the operator that cannot be met; `reason` is one sentence for them."""
+    """A refused command of an operator; `reason` is one sentence."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
@@ -45,12 +56,13 @@ class Transition:
     at_s: float
     text: str  # what the check said at that moment
     by: str | None = None  # who, where a person did it
-    announces: bool = False  # the operator is to be told now
-    state: AlarmState = AlarmState.NORMAL  # where the alarm stands after it
+    announces: bool = False  # to be announced now
+    state: AlarmState = AlarmState.NORMAL  # the alarm's state after it
     finding: Finding | None = None  # what the check had last said; None: it had said nothing, or monitoring ended
-    causes: tuple[str, ...] = ()  # what the operator had been told of, as far as it was still there
+    causes: tuple[str, ...] = ()  # the announced causes that were still active
     suppressed_by: tuple[str, ...] = ()
     shelved_until_s: float | None = None
+    worst: Finding | None = None  # furthest beyond its limit since it was raised
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,27 +75,29 @@ class Cause:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alarm:
-    """One alarm as it stands now."""
+    """The current state of one alarm."""
 
     id: str
     spec: AlarmSpec
     occurrence: int = 0  # counts announcements
     condition: bool = False  # what the check last said, without delays; UNKNOWN leaves it
-    active: bool = False  # the same with delays: what the operator is told
+    active: bool = False  # the same with delays: the announced state
     acknowledged: bool = True
     latched: bool = False  # active only because it latches
     shelved_until_s: float | None = None
     shelved_by: str | None = None
+    silenced_until_s: float | None = None  # no sound until then; it still waits for its acknowledgement
+    silenced_by: str | None = None
     suppressed_by: tuple[str, ...] = ()  # alarm ids, or "paused"
     out_of_service: bool = False
     raised_s: float | None = None  # when the standing or last activity began
-    announced_s: float | None = None  # when the operator was last told
+    announced_s: float | None = None  # time of the last announcement
     cleared_s: float | None = None
     acknowledged_by: str | None = None
     finding: Finding | None = None  # the newest while the alarm is awake
     trip: Finding | None = None  # as announced
     worst: Finding | None = None  # furthest beyond its limit since raised
-    causes: tuple[Cause, ...] = ()  # what the operator was told of
+    causes: tuple[Cause, ...] = ()  # the announced causes
     announced: tuple[tuple[str, float], ...] = ()  # causes announced of late, and when; where the spec limits repeats
     held_s: float = 0.0  # how long the other side (fault while not active, ok while active) has held
     at_s: float | None = None  # when last judged
@@ -110,8 +124,9 @@ class Alarm:
 
     @property
     def sound(self) -> Sound:
-        """What it sounds like now: silent once it is gone, acknowledged, shelved or suppressed."""
-        return self.spec.sound if self.state is AlarmState.UNACKED else Sound.NONE
+        """What it sounds like now: silent once it is gone, acknowledged, silenced, shelved or suppressed."""
+        sounds = self.state is AlarmState.UNACKED and self.silenced_until_s is None
+        return self.spec.sound if sounds else Sound.NONE
 
     @property
     def actions(self) -> tuple[Action, ...]:
@@ -160,6 +175,7 @@ def transition(
         causes=there(alarm.causes),
         suppressed_by=alarm.suppressed_by,
         shelved_until_s=alarm.shelved_until_s,
+        worst=alarm.worst,
     )
 
 
@@ -184,5 +200,6 @@ def rebased(alarm: Alarm, now_s: float) -> Alarm:
         announced_s=moved(alarm.announced_s),
         cleared_s=moved(alarm.cleared_s),
         shelved_until_s=moved(alarm.shelved_until_s),
+        silenced_until_s=moved(alarm.silenced_until_s),
         announced=tuple((name, at_s + shift_s) for name, at_s in alarm.announced),
     )

@@ -1,13 +1,14 @@
 """The life of one alarm after ISA-18.2: independent flags, a state derived from them, and one pure step of time.
 
-- *Delays* count only time in which the check really said so: UNKNOWN stops the count to raising (what was seen still
-  counts) and starts the count to clearing anew; so UNKNOWN neither raises nor clears.
-- *Occurrence* counts announcements: a raise, a new or worse cause, the end of shelving. Each asks for its own
-  acknowledgement, and an acknowledgement names the one it saw.
-- *Repeats*: where the spec says so, an alarm that comes back with causes announced of late stands in the list as it was
-  left, acknowledged or not, and is not announced again.
+- *Delays* count only time in which the check has a verdict: UNKNOWN pauses the on-delay (earlier time still counts) and
+  restarts the off-delay; so UNKNOWN neither raises nor clears.
+- *Occurrence* counts announcements: a raise, a new or worse cause, the end of shelving. Each needs its own
+  acknowledgement, and an acknowledgement names its occurrence.
+- *Silence* takes the sound for a while and nothing else. A new occurrence, and the end of the while, sound again.
+- *Repeats*: if the spec has it, an alarm that returns with recently announced causes is restored in the list as it was,
+  acknowledged or not, and is not announced again.
 - *Suppressed* alarms neither raise nor clear, and come back as they were: known ones are not announced again.
-- A clock that goes back moves the alarm's own times with it: no delay gets longer, none is skipped.
+- A clock that goes back shifts the alarm's times: no delay gets longer, none is skipped.
 """
 
 from __future__ import annotations
@@ -34,12 +35,13 @@ def advance(
     step = _Step(alarm, finding, now_s if alarm.at_s is None else max(now_s, alarm.at_s))
     step.suppress(tuple(inhibited_by))
     step.unshelve_when_due()
+    step.unsilence_when_due()
     step.judge()
     return step.result()
 
 
 def end(alarm: Alarm, now_s: float, why: str) -> tuple[Alarm, tuple[Transition, ...]]:
-    """Monitoring ends: the alarm goes back to normal, and says so where it stood or lay on the shelf."""
+    """Return to normal at the end of monitoring, with a transition if the alarm was active or shelved."""
     fresh = Alarm(id=alarm.id, spec=alarm.spec, occurrence=alarm.occurrence, out_of_service=alarm.out_of_service)
     if alarm.is_standing:
         return fresh, (transition(fresh, "cleared", now_s, text=why),)
@@ -120,6 +122,14 @@ class _Step:
         else:
             self._tell("unshelved")
 
+    def unsilence_when_due(self) -> None:
+        until_s = self._alarm.silenced_until_s
+        if until_s is None or self._now_s < until_s:
+            return
+        self._set |= {"silenced_until_s": None, "silenced_by": None}
+        if self._active and not self._acknowledged:
+            self._tell("unsilenced")
+
     def judge(self) -> None:
         match self._finding.verdict:
             case Verdict.FAULT:
@@ -162,13 +172,13 @@ class _Step:
                 self._announce("raised")
 
     def _was_announced(self, names: Collection[str]) -> bool:
-        """Whether the operator was told of all these causes so short a time ago that it is not repeated."""
+        """Whether all these causes were announced too recently to be repeated."""
         within_s = self._alarm.spec.repeat_after_s
         known = {name for name, at_s in self._alarm.announced if self._now_s - at_s < within_s}
         return within_s > 0.0 and bool(names) and known.issuperset(names)
 
     def _blame(self) -> None:
-        """A cause the operator was not told of re-alarms; one that was away no longer than the off-delay is not new."""
+        """An unannounced cause re-alarms; one that was absent no longer than the off-delay is not new."""
         names = _names(self._finding)
         if len(names) == len(self._alarm.causes) and names == there(self._alarm.causes):
             return  # by far the most frequent case
@@ -197,6 +207,7 @@ class _Step:
             return
         self._active = False
         self._set |= {"held_s": 0.0, "cleared_s": self._now_s, "latched": False, "causes": ()}
+        self._set |= {"silenced_until_s": None, "silenced_by": None}
         if not self._alarm.spec.needs_ack:
             self._acknowledged = True
         self._tell("cleared")
@@ -205,6 +216,7 @@ class _Step:
         self._occurrence += 1
         self._acknowledged = False
         self._set |= {"acknowledged_by": None, "announced_s": self._now_s}
+        self._set |= {"silenced_until_s": None, "silenced_by": None}
         if self._finding.verdict is Verdict.FAULT:
             self._set["trip"] = self._finding
         if self._alarm.spec.repeat_after_s > 0.0:

@@ -1,4 +1,4 @@
-"""How an alarm is declared: what it says, where it shows, how it sounds and how patient it is."""
+"""The declaration of an alarm: text, place, sound and delays."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class AlarmSpec:
     advice: str = ""  # one sentence: what the operator should do
     inhibited_by: tuple[str, ...] = ()  # alarms which explain this one: while they stand it is not announced
     grace_s: float = 0.0  # once this alarm's condition has gone, what it explains gets this long to go too
-    repeat_after_s: float = 0.0  # what was announced is not announced again within this time, if it comes and goes
+    repeat_after_s: float = 0.0  # an intermittent alarm is not announced again within this time
     latches: bool = False  # stays active until acknowledged although its condition has gone
     place_after: Place | None = None  # where it shows once its condition has gone; None: where it was
 

@@ -1,8 +1,8 @@
-"""The clock of ROS beside ours, from questions for its time: how late a message is that carries a stamp of that clock.
+"""The offset of the ROS clock, from calls for its time; it gives the delay of messages with a stamp of that clock.
 
-An answer was made after it was asked for, so the car's clock is ahead of ours by its time less ours at the question, at
-most; and by its time less ours at the answer, at least. Of several questions the closest count. Pings see what waits in
-the connection; this sees what waited before it, in a bridge or a node that is too busy.
+The answer is made between call and reply, so the offset is at most its time less ours at the call, and at least its
+time less ours at the reply. The tightest bounds of several calls count. Pings measure the queue of the connection; this
+measures the delay before it, in an overloaded bridge or node.
 """
 
 from __future__ import annotations

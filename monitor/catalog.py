@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, ValidationError, create_model
 
 from monitor import checks as _checks
-from monitor.check import Check, Limits
+from monitor.check import EXPERT, Check, Limits
 from monitor.instruments import GROUPS
 
 AnyCheck = Check[Any]
@@ -23,7 +23,7 @@ def load() -> tuple[AnyCheck, ...]:
     for module in sorted(iter_modules(_checks.__path__), key=lambda module: module.name):
         for check in import_module(f"{_checks.__name__}.{module.name}").CHECKS:
             if check.id in found:
-                raise ValueError(f"two checks are called {check.id}")
+                raise ValueError(f"two checks are named {check.id}")
             found[check.id] = check
     return tuple(sorted(found.values(), key=lambda check: check.order))
 
@@ -33,7 +33,7 @@ def compose(checks: Sequence[AnyCheck]) -> type[Limits]:
     groups: dict[str, type[Limits]] = dict(GROUPS)
     for check in checks:
         if groups.setdefault(check.limits_group, check.limits) is not check.limits:
-            raise ValueError(f"two classes of limits are called {check.limits_group}")
+            raise ValueError(f"two classes of limits are named {check.limits_group}")
     fields: dict[str, Any] = {
         group: (limits, Field(default_factory=limits)) for group, limits in groups.items() if limits.model_fields
     }
@@ -73,17 +73,18 @@ def changed(limits: AllLimits, values: Mapping[str, Any]) -> AllLimits:
 @lru_cache(maxsize=1)
 def schema() -> dict[str, dict[str, Any]]:
     """Every threshold by its full name with title, description, unit, default, minimum, maximum and heading, in the
-    order of Settings: that of the tiles, then what belongs to no check."""
+    order of Settings: that of the tiles, then what belongs to no check, then what is for experts."""
     tiles: dict[str, str] = {}
     for check in CHECKS:
         tiles.setdefault(check.limits_group, check.tile_label)
     places = {group: place for place, group in enumerate(tiles)}
     groups = sorted(AllLimits(), key=lambda row: places.get(row[0], len(places)))
-    return {
+    found = {
         f"{group}.{name}": {"heading": tiles.get(group, group)} | field
         for group, limits in groups
         for name, field in limits.model_json_schema()["properties"].items()
     }
+    return dict(sorted(found.items(), key=lambda row: row[1]["heading"] == EXPERT))
 
 
 __all__ = ["CHECKS", "AllLimits", "AnyCheck", "ValidationError", "changed", "compose", "flat", "load", "schema"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
+from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -17,6 +17,7 @@ __all__ = [
     "Action",
     "AlarmSpec",
     "Check",
+    "End",
     "Finding",
     "Limits",
     "NotFresh",
@@ -59,7 +60,7 @@ class Finding(NamedTuple):
     brief: str  # at most 21 letters, for the tile
     measured: Quantity | None = None
     limit: Quantity | None = None
-    causes: tuple[str, ...] = ()  # what is at fault, where one alarm stands for several things; a new one re-alarms
+    causes: tuple[str, ...] = ()  # the faulty parts, if one alarm covers several; a new one re-alarms
     level: int = 0  # how bad, where a check knows degrees; a higher one re-alarms
     applies: bool = True  # False: there is nothing here to check (an optional signal that is not published)
 
@@ -68,7 +69,7 @@ OK = Finding(verdict=Verdict.OK, text="OK", brief="OK")
 
 
 def ok(text: str, *, measured: Quantity | None = None, limit: Quantity | None = None) -> Finding:
-    """All is well; `text` says how well."""
+    """The verdict OK, with `text`."""
     return Finding(verdict=Verdict.OK, text=text, brief="OK", measured=measured, limit=limit)
 
 
@@ -81,7 +82,7 @@ def fault(
     causes: tuple[str, ...] = (),
     level: int = 0,
 ) -> Finding:
-    """Something is wrong. `brief` follows the word FAULT on the tile ("12.6 m/s"); what does not fit is left out."""
+    """The verdict FAULT. `brief` follows the word FAULT on the tile ("12.6 m/s"); it is truncated to fit."""
     short = f"FAULT {brief}" if brief else "FAULT"
     return Finding(
         verdict=Verdict.FAULT,
@@ -95,7 +96,7 @@ def fault(
 
 
 def unknown(why: str, *, short: str = "") -> Finding:
-    """It cannot be told. `short` (at most 8 letters: "no link", "stale") follows "not checked:" on the tile."""
+    """The verdict UNKNOWN. `short` (at most 8 letters: "no link", "stale") follows "not checked:" on the tile."""
     brief = f"not checked: {short}" if short else "not checked"
     return Finding(verdict=Verdict.UNKNOWN, text=why, brief=brief if len(brief) <= BRIEF_LETTERS else "not checked")
 
@@ -111,6 +112,9 @@ class Limits(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(frozen=True, extra="forbid", strict=True, validate_default=True)
 
 
+EXPERT = "Expert"  # the last heading of Settings, folded away
+
+
 def threshold(
     default: float,
     label: str,
@@ -124,7 +128,7 @@ def threshold(
 ) -> Any:
     """A field of `Limits`, in SI: what the settings page shows, what the server accepts and what the check reads.
 
-    `heading`: where it stands in Settings, if not under the tile of its check.
+    `heading`: its group in Settings, if not the tile of its check; EXPERT for what is seldom changed.
     """
     extra: dict[str, Any] = {"unit": unit}
     if heading:
@@ -145,6 +149,14 @@ def threshold(
 L = TypeVar("L", bound=Limits)
 
 
+class End(NamedTuple):
+    """The value at which an active alarm ends, in SI."""
+
+    side: Literal["below", "above"]
+    value: float
+    unit: str
+
+
 class Scope(StrEnum):
     """What a check watches, and so what can blind it."""
 
@@ -155,7 +167,7 @@ class Scope(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check(Generic[L]):
-    """A rule: what it reads, what it says, and the alarm it lights."""
+    """A rule: its signals, its function and its alarm."""
 
     id: str
     label: str  # as the operator reads it
@@ -164,8 +176,10 @@ class Check(Generic[L]):
     find: Callable[[Snapshot, L, bool], Finding]  # (snapshot, limits, was_active)
     needs: frozenset[str] = frozenset()  # signals that it reads
     immediate: bool = False  # judged with each message of a signal it needs too; every check is judged on each tick
+    ends: Callable[[L], End] | None = None  # where the alarm ends at another value than that which raises it
     group: str = ""  # name of its thresholds; a family shares one; "" = id
     tile: str = ""  # the tile of the home tab it belongs to; "" = label
+    checked_when: str = ""  # what makes it checked, as a sentence; said where it is not
     scope: Scope = Scope.CAR
     order: int = 500  # place of its tile on the home tab, which never moves: smaller comes first
 

@@ -40,7 +40,7 @@ def blind_to_the_car(snapshot: Snapshot) -> Finding | None:
 
 
 class CheckRunner:
-    """Asks checks for their findings, and keeps which of them fail."""
+    """Runs the checks, and records which of them raise."""
 
     __slots__ = ("_declared", "_failed", "crashes")
 

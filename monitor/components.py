@@ -1,4 +1,4 @@
-"""The newest word of every component on /diagnostics, where several nodes publish, each for its own parts."""
+"""The newest report of every component on /diagnostics, where several nodes publish, each its own components."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Components:
     """Merges messages into one list of components; one that falls silent turns STALE, and is forgotten in the end."""
 
     def __init__(self) -> None:
-        # By name: the newest word, when it came, and how long after the one before.
+        # By name: the newest report, its time, and the interval to the previous one.
         self._heard: dict[str, tuple[Component, float, float]] = {}
 
     def merge(self, said: Diagnostics, at_s: float) -> Diagnostics:

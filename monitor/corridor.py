@@ -1,4 +1,4 @@
-"""The way the car is about to take, as seen by a laser on its front, and how far along it the first obstacle stands."""
+"""The swept path of the car in the frame of its front laser, and the distance of the first obstacle in it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Corridor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sight:
-    """What a scan says of a corridor."""
+    """The result of a scan in a corridor."""
 
     beams: int  # that point into the corridor within `reach_m`
     blind: int  # of those, the ones without a usable return
@@ -153,7 +153,7 @@ def _spans(n: int, angle_min_rad: float, increment_rad: float, corridor: Corrido
 def _points_into(
     n: int, angle_min_rad: float, increment_rad: float, corridor: Corridor, reach_m: float
 ) -> NDArray[np.intp]:
-    """Which beams would see something that stands at `reach_m` in the corridor: their indices."""
+    """Indices of the beams that would hit an object at `reach_m` in the corridor."""
     cosines, sines = _directions(n, angle_min_rad, increment_rad)
     _, aside_m = along_and_aside(reach_m * cosines, reach_m * sines, corridor)
     return np.flatnonzero((aside_m <= 0) & (cosines > 0))

@@ -1,4 +1,4 @@
-"""What the car's signals tell of one another: acceleration by the wheels, heading, track, standstill, GPS drift."""
+"""Derived signals: acceleration by the wheels, heading, track, standstill, GPS drift."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ FINEST = 3  # digits after the point; what is nearer to its limit than that is a
 
 
 def beside(value: float, limit: float, digits: int = 1) -> str:
-    """`value` with so many digits after the point, or as many more as tell it from `limit`: 4.97 beside 5.0."""
+    """Format `value` with the given decimals, or with as many as distinguish it from `limit`: 4.97 beside 5.0."""
     if math.isfinite(value) and value != limit:
         for finer in range(digits, FINEST + 1):
             text = f"{value:.{finer}f}"

@@ -10,21 +10,21 @@ from monitor.motion import MOVES_ABOVE_MPS
 from monitor.values import Acceleration, GpsFix, Heading, LaserScan, Odometry, Twist
 
 STEP_AT_MOST_S = 1.0  # between two speeds farther apart the car may have done anything
-MEMORY = 200  # messages: how a signal behaves is told by its last ten seconds in motion, at 20 Hz …
+MEMORY = 200  # messages: the last ten seconds in motion at 20 Hz decide …
 KNOWN_AFTER = 40  # … and not before two
 WEIGHT_AT_MOST = 20  # repetitions of one stretch that count: one that was frozen does not make a signal sluggish
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Repeats:
-    """What the newest message of a signal repeats of those before it; all zero where it says something new."""
+    """What the newest message of a signal repeats; all zero if it is new."""
 
     value_n: int = 0  # messages before it in a row with the same value, to the last bit
     value_s: float = 0.0  # how long the car moved meanwhile, by its wheels
     value_m: float = 0.0  # how far
     stamp_n: int = 0  # messages before it in a row with the same stamp
     stamp_s: float = 0.0  # how long that has lasted
-    liveliness: float | None = None  # share of the messages in motion that said something new; None: too few to tell
+    liveliness: float | None = None  # share of messages in motion with a new value; None: too few
 
 
 _NOTHING = Repeats()
@@ -121,7 +121,7 @@ class RepeatFollower:
         )
 
     def _learn(self) -> None:
-        """A new value ends a stretch of repetitions; both tell how lively the signal is."""
+        """A new value ends a run of repetitions; both give the share of changes."""
         for is_new in (*[False] * min(self._in_motion, WEIGHT_AT_MOST), True):
             self._known += 1
             self._lively += (float(is_new) - self._lively) / min(self._known, MEMORY)

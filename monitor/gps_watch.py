@@ -1,4 +1,4 @@
-"""What the newest positions tell of the receiver itself: how far they drift while the car stands, how fast they run."""
+"""Behaviour of the receiver, from the newest positions: drift while the car stands, and speed of the position."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class GpsWatch:
     drift_m: tuple[float, ...] = ()  # of the last fixes at rest, newest last: distance from the anchor
     anchored_s: float | None = None  # since when the car rests where the anchor is
     over_ground_mps: tuple[float, ...] = ()  # speed between the last fixes, newest last
-    net_mps: float | None = None  # the same from the first to the last of them: noise goes back and forth
-    sigma_m: float | None = None  # the receiver's own; None: it does not say
+    net_mps: float | None = None  # the same from the first to the last of them, because noise alternates
+    sigma_m: float | None = None  # the receiver's own; None: not reported
 
 
 class GpsFollower:
@@ -93,6 +93,6 @@ class GpsFollower:
 
 
 def _median_lon(longitudes: tuple[float, ...]) -> float:
-    """Median of longitudes that may lie on both sides of the 180° meridian."""
+    """Median of longitudes on either side of the 180° meridian."""
     first = longitudes[0]
     return math.remainder(first + median(math.remainder(lon - first, 360.0) for lon in longitudes), 360.0)

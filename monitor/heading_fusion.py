@@ -8,18 +8,18 @@ from monitor.geo import heading_of_yaw_deg, turn_deg
 from monitor.values import Heading, Odometry
 
 EARTH_FRAMES = frozenset({"map", "utm", "earth", "world", "enu", "gps"})  # x east, y north (REP-103, REP-105)
-UTM_EAST_M = (100_000.0, 900_000.0)  # where easting lies in every zone
+UTM_EAST_M = (100_000.0, 900_000.0)  # the range of eastings in every zone
 DOUBT_DEG = 45.0  # further than this from the course, several times running, the yaw is not a heading
 DOUBTS = 5
 REVERSING_MPS = -0.3
 
 
 class HeadingFusion:
-    """Chooses. A published heading wins; then the yaw of odometry which is fixed to the earth; then the course.
+    """Selects the heading: a published one first, then the yaw of earth-fixed odometry, then the course.
 
-    Yaw is a heading only in a frame whose x is east: REP-105 lets `odom` begin anywhere. A frame is taken for one when
-    its name says so or its coordinates are UTM's. Two liars are known: drivers which send UTM with an orientation that
-    never changes, and yaws which the course contradicts. Neither is believed.
+    Yaw is a heading only in a frame whose x is east: REP-105 lets `odom` start anywhere. A frame is earth-fixed by its
+    name or by UTM coordinates. Two cases are rejected: drivers that send UTM with a constant orientation, and yaws that
+    the course contradicts.
     """
 
     def __init__(self) -> None:

@@ -14,10 +14,10 @@ class CauseTable:
 
     The table is `AlarmSpec.inhibited_by`: lost link ⊃ silent car ⊃ stale signal ⊃ slow signal. What is judged *by* a
     stale signal needs no row: its value cannot be read, its check is UNKNOWN, and UNKNOWN neither raises nor clears;
-    nor a grace: once the signal is back, what it says is true at once.
+    nor a grace: a returned signal is valid at once.
 
     An inhibitor holds while its condition does, whatever its own delays, and for its grace after. The grace is for
-    missing messages; where a value is judged it must be 0, for a danger that is seen again waits for nothing.
+    missing messages; for a judged value it must be 0, because a returning danger must not be delayed.
     """
 
     def __init__(self, inhibited_by: Mapping[str, tuple[str, ...]], grace_s: Mapping[str, float] | None = None) -> None:
@@ -31,14 +31,14 @@ class CauseTable:
         self._gone_at_s: dict[str, float | None] = {}  # when each inhibitor's condition went; None: it is there
 
     def note(self, alarm: Alarm, now_s: float) -> None:
-        """Remember whether this alarm holds; to be told after each of its judgements."""
+        """Store whether this alarm's condition holds; called after each of its evaluations."""
         if alarm.id not in self.inhibitors:
             return
         if alarm.condition:
             self._gone_at_s[alarm.id] = None
         elif alarm.id in self._gone_at_s:
             gone_at_s = self._gone_at_s[alarm.id]
-            if gone_at_s is None or gone_at_s > now_s:  # it goes now, or the clock went back: the grace begins anew
+            if gone_at_s is None or gone_at_s > now_s:  # it ends now, or the clock went back: the grace restarts
                 self._gone_at_s[alarm.id] = now_s
 
     def holding(self, alarm_id: str, now_s: float) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from monitor.check import Limits, threshold
+from monitor.check import EXPERT, Limits, threshold
 
 GAUGE, VEHICLE = "Gauge", "Vehicle"  # headings of Settings
 
@@ -29,13 +29,13 @@ class SteeringLimits(Limits):
 
 
 class ObstacleLimits(Limits):
-    """Shared by the two checks that look for obstacles, and by the bars that the page draws."""
+    """Shared by the two obstacle checks and by the page's bars."""
 
     standoff_m: float = threshold(
         5.0, "Obstacle distance", unit="m", low=0.5, high=50.0, step=0.5, help="Nearer than this is too near."
     )
     reaction_s: float = threshold(
-        1.0, "Reaction time", unit="s", low=0.0, high=5.0, step=0.1, help="Until the car begins to brake."
+        1.0, "Reaction time", unit="s", low=0.0, high=5.0, step=0.1, help="Until the car starts to brake."
     )
     deceleration_mps2: float = threshold(
         3.0,
@@ -44,13 +44,20 @@ class ObstacleLimits(Limits):
         low=0.5,
         high=9.0,
         step=0.1,
-        help="What the brakes are counted on for.",
+        help="Deceleration that the brakes provide.",
     )
     time_to_collision_s: float = threshold(
         2.0, "Time to collision", unit="s", low=0.5, high=10.0, step=0.1, help="Sooner than this is too soon."
     )
     deadband_m: float = threshold(
-        0.5, "Obstacle deadband", unit="m", low=0.0, high=5.0, step=0.1, help="It clears this much farther away."
+        0.5,
+        "Obstacle deadband",
+        unit="m",
+        low=0.0,
+        high=5.0,
+        step=0.1,
+        help="The alarm clears this much farther away.",
+        heading=EXPERT,
     )
     half_width_m: float = threshold(
         1.2,
@@ -59,7 +66,7 @@ class ObstacleLimits(Limits):
         low=0.5,
         high=3.0,
         step=0.1,
-        help="What is farther aside is passed by.",
+        help="Objects farther aside are ignored.",
         heading=VEHICLE,
     )
     wheelbase_m: float = threshold(2.62, "Wheelbase", unit="m", low=0.5, high=8.0, step=0.01, heading=VEHICLE)

@@ -21,15 +21,15 @@ class LinkFacts:
     problem_hint: str | None = None  # what to do
     behind_title: str | None = None  # the part that failed behind the open bridge, as a sentence; None: none known
     behind_hint: str | None = None
-    behind_mark: str | None = None  # a word or two
+    behind_mark: str | None = None  # a short text
     topics_subscribed: int = 0
     connected_s: float | None = None  # when the open connection was made
     last_message_s: float | None = None  # when the car last said anything
     published: frozenset[str] = frozenset()  # the signals that discovery found on the car
     log_trouble: str | None = None  # why the alarm log is not kept on the disk, as a sentence; None: it is
     late_s: float | None = None  # how late the messages are that come now; None: not known
-    throttled: frozenset[str] = frozenset()  # the signals of which fewer messages are asked for: the link is too slow
-    reduced: str | None = None  # what is not asked for in full, as a sentence; None: all is
+    throttled: frozenset[str] = frozenset()  # the signals that are throttled because the link is too slow
+    reduced: str | None = None  # the throttling, as a sentence; None: none
     wall_zero_s: float | None = None  # the time of day [s since 1970] when `received_s` was 0; None: not known
 
     @property

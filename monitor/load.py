@@ -34,7 +34,7 @@ class AlarmLoad:
 
 
 class RecentLoad:
-    """Keeps of the transitions what tells the load now."""
+    """Keep the transitions that count for the current load."""
 
     def __init__(self) -> None:
         self._announced: deque[float] = deque(maxlen=KEPT)
@@ -50,7 +50,7 @@ class RecentLoad:
                 self._turns.append((transition.at_s, transition.alarm_id))
 
     def at(self, now_s: float) -> AlarmLoad:
-        """The load at `now_s`. After a clock went back, what lies a window ahead is as old as what lies behind."""
+        """The load at `now_s`. After the clock went back, times up to a window ahead count like those behind."""
         announced = sum(abs(now_s - at_s) < WINDOW_S for at_s in self._announced)
         turns: dict[str, int] = {}
         for at_s, alarm_id in self._turns:
@@ -82,7 +82,7 @@ def turns_of(transitions: Sequence[Transition]) -> Mapping[str, Sequence[float]]
 
 
 def most_within(times: Iterable[float], window_s: float) -> int:
-    """The most of these moments, in order, that lie within one window."""
+    """The largest number of these sorted times within one window."""
     recent: deque[float] = deque()
     most = 0
     for at_s in times:

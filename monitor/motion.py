@@ -1,4 +1,4 @@
-"""What the speed tells beyond itself: the acceleration, and whether the car stands."""
+"""Derived from the speed: acceleration and standstill."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Slope:
         self._samples: deque[tuple[float, float]] = deque(maxlen=256)
 
     def add(self, at_s: float, value: float) -> float | None:
-        """The slope [1/s] including this sample; None while there is too little to tell."""
+        """The slope [1/s] including this sample; None while there are too few samples."""
         samples = self._samples
         if samples and (at_s < samples[-1][0] or at_s - samples[-1][0] > SPAN_AT_MOST_S):
             samples.clear()

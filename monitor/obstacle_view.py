@@ -1,4 +1,4 @@
-"""What the obstacle check looks at: the strip ahead as the car is steered now, and what the laser sees in it."""
+"""Input of the obstacle check: the corridor at the current steering, and the laser's returns in it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from monitor.values import LaserScan
 
 BLIND_AT_M = 5.0  # where the beams of the corridor are counted
 BLIND_SHARE = 0.9  # of them without a return: nothing can be said
-ANGLE_STEP_RAD = 0.005  # 10 cm aside at 10 m: what was reckoned for a bend serves the next scan too
+ANGLE_STEP_RAD = 0.005  # 10 cm aside at 10 m: a computed bend is reused for the next scan
 WIDEST_TYRE_RAD = 0.6  # no car turns its wheels farther
-ASIDE_DEADBAND_M = 0.2  # what stands at the corridor's very edge is in the way until it is so far out of it
+ASIDE_DEADBAND_M = 0.2  # hysteresis at the corridor's edge
 
 
 def corridor_ahead(snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bool = False) -> Corridor:
@@ -44,5 +44,5 @@ def look_ahead(scan: LaserScan, corridor: Corridor) -> Sight:
 
 
 def is_blind(sight: Sight) -> bool:
-    """So few beams of the corridor measured anything that neither an obstacle nor its absence can be told."""
+    """Too few beams of the corridor have a return to detect an obstacle or its absence."""
     return sight.beams > 0 and sight.blind > BLIND_SHARE * sight.beams

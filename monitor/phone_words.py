@@ -65,7 +65,7 @@ def why_words(why: Why, view: PhoneView, now_s: float, phone: str = "this phone"
             )
         case "silent":
             return WhyWords(
-                sentence=f"No position from {phone} for {now_s - view.heard_s:.0f} s",
+                sentence=f"No position from {phone} for {now_s - view.received_s:.0f} s",
                 short="silent",
                 brief="silent",
             )

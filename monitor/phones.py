@@ -1,9 +1,8 @@
-"""The phones that tell where they are, which of them is compared with the car, and what the comparisons gave.
+"""The phones that share their position, the one that is compared with the car, and the comparisons.
 
-Several pages may tell a position; one is compared. It is the one that rides in the car, where the operator said so, and
-then no other takes its place, whatever becomes of it. Else the first that told a position which can be used stays the
-one for as long as it has one, and for 10 s more; then the next in the order in which they came takes over. The car is
-looked up at the phone's own time, so nothing here depends on how often either speaks.
+Several pages can share a position; one is compared. If the operator chose the phone in the car, only that one. Else
+the first phone with a usable position stays selected as long as it has one, and for 10 s more; then the next in order
+of arrival follows. The car's position is interpolated at the phone's time, so the rates of both do not matter.
 """
 
 from __future__ import annotations
@@ -19,9 +18,9 @@ from monitor.trail import Trail
 from monitor.values import GpsFix, PhoneFix
 
 WORST_ACCURACY_M = 50.0  # a worse one comes from masts and access points
-FIX_LIVES_S = 5.0  # phones tell their position about once a second
-UNCERTAIN_AT_MOST_S = 1.0  # of the moment of a fix: a message that hung in the radio says nothing of now
-SILENT_AFTER_S = 5.0  # a page speaks at least every 3 s, be it to say why it has no position
+FIX_LIVES_S = 5.0  # phones send their position about once a second
+UNCERTAIN_AT_MOST_S = 1.0  # uncertainty of a fix's time: a message delayed by the radio is not current
+SILENT_AFTER_S = 5.0  # a page reports at least every 3 s, with or without a position
 HOLD_S = 10.0
 FORGOTTEN_AFTER_S = 60.0
 MOST = 32
@@ -29,14 +28,14 @@ UNCERTAIN_S = 0.3  # beside that: the phone's own delay, and what a radio bunche
 COMPARISONS = 5
 COMPARED_WITHIN_S = 15.0
 TRACK_S = 60.0
-STEP_S = 0.25  # fixes nearer to the one before tell nothing new, and a page in a frenzy costs nothing
+STEP_S = 0.25  # closer fixes are not new, and bound the cost of a page that floods
 
 Why = Literal["denied", "unavailable", "timeout", "insecure", "hidden", "off", "coarse", "old", "late", "silent"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PhoneWord:
-    """What one phone said: where it is, or why it cannot tell. Times are on the receiver's monotonic clock."""
+class PhoneReport:
+    """The position of one phone, or the reason for none. Times are of the receiver's monotonic clock."""
 
     phone: str  # its own name for itself, the same over reconnections
     is_handheld: bool  # not a computer on a desk, of which no GPS is expected
@@ -61,30 +60,29 @@ class Comparison:
 class PhoneView:
     """The phone that is compared, at one moment."""
 
-    phone: str | None = None  # None: none has spoken
+    phone: str | None = None  # None: none has reported
     label: str = ""
-    count: int = 0  # phones heard within the last minute
+    count: int = 0  # phones that reported within the last minute
     is_handheld: bool = False
-    heard_s: float = -math.inf
-    usable_s: float = -math.inf  # the moment of its newest usable fix; before there is one, when it first spoke
+    received_s: float = -math.inf
+    usable_s: float = -math.inf  # the moment of its newest usable fix; before there is one, of its first report
     fix: PhoneFix | None = None  # the newest, usable or not
     measured_s: float = -math.inf
     was_usable: bool = False  # it had a usable position before
-    why: Why | None = None  # why its newest word is no usable fix
+    why: Why | None = None  # why its newest report has no usable fix
     is_chosen: bool = False  # the operator said that it rides in the car
     comparisons: tuple[Comparison, ...] = ()  # the newest five, oldest first
     tracks: Tracks | None = None  # over the last minute, of places that the gate explains
 
     def is_there(self, now_s: float) -> bool:
-        """Whether a phone is to be compared at all; one that left, or was not heard for a minute, is not, unless it was
-        chosen."""
-        return self.phone is not None and (self.is_chosen or now_s - self.heard_s <= FORGOTTEN_AFTER_S)
+        """Whether a phone is to be compared at all: it was chosen, or it reported within a minute and did not leave."""
+        return self.phone is not None and (self.is_chosen or now_s - self.received_s <= FORGOTTEN_AFTER_S)
 
     def why_not(self, now_s: float) -> Why | None:
         """Why this phone has no position that can be used now; None where it has."""
         if self.why == "off":
             return "off"
-        if now_s - self.heard_s > SILENT_AFTER_S:
+        if now_s - self.received_s > SILENT_AFTER_S:
             return "silent"
         if self.why is not None:
             return self.why
@@ -100,14 +98,14 @@ NO_PHONE = PhoneView()
 
 @dataclass(slots=True, kw_only=True)
 class _Phone:
-    """One phone, as last heard."""
+    """One phone, as of its newest report."""
 
     name: str
     usable_s: float
     label: str = ""
     is_handheld: bool = True
-    heard_s: float = -math.inf
-    asked_s: float = -math.inf  # when it was chosen before it was ever heard
+    received_s: float = -math.inf
+    asked_s: float = -math.inf  # when it was chosen before its first report
     fix: PhoneFix | None = None
     measured_s: float = -math.inf
     why: Why | None = None
@@ -115,7 +113,7 @@ class _Phone:
 
 
 class Phones:
-    """Hears the phones and the car's positions; `view` is what the checks judge by."""
+    """Takes the reports of the phones and the positions of the car; `view` is what the checks judge by."""
 
     def __init__(self) -> None:
         self.view = NO_PHONE
@@ -124,34 +122,34 @@ class Phones:
         self._phones: dict[str, _Phone] = {}  # in the order in which they came
         self._chosen: str | None = None
         self._trail = Trail()
-        self._waiting: PhoneWord | None = None  # the chosen phone's fix, until the car's next position comes
+        self._waiting: PhoneReport | None = None  # the chosen phone's fix, until the car's next position comes
         self._comparisons: deque[Comparison] = deque(maxlen=COMPARISONS)
         self._pairs: deque[Pair] = deque(maxlen=round(TRACK_S / STEP_S) + 1)
         self._tracks: Tracks | None = None
         self._compared_s = -math.inf
 
-    def hear(self, word: PhoneWord, now_s: float) -> None:
-        """One word of one phone."""
+    def receive(self, report: PhoneReport, now_s: float) -> None:
+        """Take one report of one phone."""
         self._phones = {
-            n: p for n, p in self._phones.items() if n == self._rides or now_s - p.heard_s <= FORGOTTEN_AFTER_S
+            n: p for n, p in self._phones.items() if n == self._rides or now_s - p.received_s <= FORGOTTEN_AFTER_S
         }
-        if word.why == "off" and word.phone != self._rides:
-            self._phones.pop(word.phone, None)
-        elif word.phone in self._phones or len(self._phones) < MOST:
-            self._note(word, now_s)
+        if report.why == "off" and report.phone != self._rides:
+            self._phones.pop(report.phone, None)
+        elif report.phone in self._phones or len(self._phones) < MOST:
+            self._note(report, now_s)
         self._choose(now_s)
-        if word.phone == self._chosen and word.fix is not None and self._phones[word.phone].why is None:
-            if word.measured_s >= self._compared_s + STEP_S:
-                self._waiting = word
+        if report.phone == self._chosen and report.fix is not None and self._phones[report.phone].why is None:
+            if report.measured_s >= self._compared_s + STEP_S:
+                self._waiting = report
                 self._compare()
         self._look()
 
     def ride(self, phone: str | None, now_s: float) -> None:
-        """This phone rides in the car: it is compared, and no other. It may be one that has not spoken yet. None: one
+        """This phone rides in the car: it is compared, and no other. It may be one that has not reported yet. None: one
         is found as it comes."""
-        unheard = self._phones.get(self._rides or "")
-        if unheard is not None and unheard.heard_s == -math.inf:
-            del self._phones[unheard.name]  # it was only waited for
+        expected = self._phones.get(self._rides or "")
+        if expected is not None and expected.received_s == -math.inf:
+            del self._phones[expected.name]  # it was only waited for
         self._rides = phone
         if phone is not None and phone not in self._phones:
             self._phones[phone] = _Phone(name=phone, usable_s=now_s, asked_s=now_s)
@@ -164,17 +162,22 @@ class Phones:
         if self._waiting is not None and self._compare():
             self._look()
 
-    def _note(self, word: PhoneWord, now_s: float) -> None:
-        phone = self._phones.get(word.phone)
+    def _note(self, report: PhoneReport, now_s: float) -> None:
+        phone = self._phones.get(report.phone)
         if phone is None:
-            phone = self._phones[word.phone] = _Phone(name=word.phone, usable_s=now_s)
-        phone.heard_s, phone.is_handheld, phone.why, phone.label = now_s, word.is_handheld, word.why, word.label
-        if word.fix is None:
+            phone = self._phones[report.phone] = _Phone(name=report.phone, usable_s=now_s)
+        phone.received_s, phone.is_handheld, phone.why, phone.label = (
+            now_s,
+            report.is_handheld,
+            report.why,
+            report.label,
+        )
+        if report.fix is None:
             return
-        phone.fix, phone.measured_s = word.fix, word.measured_s
-        phone.why = _why_not_usable(word.fix, now_s - word.measured_s, word.uncertain_s)
+        phone.fix, phone.measured_s = report.fix, report.measured_s
+        phone.why = _why_not_usable(report.fix, now_s - report.measured_s, report.uncertain_s)
         if phone.why is None:
-            phone.usable_s, phone.was_usable = word.measured_s, True
+            phone.usable_s, phone.was_usable = report.measured_s, True
 
     def _choose(self, now_s: float) -> None:
         if self._rides is not None:
@@ -187,7 +190,7 @@ class Phones:
             (p for p in self._phones.values() if p.was_usable and p.why is None and now_s - p.usable_s <= FIX_LIVES_S),
             None,
         )
-        if found is None:  # none can be compared: told of is the one that ought to be
+        if found is None:  # none can be compared: the expected one is reported
             rest = sorted(self._phones.values(), key=lambda p: (not p.is_handheld, p.name != self._chosen))
             found = rest[0] if rest else None
         self._compare_only(None if found is None else found.name)
@@ -202,14 +205,14 @@ class Phones:
 
     def _compare(self) -> bool:
         """Compares the fix that waits, if the car's positions have reached its moment; whether it was."""
-        word = self._waiting
-        if word is None or word.fix is None or self._trail.newest_s < word.measured_s:
+        report = self._waiting
+        if report is None or report.fix is None or self._trail.newest_s < report.measured_s:
             return False
         self._waiting = None
-        place = self._trail.at(word.measured_s)
+        place = self._trail.at(report.measured_s)
         if place is None:
             return False
-        fix, at_s, sigma_m = word.fix, word.measured_s, phone_sigma_m(word.fix.accuracy_m)
+        fix, at_s, sigma_m = report.fix, report.measured_s, phone_sigma_m(report.fix.accuracy_m)
         east_m, north_m = offset_m(place.lat_deg, place.lon_deg, fix.lat_deg, fix.lon_deg)
         gate = gate_m(
             east_m,
@@ -217,7 +220,7 @@ class Phones:
             car_sigma_m=place.sigma_m,
             phone_sigma_m=sigma_m,
             velocity_mps=place.velocity_mps,
-            uncertain_s=UNCERTAIN_S + word.uncertain_s,
+            uncertain_s=UNCERTAIN_S + report.uncertain_s,
         )
         one = Comparison(
             at_s=at_s,
@@ -229,7 +232,7 @@ class Phones:
         self._comparisons.append(one)
         while self._comparisons[0].at_s < at_s - COMPARED_WITHIN_S:
             self._comparisons.popleft()
-        if one.distance_m <= one.gate_m:  # else it is told by the gate, and would spoil a minute of track besides
+        if one.distance_m <= one.gate_m:  # otherwise the gate reports it, and it would distort a minute of the track
             self._pairs.append(
                 Pair(
                     at_s=at_s,
@@ -259,7 +262,7 @@ class Phones:
             label=phone.label,
             count=len(self._phones),
             is_handheld=phone.is_handheld,
-            heard_s=max(phone.heard_s, phone.asked_s),
+            received_s=max(phone.received_s, phone.asked_s),
             usable_s=phone.usable_s,
             fix=phone.fix,
             measured_s=phone.measured_s,

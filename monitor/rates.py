@@ -6,9 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from statistics import median_low
 
-WINDOW_S = (
-    5.0  # the measured rate looks back this far: long against Wi-Fi bunching, short against an operator's patience …
-)
+WINDOW_S = 5.0  # window of the measured rate: long against Wi-Fi bunching, short for the operator …
 WINDOW_PERIODS = 5  # … or this many periods, for slow signals
 STALE_PERIODS = 10  # rides out bunching on Wi-Fi …
 STALE_FLOOR_S = 1.0  # … and no shorter than this for fast signals
@@ -21,14 +19,14 @@ BLOCK_INTERVALS = 5
 STEADY_WITHIN = 0.1  # relative
 PROVISIONAL_BLOCKS = 6  # so long a learned rate is refined: its first blocks may hold the catching up of a hiccup
 HICCUP_SHARE = 0.8  # a block below this share of the learned rate is a source that slowed down, and refines nothing
-DECIDED_BLOCKS = 4  # without agreement by then, the declared rate stands
+DECIDED_BLOCKS = 4  # without agreement by then, the declared rate applies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rate:
     """Messages per second of one signal."""
 
-    measured_hz: float | None  # over the sliding window; None: not enough heard yet; 0.0: silent
+    measured_hz: float | None  # over the sliding window; None: too few messages; 0.0: silent
     expected_hz: float | None  # None: neither declared, set nor learned
     settled: bool  # whether `expected_hz` may be held against the car
     learning: bool = False  # whether it may still settle; a signal without a default that never keeps a rate does not
@@ -37,11 +35,10 @@ class Rate:
 class RateMeter:
     """Follows the arrivals of one signal.
 
-    What to expect is, in this order: what the operator set; the car's own steady rate; the declared default. Rates
-    differ between healthy cars (a scan at 10, 30 or 75 Hz), so a car which holds its own rate for two blocks of 2.5 s
-    is taken at its word. After a hiccup messages come faster than their source for some seconds: the
-    median of the blocks of the next 15 s takes the place of what was learned first. Later only a steadily *higher* rate
-    is learned: a falling one is what the operator must know.
+    The expected rate is, in this order: the operator's; the car's own steady rate; the declared default. Rates differ
+    between healthy cars (a scan at 10, 30 or 75 Hz), so a rate that holds for two blocks of 2.5 s is learned. After a
+    stall messages arrive faster than their source for some seconds: the median of the blocks of the next 15 s replaces
+    the first learned rate. Later only a steadily *higher* rate is learned: a falling one must raise an alarm.
     """
 
     __slots__ = (
@@ -80,7 +77,7 @@ class RateMeter:
         self.restart()
 
     def restart(self) -> None:
-        """Measure anew: what came before a gap says nothing of the rate after it. What was learned stays."""
+        """Restart the measurement after a gap; the learned rate stays."""
         self._arrivals.clear()
         self._first_s = 0.0
         self._last_s: float | None = None
@@ -97,7 +94,7 @@ class RateMeter:
     def receive(self, at_s: float) -> None:
         last_s = self._last_s
         if last_s is None or not last_s <= at_s <= last_s + self.horizon_s:
-            # A silence long enough to be called stale has its own alarm; a clock that went back tells nothing at all.
+            # A stale signal has its own alarm; after the clock went back the rate is unknown.
             self.restart()
             self._first_s = at_s
             self._heard = 1

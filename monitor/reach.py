@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReachFacts:
-    """How many operators can hear alarms at one moment."""
+    """The number of operators that can hear alarms now."""
 
     can: int = 0  # operators who have a phone that would sound an alarm now
     of: int = 0  # operators whose phones are known
-    why: str = ""  # why those who cannot, cannot: a few words; "": nobody is known, or all can
+    why: str = ""  # why the others cannot, in short; "": no operator, or all can

@@ -39,11 +39,11 @@ class Reading(Generic[T_co]):
         return self.silent_s(now_s) + self.delay_s
 
     def silent_s(self, now_s: float) -> float:
-        """Since it came: of the messages, not of what they say."""
+        """Age of the message, not of its content."""
         return max(0.0, now_s - self.received_s)
 
     def is_fresh(self, now_s: float) -> bool:
-        # Both ways: a reading from far in the future says that the clock went back, not that the value is new.
+        # Both ways: a reading from far in the future means that the clock went back, not that the value is new.
         silent_s = now_s - self.received_s
         return -self.horizon_s <= silent_s <= self.horizon_s - self.delay_s and self.delay_s <= DELAY_AT_MOST_S
 

@@ -1,4 +1,4 @@
-"""What a signal said a moment ago, so that a check can tell at which speed something comes nearer."""
+"""The recent values of a signal, for the closing speed of an object."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from monitor.reading import Reading
 
-BEFORE_S = 0.4  # long enough to tell a walking person from noise, short enough for a car that brakes
+BEFORE_S = 0.4  # long enough to distinguish a walking person from noise, short enough for a braking car
 AT_MOST_S = 1.2
 
 

@@ -1,12 +1,13 @@
-"""What the operator does about an alarm: acknowledge it, shelve it for a while, take it off the shelf."""
+"""What the operator does about an alarm: acknowledge it, silence it or shelve it for a while, take it off the shelf."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from monitor.alarm import Alarm, Change, Refused, Transition, rebased, transition
+from monitor.alarm import Alarm, AlarmState, Change, Refused, Transition, rebased, transition
 
 SHELVE_AT_MOST_MIN = 15.0  # longer is forgotten
+SILENCE_S = 30.0  # enough to speak with the driver, and too short to be forgotten
 
 
 def acknowledge(alarm: Alarm, occurrence: int, by: str, now_s: float) -> tuple[Alarm, tuple[Transition, ...]]:
@@ -16,8 +17,8 @@ def acknowledge(alarm: Alarm, occurrence: int, by: str, now_s: float) -> tuple[A
         who = f" by {alarm.acknowledged_by}" if alarm.acknowledged_by and alarm.active else ""
         raise Refused(f"{title}: already acknowledged{who}" if alarm.active else f"{title}: nothing to acknowledge")
     if occurrence != alarm.occurrence:
-        raise Refused(f"{title} was announced anew meanwhile: look again")
-    after = replace(alarm, acknowledged=True, acknowledged_by=by)
+        raise Refused(f"{title} was raised again meanwhile: check again")
+    after = replace(alarm, acknowledged=True, acknowledged_by=by, silenced_until_s=None, silenced_by=None)
     transitions = [_transition(after, "acknowledged", by, now_s)]
     if alarm.latched:
         after = replace(after, active=False, latched=False, held_s=0.0, cleared_s=now_s, causes=())
@@ -25,10 +26,23 @@ def acknowledge(alarm: Alarm, occurrence: int, by: str, now_s: float) -> tuple[A
     return after, tuple(transitions)
 
 
+def silence(alarm: Alarm, occurrence: int, by: str, now_s: float) -> tuple[Alarm, tuple[Transition, ...]]:
+    """No sound of this very occurrence for `SILENCE_S`. It is not acknowledged by that; a newer one sounds at once."""
+    title = alarm.spec.title
+    if alarm.state is not AlarmState.UNACKED:
+        raise Refused(f"{title}: nothing sounds that could be silenced")
+    if occurrence != alarm.occurrence:
+        raise Refused(f"{title} was raised again meanwhile: check again")
+    if alarm.silenced_until_s is not None:
+        raise Refused(f"{title}: already silenced{f' by {alarm.silenced_by}' if alarm.silenced_by else ''}")
+    after = replace(rebased(alarm, now_s), silenced_until_s=now_s + SILENCE_S, silenced_by=by)
+    return after, (_transition(after, "silenced", by, now_s),)
+
+
 def shelve(
     alarm: Alarm, occurrence: int, minutes: float, by: str, now_s: float, *, is_inhibitor: bool
 ) -> tuple[Alarm, tuple[Transition, ...]]:
-    """Hide the alarm for some minutes, at most 15, in the operator's name; it goes on being judged meanwhile."""
+    """Shelve the alarm for some minutes, at most 15, in the operator's name; it is still evaluated."""
     title = alarm.spec.title
     if not alarm.spec.shelvable:
         raise Refused(f"{title} is critical and cannot be shelved")
@@ -41,8 +55,14 @@ def shelve(
     if not alarm.is_standing:
         raise Refused(f"{title}: nothing to shelve")
     if occurrence != alarm.occurrence:
-        raise Refused(f"{title} was announced anew meanwhile: look again")
-    after = replace(rebased(alarm, now_s), shelved_until_s=now_s + 60.0 * minutes, shelved_by=by)
+        raise Refused(f"{title} was raised again meanwhile: check again")
+    after = replace(
+        rebased(alarm, now_s),
+        shelved_until_s=now_s + 60.0 * minutes,
+        shelved_by=by,
+        silenced_until_s=None,
+        silenced_by=None,
+    )
     return after, (_transition(after, "shelved", by, now_s),)
 
 

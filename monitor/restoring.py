@@ -9,11 +9,11 @@ from monitor.alarm import Alarm, AlarmState, Cause, Transition
 
 
 def restore(alarms: Mapping[str, Alarm], transitions: Iterable[Transition]) -> dict[str, Alarm]:
-    """The alarms after the transitions, oldest first, whose times are on the clock that goes on (they may be negative).
+    """The alarms after the transitions, oldest first, with times on the current clock (they may be negative).
 
-    What was told comes back: active, acknowledged and by whom, shelved until when, suppressed by what, the causes and
-    the values of the trip, the number of the occurrence. What the checks say does not: every condition is unknown until
-    it is judged again, and unknown clears nothing. Transitions of alarms that are not there are passed over.
+    The announced state is restored: active, acknowledged and by whom, shelved until when, suppressed by what, causes
+    and values of the trip, number of the occurrence. Findings are not: every condition is unknown until it is evaluated
+    again, and unknown clears nothing. Transitions of unknown alarms are ignored.
     """
     restored = dict(alarms)
     for transition in transitions:
@@ -56,7 +56,7 @@ def _after(alarm: Alarm, transition: Transition) -> Alarm:
             return replace(alarm, acknowledged=True, acknowledged_by=transition.by)
         case "shelved":
             return replace(alarm, shelved_by=transition.by)
-        case "unshelved" if alarm.active:  # its end announces the alarm anew
+        case "unshelved" if alarm.active:  # its end announces the alarm again
             return _announced(alarm, transition)
     return alarm
 

@@ -29,7 +29,7 @@ IMPAIRED_SPEC = AlarmSpec(
     needs_ack=True,
     off_delay_s=10.0,  # a check that fails now and then is one failing check
     actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-    advice="The part named is not monitored. Tell the administrator of catgraph.",
+    advice="The named part is not monitored. Inform the administrator of catgraph.",
 )
 
 ENDED = "Monitoring ended"
@@ -99,7 +99,7 @@ class Monitor:
         return self._declared
 
     def end(self, now_s: float) -> tuple[Transition, ...]:
-        """Monitoring ends by the operator's wish: nothing is judged and nothing stands any more."""
+        """End monitoring on the operator's command: nothing is evaluated, and no alarm stays active."""
         transitions: list[Transition] = []
         for alarm_id, alarm in self.alarms.items():
             self.alarms[alarm_id], happened = end(alarm, now_s, ENDED)
@@ -110,11 +110,11 @@ class Monitor:
         return tuple(transitions)
 
     def restore(self, transitions: Iterable[Transition]) -> None:
-        """Goes on from where the alarms stood after these transitions, oldest first; see `monitor.restoring`."""
+        """Restore the alarms after these transitions, oldest first; see `monitor.restoring`."""
         self.alarms = restore(self.alarms, transitions)
 
     def number_on(self, transitions: Iterable[Transition]) -> None:
-        """Only counts on from the occurrences of these transitions: what they told of is over, or not yet due."""
+        """Continue the occurrence numbers of these transitions only; their alarms are over or not yet due."""
         self.alarms = numbered_on(self.alarms, transitions)
 
     def standing(self) -> list[Alarm]:
@@ -132,6 +132,9 @@ class Monitor:
     def acknowledge(self, alarm_id: str, occurrence: int, by: str, now_s: float) -> tuple[Transition, ...]:
         """Raises Refused with the reason, as do `shelve` and `unshelve`."""
         return self._respond(alarm_id, lambda alarm: response.acknowledge(alarm, occurrence, by, now_s))
+
+    def silence(self, alarm_id: str, occurrence: int, by: str, now_s: float) -> tuple[Transition, ...]:
+        return self._respond(alarm_id, lambda alarm: response.silence(alarm, occurrence, by, now_s))
 
     def shelve(self, alarm_id: str, occurrence: int, minutes: float, by: str, now_s: float) -> tuple[Transition, ...]:
         is_inhibitor = alarm_id in self._causes.inhibitors
@@ -173,7 +176,7 @@ class Monitor:
             return ()
         if by and is_fault:
             why = self.alarms[by[0]].spec.title
-            self.findings[check.id] = unknown(f"Not judged yet: {why}", short="waiting")
+            self.findings[check.id] = unknown(f"Not evaluated yet: {why}", short="waiting")
         else:
             self.findings[check.id] = finding
         if snapshot.paused and check.scope is Scope.CAR:

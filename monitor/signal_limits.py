@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import create_model
 
-from monitor.check import Limits, threshold
+from monitor.check import EXPERT, Limits, threshold
 from monitor.signals import SIGNALS
 
 GROUP = "signals"
@@ -18,21 +18,23 @@ class SlowLimits(Limits):
 
     slow_below_percent: float = threshold(
         90.0,
-        "Slow below",
+        "Signal slow below",
         unit="%",
         low=10.0,
         high=100.0,
         step=1.0,
         help="Of the expected rate.",
+        heading=EXPERT,
     )
     frozen_after_s: float = threshold(
         2.0,
-        "Frozen after",
+        "Signal frozen after",
         unit="s",
         low=1.0,
         high=60.0,
         step=0.5,
-        help="Of messages that go on saying the same while the car moves, or carry one stamp.",
+        help="For messages that repeat one value while the car moves, or repeat one stamp.",
+        heading=EXPERT,
     )
 
 
@@ -47,7 +49,7 @@ _rates: dict[str, Any] = {
             high=1000.0,
             step=0.5,
             help="0: learn the car's own steady rate.",
-            heading="Expected rates",
+            heading=EXPERT,
         ),
     )
     for signal in SIGNALS.values()

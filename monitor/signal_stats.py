@@ -60,7 +60,7 @@ class SignalStats:
         return reading
 
     def restart(self) -> None:
-        """Measure anew: what comes now does not follow upon what came before."""
+        """Restart the measurement after a discontinuity."""
         self.meter.restart()
         self.repeats.restart()
         if self.stamps is not None:

@@ -1,12 +1,12 @@
-"""Whether the car's own speed shows that an order slows it: a change that the order explains.
+"""Whether the car's own speed proves that an order slows it: a change that the order explains.
 
-Before an order the car may cruise, accelerate, brake or coast. All of that goes on without the order and proves
-nothing. The speeds are therefore explained twice: by a motion that changed at most once, and before the order could
-act, and by the same with one change more, after the first command. The order is shown where the second explanation is
-far better than the noise allows, the car now brakes with a fair share of what was ordered, and its speed is clearly
-below where its motion before led (a likelihood-ratio test for a change of slope, after Quandt, JASA 53, 1958).
+Before an order the car may cruise, accelerate, brake or coast; that motion continues without the order and proves
+nothing. Two models are therefore fitted to the speeds: one change of slope at most, before the order could act; and the
+same with one more change after the first command. The order is proven if the second model fits far better than the
+noise allows, the car now brakes with a fair share of the ordered deceleration, and its speed is clearly below the
+extrapolated one (a likelihood-ratio test for a change of slope, after Quandt, JASA 53, 1958).
 
-A car that reaches standstill where its motion before did not lead to one is shown to have stopped.
+A car that reaches standstill to which its former motion would not have led is proven to have stopped.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ REACTS_WITHIN_S = 3.0  # a change that begins later is not explained by the orde
 SEARCHED_S = 6.0  # after the first command: a proof is searched for so long
 LEAST_AFTER = 3  # speeds after the change
 SIGMAS = 5.0  # by which the change must stand out …
-SIGMAS_AT_FIRST = 6.0  # … and as long as it has lasted no longer than this: a change shortly before looks alike
+SIGMAS_AT_FIRST = 6.0  # … and as long as it has lasted no longer than this: a change shortly before looks the same
 AT_FIRST_S = 0.6
 LEAST_DROP_MPS = 0.15
 LEAST_EXTRA_MPS2 = 0.3  # deceleration beyond what was there before …
@@ -62,9 +62,9 @@ MOST_SPEEDS = 1024
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowProof:
-    """What the speeds show of the order that stands."""
+    """The proof of the active order by the speeds."""
 
-    ordered_s: float | None = None  # of which order; None: none stands
+    ordered_s: float | None = None  # of which order; None: none is active
     shown: Shown | None = None  # None: nothing that the order explains
     shown_s: float | None = None
     stood_before: bool = False  # the car stood when it was ordered: there was nothing to slow
@@ -159,7 +159,7 @@ def _before(speeds: list[tuple[float, float]], since_s: float) -> _Before | None
         late = times >= -span_s
         if LEAST_BEFORE <= int(late.sum()) < len(times):
             lines.append(line(times[late], values[late], NOISE_FLOOR_MPS))
-    if len(lines) == 1:  # speeds come seldom: the newest of them say how the motion changed lately
+    if len(lines) == 1:  # speeds are rare: the newest of them give the recent change of motion
         lines.append(line(times[-LEAST_BEFORE:], values[-LEAST_BEFORE:], NOISE_FLOOR_MPS))
     return _Before(sign=sign, times_s=times, speeds_mps=values, lines=tuple(lines))
 
@@ -243,6 +243,6 @@ def _slows(motion: _Before, times: Floats, values: Floats, step: float, decelera
 
 
 def _changes(times: Floats) -> Floats:
-    """The moments at which the order may have begun to act."""
+    """The times at which the order may have started to act."""
     last_s = min(float(times[-LEAST_AFTER]), float(times[-1]) - LEAST_CHANGED_S, REACTS_WITHIN_S)
     return np.linspace(0.0, last_s, min(16, 2 + int(last_s / 0.08))) if last_s > 0.0 else np.empty(0)

@@ -12,7 +12,7 @@ class SlowingFacts:
     is_armed: bool = False
     topic: str = ""  # where commands go
     rivals: tuple[str, ...] = ()  # who else publishes there, by the names of their nodes
-    ordered_s: float | None = None  # when the order that stands was given; None: none stands
+    ordered_s: float | None = None  # time of the active order; None: none is active
     sending_s: float | None = None  # since when its commands go out without a gap; None: they do not
     deceleration_mps2: float = 0.0
     commanded_mps: float | None = None  # the newest command

@@ -50,26 +50,26 @@ class Snapshot:
     """Everything known of a vehicle at one moment, immutable: any moment of a recording can be judged alone."""
 
     now_s: float
-    readings: Mapping[str, Reading[Any]] = field(default_factory=dict)  # only signals that were ever heard or derived
+    readings: Mapping[str, Reading[Any]] = field(default_factory=dict)  # only signals that were received or derived
     link: LinkFacts = field(default_factory=LinkFacts)
     rates: Mapping[str, Rate] = field(default_factory=dict)  # of every signal; up to 0.5 s old
     paused: bool = False
     paused_since_s: float | None = None
     heard_s: float | None = None  # when any signal last came
     unusable: Mapping[str, Unusable] = field(default_factory=dict)  # signals whose newest messages cannot be used
-    extents: Mapping[str, Extent] = field(default_factory=dict)  # where a headline number was ever heard
+    extents: Mapping[str, Extent] = field(default_factory=dict)  # of signals with a received headline number
     track: tuple[TrackPoint, ...] = ()  # where the car was, thinned and bounded, oldest first
     track_m: float | None = None  # distance driven since connecting; None: never had a position
-    gps: GpsWatch = field(default_factory=GpsWatch)  # what the newest fixes tell of the receiver
+    gps: GpsWatch = field(default_factory=GpsWatch)  # the receiver's behaviour, by the newest fixes
     phone: PhoneView = NO_PHONE  # the operator's phone beside the car
-    phones: tuple[PhoneView, ...] = ()  # every phone that tells where it is, in the order in which they came
+    phones: tuple[PhoneView, ...] = ()  # every phone that shares its position, in order of arrival
     scan_before: Reading[LaserScan] | None = None  # some 0.4 s before the newest
     distance_before: Reading[Distance] | None = None
-    standing_since_s: float | None = None  # when the car came to rest by its wheels; None: it moves, or cannot be told
-    speed_slope_mps2: float | None = None  # how the wheels' speed changes, over 0.6 s; None: too little heard to tell
+    standing_since_s: float | None = None  # when the wheels stopped; None: the car moves, or unknown
+    speed_slope_mps2: float | None = None  # slope of the wheel speed over 0.6 s; None: too few messages
     clock_jump: ClockJump | None = None  # the newest since connecting
     recorder: RecorderFacts = field(default_factory=RecorderFacts)
-    reach: ReachFacts | None = None  # whom an alarm would reach; None: nobody is asked, as in a recording
+    reach: ReachFacts | None = None  # operators that can hear an alarm; None: not applicable, as in a recording
     slowing: SlowingFacts = field(default_factory=SlowingFacts)
     slow_proof: SlowProof = NOTHING_SHOWN  # what the car's speed shows of the order
 

@@ -12,7 +12,7 @@ from monitor.snapshot import Snapshot
 OVERDUE_PERIODS = 3
 OVERDUE_S = 0.3  # later than this nothing of Wi-Fi's usual bunching explains
 FAST_HORIZON_S = 2.0  # signals that would be missed within the 2 s in which silence is to be named
-FALTERS_AT = 0.5  # of its horizon: a silence that was told is over when no gap comes near another
+FALTERS_AT = 0.5  # of its horizon: an announced silence ends when no gap comes near another
 CROWD = 3  # so many fast signals do not die at one moment by themselves
 BRIDGE_WITHIN_S = 2.6  # a half-open link is found within 2.5 s: then it has been called lost, or the bridge is alive
 
@@ -21,17 +21,17 @@ BRIDGE_WITHIN_S = 2.6  # a half-open link is found within 2.5 s: then it has bee
 class Silence:
     """How silent the car is at one moment."""
 
-    heard: int  # signals heard on this connection that ought to come regularly
+    heard: int  # signals received on this connection that have a regular rate
     fresh: int  # of those, the ones that still come
     is_quiet: bool  # nothing where several things ought to have come: too early to blame one signal
     is_silent: bool  # nothing comes of all that comes fast
     falters: bool  # nothing fast for half as long: after a silence it is not over yet
     silent_s: float  # since the newest fast message
-    is_bridge_proved: bool  # the bridge has been heard from since
+    is_bridge_proved: bool  # the bridge has answered since
 
 
 def silence(snapshot: Snapshot) -> Silence | None:
-    """None while nothing regular was heard on this connection."""
+    """None before the first regular signal on this connection."""
     now_s, opened_s = snapshot.now_s, snapshot.link.opened_s
     heard = [one for one in _arrivals(snapshot) if opened_s is None or one.at_s >= opened_s]
     if not heard:

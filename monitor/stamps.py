@@ -1,10 +1,10 @@
-"""The car's clock beside ours: whether the stamps of its messages jump, fall behind or run ahead.
+"""The car's clock relative to ours: whether the stamps of its messages jump, fall behind or run ahead.
 
-Two clocks are never subtracted to get an age. What tells is the *change* of their difference, stamp − received: on a
-healthy car it stays what it was, less the moments a message waited on its way. So a step of the difference between two
-steady stretches is a jump of the car's clock (Wi-Fi can delay a message, but not send it before its time); a
-difference that shrinks bit by bit says that messages come ever later, or that the clock runs slow. A step back by less
-than the time between two messages looks like one that waited, and counts as lateness.
+Two clocks are never subtracted to get an age. Only the *change* of their difference, stamp − received, is used: on a
+healthy car it is constant, less the transport delay of a message. A step of the difference between two steady intervals
+is a jump of the car's clock, because Wi-Fi can delay a message but not advance it. A slowly shrinking difference means
+increasing delays, or a slow clock. A step back by less than the message period looks like a delayed message, and counts
+as lateness.
 """
 
 from __future__ import annotations

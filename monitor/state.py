@@ -11,7 +11,7 @@ from monitor.components import Components
 from monitor.derived_signals import SOURCES, DerivedSignals
 from monitor.freeze_detection import Wheels
 from monitor.link import LinkFacts, Phase
-from monitor.phones import Phones, PhoneWord
+from monitor.phones import PhoneReport, Phones
 from monitor.rates import Rate
 from monitor.reach import ReachFacts
 from monitor.reading import Extent, Freshness, Reading
@@ -42,7 +42,7 @@ class State:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything but the operator's rates: another car, or monitoring begins anew."""
+        """Reset everything except the operator's rates: another car, or a new start of monitoring."""
         self._stats = {
             name: SignalStats(signal, self._expected_hz.get(name), one_writer=name not in MANY_WRITERS)
             for name, signal in SIGNALS.items()
@@ -62,7 +62,7 @@ class State:
         self._rides: str | None = None
         self._scan_history = self._stats["scan"].history = ReadingHistory()
         self._distance_history = self._stats["distance"].history = ReadingHistory()
-        # Read by whoever likes, written by `link` and `set_paused` alone: asked at every message.
+        # Public to read, written by `link` and `set_paused` only: read at every message.
         self.link_facts = LinkFacts()
         self.paused = False
         self._recorder = RecorderFacts()
@@ -118,20 +118,20 @@ class State:
         return signal, derived[0]
 
     def refuse(self, signal: str, reason: str, received_s: float) -> None:
-        """A message came that says nothing usable of this signal, and why."""
+        """A message without a usable value of this signal, and the reason."""
         self._follow_clock(received_s)
         meter = self._stats[signal].meter
         meter.receive(received_s)
         self._heard_s = received_s
         self._unusable = refused(self._unusable, signal, reason, received_s, meter.horizon_s, meter.period_s)
 
-    def hear_phone(self, word: PhoneWord, now_s: float) -> None:
-        """What an operator's phone says of its own position; judged on the next tick."""
+    def receive_phone(self, report: PhoneReport, now_s: float) -> None:
+        """Take the report of an operator's phone; judged on the next tick."""
         self._follow_clock(now_s)
-        self._phones.hear(word, now_s)
+        self._phones.receive(report, now_s)
 
     def ride(self, phone: str | None, now_s: float) -> None:
-        """Which phone rides in the car, as the operator says; None: nobody says."""
+        """Set the phone in the car, chosen by the operator; None: no choice."""
         self._follow_clock(now_s)
         self._rides = phone
         self._phones.ride(phone, now_s)
@@ -141,11 +141,11 @@ class State:
         return self._table.newest.get(signal)
 
     def phones(self, now_s: float) -> int:
-        """How many phones were heard within the last minute."""
+        """The number of phones that reported within the last minute."""
         return self._phones.view.count if self._phones.view.is_there(now_s) else 0
 
     def link(self, facts: LinkFacts) -> None:
-        """What is now known of the link. A link that opens (again) starts the measuring of rates anew."""
+        """Set the facts of the link. A link that opens restarts the measurement of rates."""
         before, self.link_facts = self.link_facts, facts
         if facts.opened_s is not None and facts.opened_s != before.opened_s:
             for stats in self._stats.values():
@@ -163,11 +163,11 @@ class State:
         self._slow_proof.order(facts)
 
     def reach(self, facts: ReachFacts) -> None:
-        """Whom an alarm would reach now."""
+        """Set which operators can hear an alarm."""
         self._reach = facts
 
     def set_paused(self, paused: bool, since_s: float | None = None) -> None:
-        """Monitoring is paused or goes on. `since_s` is when the pause began, where it was not now."""
+        """Pause or resume monitoring. `since_s`: an earlier start of the pause."""
         self.paused = paused
         self._paused_since_s = since_s if paused else None
 
@@ -204,7 +204,7 @@ class State:
         )
 
     def glance(self, now_s: float) -> Snapshot:
-        """As `snapshot`, for showing only: whether and when anybody looks changes nothing of what is judged later."""
+        """Like `snapshot`, for display only: it does not affect later evaluations."""
         kept = self._rates_at_s, self._rates, self._latest_s
         try:
             return self.snapshot(now_s)
@@ -212,7 +212,7 @@ class State:
             self._rates_at_s, self._rates, self._latest_s = kept
 
     def _follow_clock(self, at_s: float) -> None:
-        """When the clock goes back, what is known keeps its age; else old values would look new for a long time."""
+        """Keep all ages when the clock goes back; otherwise old values would look new for a long time."""
         if at_s >= self._latest_s:
             self._latest_s = at_s
             return
@@ -222,7 +222,7 @@ class State:
         self._latest_s = at_s
         self._slow_proof.forget()
         self._fix_s = -math.inf
-        self._phones = Phones()  # they speak again within seconds
+        self._phones = Phones()  # they report again within seconds
         self._phones.ride(self._rides, at_s)
         self._table.shift(shift_s)
         self._unusable = MappingProxyType({})

@@ -1,4 +1,4 @@
-"""The tiles of the home tab: each the worst of the checks it stands for."""
+"""The tiles of the home tab: each shows the worst of its checks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Tile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where a tile of the home tab is, and what it stands for."""
+    """The position of a tile on the home tab, and its checks."""
 
     id: str
     label: str
@@ -77,7 +77,7 @@ def _words(verdict: Verdict, those: Sequence[Finding], of: int) -> tuple[str, st
     if all(finding.text == first.text for finding in those):
         return first.text, first.brief
     if verdict is Verdict.OK:
-        return f"All {len(those)} in order", "OK"
+        return f"All {len(those)} OK", "OK"
     texts = list(dict.fromkeys(finding.text for finding in those))
     briefs = list(dict.fromkeys(finding.brief for finding in those))
     text = "; ".join(texts)

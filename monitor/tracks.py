@@ -13,12 +13,12 @@ from monitor.values import GpsFix
 SMOOTH_S = 1.0  # the place of the car is the mean of this long: takes the noise of single fixes off the length
 LOOK_BACK_S = 2.5  # over this long the positions show whether and where the car moves
 ENDS_S = 0.5  # of that, what is averaged at either end …
-SPAN_S = 1.0  # … and how far apart the ends must lie at least
+SPAN_S = 1.0  # … and the least distance of the ends
 MOVES_ABOVE_MPS = 0.5  # drift of a standing receiver stays below (19 m in a minute at the worst); a walk is above
 STANDS_BELOW_MPS = 0.3
 CHORD_M = 1.0  # the way is summed in chords of at least this, or of two sigma of a receiver that knows its own
 CHORD_AT_MOST_M = 10.0
-GAP_S = 5.0  # after a longer one the wheel speed of now says nothing of the way between
+GAP_S = 5.0  # after a longer gap the current wheel speed says nothing about the distance in it
 FASTEST_MPS = 70.0
 JUMP_M = 10.0
 POINTS = 2000
@@ -54,7 +54,7 @@ class Track:
         self._anchor: tuple[float, float] | None = None
         self._driven_m = 0.0  # up to the anchor
         self._shown_m: float | None = None
-        self._moves: bool | None = None  # by the newest fix; None: too little seen to tell
+        self._moves: bool | None = None  # by the newest fix; None: too few fixes
         self._moved: bool | None = None  # by the one before
         self._marked = 0
         self._had_gap = False  # since the newest point
@@ -65,7 +65,7 @@ class Track:
         return self._shown_m
 
     def receive(self, fix: GpsFix, at_s: float, speed_mps: float | None, is_standing: bool | None) -> None:
-        """One position. `speed_mps` and `is_standing` are what the wheels say, None where they say nothing fresh."""
+        """Add a position. `speed_mps` and `is_standing` are by the wheels; None: not fresh."""
         if fix.status < 0 or not (math.isfinite(fix.lat_deg) and math.isfinite(fix.lon_deg)):
             return
         plane = self._plane or Plane(fix.lat_deg, fix.lon_deg)
@@ -92,7 +92,7 @@ class Track:
         last_s, last_east_m, last_north_m = self._fixes[-1]
         gap_s = at_s - last_s
         if gap_s < 0.0:
-            return True  # the clock went back: begin anew
+            return True  # the clock went back: restart
         step_m = math.hypot(east_m - last_east_m, north_m - last_north_m)
         if speed_mps is None or gap_s > GAP_S:
             return step_m > JUMP_M + FASTEST_MPS * max(gap_s, 1.0)  # fixes may come bunched: allow a second
@@ -170,7 +170,7 @@ class Track:
 
 
 def _mean(fixes: Iterable[tuple[float, float, float]], from_s: float, to_s: float) -> tuple[float, float, float]:
-    """Of the fixes up to the first that lies outside of a time; the first of all is inside."""
+    """The fixes up to the first outside of a time; the first of all is inside."""
     n = 0
     sum_s = sum_east_m = sum_north_m = 0.0
     for at_s, east_m, north_m in fixes:

@@ -50,14 +50,14 @@ class Trail:
             fixes.popleft()
 
     def at(self, moment_s: float) -> Place | None:
-        """Where the car was then, on the straight line between two positions; None where that cannot be told."""
+        """The car's position at that time, interpolated linearly between two positions; None: unknown."""
         found = self._between(moment_s)
         if found is None:
             return None
         lat_deg, lon_deg, sigma_m = found
         before_s = moment_s - VELOCITY_S
         before = self._between(before_s)
-        if before is None and moment_s - self._fixes[0][0] >= VELOCITY_S / 2:  # the trail has just begun
+        if before is None and moment_s - self._fixes[0][0] >= VELOCITY_S / 2:  # the trail has just started
             before_s, *_ = self._fixes[0]
             before = self._fixes[0][1:]
         velocity_mps = (0.0, 0.0)

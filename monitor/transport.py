@@ -1,8 +1,8 @@
-"""How old a message was when it came: an upper bound of its transport delay, from pings, queues and stamps.
+"""An upper bound of a message's transport delay, from pings, queues and stamps.
 
-Pings are marks in the stream. The bridge answers one as soon as it reads it, behind all that it has already written to
-the connection. So what arrives after the answer was written after the ping was sent, by our own clock: no clock of the
-car is needed, and a delay that was there from the first message on is seen too.
+Pings are marks in the stream. The bridge answers one when it reads it, behind all data already written to the
+connection. So a message that arrives after the answer was written after the ping was sent, by our own clock: no clock
+of the car is needed, and a delay that exists from the first message on is measured too.
 
 A message may have waited before it was written. ROS 1's rosbridge, and ours, keep a queue for each subscription and
 hold one message more in the hand while the connection takes nothing. A message cannot have entered a queue of `q`

@@ -9,16 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from monitor.signals import SIGNALS
 from monitor.state import State
 
 STEP_S = 0.2
 SPAN = 300  # steps: a minute
-TRENDS = ("speed", "acceleration", "distance", "steering", "brake", "accelerator")
+TRENDS = tuple(name for name, signal in SIGNALS.items() if signal.trend)
 
-Row = tuple[float, float] | None | str
-NO_NUMBER = "none"  # a message came and had no number to give: no object is in range
+Row = tuple[float, float] | Literal["none"] | None
+NO_NUMBER: Literal["none"] = "none"  # a message came and had no number to give: no object is in range
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,8 +74,8 @@ class Trends:
             is_number = number is not None and math.isfinite(number)
             line.note(math.floor(now_s / STEP_S), number if number is not None and is_number else math.nan)
 
-    def hear(self, changed: Iterable[str], state: State, now_s: float) -> None:
-        """The signals that just changed, as the state has them now."""
+    def receive(self, changed: Iterable[str], state: State, now_s: float) -> None:
+        """Take the signals that just changed, as the state has them now."""
         for name in changed:
             if name in self._lines:
                 reading, headline = state.get(name), SIGNALS[name].headline

@@ -77,8 +77,10 @@ class Triggers:
         self._gone_s: dict[str, float] = {}  # rule → when it was last seen to be gone
         self._vetoed: set[str] = set()
 
-    def look(self, alarms: Mapping[str, Alarm], limits: SlowDownLimits, now_s: float) -> Due | None:
-        """The first rule, in the order above, that is due now and not vetoed."""
+    def look(
+        self, alarms: Mapping[str, Alarm], limits: SlowDownLimits, now_s: float, *, counting: str | None = None
+    ) -> Due | None:
+        """The rule that is due now and not vetoed: the one that counts down already, else the first of the list."""
         due: Due | None = None
         for trigger in TRIGGERS:
             alarm = _faulty(trigger.checks, alarms) if getattr(limits, trigger.switch) >= 0.5 else None
@@ -90,7 +92,8 @@ class Triggers:
                 continue
             self._gone_s.pop(trigger.id, None)
             since_s = self._since_s.setdefault(trigger.id, now_s)
-            if due is None and trigger.id not in self._vetoed and now_s - since_s >= getattr(limits, trigger.after):
+            is_due = trigger.id not in self._vetoed and now_s - since_s >= getattr(limits, trigger.after)
+            if is_due and (due is None or trigger.id == counting):
                 text = alarm.finding.text if alarm.finding is not None else trigger.title
                 due = Due(trigger=trigger, text=text, since_s=since_s)
         return due

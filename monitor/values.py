@@ -177,6 +177,13 @@ class Level:
     unit: str  # "%" or "l"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Number:
+    """A signal that is one number, in the unit of its row in `monitor.signals`."""
+
+    value: float
+
+
 Value = (
     Twist
     | Acceleration
@@ -191,4 +198,5 @@ Value = (
     | Diagnostics
     | MotionCommand
     | Level
+    | Number
 )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 
+@cache  # it is asked for by each page and each recording, and would be read from the disk
 def catgraph_version() -> str:
     """The installed version; "0" for a checkout that was never installed."""
     try:

@@ -1,7 +1,11 @@
 """Prints what the stages of `make test` gave: counts, the slowest tests, what was retried, failed or never ended.
 
     python -m tests.summary out/tests/fast.jsonl out/tests/slow.jsonl …
+    python -m tests.summary --each out/tests/soak.jsonl
+    python -m tests.summary --slow out/tests/fast.jsonl out/tests/slow.jsonl > tests/slow_tests.txt
 
+With `--each`, every test is a row, with the last line that it printed: what it measured. With `--slow`, only the names
+of the tests that took more than a second are printed, for the file from which they are marked.
 Each file is the log of one stage as pytest-reportlog writes it: a line of JSON for each phase of each test. What failed
 and what never ended goes to the error output, as the last lines there.
 """
@@ -12,12 +16,13 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 SLOWEST = 10
 LONGEST_REASON = 200  # characters
+SLOW_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +36,7 @@ class Stage:
     failed: dict[str, str] = field(default_factory=dict)
     retried: dict[str, str] = field(default_factory=dict)
     unfinished: tuple[str, ...] = ()
+    printed: dict[str, str] = field(default_factory=dict)
 
 
 def read_stage(path: Path) -> Stage:
@@ -46,6 +52,8 @@ def read_stage(path: Path) -> Stage:
             open_tests[name] = None
         if when == "teardown":
             open_tests.pop(name, None)
+        if when == "call":
+            stage.printed[name] = _last_line_printed(one)
         if outcome == "rerun":
             stage.retried[name] = _reason(one)
         elif outcome == "failed":
@@ -53,9 +61,7 @@ def read_stage(path: Path) -> Stage:
             stage.outcomes[name] = outcome
         elif when == "call" or outcome == "skipped":
             stage.outcomes[name] = outcome
-    return Stage(
-        stage.name, stage.length_s, stage.seconds, stage.outcomes, stage.failed, stage.retried, tuple(open_tests)
-    )
+    return replace(stage, unfinished=tuple(open_tests))
 
 
 def _reports(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
@@ -76,6 +82,26 @@ def _reason(report: dict[str, Any]) -> str:
     return str(text).partition("\n")[0][:LONGEST_REASON]
 
 
+def _last_line_printed(report: dict[str, Any]) -> str:
+    """The last line that the test itself wrote to its standard output; empty where it wrote nothing."""
+    written = "".join(text for title, text in report.get("sections", ()) if title == "Captured stdout call")
+    return written.strip().rpartition("\n")[2][:LONGEST_REASON]
+
+
+def each(stage: Stage) -> list[str]:
+    """A row for each test of a stage, in the order in which they ran."""
+    rows = [f"{'result':8}{'minutes':>8}  test: what it printed"]
+    for name, outcome in stage.outcomes.items():
+        printed = f": {stage.printed[name]}" if stage.printed.get(name) else ""
+        rows.append(f"{outcome:8}{stage.seconds[name] / 60:8.1f}  {name}{printed}")
+    return ["", *rows]
+
+
+def slow(stages: Iterable[Stage]) -> list[str]:
+    """The names of functions of which one test took longer than SLOW_S, in order."""
+    return sorted({name.partition("[")[0] for stage in stages for name, s in stage.seconds.items() if s > SLOW_S})
+
+
 def summary(stages: Iterable[Stage]) -> list[str]:
     """The lines of the table, the slowest tests and the retried ones."""
     stages = tuple(stages)
@@ -89,7 +115,7 @@ def summary(stages: Iterable[Stage]) -> list[str]:
     lines += ["", f"the {SLOWEST} slowest"]
     lines += [f"{s:7.1f} s  {name}" for name, s in sorted(seconds.items(), key=lambda one: -one[1])[:SLOWEST]]
     retried = [f"{name}: {why}" for stage in stages for name, why in stage.retried.items()]
-    return lines + (["", "retried", *retried] if retried else [])
+    return lines + (["", f"{len(retried)} retried", *retried] if retried else [])
 
 
 def faults(stages: Iterable[Stage]) -> list[str]:
@@ -102,9 +128,13 @@ def faults(stages: Iterable[Stage]) -> list[str]:
     return lines
 
 
-def main(paths: list[str]) -> int:
-    stages = [read_stage(Path(path)) for path in paths]
-    print("\n".join(summary(stages)), flush=True)
+def main(arguments: list[str]) -> int:
+    stages = [read_stage(Path(path)) for path in arguments if not path.startswith("--")]
+    if "--slow" in arguments:
+        print("\n".join(slow(stages)))
+        return 0
+    rows = [row for stage in stages for row in each(stage)] if "--each" in arguments else []
+    print("\n".join([*rows, *summary(stages)]), flush=True)
     wrong = faults(stages)
     if wrong:
         print("\n".join(wrong), file=sys.stderr, flush=True)

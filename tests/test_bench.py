@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -17,8 +20,10 @@ from tests.bench.child import Child, Failed
 from tests.bench.rig import QUICK, Rig
 from tests.bench.rows.latency import latencies_ms
 from tests.bench.rows.memory import growth_mb_an_hour
+from tests.bench.serving import LoopLag
 from tests.bench.table import Group, Row, printed
 from tests.bench.wire import Wire
+from tests.tree import PROJECT
 
 MS = 1_000_000
 
@@ -52,6 +57,45 @@ def test_the_growth_of_the_servers_memory_has_a_row(tmp_path: Path) -> None:
     growth, used = group["rows"]
     assert (growth["unit"], growth["reach"]) == ("MB/h", 1.0)
     assert used["catgraph"] > 20
+
+
+@pytest.mark.slow
+def test_the_stalls_of_the_event_loop_have_a_row(tmp_path: Path) -> None:
+    found = tmp_path / "found.json"
+    assert main(["--quick", "--only", "stall", "--json", str(found)]) == 0
+    (group,) = orjson.loads(found.read_bytes())["groups"]
+    p99, longest, *_, lost = group["rows"]
+    assert (p99["unit"], p99["reach"], lost["reach"]) == ("ms", 20.0, 0)
+    assert 0 < p99["catgraph"] <= longest["catgraph"]
+
+
+async def test_a_stall_of_the_event_loop_is_seen() -> None:
+    lag = LoopLag()
+    await lag.begin()
+    await asyncio.sleep(0.02)
+    time.sleep(0.1)  # noqa: ASYNC251 - the stall
+    await asyncio.sleep(0.02)
+    assert max(lag_s for lag_s, _ in await lag.end()) > 0.09
+
+
+def test_the_disk_of_a_process_is_made_slow(tmp_path: Path) -> None:
+    """Each kind of access takes longer, and files elsewhere do not."""
+    program = (
+        "import os, sqlite3, sys, time; from pathlib import Path; from tests.bench import slow_disk\n"
+        "slow, other = Path(sys.argv[1]), Path(sys.argv[2]); slow_disk.begin(slow, 0.2)\n"
+        "database = sqlite3.connect(':memory:')\n"
+        "def took(work): began = time.monotonic(); work(); return time.monotonic() - began\n"
+        "for work in (lambda: (slow / 'a').open('w').close(), lambda: os.stat(slow), lambda: os.listdir(slow),\n"
+        "             lambda: database.execute('SELECT 1'), lambda: (other / 'a').open('w').close()):\n"
+        "    print(took(work) > 0.19)"
+    )
+    slow, other = tmp_path / "slow", tmp_path / "other"
+    slow.mkdir()
+    other.mkdir()
+    ended = subprocess.run(
+        [sys.executable, "-c", program, str(slow), str(other)], cwd=PROJECT, capture_output=True, text=True, check=True
+    )
+    assert ended.stdout.split() == ["True"] * 4 + ["False"]
 
 
 @pytest.mark.world(n=25)

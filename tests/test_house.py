@@ -4,25 +4,18 @@ from __future__ import annotations
 
 import ast
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.conftest import SLOW_TESTS
 from tests.tree import PROJECT, project_files, text_of
 
 EMPTY_NAMES = {"util", "utils", "helper", "helpers", "common", "misc"}
 
 PYTHON = [path for path in project_files() if path.suffix == ".py" and path.parts[0] in ("monitor", "server")]
 PAGE = [path for path in project_files() if path.parts[0] in ("static", "templates")]
-
-
-def test_imports_point_inward() -> None:
-    lint = Path(sys.executable).with_name("lint-imports")
-    done = subprocess.run([lint, "--no-logo"], cwd=PROJECT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_files_have_names_that_say_something() -> None:
@@ -57,6 +50,16 @@ def test_the_page_loads_nothing_from_elsewhere() -> None:
         re.IGNORECASE,
     )
     assert [f"{path}: {hit[0]}" for path in PAGE for hit in load.finditer(text_of(path) or "")] == []
+
+
+def test_what_drives_a_browser_lies_in_the_folders_of_its_stage() -> None:
+    """Any other would be in no stage of `make test`."""
+    stage = re.search(r"(?m)^BROWSER := ((?:tests/\w+ )+)", text_of(Path("Makefile")))
+    assert stage is not None
+    tests = [path for path in project_files() if path.suffix == ".py" and path.parts[0] == "tests"]
+    marked = [path for path in tests if re.search(r"\bmark\.browser\b", text_of(path))]
+    assert marked != []
+    assert [path for path in marked if not path.as_posix().startswith(tuple(stage[1].split()))] == []
 
 
 def test_nobody_elses_files_are_tracked() -> None:
@@ -102,3 +105,22 @@ def test_module_state_is_recognised(source: str, lines: list[int]) -> None:
 
 def _tree(path: Path) -> ast.Module:
     return ast.parse((PROJECT / path).read_text(encoding="utf-8"))
+
+
+def test_what_is_listed_as_slow_exists() -> None:
+    """A test that gets another name or file takes its line of `tests/slow_tests.txt` along."""
+    found = {
+        f"{path}::{name}"
+        for path in map(str, project_files())
+        if any(one.startswith(f"{path}::") for one in SLOW_TESTS)
+        for name in re.findall(r"def (test_\w+)\(", (PROJECT / path).read_text(encoding="utf-8"))
+    }
+    assert {re.sub("::.*::", "::", one) for one in SLOW_TESTS} - found == set()
+
+
+def test_a_retry_stands_on_one_test_with_its_reason() -> None:
+    retried = re.compile(r".*mark\.flaky.*")
+    reasoned = re.compile(r"\s*@pytest\.mark\.flaky\(.*reason=\"\w.*")
+    tests = [path for path in project_files() if path.parts[0] == "tests" and path.name != Path(__file__).name]
+    lines = [line for path in tests if path.suffix == ".py" for line in retried.findall(text_of(path) or "")]
+    assert [line for line in lines if not reasoned.fullmatch(line)] == []

@@ -16,7 +16,6 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from monitor.check import Check
 from server.cli.main import main
 from server.web.assets.icons import ICONS
 from tests.tree import PROJECT, project_files
@@ -102,16 +101,6 @@ def test_the_commands_of_the_readme_exist(capsys: pytest.CaptureFixture[str]) ->
     commands = capsys.readouterr().out
     for command in set(re.findall(r"(?:`|bin/)catgraph ([a-z]+)", readme)):
         assert re.search(rf"^ +{command} ", commands, re.M), command
-
-
-def test_the_check_of_the_recipe_works() -> None:
-    example = re.search(r"```python\n(.*?)```", (PROJECT / "docs/extending.md").read_text(encoding="utf-8"), re.S)
-    assert example
-    module: dict[str, Any] = {"__name__": "example"}
-    exec(compile(example[1], "docs/extending.md", "exec", dont_inherit=True), module)
-    (check,) = module["CHECKS"]
-    assert isinstance(check, Check)
-    assert check.limits().max_percent == 80.0
 
 
 @pytest.mark.slow

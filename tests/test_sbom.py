@@ -9,8 +9,6 @@ import tomllib
 from typing import Any
 
 import pytest
-from cyclonedx.schema import SchemaVersion
-from cyclonedx.validation.json import JsonStrictValidator
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -27,6 +25,9 @@ def bill(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def test_it_keeps_the_schema(bill: str) -> None:
+    from cyclonedx.schema import SchemaVersion  # takes two seconds, which every other test process is spared
+    from cyclonedx.validation.json import JsonStrictValidator
+
     validator = JsonStrictValidator(SchemaVersion.V1_6)
     assert validator.validate_str(bill) is None
     broken = json.loads(bill) | {"components": [{"name": "x"}]}

@@ -10,10 +10,11 @@ import pytest
 from tests.summary import main, read_stage, summary
 
 
-def report(name: str, when: str, outcome: str, start: float, stop: float, why: str = "") -> str:
+def report(name: str, when: str, outcome: str, start: float, stop: float, why: str = "", printed: str = "") -> str:
     longrepr = {"reprcrash": {"message": why}} if why else None
     kind = {"$report_type": "TestReport", "nodeid": name, "when": when, "outcome": outcome, "longrepr": longrepr}
-    return json.dumps(kind | {"start": start, "stop": stop, "duration": stop - start})
+    sections = [["Captured stdout setup", "a server starts\n"], ["Captured stdout call", printed]]
+    return json.dumps(kind | {"start": start, "stop": stop, "duration": stop - start, "sections": sections})
 
 
 def whole(name: str, start: float, s: float, outcome: str = "passed", why: str = "") -> list[str]:
@@ -36,7 +37,7 @@ def test_each_way_a_test_ends_is_counted(tmp_path: Path, capsys: pytest.CaptureF
     assert main([write(tmp_path / "fast.jsonl", lines)]) == 1
     shown = capsys.readouterr()
     assert "fast            2        0       1        1      0.1" in shown.out
-    assert "t::c: too late" in shown.out
+    assert "1 retried\nt::c: too late" in shown.out
     assert "and more" not in shown.out
     assert shown.err == "FAILED t::b: assert 1 == 2\n"
 
@@ -59,3 +60,20 @@ def test_the_slowest_come_first_and_the_total_is_of_all_stages(tmp_path: Path) -
     lines = summary([one, other])
     assert [line.split()[-1] for line in lines if " s  " in line] == ["t::b", "t::c", "t::a"]
     assert [line.split()[-1] for line in lines if line.startswith("total")] == ["4.5"]
+
+
+def test_each_proof_is_a_row_with_what_it_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = [
+        report("t::kills", "call", "passed", 0, 90, printed="begins\n1000 kills, nothing lost\n\n"),
+        report("t::silent", "call", "failed", 90, 96, "assert 0"),
+    ]
+    assert main(["--each", write(tmp_path / "soak.jsonl", lines)]) == 1
+    rows = capsys.readouterr().out.splitlines()
+    assert rows[2:4] == ["passed       1.5  t::kills: 1000 kills, nothing lost", "failed       0.1  t::silent"]
+
+
+def test_slow_functions_are_named_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    fast = whole("t::a[1]", 0, 1.2) + whole("t::a[2]", 2, 3) + whole("t::b", 5, 0.9)
+    logs = [write(tmp_path / "fast.jsonl", fast), write(tmp_path / "slow.jsonl", whole("t::T::c", 6, 2))]
+    assert main(["--slow", *logs]) == 0
+    assert capsys.readouterr().out == "t::T::c\nt::a\n"

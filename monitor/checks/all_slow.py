@@ -1,4 +1,4 @@
-"""Do most signals come slower than they should at once? Then one cause is to blame, and it is told once."""
+"""Are most signals slower than expected at once? Then one alarm reports the common cause."""
 
 from __future__ import annotations
 
@@ -65,6 +65,7 @@ CHECKS = (
         label="All rates",
         tile="Rates",
         order=110,
+        checked_when="Checked while enough signals with a known rate arrive.",
         group=GROUP,
         alarm=AlarmSpec(
             title="Most signals are slow",
@@ -76,7 +77,7 @@ CHECKS = (
             off_delay_s=5.0,
             repeat_after_s=600.0,
             actions=(Action.ACKNOWLEDGE,),  # it explains the single rates: never hidden
-            advice="Bridge, radio or server is overloaded: what is shown comes late.",
+            advice="Bridge, radio or server is overloaded: shown values are delayed.",
             inhibited_by=("car_silent", "no_message", "link_late", "link_late_moving"),
         ),
         limits=SignalLimits,

@@ -34,6 +34,7 @@ CHECKS = (
         label="Behind the bridge",
         tile="Link",
         order=120,
+        checked_when="Checked while the bridge is connected.",
         alarm=AlarmSpec(
             title="Fault between bridge and car",
             priority=Priority.WARNING,

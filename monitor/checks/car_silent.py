@@ -1,4 +1,4 @@
-"""Has everything from the car stopped at once, while the link stands?"""
+"""Have all messages of the car stopped while the link is open?"""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
         return ok(f"{found.fresh} of {found.heard} signals come")
     if not (found.is_bridge_proved or was_active or found.silent_s > BRIDGE_WITHIN_S):
         # Car or link? Wait for the bridge's next sign of life: a lost link has its own words.
-        return unknown(f"No message for {found.silent_s:.1f} s, asking the bridge", short="silent")
+        return unknown(f"No message for {found.silent_s:.1f} s, pinging the bridge", short="silent")
     if not found.is_silent:
         proof = "messages come with gaps"
     elif found.is_bridge_proved:
-        proof = "the bridge answers, the car says nothing"
+        proof = "the bridge answers, the car sends nothing"
     else:
         proof = "neither car nor bridge answers"
     if snapshot.link.behind_title:
@@ -52,6 +52,7 @@ CHECKS = (
         label="Car heard",
         tile="Link",
         order=120,
+        checked_when="Checked once the first message has come.",
         alarm=AlarmSpec(
             title="The car fell silent",
             priority=Priority.CRITICAL,

@@ -1,9 +1,8 @@
 """Does the car's clock jump, and does it agree with the time of this server?
 
-Stamps are compared with the time of arrival only for how their difference changes, which needs no common clock, and
-with the time of day where the shell passes it. A difference of more than a day is no offset of a clock that runs: it is
-a recording, a simulation with a time of its own, or a clock that was never set. None of these can be told from the
-others, so the offset is then *not checked*, and said so; jumps are judged on any clock.
+Only changes of the difference between stamp and arrival are used, which needs no common clock, and the time of day if
+it is given. A difference of more than a day is a recording, a simulation with its own time, or a clock that was never
+set. These cannot be distinguished, so the offset is then *not checked*; jumps are judged on any clock.
 """
 
 from __future__ import annotations
@@ -31,9 +30,9 @@ from monitor.signals import SIGNALS
 from monitor.snapshot import Snapshot
 from monitor.stamps import JUMP_S
 
-TOLD_S = 10.0  # a jump is over at once; it is told for so long
+TOLD_S = 10.0  # a jump is instantaneous; it is reported for this time
 ANOTHER_TIME_S = 86_400.0
-STUCK_AFTER = 3  # equal stamps: a signal whose stamp rests has its own alarm and tells nothing of the clock
+STUCK_AFTER = 3  # equal stamps: a constant stamp has its own alarm and says nothing about the clock
 
 
 class ClockLimits(Limits):
@@ -45,7 +44,7 @@ class ClockLimits(Limits):
         low=0.5,
         high=60.0,
         step=0.5,
-        help="Against what is usual since connecting: messages that come late, or a clock that runs slow or fast.",
+        help="Relative to the usual offset since connecting: late messages, or a clock that runs slow or fast.",
     )
     offset_s: float = threshold(
         5.0,
@@ -62,15 +61,15 @@ def jumps(snapshot: Snapshot, limits: ClockLimits, was_active: bool) -> Finding:
     jump = snapshot.clock_jump
     if jump is None:
         if not _stamped(snapshot):
-            return absent("No message of the car carries a stamp", brief="no stamps")
+            return absent("No message of the car has a stamp", brief="no stamps")
         return ok("The car's clock has not jumped since connecting")
     ago_s = max(0.0, snapshot.now_s - jump.at_s)
     how = f"{'ahead' if jump.by_s > 0 else 'back'} by {_words(abs(jump.by_s))}"
     if abs(jump.by_s) <= limits.jump_s or ago_s > TOLD_S:
-        return ok(f"It went {how} {_words(ago_s)} ago, and is steady since")
+        return ok(f"It jumped {how} {_words(ago_s)} ago and is steady since then")
     labels = ", ".join(SIGNALS[name].label for name in jump.signals)
     return fault(
-        f"The car's clock went {how} ({labels})",
+        f"The car's clock jumped {how} ({labels})",
         brief=f"{'+' if jump.by_s > 0 else '−'}{_words(abs(jump.by_s))}",
         measured=Quantity(label="Jump", value=jump.by_s, unit="s"),
         limit=Quantity(label="Allowed", value=limits.jump_s, unit="s"),
@@ -83,7 +82,7 @@ def differs(snapshot: Snapshot, limits: ClockLimits, was_active: bool) -> Findin
     if not stamped:
         if any(True for _ in _stamped(snapshot)):
             return unknown("No stamped message is fresh", short="stale")
-        return absent("No message of the car carries a stamp", brief="no stamps")
+        return absent("No message of the car has a stamp", brief="no stamps")
     offset_s = _offset_s(stamped, snapshot.link.wall_zero_s)
     if offset_s is not None and abs(offset_s) > ANOTHER_TIME_S:
         return unknown(
@@ -97,7 +96,7 @@ def differs(snapshot: Snapshot, limits: ClockLimits, was_active: bool) -> Findin
     if abs(change_s) > limits.late_s * slack:
         return _changed(change_s, limits)
     if offset_s is None:
-        return ok(f"Stamps {abs(change_s):.1f} s from usual; the time of day is not known")
+        return ok(f"Stamps {abs(change_s):.1f} s from usual; the time of day is unknown")
     text = f"Car's clock {_words(abs(offset_s))} {'ahead of' if offset_s > 0 else 'behind'} this server"
     if abs(offset_s) > limits.offset_s * slack:
         return fault(
@@ -171,10 +170,11 @@ CHECKS = (
         label="Clock jump",
         tile="Clock",
         order=125,
+        checked_when="Checked while the car's messages carry a time stamp.",
         group="clock",
         alarm=_alarm(
             "The car's clock jumped",
-            "Times before and after do not fit together: what is reckoned from them begins anew.",
+            "Times before and after do not match: values computed from them restart.",
             on_delay_s=0.0,
             off_delay_s=0.0,
             by=(),
@@ -187,10 +187,11 @@ CHECKS = (
         label="Clock offset",
         tile="Clock",
         order=126,
+        checked_when="Checked while messages with a time stamp of about now arrive.",
         group="clock",
         alarm=_alarm(
             "Car's clock and server differ",
-            "What is shown may be older than it looks, and times in recordings are wrong by as much.",
+            "Values may be older than shown, and times in recordings are wrong by this amount.",
             on_delay_s=2.0,  # a burst after a gap of the radio is over by then
             off_delay_s=5.0,
             by=("clock_jump", "link_late", "link_late_moving"),

@@ -35,6 +35,7 @@ CHECKS = (
         label="Connecting",
         tile="Link",
         order=120,
+        checked_when="Checked when a connection was opened or has failed.",
         alarm=AlarmSpec(
             title="Connection failed",
             priority=Priority.WARNING,

@@ -1,7 +1,7 @@
-"""What the car's own diagnostics say: errors and stale components warn, warnings advise, each by its component.
+"""Does the car's own diagnostics report errors, stale components or warnings?
 
 One alarm of each kind, with the components as its causes: a component that joins re-alarms an acknowledged one.
-Components no other check knows of are among them, so that nothing the car says of itself goes unsaid.
+Components that no other check uses are included, so that everything the car reports is shown.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ def find(levels: Collection[int], snapshot: Snapshot, limits: Limits, was_active
 
 
 def _text(bad: list[Component]) -> str:
-    told = [
+    listed = [
         f"{component.name[:60]} {WORDS[component.level]}{f': {component.message[:80]}' if component.message else ''}"
         for component in bad[:NAMED]
     ]
     more = f"; and {len(bad) - NAMED} more" if len(bad) > NAMED else ""
-    return "; ".join(told) + more
+    return "; ".join(listed) + more
 
 
 def _check(id: str, label: str, title: str, levels: Collection[int], priority: Priority) -> Check[Limits]:
@@ -63,15 +63,16 @@ def _check(id: str, label: str, title: str, levels: Collection[int], priority: P
         label=label,
         tile="Diagnostics",
         order=130,
+        checked_when="Checked while Diagnostics is published and fresh.",
         alarm=AlarmSpec(
             title=title,
             priority=priority,
             place=Place.SNACKBAR if is_warning else Place.LIST,
             sound=Sound.MEDIUM if is_warning else Sound.LOW,
             needs_ack=is_warning,
-            off_delay_s=10.0,  # ten reports of a 1 Hz publisher: a part at its own limit comes and goes
+            off_delay_s=10.0,  # ten reports of a 1 Hz publisher: a part at its own limit is intermittent
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="The car reports it itself: check the component named.",
+            advice="Reported by the car: check the named component.",
         ),
         limits=Limits,
         find=partial(find, frozenset(levels)),

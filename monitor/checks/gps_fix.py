@@ -1,8 +1,8 @@
-"""Has the receiver a fix, and does it say how good it is?
+"""Does the receiver have a fix, and does it report its quality?
 
 Covariance is trusted only if its type is at least APPROXIMATED and its values are finite and above zero
-(sensor_msgs/NavSatFix); the real car marks zeros as known. The report's wish to reject unknown quality outright is a
-setting, off by default, because the real car would be rejected for ever.
+(sensor_msgs/NavSatFix); the real car marks zeros as known. Rejecting unknown quality, as the report wants, is a
+setting, off by default, because it would always reject the real car.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from monitor.check import (
     Action,
     AlarmSpec,
     Check,
+    End,
     Finding,
     Limits,
     Place,
@@ -26,6 +27,8 @@ from monitor.check import (
 from monitor.figures import beside
 from monitor.snapshot import Snapshot
 
+STATUS_UNSET = -2  # sensor_msgs/NavSatStatus of ROS 2: "status is not yet set"
+
 
 class FixLimits(Limits):
     worst_sigma_m: float = threshold(
@@ -38,22 +41,28 @@ class FixLimits(Limits):
         low=0.0,
         high=1.0,
         step=1.0,
-        help="1: a position whose quality is unknown counts as no position.",
+        help="1: a position of unknown quality counts as no position.",
     )
+
+
+def ends(limits: FixLimits) -> End:
+    return End("below", 0.9 * limits.worst_sigma_m, "m")
 
 
 def has_fix(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
     if snapshot.get("position") is None and "position" not in snapshot.link.published:
         return absent("Position is not published")
     fix = snapshot.need("position")
+    if fix.status == STATUS_UNSET:
+        return fault("The receiver does not say whether it has a fix", brief="fix unset", causes=("position",))
     if fix.status < 0:
-        return fault("The receiver has no fix; its coordinates mean nothing", brief="no fix", causes=("position",))
+        return fault("The receiver has no fix; its coordinates are invalid", brief="no fix", causes=("position",))
     if fix.sigma_m is None:
         return ok("A fix of unknown quality")
     text = f"A fix with an error of {beside(fix.sigma_m, limits.worst_sigma_m)} m"
     measured = Quantity(label="Error", value=fix.sigma_m, unit="m")
     limit = Quantity(label="At most", value=limits.worst_sigma_m, unit="m")
-    if fix.sigma_m > limits.worst_sigma_m * (0.9 if was_active else 1.0):
+    if fix.sigma_m > (ends(limits).value if was_active else limits.worst_sigma_m):
         return fault(text, brief=f"{fix.sigma_m:.0f} m", measured=measured, limit=limit, causes=("quality",))
     return ok(text, measured=measured, limit=limit)
 
@@ -68,11 +77,11 @@ def knows_its_quality(snapshot: Snapshot, limits: FixLimits, was_active: bool) -
             if fix.covariance_type == 0
             else f"a covariance of type {fix.covariance_type} without values"
         )
-        why = f"The receiver does not say how good its position is: {kind}"
+        why = f"The receiver does not report the quality of its position: {kind}"
         if limits.strict >= 1.0:
             return fault(f"{why}; rejected by the strict setting", brief="quality", causes=("position",))
         return unknown(why, short="quality")  # a healthy car of this kind would alarm for ever
-    return ok("The receiver says how good its position is")
+    return ok("The receiver reports the quality of its position")
 
 
 CHECKS = (
@@ -80,6 +89,7 @@ CHECKS = (
         id="gps_fix",
         label="GPS fix",
         order=40,
+        checked_when="Checked while Position is published and fresh.",
         alarm=AlarmSpec(
             title="GPS: no usable fix",
             priority=Priority.WARNING,
@@ -89,16 +99,18 @@ CHECKS = (
             on_delay_s=3.0,
             off_delay_s=5.0,
             actions=(Action.ACKNOWLEDGE,),
-            advice="Where the car is and goes must be judged by eye.",
+            advice="Watch where the car is and where it goes.",
         ),
         limits=FixLimits,
         find=has_fix,
+        ends=ends,
         needs=frozenset({"position"}),
     ),
     Check(
         id="gps_quality",
         label="GPS quality",
         order=41,
+        checked_when="Checked while Position is fresh and its receiver reports a quality.",
         group="gps_fix",
         alarm=AlarmSpec(
             title="GPS quality unknown",

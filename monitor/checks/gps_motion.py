@@ -29,7 +29,7 @@ from monitor.gps_watch import FIXES
 from monitor.motion import STANDS_BELOW_MPS
 from monitor.snapshot import Snapshot
 
-SIGMA_UNKNOWN_M = 2.5  # of a receiver that does not say
+SIGMA_UNKNOWN_M = 2.5  # of a receiver without quality
 DRIFT_SIGMAS = 4.3
 
 
@@ -46,7 +46,7 @@ class DriftLimits(Limits):
 
 
 class JumpLimits(Limits):
-    margin_mps: float = threshold(3.0, "GPS runs faster than the car by", unit="m/s", low=0.5, high=30.0, step=0.5)
+    margin_mps: float = threshold(3.0, "GPS faster than the car by", unit="m/s", low=0.5, high=30.0, step=0.5)
 
 
 def _why_not(snapshot: Snapshot) -> Finding | None:
@@ -66,9 +66,9 @@ def drifts(snapshot: Snapshot, limits: DriftLimits, was_active: bool) -> Finding
     watch = snapshot.gps
     if snapshot.standing_since_s is None:
         if was_active:
-            return ok("The car moves: no drift at standstill any more")  # else it would stand until the next stop
+            return ok("The car moves: no drift at standstill")  # else it would stand until the next stop
         if speed_mps < STANDS_BELOW_MPS:
-            return unknown("The car has only just come to rest", short="waiting")
+            return unknown("The car has just stopped", short="waiting")
         return unknown("The car moves", short="moving")
     if len(watch.drift_m) < FIXES or watch.anchored_s is None:
         return unknown("Taking the place where the car stopped", short="waiting")
@@ -94,7 +94,7 @@ def jumps(snapshot: Snapshot, limits: JumpLimits, was_active: bool) -> Finding:
         return unknown("Waiting for positions", short="waiting")
     allowed_mps = speed_mps + limits.margin_mps
     slowest_mps = min(*watch.over_ground_mps, watch.net_mps)
-    text = f"The position runs at {watch.net_mps:.1f} m/s, the car at {speed_mps:.1f} m/s"
+    text = f"The position moves at {watch.net_mps:.1f} m/s, the car at {speed_mps:.1f} m/s"
     measured = Quantity(label="Position", value=watch.net_mps, unit="m/s")
     limit = Quantity(label="Allowed", value=allowed_mps, unit="m/s")
     if slowest_mps > speed_mps + limits.margin_mps * (0.8 if was_active else 1.0):
@@ -107,6 +107,7 @@ CHECKS = (
         id="gps_drift",
         label="GPS drift",
         order=50,
+        checked_when="Checked at standstill with a fix, once three positions have come since the car stopped.",
         alarm=AlarmSpec(
             title="GPS drift at standstill",
             priority=Priority.WARNING,
@@ -128,6 +129,7 @@ CHECKS = (
         label="GPS jump",
         tile="GPS drift",
         order=51,
+        checked_when="Checked while Speed and Position are fresh and the receiver has a fix.",
         alarm=AlarmSpec(
             title="GPS runs away",
             priority=Priority.WARNING,

@@ -12,6 +12,7 @@ from monitor.check import (
     Action,
     AlarmSpec,
     Check,
+    End,
     Finding,
     Limits,
     Place,
@@ -50,6 +51,10 @@ def _laser_is_absent(snapshot: Snapshot) -> bool:
     return snapshot.get("scan") is None and "scan" not in snapshot.link.published
 
 
+def ends(limits: BlindLimits) -> End:
+    return End("below", limits.blind_percent - DEADBAND_PERCENT, "%")
+
+
 def sees(snapshot: Snapshot, limits: BlindLimits, was_active: bool) -> Finding:
     if _laser_is_absent(snapshot):
         return absent("The laser is not published")
@@ -60,7 +65,7 @@ def sees(snapshot: Snapshot, limits: BlindLimits, was_active: bool) -> Finding:
     percent = 100.0 * sight.blind / sight.beams
     measured = Quantity(label="Without a return", value=percent, unit="%")
     text = f"{percent:.0f} % of {sight.beams} beams ahead without a usable return"
-    if percent > limits.blind_percent - (DEADBAND_PERCENT if was_active else 0.0):
+    if percent > (ends(limits).value if was_active else limits.blind_percent):
         return fault(text, brief=f"{percent:.0f} % blind", measured=measured, limit=limit, causes=("scan",))
     return ok(text, measured=measured, limit=limit)
 
@@ -116,22 +121,25 @@ CHECKS = (
         id="laser_blind",
         label="Laser",
         order=80,
+        checked_when="Checked while the laser is published and fresh.",
         alarm=_alarm(
             "The laser cannot see",
-            "Obstacles are not checked: look ahead yourself, and for sun, dirt or a cover on the laser.",
+            "Obstacles are not checked: watch ahead, and look for sun, dirt or a cover on the laser.",
             on_delay_s=1.0,
             actions=(Action.ACKNOWLEDGE,),  # it explains why obstacles are not checked: never hidden
         ),
         limits=BlindLimits,
-        find=sees,  # on the tick: it must hold for a second anyway, and 75 looks a second are not free
+        ends=ends,
+        find=sees,  # at ticks only: it must hold for a second anyway, and 75 checks a second cost time
     ),
     Check(
         id="scan_shape",
         label="Scan shape",
         order=90,
+        checked_when="Checked while the laser is fresh and has more than one beam.",
         alarm=_alarm(
             "The scan contradicts itself",
-            "Returns may be drawn and judged in the wrong place: check the laser's driver.",
+            "Returns may be drawn and evaluated in the wrong place: check the laser's driver.",
             on_delay_s=0.5,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
         ),

@@ -6,6 +6,7 @@ from monitor.check import (
     Action,
     AlarmSpec,
     Check,
+    End,
     Finding,
     Limits,
     Place,
@@ -42,6 +43,18 @@ class LateLimits(Limits):
     )
 
 
+def ends(limits: LateLimits) -> End:
+    return _end(limits.late_s)
+
+
+def ends_moving(limits: LateLimits) -> End:
+    return _end(limits.critical_s)
+
+
+def _end(limit_s: float) -> End:
+    return End("below", limit_s * HYSTERESIS, "s")
+
+
 def late(snapshot: Snapshot, limits: LateLimits, was_active: bool) -> Finding:
     return _judge(snapshot, limits.late_s, was_active)
 
@@ -50,23 +63,23 @@ def late_moving(snapshot: Snapshot, limits: LateLimits, was_active: bool) -> Fin
     found = _judge(snapshot, limits.critical_s, was_active)
     speed = snapshot.get("speed")
     if speed is None:
-        return absent("Whether the car moves is not known", brief="no speed")
+        return absent("Whether the car moves is unknown", brief="no speed")
     if abs(speed.value.speed_mps) <= MOVES_ABOVE_MPS:
-        return ok("The car stood when it was last measured")
+        return ok("The car was standing at the last measurement")
     return found
 
 
 def _judge(snapshot: Snapshot, limit_s: float, was_active: bool) -> Finding:
     link, now_s = snapshot.link, snapshot.now_s
     if link.phase != "monitoring" or link.late_s is None:
-        return absent("How late messages are is not known", brief="not known")
+        return absent("The delay of messages is unknown", brief="not known")
     late_s = link.late_s
     text = f"{late_s:.1f} s late"
-    if late_s <= limit_s * (HYSTERESIS if was_active else 1.0):
-        return ok(f"Messages come {text}")
+    if late_s <= (_end(limit_s).value if was_active else limit_s):
+        return ok(f"Messages arrive {text}")
     heard_s = max((at_s for at_s in (link.last_message_s, snapshot.heard_s) if at_s is not None), default=None)
     if heard_s is None or now_s - heard_s > QUIET_S + late_s:
-        return unknown("No message comes", short="silent")
+        return unknown("No message arrives", short="silent")
     rest = f". {link.reduced}" if link.reduced else ""
     return fault(
         f"{text}: the link is too slow{rest}",
@@ -99,16 +112,18 @@ CHECKS = (
         label="Link delay",
         tile="Link",
         order=120,
+        checked_when="Checked while messages arrive and their delay is known.",
         group="link_late",
         alarm=_alarm(
             Priority.WARNING,
             Place.SNACKBAR,
             Sound.MEDIUM,
-            "What is shown is as old as it says: wait, or bring car and server nearer together.",
+            "Values are as old as shown: wait, or reduce the distance between car and server.",
             by=("link_late_moving", "link_lost"),
         ),
         limits=LateLimits,
         find=late,
+        ends=ends,
         scope=Scope.LINK,
     ),
     Check(
@@ -116,6 +131,7 @@ CHECKS = (
         label="Link delay, moving",
         tile="Link",
         order=120,
+        checked_when="Checked while the car moves, messages arrive and their delay is known.",
         group="link_late",
         alarm=_alarm(
             Priority.CRITICAL,
@@ -126,6 +142,7 @@ CHECKS = (
         ),
         limits=LateLimits,
         find=late_moving,
+        ends=ends_moving,
         scope=Scope.LINK,
     ),
 )

@@ -42,6 +42,7 @@ CHECKS = (
         label="Link open",
         tile="Link",
         order=120,
+        checked_when="Checked while the bridge is connected, or was and got lost.",
         alarm=AlarmSpec(
             title="Connection lost",
             priority=Priority.CRITICAL,

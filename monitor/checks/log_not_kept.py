@@ -24,7 +24,7 @@ class LogLimits(Limits):
 
 def find(snapshot: Snapshot, limits: LogLimits, was_active: bool) -> Finding:
     trouble = snapshot.link.log_trouble
-    return ok("The alarm log is kept") if trouble is None else fault(trouble, brief="not kept")
+    return ok("The alarm log is stored") if trouble is None else fault(trouble, brief="not kept")
 
 
 CHECKS = (
@@ -32,8 +32,9 @@ CHECKS = (
         id="log_not_kept",
         label="Alarm log",
         order=128,
+        checked_when="Always checked.",
         alarm=AlarmSpec(
-            title="Alarm log not kept",
+            title="Alarm log not stored",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,
@@ -41,7 +42,7 @@ CHECKS = (
             on_delay_s=2.0,  # another program that reads the file for a moment
             off_delay_s=5.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="Alarms go on; a restart would lose what is in memory. Make room on the server's disk.",
+            advice="Alarms continue; a restart would lose what is in memory. Free space on the server's disk.",
         ),
         limits=LogLimits,
         find=find,

@@ -1,4 +1,4 @@
-"""Is the link open, and the car says nothing on it?"""
+"""Is the link open without any message of the car?"""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
         return absent("Not connected", brief="no link")
     heard_s = max((at_s for at_s in (link.last_message_s, snapshot.heard_s) if at_s is not None), default=None)
     if heard_s is not None and heard_s >= opened_s:
-        return ok("The car speaks")
+        return ok("The car sends messages")
     waited_s = snapshot.now_s - opened_s
     if waited_s < WITHIN_S:
         return unknown("Waiting for the first message", short="waiting")
@@ -59,6 +59,7 @@ CHECKS = (
         label="First message",
         tile="Link",
         order=120,
+        checked_when="Checked once the bridge is connected, after a short wait.",
         alarm=AlarmSpec(
             title="Connected, but no message",
             priority=Priority.WARNING,

@@ -23,7 +23,7 @@ from monitor.snapshot import Snapshot
 
 
 class NotMovingLimits(Limits):
-    after_s: float = threshold(10.0, "Standing is said after", unit="s", low=2.0, high=600.0, step=1.0)
+    after_s: float = threshold(10.0, "Standing is reported after", unit="s", low=2.0, high=600.0, step=1.0)
 
 
 def find(snapshot: Snapshot, limits: NotMovingLimits, was_active: bool) -> Finding:
@@ -50,6 +50,7 @@ CHECKS = (
         id="not_moving",
         label="Moving",
         order=115,
+        checked_when="Checked while Speed is fresh.",
         alarm=AlarmSpec(
             title="The car is not moving",
             priority=Priority.ADVISORY,
@@ -58,7 +59,7 @@ CHECKS = (
             needs_ack=False,
             off_delay_s=1.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="Where it should be moving, look at its controllers.",
+            advice="If it should be moving, check its controllers.",
         ),
         limits=NotMovingLimits,
         find=find,

@@ -1,7 +1,7 @@
-"""Does something stand in the way? Asked of the laser, along the corridor, and of the car's own distance estimator.
+"""Is an obstacle ahead, by the laser in the corridor, or by the car's distance estimator?
 
-Too near is: nearer than the distance the operator allows or than the car needs to stop, or met within the time to
-collision at the speed at which the gap closes (SAE J2944: undefined while it does not close).
+Too near is: nearer than the allowed distance or the stopping distance, or a time to collision below the limit, at the
+closing speed of the gap (SAE J2944: undefined while it does not close).
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Fi
         closing_mps = _closing(sight.gap_m, gap_before_m, span_s, speed_mps)
     found = _judge(sight.gap_m, sight.bearing_rad, speed_mps, closing_mps, limits, was_active, cause="scan")
     if tyre_angle_rad(snapshot) is None:
-        found = found._replace(text=f"{found.text}; steering unknown, looked straight ahead")
+        found = found._replace(text=f"{found.text}; steering unknown, checked straight ahead")
     return found
 
 
@@ -116,7 +116,7 @@ def _judge(
         collision_s = gap_m / closing_mps
         if collision_s < limits.time_to_collision_s * (1.25 if was_active else 1.0):
             return fault(
-                f"{text}; met in {collision_s:.1f} s, {limits.time_to_collision_s:.1f} s needed",
+                f"{text}; collision in {collision_s:.1f} s, {limits.time_to_collision_s:.1f} s needed",
                 brief=f"in {collision_s:.1f} s",
                 measured=measured,
                 limit=limit,
@@ -151,6 +151,7 @@ CHECKS = (
         label="Obstacle (laser)",
         tile="Obstacle",
         order=20,
+        checked_when="Checked while the laser is fresh and sees into the corridor.",
         group="obstacle",
         alarm=_alarm("Obstacle ahead", ("laser_blind",)),
         limits=ObstacleLimits,
@@ -163,8 +164,9 @@ CHECKS = (
         label="Obstacle (nearest object)",
         tile="Obstacle",
         order=21,
+        checked_when="Checked while Nearest distance is published and fresh.",
         group="obstacle",
-        # Both say the same of the same thing: what the laser announced is not announced again.
+        # Both detect the same object: one that the laser announced is not announced again.
         alarm=_alarm("Object too near", ("obstacle",)),
         limits=ObstacleLimits,
         find=by_estimator,

@@ -1,4 +1,4 @@
-"""Has somebody paused the monitoring and forgotten it? Told after some minutes, and again each time these double."""
+"""Was the monitoring paused and forgotten? Reported after some minutes, and again each time these double."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from monitor.snapshot import Snapshot
 class PausedLimits(Limits):
     after_min: float = threshold(
         5.0,
-        "Pause is said after",
+        "Pause is reported after",
         unit="min",
         low=0.5,
         high=60.0,
         step=0.5,
-        help="And again after 2, 4, 8 times as long.",
+        help="Then again after 2, 4 and 8 times as long.",
     )
 
 
@@ -39,7 +39,7 @@ def find(snapshot: Snapshot, limits: PausedLimits, was_active: bool) -> Finding:
         return ok("Monitoring is on")
     paused_s = max(0.0, snapshot.now_s - snapshot.paused_since_s)
     after_s = 60.0 * limits.after_min
-    text = f"Monitoring paused for {paused_s / 60:.0f} min: no alarm comes"
+    text = f"Monitoring paused for {paused_s / 60:.0f} min: no alarm is raised"
     if paused_s < after_s:
         return ok(text)
     return fault(
@@ -57,6 +57,7 @@ CHECKS = (
         id="paused_long",
         label="Monitoring",
         order=127,
+        checked_when="Always checked.",
         alarm=AlarmSpec(
             title="Monitoring paused too long",
             priority=Priority.WARNING,
@@ -64,7 +65,7 @@ CHECKS = (
             sound=Sound.MEDIUM,
             needs_ack=False,  # to go on is to have seen it
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="Press Resume: until then nothing is checked and no alarm comes.",
+            advice="Press Resume: until then nothing is checked and no alarm is raised.",
         ),
         limits=PausedLimits,
         find=find,

@@ -8,6 +8,7 @@ from monitor.check import (
     Action,
     AlarmSpec,
     Check,
+    End,
     Finding,
     Limits,
     Place,
@@ -36,12 +37,17 @@ class PedalLimits(Limits):
     )
 
 
+def ends(limits: PedalLimits) -> End:
+    """Of the pedal that is pressed less."""
+    return End("below", max(0.0, limits.pressed_percent - DEADBAND_PERCENT), "%")
+
+
 def find(snapshot: Snapshot, limits: PedalLimits, was_active: bool) -> Finding:
     brake = snapshot.need("brake").percent
     accelerator = snapshot.need("accelerator").percent
     if not (math.isfinite(brake) and math.isfinite(accelerator)):
-        return unknown("A pedal says no number", short="no data")
-    pressed = max(0.0, limits.pressed_percent - (DEADBAND_PERCENT if was_active else 0.0))
+        return unknown("A pedal value is not a number", short="no data")
+    pressed = ends(limits).value if was_active else limits.pressed_percent
     text = f"Brake {brake:.0f} %, accelerator {accelerator:.0f} %"
     measured = Quantity(label="Both at least", value=min(brake, accelerator), unit="%")
     limit = Quantity(label="Pressed above", value=limits.pressed_percent, unit="%")
@@ -61,6 +67,7 @@ CHECKS = (
         id="pedals",
         label="Pedals",
         order=30,
+        checked_when="Checked while Brake and Accelerator are fresh.",
         alarm=AlarmSpec(
             title="Brake and accelerator together",
             priority=Priority.WARNING,
@@ -70,10 +77,11 @@ CHECKS = (
             on_delay_s=0.3,
             off_delay_s=1.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="Two controllers may command the car at once: be ready to take over.",
+            advice="Two controllers may be commanding the car: be ready to take over.",
         ),
         limits=PedalLimits,
         find=find,
+        ends=ends,
         needs=frozenset({"brake", "accelerator"}),
         immediate=True,
     ),

@@ -1,8 +1,8 @@
-"""Are the operator's phone and the car where both say they are, and do they move as one?
+"""Do the positions of the operator's phone and of the car agree, and do both move together?
 
-The gate compares the two places at the phone's own time with what the errors of both receivers explain (chi-square,
-99.9 %, `agreement.gate_m`). The tracks of the last minute are correlated, both axes pooled (`agreement.correlate`);
-that says nothing where the car hardly moved, and then nothing is said.
+The gate tests whether the errors of both receivers explain the distance at the phone's time (chi-square, 99.9 %,
+`agreement.gate_m`). The tracks of the last minute are correlated, both axes pooled (`agreement.correlate`); the result
+is unknown if the car hardly moved.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SPREAD_SIGMAS = 3.0  # of the phone: a car that moved less has no track to compa
 class AgreementLimits(Limits):
     least_m: float = threshold(
         10.0,
-        "Phone and car apart",
+        "Phone and car: distance apart",
         unit="m",
         low=2.0,
         high=1000.0,
@@ -54,7 +54,7 @@ class AgreementLimits(Limits):
         low=0.0,
         high=0.95,
         step=0.05,
-        help="A healthy pair that moves enough to be judged lies above 0.8.",
+        help="A healthy pair that moves enough has more than 0.8.",
     )
 
 
@@ -95,7 +95,7 @@ def agree(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -> Find
         f"{name_of(view).replace('the', 'The', 1)} is {beside(newest.distance_m, allowed_m, 0)} m from the car; "
         f"up to {allowed_m:.0f} m is normal"
     )
-    measured = Quantity(label="Apart", value=newest.distance_m, unit="m")
+    measured = Quantity(label="Distance apart", value=newest.distance_m, unit="m")
     limit = Quantity(label="Normal up to", value=allowed_m, unit="m")
     if is_fault:
         return fault(
@@ -112,12 +112,12 @@ def move_as_one(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -
     if tracks is None or tracks.pairs < PAIRS or tracks.span_s < SPAN_S:
         pairs = 0 if tracks is None else tracks.pairs
         return unknown(
-            f"Taking both tracks: {pairs} places of the last minute agree, {PAIRS} over {SPAN_S:.0f} s are needed",
+            f"Collecting both tracks: {pairs} positions of the last minute agree, {PAIRS} over {SPAN_S:.0f} s needed",
             short="waiting",
         )
     needed_m = SPREAD_SIGMAS * tracks.phone_sigma_m
     if tracks.car_spread_m <= needed_m:
-        text = f"the car's track spreads {tracks.car_spread_m:.1f} m, with this phone {needed_m:.1f} m would tell"
+        text = f"the car's track spreads {tracks.car_spread_m:.1f} m, with this phone {needed_m:.1f} m is needed"
         if _drives(snapshot):
             return unknown(f"{text[0].upper()}{text[1:]}", short="near")
         return unknown(f"Standing: {text}", short="standing")
@@ -132,7 +132,7 @@ def move_as_one(snapshot: Snapshot, limits: AgreementLimits, was_active: bool) -
 
 
 def _drives(snapshot: Snapshot) -> bool:
-    """Whether the wheels say that the car moves now."""
+    """Whether the car moves now, by the wheel speed."""
     speed = snapshot.get("speed")
     return (
         speed is not None
@@ -147,6 +147,7 @@ CHECKS = (
         id="phone_car",
         label="Phone–car",
         order=52,
+        checked_when="Checked while the car has a fix and a phone in it shares its position.",
         alarm=AlarmSpec(
             title="Phone and car disagree",
             priority=Priority.WARNING,
@@ -156,7 +157,7 @@ CHECKS = (
             on_delay_s=3.0,
             off_delay_s=5.0,
             actions=(Action.ACKNOWLEDGE,),
-            advice="Where phone and car are together, do not trust the car's position.",
+            advice="If the phone is in the car, do not trust the car's position.",
             inhibited_by=("gps_jump", "gps_drift"),
             place_after=Place.LIST,
         ),
@@ -167,6 +168,7 @@ CHECKS = (
         id="phone_tracks",
         label="Tracks",
         order=54,
+        checked_when="Checked while car and phone move, once the tracks of a minute are collected.",
         group="phone_car",
         alarm=AlarmSpec(
             title="Tracks do not correlate",
@@ -177,7 +179,7 @@ CHECKS = (
             on_delay_s=3.0,
             off_delay_s=5.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="The phone does not move as the car does: see whether it is in the car.",
+            advice="The phone does not move with the car: check whether it is in the car.",
             inhibited_by=("phone_car",),
         ),
         limits=AgreementLimits,

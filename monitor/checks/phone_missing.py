@@ -1,8 +1,7 @@
-"""Has the operator's phone a position, and if not, why?
+"""Does the operator's phone have a position, and if not, why?
 
-Only a page that is there is asked for one. A computer on a desk has no receiver and is not blamed for it, unless
-somebody refused it the permission or chose it to ride in the car; a page
-that said farewell, or was not heard for a minute, is no phone any more.
+Only an open page is expected to have one. A computer without a receiver raises no alarm, unless its permission was
+denied or it was chosen as the phone in the car. A page that was closed, or was silent for a minute, no longer counts.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ def find(snapshot: Snapshot, limits: MissingLimits, was_active: bool) -> Finding
         radius_m = view.fix.accuracy_m if view.fix is not None else 0.0
         return ok(f"Position of the phone known to {radius_m:.0f} m")
     if not view.is_handheld and not view.is_chosen and why != "denied":
-        return _none("This is no phone: no position is expected of it", was_active)
+        return _none("This is not a phone: no position is expected", was_active)
     if why == "silent" and not view.was_usable and not view.is_chosen:
         return _none("No phone is sharing its position", was_active)  # nothing was lost with it
     words, missing_s = why_words(why, view, now_s, name_of(view)), view.missing_s(now_s)
@@ -70,6 +69,7 @@ CHECKS = (
         label="Phone position",
         tile="Phone–car",
         order=53,
+        checked_when="Checked once a phone shares its position or is chosen as the one in the car.",
         alarm=AlarmSpec(
             title="Phone position missing",
             priority=Priority.WARNING,
@@ -79,7 +79,7 @@ CHECKS = (
             off_delay_s=FIX_LIVES_S + 1.0,  # longer than one fix lives: now and then one is not a position
             repeat_after_s=3600.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="Allow this page the location and keep it open: without it nobody checks the car's position.",
+            advice="Allow location access for this page and keep it open: otherwise the car's position is not checked.",
         ),
         limits=MissingLimits,
         find=find,

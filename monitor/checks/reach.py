@@ -1,7 +1,7 @@
 """Can any operator hear an alarm while the car moves?
 
-Nobody is needed while the car stands. A page that is reloaded says nothing for a moment, and its sound needs a tap
-again: hence the delay.
+No operator is needed while the car stands. A reloaded page is silent for a moment, and its sound needs a tap again:
+hence the delay.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from monitor.check import (
 from monitor.motion import MOVES_ABOVE_MPS
 from monitor.snapshot import Snapshot
 
-RELOADED_S = 15.0  # a page is loaded anew and touched again within this
+RELOADED_S = 15.0  # a page is reloaded and touched again within this time
 
 
 class ReachLimits(Limits):
@@ -35,16 +35,16 @@ class ReachLimits(Limits):
 def find(snapshot: Snapshot, limits: ReachLimits, was_active: bool) -> Finding:
     facts = snapshot.reach
     if facts is None:
-        return absent("Nobody is asked whether alarms are heard", brief="not asked")
+        return absent("Alarm reach is not monitored here", brief="not monitored")
     measured = Quantity(label="Can hear alarms", value=facts.can, unit="")
     if facts.can > 0:
         return ok(f"{facts.can} of {facts.of} operators can hear alarms", measured=measured)
-    why = f"none of {facts.of} ({facts.why})" if facts.of else "no operator's phone is here"
+    why = f"none of {facts.of} ({facts.why})" if facts.of else "no operator's phone is connected"
     speed = snapshot.get("speed")
     if speed is None:
-        return absent(f"Nobody can hear alarms: {why}; whether the car moves is not known", brief="no speed")
+        return absent(f"Nobody can hear alarms: {why}; whether the car moves is unknown", brief="no speed")
     if not speed.is_fresh(snapshot.now_s):
-        return unknown(f"Nobody can hear alarms: {why}; whether the car moves is not known", short="no speed")
+        return unknown(f"Nobody can hear alarms: {why}; whether the car moves is unknown", short="no speed")
     if not moves(snapshot, was_active):
         return ok(f"Nobody can hear alarms: {why}; the car stands", measured=measured)
     text = f"The car moves at {abs(speed.value.speed_mps):.1f} m/s and nobody can hear alarms: {why}"
@@ -65,17 +65,18 @@ CHECKS = (
         id="reach",
         label="Alarm reach",
         order=126,
+        checked_when="Checked of a live car, while Speed is fresh.",
         alarm=AlarmSpec(
             title="Nobody can hear alarms",
             priority=Priority.WARNING,
-            place=Place.LIST,  # the strip shows it on every tab; a page that is silent says so itself, above all else
+            place=Place.LIST,  # the strip shows it on every tab; a page without sound shows that itself
             sound=Sound.MEDIUM,
-            needs_ack=True,  # whoever comes back must know that nobody listened
+            needs_ack=True,  # a returning operator must see that nobody could hear alarms
             on_delay_s=RELOADED_S,
             off_delay_s=2.0,
             repeat_after_s=1800.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="Open this page on a phone, touch it once to allow sound, and keep it in front.",
+            advice="Open this page on a phone, tap it once to allow sound, and keep it in the foreground.",
         ),
         limits=ReachLimits,
         find=find,

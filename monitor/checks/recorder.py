@@ -6,6 +6,7 @@ from monitor.check import (
     Action,
     AlarmSpec,
     Check,
+    End,
     Finding,
     Limits,
     Place,
@@ -35,7 +36,7 @@ class RecordingLimits(Limits):
         low=0.0,
         high=1.0,
         step=1.0,
-        help="1: recording begins with monitoring. 0: by hand only.",
+        help="1: recording starts with monitoring. 0: manually only.",
     )
     all_topics: float = threshold(
         1.0,
@@ -44,7 +45,7 @@ class RecordingLimits(Limits):
         low=0.0,
         high=1.0,
         step=1.0,
-        help="0: only the topics that catgraph itself reads.",
+        help="0: only the topics that catgraph reads.",
     )
     bulky: float = threshold(
         0.0,
@@ -62,7 +63,7 @@ class RecordingLimits(Limits):
         low=0.0,
         high=600.0,
         step=5.0,
-        help="A link that returns within this time goes on with the same recording, in a second part.",
+        help="If the link returns within this time, the same recording continues in a second part.",
     )
     quota_gb: float = threshold(
         0.0,
@@ -71,7 +72,7 @@ class RecordingLimits(Limits):
         low=0.0,
         high=10_000.0,
         step=1.0,
-        help="All recordings together may take this much; 0: as much as there is. Nothing is ever deleted for it.",
+        help="Limit for all recordings together; 0: no limit. Nothing is ever deleted for it.",
     )
     min_free_gb: float = threshold(
         0.5,
@@ -89,7 +90,7 @@ class RecordingLimits(Limits):
         low=0.0,
         high=1000.0,
         step=0.5,
-        help="You are warned when less than this may still be recorded.",
+        help="A warning is raised when less than this remains.",
     )
     behind_s: float = threshold(
         2.0,
@@ -98,8 +99,16 @@ class RecordingLimits(Limits):
         low=0.5,
         high=30.0,
         step=0.5,
-        help="A message that waits longer than this to be written says that the disk is too slow.",
+        help="A message that waits longer than this to be written means that the disk is too slow.",
     )
+
+
+def caught_up(limits: RecordingLimits) -> End:
+    return End("below", 0.5 * limits.behind_s, "s")
+
+
+def has_room_again(limits: RecordingLimits) -> End:
+    return End("above", 1.1 * limits.warn_gb, "GB")
 
 
 def keeps_up(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> Finding:
@@ -112,10 +121,10 @@ def keeps_up(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> F
         return fault(f"The disk is too slow: {many}", brief="lost some", causes=("dropped",))
     measured = Quantity(label="Behind", value=round(facts.behind_s, 1), unit="s")
     limit = Quantity(label="At most", value=limits.behind_s, unit="s")
-    text = f"Messages wait {facts.behind_s:.1f} s to be written, at most {limits.behind_s:g} s is usual"
-    if facts.behind_s > limits.behind_s * (0.5 if was_active else 1.0):
+    text = f"Messages wait {facts.behind_s:.1f} s to be written, at most {limits.behind_s:g} s is normal"
+    if facts.behind_s > (caught_up(limits).value if was_active else limits.behind_s):
         return fault(text, brief=f"{facts.behind_s:.0f} s", measured=measured, limit=limit, causes=("behind",))
-    return ok("All that comes is recorded", measured=measured, limit=limit)
+    return ok("All messages are recorded", measured=measured, limit=limit)
 
 
 def has_room(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> Finding:
@@ -123,12 +132,12 @@ def has_room(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> F
     if facts.state not in ("recording", "saving", "held"):
         return absent("Nothing is recorded now", brief="not recording")
     if facts.left_gb is None:
-        return unknown("The disk has not said how much room it has", short="no word")
+        return unknown("The free space of the disk is unknown", short="no word")
     left_gb, warn_gb = facts.left_gb, limits.warn_gb
     measured = Quantity(label="Room", value=round(left_gb, 2), unit="GB")
     limit = Quantity(label="Warn below", value=warn_gb, unit="GB")
-    text = f"Room for {left_gb:.2f} GB more, then recording stops{f': {facts.limit}' if facts.limit else ''}"
-    if left_gb < warn_gb * (1.1 if was_active else 1.0):
+    text = f"Space for {left_gb:.2f} GB more, then recording stops{f': {facts.limit}' if facts.limit else ''}"
+    if left_gb < (has_room_again(limits).value if was_active else warn_gb):
         return fault(text, brief=f"{left_gb:.1f} GB", measured=measured, limit=limit)
     return ok(text, measured=measured, limit=limit)
 
@@ -138,8 +147,8 @@ def goes_on(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> Fi
     if facts.state == "stopped":
         return fault(facts.trouble or "Recording stopped by itself", brief="stopped")
     if facts.state == "off":
-        return absent("Nothing is to be recorded", brief="not recording")
-    return ok("It is recorded" if facts.state != "held" else "What was recorded is saved")
+        return absent("Recording is off", brief="not recording")
+    return ok("Recording" if facts.state != "held" else "What was recorded is saved")
 
 
 CHECKS = (
@@ -147,17 +156,18 @@ CHECKS = (
         id="recording_stopped",
         label="Recorder",
         order=129,
+        checked_when="Checked while a recording is made.",
         group="recording",
         tile=RECORDING,
         alarm=AlarmSpec(
             title="Recording stopped",
             priority=Priority.WARNING,
-            place=Place.DIALOG,  # whoever drives to record must not find it out afterwards
+            place=Place.DIALOG,  # the driver of a recorded test must know at once
             sound=Sound.MEDIUM,
             needs_ack=True,
             off_delay_s=1.0,
             actions=(Action.ACKNOWLEDGE,),
-            advice="What was recorded so far is kept. Make room or mend the disk, then start recording again.",
+            advice="What was recorded is kept. Free space or repair the disk, then start recording again.",
         ),
         limits=RecordingLimits,
         find=goes_on,
@@ -167,6 +177,7 @@ CHECKS = (
         id="recorder_behind",
         label="Recorder keeps up",
         order=130,
+        checked_when="Checked while a recording is made.",
         group="recording",
         tile=RECORDING,
         alarm=AlarmSpec(
@@ -183,12 +194,14 @@ CHECKS = (
         ),
         limits=RecordingLimits,
         find=keeps_up,
+        ends=caught_up,
         scope=Scope.SERVER,
     ),
     Check(
         id="disk_nearly_full",
-        label="Room on the disk",
+        label="Disk space",
         order=131,
+        checked_when="Checked while recording is switched on and the free space is known.",
         group="recording",
         tile=RECORDING,
         alarm=AlarmSpec(
@@ -205,6 +218,7 @@ CHECKS = (
         ),
         limits=RecordingLimits,
         find=has_room,
+        ends=has_room_again,
         scope=Scope.SERVER,
     ),
 )

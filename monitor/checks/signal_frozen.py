@@ -1,9 +1,9 @@
-"""Does a signal go on talking, but always say the same? One alarm for each signal, made from the table of signals.
+"""Does a signal keep sending an unchanged value? One alarm per signal, from the table of signals.
 
-Most values may rest: a brake at 0 %, an accelerator nobody touches, a wheel held straight, an estimator that repeats
-its last object. So a value is held against a signal only where it cannot rest while the car moves: a position,
-odometry, a scan with returns; and, where the signal has been seen to change with nearly every message, its own noise:
-speed, acceleration, heading. A stamp may never rest, whatever the car does.
+Most values may stay constant: a brake at 0 %, an unused accelerator, a straight wheel, an estimator that repeats its
+last object. So only values are judged that cannot stay constant while the car moves: a position, odometry, a scan with
+returns; and speed, acceleration and heading, if the signal was seen to change with nearly every message. A stamp must
+always advance.
 """
 
 from __future__ import annotations
@@ -50,20 +50,20 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
     snapshot.need(signal.name)  # while stale nothing comes that could be frozen
     repeats = reading.repeats
     if repeats is None:
-        return absent(f"{signal.label} may rest, and its messages carry no stamp", brief="may rest")
+        return absent(f"{signal.label} may stay constant, and its messages have no stamp", brief="may rest")
     share = HOLDS if was_active else 1.0
     if repeats.stamp_n >= LEAST_REPEATS and repeats.stamp_s >= share * limits.frozen_after_s:
         return _frozen(signal, "one stamp", repeats.stamp_s, limits)
     if signal.name in BY_MOTION | BY_NOISE:
         return _value(signal, reading, repeats, snapshot, limits, share)
-    return ok(f"{signal.label}: its stamps go on")
+    return ok(f"{signal.label}: its stamps advance")
 
 
 def _value(
     signal: Signal, reading: Reading[object], repeats: Repeats, snapshot: Snapshot, limits: SlowLimits, share: float
 ) -> Finding:
     if repeats.value_n == 0:
-        return ok(f"{signal.label}: its values go on")
+        return ok(f"{signal.label}: its values change")
     held_s = repeats.value_s
     is_long = repeats.value_n >= LEAST_REPEATS and held_s >= share * limits.frozen_after_s
     if is_long:
@@ -72,17 +72,17 @@ def _value(
     if abs(snapshot.need("speed").speed_mps) > MOVES_ABOVE_MPS:
         return ok(f"{signal.label}: the same value for {held_s:.1f} s of driving")
     if reading.stamp_s is not None:
-        return ok(f"{signal.label}: its stamps go on")
-    return unknown(f"{signal.label}: the car stands, where a value may rest", short="stands")
+        return ok(f"{signal.label}: its stamps advance")
+    return unknown(f"{signal.label}: the car stands, so a value may stay constant", short="stands")
 
 
 def _why_not(signal: Signal, reading: Reading[object], repeats: Repeats, share: float) -> Finding | None:
     """Why a value that was held so long proves nothing, None where it does."""
     if signal.name in BY_NOISE:
         if repeats.liveliness is None:
-            return unknown(f"{signal.label}: not yet known how often it changes", short="waiting")
+            return unknown(f"{signal.label}: how often it changes is not yet known", short="waiting")
         if repeats.liveliness < LIVELY:
-            return absent(f"{signal.label} often repeats a value: it proves nothing", brief="often repeats")
+            return absent(f"{signal.label} often repeats a value, so a repeat proves nothing", brief="often repeats")
         return None
     if repeats.value_m < share * LEAST_WAY_M:
         return ok(f"{signal.label}: the same value for {repeats.value_m:.1f} m of driving")
@@ -97,7 +97,7 @@ def _why_not(signal: Signal, reading: Reading[object], repeats: Repeats, share: 
 def _frozen(signal: Signal, what: str, held_s: float, limits: SlowLimits) -> Finding:
     brief = f"{signal.label} {held_s:.0f} s"
     return fault(
-        f"{signal.label}: messages come, but with {what} for {held_s:.1f} s"
+        f"{signal.label}: messages arrive, but with {what} for {held_s:.1f} s"
         + (" of driving" if what == "one value" else ""),
         brief=brief if len(f"FAULT {brief}") <= BRIEF_LETTERS else signal.label,
         measured=Quantity(label="Unchanged for", value=held_s, unit="s"),
@@ -107,13 +107,14 @@ def _frozen(signal: Signal, what: str, held_s: float, limits: SlowLimits) -> Fin
 
 
 def check(signal: Signal) -> Check[Limits]:
-    # A speed that is frozen says nothing of how far the car has come, by which the others are judged.
+    # A frozen speed does not give the driven distance, by which the others are judged.
     explains = signal.name == "speed"
     return Check(
         id=f"signal_frozen.{signal.name}",
         label=f"{signal.label} changes",
         tile="Frozen",
         order=105,
+        checked_when="Checked while the signal arrives and the car moves.",
         group=GROUP,
         alarm=AlarmSpec(
             title=f"{signal.label} frozen",
@@ -123,7 +124,7 @@ def check(signal: Signal) -> Check[Limits]:
             needs_ack=True,
             off_delay_s=2.0,
             actions=(Action.ACKNOWLEDGE,) if explains else (Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="Messages come, but what they say is old: do not trust the value shown.",
+            advice="Messages arrive, but their content is old: do not trust the value.",
             inhibited_by=(
                 f"signal_stale.{signal.name}",
                 *(("signal_frozen.speed",) if signal.name in BY_MOTION else ()),

@@ -24,22 +24,22 @@ from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
 from monitor.signals import SIGNALS, Signal
 from monitor.snapshot import Snapshot
 
-DEADBAND_PERCENT = 3.0  # a rate at the very limit neither comes nor goes
+DEADBAND_PERCENT = 3.0  # hysteresis for a rate at the limit
 
 
 def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
     reading = snapshot.get(signal.name)
     if reading is None or reading.derived_from is not None:
-        return absent(f"{signal.label}: no rate to measure")  # that it never came is the other family's to say
+        return absent(f"{signal.label}: no rate to measure")  # a signal never received has its own alarm
     if signal.event_like and set_hz(limits, signal.name) == 0.0:
-        return absent(f"{signal.label} speaks when it has something to say", brief="no fixed rate")
+        return absent(f"{signal.label} is published on events only", brief="no fixed rate")
     if signal.name in snapshot.link.throttled:
-        return absent(f"{signal.label}: fewer messages are asked for, for the link is slow", brief="throttled")
-    snapshot.need(signal.name)  # while stale there is no rate to speak of
+        return absent(f"{signal.label}: throttled because the link is slow", brief="throttled")
+    snapshot.need(signal.name)  # a stale signal has no rate
     rate = snapshot.rates.get(signal.name)
     if rate is None or rate.expected_hz is None or not rate.settled:
         if rate is not None and not rate.learning:
-            return absent(f"{signal.label} keeps no steady rate", brief="no fixed rate")
+            return absent(f"{signal.label} has no steady rate", brief="no fixed rate")
         return unknown(f"{signal.label}: measuring its rate", short="waiting")
     if rate.measured_hz is None:
         return unknown(f"{signal.label}: measuring its rate", short="waiting")
@@ -69,6 +69,7 @@ def check(signal: Signal) -> Check[Limits]:
         label=f"{signal.label} rate",
         tile="Rates",
         order=110,
+        checked_when="Checked while the signal arrives and its rate is known.",
         group=GROUP,
         alarm=AlarmSpec(
             title=f"{signal.label} slower than expected",
@@ -81,7 +82,7 @@ def check(signal: Signal) -> Check[Limits]:
             off_delay_s=2.0,
             repeat_after_s=600.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="The car or the radio is busy; what depends on it comes late.",
+            advice="The car or the radio is busy; dependent values are delayed.",
             inhibited_by=(f"signal_stale.{signal.name}", "all_slow", "link_late", "link_late_moving"),
         ),
         limits=SignalLimits,

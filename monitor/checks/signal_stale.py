@@ -32,7 +32,7 @@ NEVER_AFTER_S = 5.0  # as long as the whole car is given for its first message
 def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
     unusable = snapshot.unusable.get(signal.name)
     if unusable is not None and unusable.is_coming(snapshot.now_s):
-        return ok(f"{signal.label}: messages come, {unusable.words}")
+        return ok(f"{signal.label}: messages arrive, {unusable.words}")
     reading = snapshot.get(signal.name)
     if reading is None or reading.derived_from is not None:
         return _never_came(signal, snapshot, limits)
@@ -48,7 +48,7 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
         return unknown(f"{signal.label}: the clock went back", short="waiting")
     opened_s = snapshot.link.opened_s
     if opened_s is not None and reading.received_s < opened_s:
-        # Not heard since the link came back: it gets its time anew.
+        # Nothing since the link returned: its time starts again.
         age_s = snapshot.now_s - opened_s
         if age_s <= max(reading.horizon_s, GRACE_S):
             return unknown(f"{signal.label}: waiting for its first message", short="waiting")
@@ -70,7 +70,7 @@ def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Findi
             return unknown(f"{signal.label} is not published", short="no data")
         return absent(f"{signal.label} is not published")
     if not is_wanted:
-        return absent(f"{signal.label}: nothing came yet", brief="nothing came")
+        return absent(f"{signal.label}: nothing received yet", brief="nothing received")
     opened_s = snapshot.link.opened_s
     if opened_s is None or snapshot.now_s - opened_s < NEVER_AFTER_S:
         return unknown(f"{signal.label}: waiting for its first message", short="waiting")
@@ -78,7 +78,7 @@ def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Findi
         return unknown(f"{signal.label}: the whole car is silent", short="silent")
     waited_s = snapshot.now_s - opened_s
     return fault(
-        f"{signal.label}: nothing came in {waited_s:.0f} s since connecting",
+        f"{signal.label}: nothing received in {waited_s:.0f} s since connecting",
         brief=signal.label,
         causes=(signal.name,),
     )
@@ -101,9 +101,10 @@ def _brief(signal: Signal, age_s: float) -> str:
 def check(signal: Signal) -> Check[Limits]:
     return Check(
         id=f"signal_stale.{signal.name}",
-        label=f"{signal.label} heard",
+        label=f"{signal.label} received",
         tile="Signals",
         order=100,
+        checked_when="Checked once the signal has come.",
         group=GROUP,
         alarm=AlarmSpec(
             title=f"{signal.label} silent",

@@ -32,7 +32,7 @@ AT_LEAST = 2
 def find(signal: Signal, snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     found = snapshot.unusable.get(signal.name)
     if found is None:
-        text = f"{signal.label}: what comes can be used"
+        text = f"{signal.label}: received values can be used"
         return ok(text) if was_active or snapshot.get(signal.name) is not None else absent(text)
     for_s = snapshot.now_s - found.since_s
     if not found.is_coming(snapshot.now_s):
@@ -65,16 +65,16 @@ def find_all(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
         and (opened_s is None or reading.received_s >= opened_s)
     ]
     if not useless:
-        return ok("What comes can be used")
+        return ok("Received values can be used")
     for_s = min(now_s - one.since_s for one in useless.values())
-    text = f"{len(useless)} of {len(useless) + len(usable)} fast signals bring no usable value"
+    text = f"{len(useless)} of {len(useless) + len(usable)} fast signals have no usable value"
     if usable or len(useless) < CROWD:
         return ok(text)
     if not was_active and for_s < AFTER_S:
         return unknown(text, short="unusable")
     name, newest = max(useless.items(), key=lambda item: item[1].at_s)
     return fault(
-        f"No usable value for {for_s:.1f} s, though messages come. {SIGNALS[name].label}: {newest.words}",
+        f"No usable value for {for_s:.1f} s, although messages arrive. {SIGNALS[name].label}: {newest.words}",
         brief="no value",
         measured=Quantity(label="Without a usable value for", value=for_s, unit="s"),
         causes=("car",),
@@ -87,6 +87,7 @@ def check(signal: Signal) -> Check[Limits]:
         label=f"{signal.label} usable",
         tile="Signals",
         order=100,
+        checked_when="Checked once messages of the signal come.",
         alarm=AlarmSpec(
             title=f"{signal.label} unusable",
             priority=Priority.WARNING,
@@ -95,7 +96,7 @@ def check(signal: Signal) -> Check[Limits]:
             needs_ack=True,
             off_delay_s=2.0,
             actions=(Action.ACKNOWLEDGE,),  # not to be shelved: it is why other checks do not judge
-            advice="Messages come, but what depends on this signal is not checked: look at its sensor or driver.",
+            advice="Messages arrive, but checks of this signal cannot run: inspect its sensor or driver.",
             inhibited_by=("car_unusable",),
             grace_s=GRACE_S,
         ),
@@ -111,8 +112,9 @@ CHECKS = (
         label="Car's values usable",
         tile="Link",
         order=120,
+        checked_when="Checked once messages of the car come.",
         alarm=AlarmSpec(
-            title="No usable value comes",
+            title="No usable values",
             priority=Priority.CRITICAL,
             place=Place.DIALOG,
             sound=Sound.HIGH,

@@ -1,9 +1,9 @@
-"""Does the car slow when catgraph orders it to? The proof is the car's own speed, and nothing else.
+"""Does the car slow down when catgraph orders it? The only proof is the car's own speed.
 
-First a change must be shown that the order explains (monitor/slow_proof.py): the ramp begins at the measured speed, so
-that a car is no faster than commanded proves nothing. From then on half of the ordered deceleration counts as obeyed,
-as a real car follows loosely and the slope of the speed is known over the last 0.6 s; so does a car that is no faster
-than commanded. A car that stands needs no alarm, whatever made it stand.
+First a change must be proven that the order explains (monitor/slow_proof.py): the ramp starts at the measured speed, so
+a car that is no faster than commanded proves nothing. After that, half of the ordered deceleration is enough, because a
+real car follows loosely and the slope is known over 0.6 s only; so is a speed no higher than commanded. A standing car
+raises no alarm, whatever stopped it.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from monitor.slow_proof import NOTHING_SHOWN, SHARE, SlowProof
 from monitor.snapshot import Snapshot
 
 TILE = "Slow-down"
-STANDS_ALREADY = "The car stood already: there is nothing to slow"
-STANDS_UNPROVEN = "The car stands; its speed does not show that the order stopped it"
+STANDS_ALREADY = "The car was already standing: nothing to slow"
+STANDS_UNPROVEN = "The car stands; its speed does not prove that the order stopped it"
 WITHIN_S = 1.0  # of the first command
 FOLLOWS_WITHIN_MPS = 0.5  # once it is shown to slow, a car so near the commanded speed follows it
 ENDED_TOLD_S = 30.0
@@ -46,7 +46,7 @@ def _switch(label: str, help: str) -> Any:
         low=0.0,
         high=1.0,
         step=1.0,
-        help=f"{help} 1: after a count-down of 2 s the car is slowed, if slow-down is armed and nobody vetoes.",
+        help=f"{help} 1: after a countdown of 2 s the car is slowed, if the slow-down is armed and nobody vetoes.",
     )
 
 
@@ -64,7 +64,7 @@ class SlowDownLimits(Limits):
         low=0.3,
         high=4.6,
         step=0.1,
-        help="From the measured speed to zero. 4.6 is as hard as the car brakes.",
+        help="From the measured speed to zero. 4.6 is the car's hardest braking.",
     )
     longest_s: float = threshold(
         600.0,
@@ -73,15 +73,19 @@ class SlowDownLimits(Limits):
         low=10.0,
         high=3600.0,
         step=10.0,
-        help="An order that nobody releases ends after this time, with an alarm: the controllers drive again.",
+        help="An order that is not released ends after this time, with an alarm; then the controllers drive again.",
     )
     on_speed: float = _switch("Slow down when too fast", "Speed above its limit for the time below.")
     on_speed_after_s: float = _after("Too fast for", 3.0)
     on_obstacle: float = _switch("Slow down before an obstacle", "An obstacle within the stopping distance.")
     on_obstacle_after_s: float = _after("Obstacle for", 0.3)
-    on_reach: float = _switch("Slow down when nobody hears", "No operator's phone is reachable while the car moves.")
+    on_reach: float = _switch(
+        "Slow down when nobody can hear alarms", "No operator's phone is reachable while the car moves."
+    )
     on_reach_after_s: float = _after("Nobody reachable for", 10.0)
-    on_rate_speed: float = _switch("Slow down when speed is slow", "Speed comes less often than expected, or not.")
+    on_rate_speed: float = _switch(
+        "Slow down when speed is slow", "Speed arrives less often than expected, or not at all."
+    )
     on_rate_distance: float = _switch("… when distance is slow", "The nearest object likewise.")
     on_rate_position: float = _switch("… when position is slow", "The position likewise.")
     on_rate_scan: float = _switch("… when the laser is slow", "The laser's scans likewise.")
@@ -102,9 +106,11 @@ def obeys(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Findi
     speed = snapshot.get("speed")
     if speed is None or not speed.is_fresh(snapshot.now_s):
         if for_s < WITHIN_S:
-            return unknown("No speed has come since the order", short="no speed")
+            return unknown("No speed received since the order", short="no speed")
         return fault(
-            "NOT CONFIRMED: no speed comes from the car. Use the physical stop", brief="no speed", causes=("no speed",)
+            "NOT CONFIRMED: no speed received from the car. Use the physical stop",
+            brief="no speed",
+            causes=("no speed",),
         )
     speed_mps = abs(speed.value.speed_mps)
     proof = proof_of(snapshot)
@@ -120,7 +126,7 @@ def obeys(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Findi
         if for_s < WITHIN_S:
             return unknown(f"{text}: ordered {for_s:.1f} s ago", short="waiting")
         return fault(
-            f"NOT CONFIRMED: {text}, and its speed does not show that the order slows it. Use the physical stop",
+            f"NOT CONFIRMED: {text}, and its speed does not prove that the order slows it. Use the physical stop",
             brief=f"{speed_mps:.1f} m/s",
             measured=measured,
             limit=limit,
@@ -133,7 +139,7 @@ def obeys(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Findi
     if for_s < WITHIN_S or (proof.shown_s is not None and snapshot.now_s - proof.shown_s < WITHIN_S):
         return ok(f"{text}: the car slows")
     if braking_mps2 is None:
-        return fault(f"NOT CONFIRMED: {text}, too few speeds come. Use the physical stop", causes=("no speed",))
+        return fault(f"NOT CONFIRMED: {text}, too few speed messages. Use the physical stop", causes=("no speed",))
     return fault(
         f"NOT CONFIRMED: {text}, braking {braking_mps2:.1f} m/s², {least_mps2:.2f} needed. Use the physical stop",
         brief=f"{speed_mps:.1f} m/s",
@@ -144,7 +150,7 @@ def obeys(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Findi
 
 
 def proof_of(snapshot: Snapshot) -> SlowProof:
-    """What the car's speed shows of the order that stands."""
+    """The proof of the active order by the car's speed."""
     proof = snapshot.slow_proof
     return proof if proof.ordered_s == snapshot.slowing.ordered_s else NOTHING_SHOWN
 
@@ -160,7 +166,7 @@ def is_alone(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Fi
     if not facts.is_armed:
         return absent("Slow-down is not armed", brief="not armed")
     if not facts.rivals:
-        return ok(f"Nobody else publishes on {facts.topic}")
+        return ok(f"No other node publishes on {facts.topic}")
     names = ", ".join(facts.rivals[:3]) + (f" and {len(facts.rivals) - 3} more" if len(facts.rivals) > 3 else "")
     return fault(
         f"{names} also command{'s' if len(facts.rivals) == 1 else ''} the car on {facts.topic}: the last message wins",
@@ -173,9 +179,7 @@ def goes_on(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Fin
     facts = snapshot.slowing
     ended_s = facts.ended_at_longest_s
     if ended_s is not None and snapshot.now_s - ended_s < ENDED_TOLD_S:
-        return fault(
-            f"The order ended after {limits.longest_s:.0f} s: the car is not held any more", brief="hold ended"
-        )
+        return fault(f"The order ended after {limits.longest_s:.0f} s: the car is no longer held", brief="hold ended")
     if facts.ordered_s is None:
         return absent("The car is not held", brief="not ordered")
     left_s = limits.longest_s - (snapshot.now_s - facts.ordered_s)
@@ -187,6 +191,7 @@ CHECKS = (
         id="slow_down_unconfirmed",
         label="Car obeys",
         order=110,
+        checked_when="Checked while the car is being slowed.",
         group="slow_down",
         tile=TILE,
         alarm=AlarmSpec(
@@ -208,6 +213,7 @@ CHECKS = (
         id="slow_down_hold_ended",
         label="Car held",
         order=111,
+        checked_when="Checked while the car is being slowed.",
         group="slow_down",
         tile=TILE,
         alarm=AlarmSpec(
@@ -226,6 +232,7 @@ CHECKS = (
         id="slow_down_rivals",
         label="Alone on the topic",
         order=112,
+        checked_when="Checked while the slow-down is armed or the car is being slowed.",
         group="slow_down",
         tile=TILE,
         alarm=AlarmSpec(
@@ -236,7 +243,7 @@ CHECKS = (
             needs_ack=True,
             off_delay_s=2.0,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),
-            advice="It may override a slow-down. Stop that node, or put the guard between it and the car.",
+            advice="It may override a slow-down. Stop that node, or place the guard between it and the car.",
         ),
         limits=SlowDownLimits,
         find=is_alone,

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 from monitor.check import (
+    EXPERT,
     Action,
     AlarmSpec,
     Check,
+    End,
     Finding,
     Limits,
     Place,
@@ -33,16 +35,20 @@ class SpeedLimits(Limits):
         high=5.0,
         step=0.1,
         help="The alarm clears this far below the limit.",
+        heading=EXPERT,
     )
+
+
+def ends(limits: SpeedLimits) -> End:
+    """A deadband as wide as the limit would never end, so it takes at most half of it."""
+    return End("below", max(limits.max_mps / 2, limits.max_mps - limits.deadband_mps), "m/s")
 
 
 def find(snapshot: Snapshot, limits: SpeedLimits, was_active: bool) -> Finding:
     speed_mps = abs(snapshot.need("speed").speed_mps)  # reversing too fast is too fast
     if not math.isfinite(speed_mps):
         return unknown("Speed is not a number", short="no data")
-    # A deadband as wide as the limit would never clear, so it takes at most half of it.
-    clear_mps = max(limits.max_mps / 2, limits.max_mps - limits.deadband_mps)
-    allowed_mps = clear_mps if was_active else limits.max_mps
+    allowed_mps = ends(limits).value if was_active else limits.max_mps
     text = f"{beside(speed_mps, limits.max_mps)} m/s, limit {limits.max_mps:.1f} m/s"
     measured = Quantity(label="Speed", value=speed_mps, unit="m/s")
     limit = Quantity(label="Limit", value=limits.max_mps, unit="m/s")
@@ -56,6 +62,7 @@ CHECKS = (
         id="speed_limit",
         label="Speed",
         order=10,
+        checked_when="Checked while Speed is fresh.",
         alarm=AlarmSpec(
             title="Speed above limit",
             priority=Priority.CRITICAL,
@@ -69,6 +76,7 @@ CHECKS = (
         ),
         limits=SpeedLimits,
         find=find,
+        ends=ends,
         needs=frozenset({"speed"}),
         immediate=True,
     ),

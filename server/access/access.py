@@ -1,33 +1,37 @@
-"""Access to one server: who was invited, who is paired, who may come in. The one object that the rest asks."""
+"""Access control of one server: invitations, paired devices, authentication. The package's only interface."""
 
 from __future__ import annotations
 
 import asyncio
 import ipaddress
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any, TypeVar
 
 from server.access import pending_invitations, secret_file
-from server.access.active_connections import Visits
+from server.access.active_connections import ActiveConnections
 from server.access.cookie import Cookies
 from server.access.devices import Device, Devices
 from server.access.identity import LOCAL, Principal, Role
 from server.access.invitations import PIN_DIGITS, Invitation, Invitations
 from server.access.keys import Keys
 from server.access.names import Names
-from server.access.pin_throttle import Guesses
+from server.access.pin_throttle import PinThrottle
 from server.access.tickets import Tickets
 from server.control import display_name
+from server.storage.storage_thread import StorageThread
 
 log = logging.getLogger("catgraph.access")
 
+T = TypeVar("T")
 FOLDER = "access"  # in the data folder; 0700, and every file in it 0600
 
 
 class NotPaired(Exception):
-    """The device was not let in; `str()` is one sentence for its owner, `code` a word for its page."""
+    """Pairing failed; `str()` is a sentence for the user, `code` is for the page."""
 
     def __init__(self, code: str, sentence: str, *, wait_s: float | None = None) -> None:
         super().__init__(sentence)
@@ -56,9 +60,11 @@ class Access:
         is_open: bool,
         now: Callable[[], float],
         wall_ms: Callable[[], int],
+        storage: StorageThread | None = None,
     ) -> None:
         """`data`: the data folder, None: nothing is kept. `names`: what else this server is called.
         `is_open`: everybody who reaches this server may act, because it listens on this machine only.
+        `storage`: the thread that uses the folder; None: the caller waits for the disk.
 
         Raises OSError where its folder cannot be used, ValueError where `names` holds nonsense.
         """
@@ -70,11 +76,12 @@ class Access:
         if self._folder is not None:
             secret_file.folder(self._folder)
         self.names = Names(names, is_open=is_open)
-        self.devices = Devices(self._folder)
-        self.visits = Visits()
+        self._storage = storage
+        self.devices = Devices(self._folder, storage=storage)
+        self.visits = ActiveConnections()
         self._invitations = Invitations()
-        self._printed: dict[Role, Invitation] = {}  # the one that stands on the terminal
-        self._guesses = Guesses()
+        self._printed: dict[Role, Invitation] = {}  # the one shown on the terminal
+        self._guesses = PinThrottle()
         self._tickets = Tickets()
         self._cookies = Cookies(self.devices.signing_key, self.devices.server, wall_ms=wall_ms)
         self._removed: dict[str, str] = {}  # devices that were removed in this run: why
@@ -84,7 +91,7 @@ class Access:
     # -- invitations -------------------------------------------------------------------------------------------------
 
     def invitation(self, role: Role = Role.OPERATOR) -> Invitation:
-        """What stands on the terminal for the next device of this role: the same until it is used or too old."""
+        """The invitation shown on the terminal for this role: the same until it is used or expires."""
         now_s = self._now()
         printed = self._printed.get(role)
         if printed is None or printed not in self._invitations.standing(now_s):
@@ -100,7 +107,7 @@ class Access:
         return self.invitation(role).token
 
     def pin(self, role: Role = Role.OPERATOR) -> str:
-        """The PIN of six digits that goes with it."""
+        """The six-digit PIN of the same invitation."""
         return self.invitation(role).pin
 
     def listens_at(self, address: str) -> None:
@@ -114,31 +121,46 @@ class Access:
 
     # -- pairing -----------------------------------------------------------------------------------------------------
 
-    def pair(self, *, token: str | None, pin: str | None, name: str, peer: str) -> tuple[Device, str]:
-        """Lets a new device in for its invitation; the device and its secret. Raises NotPaired, OSError.
+    async def pair(self, *, token: str | None, pin: str | None, name: str, peer: str) -> tuple[Device, str]:
+        """Lets a new device in for its invitation; the device and its secret, once the disk has it.
+
+        Raises NotPaired, OSError. A caller that is cancelled leaves it to its end.
+        """
+        return await _to_its_end(self._pair(token, pin, name, peer))
+
+    async def _pair(self, token: str | None, pin: str | None, name: str, peer: str) -> tuple[Device, str]:
+        await self._collect()
+        found = self._judge(token, pin, peer)
+        try:
+            device, secret = await self.devices.add(name, found.role, now_ms=self._wall_ms())
+        except OSError:
+            self._invitations.add(found, now_s=self._now())
+            raise
+        log.info("device paired: name=%s role=%s", device.name, device.role)
+        self.on_paired(device.name, device.role)
+        return device, secret
+
+    async def _collect(self) -> None:
+        """Takes the invitations that `catgraph pair` laid into the folder."""
+        if self._folder is None:
+            return
+        now_s = self._now()
+        collect = partial(pending_invitations.collect, self._folder, now_s=now_s, wall_ms=self._wall_ms())
+        for invitation in collect() if self._storage is None else await self._storage.run(collect):
+            self._invitations.add(invitation, now_s=now_s)
+
+    def _judge(self, token: str | None, pin: str | None, peer: str) -> Invitation:
+        """The invitation, which is used up. Raises NotPaired.
 
         Nothing is waited for in here, so that tries in parallel are judged one after another.
         """
         now_s = self._now()
-        if self._folder is not None:
-            for invitation in pending_invitations.collect(self._folder, now_s=now_s, wall_ms=self._wall_ms()):
-                self._invitations.add(invitation, now_s=now_s)
         if token is not None:
             found = self._invitations.take(token=token, now_s=now_s)
             if found is None:
-                raise NotPaired(
-                    "used", "This link was used already, or it is older than 10 minutes. Ask for a new one."
-                )
-        else:
-            found = self._by_pin(pin or "", _peer(peer), now_s)
-        try:
-            device, secret = self.devices.add(name, found.role, now_ms=self._wall_ms())
-        except OSError:
-            self._invitations.add(found, now_s=now_s)
-            raise
-        log.info("%s was paired as %s", device.name, device.role)
-        self.on_paired(device.name, device.role)
-        return device, secret
+                raise NotPaired("used", "This link was used already or is older than 10 minutes. Request a new one.")
+            return found
+        return self._by_pin(pin or "", _peer(peer), now_s)
 
     def _by_pin(self, pin: str, peer: str, now_s: float) -> Invitation:
         wait_s = self._guesses.wait_s(peer, now_s=now_s)
@@ -153,41 +175,48 @@ class Access:
         self._guesses.wrong(peer, now_s=now_s)
         wait_s = self._guesses.wait_s(peer, now_s=now_s)
         if not standing:
-            raise NotPaired(
-                "expired", "No PIN is valid now: it was used, or it is older than 10 minutes.", wait_s=wait_s
-            )
+            raise NotPaired("expired", "No PIN is valid now: it was used or is older than 10 minutes.", wait_s=wait_s)
         raise NotPaired("wrong", "This PIN is wrong.", wait_s=wait_s)
 
     # -- devices -----------------------------------------------------------------------------------------------------
 
-    def remove(self, id: str, *, by: str, but: object = None) -> Device | None:
+    async def remove(self, id: str, *, by: str, but: object = None) -> Device | None:
         """The device may not come any more, and what it has open ends now. `but`: a task that may end its answer.
 
         Raises OSError where the list cannot be kept: it is out now, and would be in again after a restart.
         """
-        try:
-            device = self.devices.remove(id, now_ms=self._wall_ms())
-        finally:
-            if self.devices.get(id) is None:
-                self._removed[id] = f"This device was removed by {by}."
-                self.visits.end(id, self._removed[id], but=but)
+        device = self.devices.remove(id)
+        self._removed[id] = f"This device was removed by {by}."
+        self.visits.end(id, self._removed[id], but=but)
+        if device is not None:
+            await _to_its_end(self.devices.save(now_ms=self._wall_ms()))
         return device
 
-    def change(self, id: str, *, role: Role | None, name: str | None, but: object = None) -> Device | None:
-        """The device with another role or name, which counts at once: its sockets begin anew. Raises OSError."""
+    async def change(self, id: str, *, role: Role | None, name: str | None, but: object = None) -> Device | None:
+        """Change role or name of a device at once; its sockets are closed. Returns the device.
+
+        Raises OSError if the list cannot be stored: nothing changed then.
+        """
         before = self.devices.get(id)
-        clean = None if name is None else display_name.clean(name)
-        device = self.devices.change(id, role=role, name=clean, now_ms=self._wall_ms())
+        device = self.devices.change(id, role=role, name=None if name is None else display_name.clean(name))
         if device is not None and before is not None and (device.role, device.name) != (before.role, before.name):
-            self.visits.end(
-                id, "The role of this device was changed.", only_sockets=device.role == before.role, but=but
-            )
+            await _to_its_end(self._keep_changed(before, device, but))
         return device
+
+    async def _keep_changed(self, before: Device, device: Device, but: object) -> None:
+        because, only_sockets = "The role of this device was changed.", device.role == before.role
+        self.visits.end(device.id, because, only_sockets=only_sockets, but=but)
+        try:
+            await self.devices.save(now_ms=self._wall_ms())
+        except OSError:
+            self.devices.change(device.id, role=before.role, name=before.name)
+            self.visits.end(device.id, because, only_sockets=only_sockets, but=but)
+            raise
 
     # -- who asks ----------------------------------------------------------------------------------------------------
 
     def known(self, headers: Mapping[str, str], *, scheme: str) -> Admitted | None:
-        """Who sends these headers; None: nobody that is known. `scheme`: http or https."""
+        """The principal that these headers authenticate; None: unknown. `scheme`: http or https."""
         if self.is_open:
             return Admitted(who=LOCAL, by="local")
         authorization = headers.get("authorization")
@@ -202,8 +231,7 @@ class Access:
         device = self.devices.known(id, secret, now_ms=now_ms)
         if device is None:
             return None
-        if (write := self.devices.seen(id, now_ms=now_ms)) is not None:
-            asyncio.get_running_loop().run_in_executor(None, write)
+        self.devices.seen(id, now_ms=now_ms)
         is_secure = self.is_secure(scheme, headers.get("host", ""))
         renewed = self._cookies.header(id, secret, is_secure=is_secure) if is_old else None
         return Admitted(
@@ -211,13 +239,13 @@ class Access:
         )
 
     def why_unknown(self, headers: Mapping[str, str], *, scheme: str) -> tuple[str, str]:
-        """A word and a sentence for who is not known: a device that was removed is told so."""
+        """Code and sentence of a failed authentication; distinguishes a removed device."""
         if "authorization" in headers:
             return "key", "This key is not known to the server."
         read = self._read_cookie(headers, scheme)
         if read is None:
             return "unpaired", "This device is not paired with the server."
-        return "removed", self._removed.get(read[0], "This device is not paired any more.")
+        return "removed", self._removed.get(read[0], "This device is no longer paired.")
 
     def is_secure(self, scheme: str, host: str) -> bool:
         """Whether the browser at the other end has TLS."""
@@ -228,7 +256,7 @@ class Access:
         return self._cookies.header(device.id, secret, is_secure=self.is_secure(scheme, host))
 
     def no_cookie(self, *, scheme: str, host: str) -> str:
-        """The Set-Cookie that takes it away."""
+        """The Set-Cookie that deletes it."""
         return self._cookies.gone(is_secure=self.is_secure(scheme, host))
 
     def _read_cookie(self, headers: Mapping[str, str], scheme: str) -> tuple[str, str, bool] | None:
@@ -248,9 +276,19 @@ class Access:
     def stop(self) -> None:
         """When the server ends."""
         if not self.is_open:
-            self.devices.seen_on_disk(now_ms=self._wall_ms())()
-        if self._folder is not None:
-            pending_invitations.retire(self._folder)
+            self.devices.save_seen(now_ms=self._wall_ms())
+        if self._folder is None:
+            return
+        retire = partial(pending_invitations.retire, self._folder)
+        if self._storage is None:
+            retire()
+        else:
+            self._storage.submit(retire)
+
+
+async def _to_its_end(work: Coroutine[Any, Any, T]) -> T:
+    """Return the result of `work`, which continues if the caller is cancelled."""
+    return await asyncio.shield(asyncio.create_task(work))
 
 
 def _peer(address: str) -> str:

@@ -1,4 +1,4 @@
-"""What each device has under way now: requests and sockets, so that they end when it may not come any more."""
+"""The open requests and sockets of each device, to cancel them when its access ends."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from dataclasses import dataclass
 
 
 @dataclass(slots=True, eq=False)
-class Visit:
-    """One request or socket under way."""
+class ActiveConnection:
+    """One open request or socket."""
 
     task: asyncio.Task[object]
     is_socket: bool
-    ended_because: str | None = None  # set: it was ended from here, and not by its own program
+    ended_because: str | None = None  # set if it was cancelled from here
 
 
-class Visits:
-    """All that is under way."""
+class ActiveConnections:
+    """The open requests and sockets of all devices."""
 
     def __init__(self) -> None:
-        self._under_way: dict[str, set[Visit]] = {}
+        self._under_way: dict[str, set[ActiveConnection]] = {}
 
     @contextmanager
-    def of(self, device: str, *, is_socket: bool) -> Iterator[Visit]:
-        """Notes the running task as a visit of this device."""
+    def of(self, device: str, *, is_socket: bool) -> Iterator[ActiveConnection]:
+        """Register the running task as a connection of this device."""
         task = asyncio.current_task()
         assert task is not None
-        visit = Visit(task=task, is_socket=is_socket)
+        visit = ActiveConnection(task=task, is_socket=is_socket)
         mine = self._under_way.setdefault(device, set())
         mine.add(visit)
         try:
@@ -39,7 +39,7 @@ class Visits:
                 del self._under_way[device]
 
     def end(self, device: str, because: str, *, only_sockets: bool = False, but: object = None) -> int:
-        """Ends what the device has under way, without waiting for it; how many. `but`: a task that goes on."""
+        """Cancel the device's requests and sockets without waiting; return their number. `but`: a task to keep."""
         ended = [
             visit
             for visit in self._under_way.get(device, set())
@@ -51,5 +51,5 @@ class Visits:
         return len(ended)
 
     def sockets(self, device: str) -> int:
-        """How many sockets it has open."""
+        """The number of open sockets."""
         return sum(1 for visit in self._under_way.get(device, ()) if visit.is_socket)

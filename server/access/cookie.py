@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from itsdangerous import BadSignature, TimestampSigner
 
-LASTS_S = 90 * 86_400  # as long as a device is remembered; given anew long before
+LASTS_S = 90 * 86_400  # as long as a device is remembered; renewed long before
 RENEWED_AFTER_S = 86_400
 _LONGEST = 400  # letters; ours has about 110
 
@@ -16,7 +16,7 @@ class Cookies:
     """Signs and reads cookies of one server."""
 
     def __init__(self, key: str, server: str, *, wall_ms: Callable[[], int]) -> None:
-        """`server`: a short sign that tells two servers on one host apart, for cookies know no ports."""
+        """`server`: a short id that distinguishes two servers on one host, because cookies ignore ports."""
 
         class Signer(TimestampSigner):
             def get_timestamp(self) -> int:
@@ -27,7 +27,7 @@ class Cookies:
         self._wall_ms = wall_ms
 
     def name(self, is_secure: bool) -> str:
-        """Under TLS a name that browsers take only with Secure, Path=/ and no Domain."""
+        """The cookie's name; with TLS it has a prefix that requires Secure, Path=/ and no Domain."""
         return f"{'__Host-' if is_secure else ''}catgraph-{self._server}"
 
     def header(self, id: str, secret: str, *, is_secure: bool) -> str:
@@ -37,12 +37,12 @@ class Cookies:
         return f"{self.name(is_secure)}={value}; {kept}{'; Secure' if is_secure else ''}"
 
     def gone(self, *, is_secure: bool) -> str:
-        """The value of Set-Cookie that takes it away."""
+        """The value of Set-Cookie that deletes it."""
         kept = "Path=/; Max-Age=0; HttpOnly; SameSite=Strict"
         return f"{self.name(is_secure)}=; {kept}{'; Secure' if is_secure else ''}"
 
     def read(self, header: str, *, is_secure: bool) -> tuple[str, str, bool] | None:
-        """Id, secret and whether it is time for a new one; None: none of ours, forged or too old."""
+        """Id, secret and whether the cookie is due for renewal; None: missing, forged or expired."""
         for part in header.split(";"):
             name, _, value = part.strip().partition("=")
             if name == self.name(is_secure) and len(value) <= _LONGEST:
@@ -51,8 +51,8 @@ class Cookies:
 
     def _unsigned(self, value: str) -> tuple[str, str, bool] | None:
         try:
-            told, given = self._signer.unsign(value, max_age=LASTS_S, return_timestamp=True)
-            id, _, secret = told.decode().partition(":")
+            token, given = self._signer.unsign(value, max_age=LASTS_S, return_timestamp=True)
+            id, _, secret = token.decode().partition(":")
         except (BadSignature, UnicodeDecodeError):
             return None
         return id, secret, self._wall_ms() / 1000 - given.timestamp() > RENEWED_AFTER_S

@@ -1,6 +1,6 @@
-"""The devices that were paired: name, role, when each was last seen, and the hash of its secret. Kept in one file.
+"""The paired devices: name, role, last visit and the hash of the secret. Stored in one file.
 
-The secret itself lies only in the cookie of the device; its 256 random bits need no slow hash.
+The secret itself is only in the device's cookie; 256 random bits need no slow hash.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ import hashlib
 import hmac
 import logging
 import secrets
-import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +19,13 @@ from server.access import secret_file
 from server.access.identity import Role
 from server.control import display_name
 from server.storage.set_aside import set_aside
+from server.storage.storage_thread import StorageThread
 
 log = logging.getLogger("catgraph.access")
 
 FILE = "devices.json"
-FORGOTTEN_AFTER_MS = 90 * 86_400_000  # a phone that did not come for a season pairs again
-MOST = 100  # the one not seen for longest goes
+FORGOTTEN_AFTER_MS = 90 * 86_400_000  # a phone unused for a season must be paired again
+MOST = 100  # the one with the oldest visit is dropped
 SEEN_EVERY_MS = 60_000  # how finely "last seen" is kept on the disk
 
 
@@ -41,18 +42,23 @@ class Device:
 
 
 class Devices:
-    """All of them. What changes who may come in is on the disk before it is answered."""
+    """All paired devices. A change of access is on the disk before it is answered.
 
-    def __init__(self, folder: Path | None) -> None:
-        """`folder` None: they last as long as this run. Raises OSError where the file cannot be read."""
+    A change counts in memory at once. The lists are written in the order in which they were made, so that none brings
+    back who was removed meanwhile.
+    """
+
+    def __init__(self, folder: Path | None, *, storage: StorageThread | None = None) -> None:
+        """`folder` None: they last as long as this run. `storage`: the thread that writes; None: the caller writes.
+
+        Raises OSError where the file cannot be read.
+        """
         self._path = None if folder is None else folder / FILE
+        self._storage = storage
         self._devices: dict[str, Device] = {}
-        self.server = secrets.token_hex(4)  # tells the cookies of two servers on one host apart
+        self.server = secrets.token_hex(4)  # distinguishes the cookies of two servers on one host
         self.signing_key = secrets.token_hex(32)
         self._saved_ms = 0
-        self._version = 0
-        self._written = 0
-        self._writing = threading.Lock()
         if self._path is not None:
             self._load(self._path)
 
@@ -64,7 +70,7 @@ class Devices:
         return self._devices.get(id)
 
     def known(self, id: str, secret: str, *, now_ms: int) -> Device | None:
-        """The device whose secret this is, if it was seen of late."""
+        """The device with this secret, if its last visit is recent."""
         device = self._devices.get(id)
         expected = device.secret_sha256 if device is not None else _hash("")
         is_right = hmac.compare_digest(expected, _hash(secret))
@@ -72,8 +78,8 @@ class Devices:
             return None
         return device
 
-    def add(self, name: str, role: Role, *, now_ms: int) -> tuple[Device, str]:
-        """A new device and its secret, which nobody is told but the device. Raises OSError: it is not paired then."""
+    async def add(self, name: str, role: Role, *, now_ms: int) -> tuple[Device, str]:
+        """Add a device; return it with its secret, which only the device gets. Raises OSError: not paired then."""
         secret = secrets.token_urlsafe(32)
         device = Device(
             id=secrets.token_hex(6),
@@ -86,48 +92,60 @@ class Devices:
         before = dict(self._devices)
         self._devices[device.id] = device
         self._drop_oldest(now_ms)
-        self._save_or(before, now_ms)
+        dropped = {id: one for id, one in before.items() if id not in self._devices}
+        try:
+            await self.save(now_ms=now_ms)
+        except OSError:
+            self._devices.pop(device.id, None)
+            self._devices |= dropped
+            raise
         return device, secret
 
-    def change(self, id: str, *, role: Role | None, name: str | None, now_ms: int) -> Device | None:
-        """The device with another role or name; None: there is none. Raises OSError: nothing changed then."""
+    def change(self, id: str, *, role: Role | None = None, name: str | None = None) -> Device | None:
+        """The device with another role or name, which `save` keeps; None: there is none."""
         device = self._devices.get(id)
         if device is None:
             return None
-        before = dict(self._devices)
-        changed = replace(device, role=role or device.role, name=name or device.name)
-        self._devices[id] = changed
-        self._save_or(before, now_ms)
+        changed = self._devices[id] = replace(device, role=role or device.role, name=name or device.name)
         return changed
 
-    def remove(self, id: str, *, now_ms: int) -> Device | None:
-        """It may not come in any more, whatever becomes of the file: `OSError` says that it would after a restart."""
-        device = self._devices.pop(id, None)
-        if device is not None:
-            self._save(now_ms)
-        return device
+    def remove(self, id: str) -> Device | None:
+        """Remove the device; `save` stores the change."""
+        return self._devices.pop(id, None)
 
-    def seen(self, id: str, *, now_ms: int) -> Callable[[], None] | None:
-        """It was here now. What is returned writes it to the disk, where it is time for that: in a thread, for no page
-        shall wait for the disk. A disk that is full ends nobody's session."""
+    async def save(self, *, now_ms: int) -> None:
+        """Returns once the disk has the list. Raises OSError: a restart brings back the one before."""
+        self._saved_ms = now_ms
+        write = partial(self._write, self._content())
+        if self._storage is None:
+            write()
+        else:
+            await self._storage.run(write)
+
+    def seen(self, id: str, *, now_ms: int) -> None:
+        """Record a visit. It is written once a minute, in the background; errors are logged only."""
         device = self._devices.get(id)
         if device is None:
-            return None
+            return
         self._devices[id] = replace(device, seen_ms=max(now_ms, device.seen_ms))
-        return None if now_ms - self._saved_ms < SEEN_EVERY_MS else self.seen_on_disk(now_ms=now_ms)
+        if now_ms - self._saved_ms >= SEEN_EVERY_MS:
+            self.save_seen(now_ms=now_ms)
 
-    def seen_on_disk(self, *, now_ms: int) -> Callable[[], None]:
-        """What writes when each was last seen."""
+    def save_seen(self, *, now_ms: int) -> None:
+        """Write the last visits in the background; a full disk ends no session."""
         self._saved_ms = now_ms
-        version, content = self._content()
+        content = self._content()
 
         def write() -> None:
             try:
-                self._write(version, content)
+                self._write(content)
             except OSError as why:
                 log.warning("when devices were last seen cannot be kept: %s", why)
 
-        return write
+        if self._storage is None:
+            write()
+        else:
+            self._storage.submit(write)
 
     def _own_name(self, name: str) -> str:
         taken = {one.name for one in self._devices.values()}
@@ -139,34 +157,19 @@ class Devices:
         kept.sort(key=lambda one: one.seen_ms)
         self._devices = {one.id: one for one in kept[-MOST:]}
 
-    def _save_or(self, before: dict[str, Device], now_ms: int) -> None:
-        try:
-            self._save(now_ms)
-        except OSError:
-            self._devices = before
-            raise
-
-    def _save(self, now_ms: int) -> None:
-        self._saved_ms = now_ms
-        self._write(*self._content())
-
-    def _content(self) -> tuple[int, Mapping[str, Any]]:
-        self._version += 1
+    def _content(self) -> Mapping[str, Any]:
         devices = [asdict(one) for one in self._devices.values()]
-        return self._version, {"server": self.server, "signing_key": self.signing_key, "devices": devices}
+        return {"server": self.server, "signing_key": self.signing_key, "devices": devices}
 
-    def _write(self, version: int, content: Mapping[str, Any]) -> None:
-        """Never an older list over a newer one: who was removed meanwhile would be in it again."""
-        with self._writing:
-            if self._path is not None and version > self._written:
-                secret_file.write(self._path, content)
-                self._written = version
+    def _write(self, content: Mapping[str, Any]) -> None:
+        if self._path is not None:
+            secret_file.write(self._path, content)
 
     def _load(self, path: Path) -> None:
         try:
             found = secret_file.read(path)
             if found is None:
-                self._save(0)
+                self._write(self._content())
                 return
             server, key = str(found["server"]), str(found["signing_key"])
             devices = [_device(one) for one in found["devices"]]
@@ -175,7 +178,7 @@ class Devices:
         except (ValueError, KeyError, TypeError) as why:
             aside = set_aside(path, "damaged")
             log.error("the list of paired devices cannot be read (%s): all pair anew; it is kept as %s", why, aside)
-            self._save(0)
+            self._write(self._content())
             return
         self.server, self.signing_key = server, key
         self._devices = {one.id: one for one in devices}

@@ -1,4 +1,4 @@
-"""Who asks: one device or program, and its role. Found once at the edge; everything inside is handed a Who."""
+"""The identity of a request: one device or program, and its role. Determined once, in the middleware."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ SCOPE_KEY = "catgraph.who"  # in the ASGI scope of a request that was let in
 
 
 class Connection(Protocol):
-    """A request or a socket, as far as it matters here: this file stands beneath the web."""
+    """The part of a request or socket that is used here, because this package is below the web."""
 
     scope: MutableMapping[str, Any]
 
 
 class Role(StrEnum):
-    """What a paired device may do: a viewer looks, an operator also acts."""
+    """The rights of a device: a viewer reads, an operator can also make changes."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"
@@ -37,17 +37,17 @@ class Principal:
         return self.role is Role.OPERATOR
 
 
-# Everybody, where the server listens on the loopback interface only.
+# Everybody, if the server listens on the loopback interface only.
 LOCAL = Principal(id="local", name="this machine", role=Role.OPERATOR)
 
 
 def principal_of(connection: Connection) -> Principal:
-    """Who sent this request or opened this socket. Raises KeyError where nobody looked: that is a mistake of ours, and
-    it must not be taken for a permission."""
+    """The principal of a request or socket. Raises KeyError if it was not authenticated: a programming error, which
+    must not count as a permission."""
     found: Principal = connection.scope[SCOPE_KEY]
     return found
 
 
 def is_known(connection: Connection) -> bool:
-    """Whether it is known who asks: everywhere, but for the few things that need nobody."""
+    """Whether the request was authenticated: always, except on the few public routes."""
     return SCOPE_KEY in connection.scope

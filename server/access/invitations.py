@@ -1,6 +1,6 @@
-"""The words that let one new device in: a token for the QR link and a PIN for the thumb, for ten minutes, once.
+"""Invitations: a token for the QR link and a PIN to type, valid for one device and ten minutes.
 
-Token and PIN of an invitation are one: the first device that uses either uses up both. Time is an argument.
+The first device that uses either token or PIN invalidates both. Time is an argument.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from server.access.identity import Role
 
 LASTS_S = 600.0
-MOST_STANDING = 6  # each PIN that stands makes a guess likelier; the oldest goes
+MOST_STANDING = 6  # each valid PIN makes a guess likelier; the oldest is dropped
 PIN_DIGITS = 6
-TOKEN_BYTES = 18  # 144 bits: nobody guesses it, so that it needs no waits as the PIN does
+TOKEN_BYTES = 18  # 144 bits cannot be guessed, so unlike the PIN it needs no throttle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +36,7 @@ def new_pin() -> str:
 
 
 class Invitations:
-    """Those that stand now. What was used, withdrawn or is too old lets nobody in."""
+    """The valid invitations: not used, withdrawn or expired."""
 
     def __init__(self) -> None:
         self._standing: list[Invitation] = []
@@ -61,9 +61,9 @@ class Invitations:
         return list(self._standing)
 
     def take(self, *, token: str | None = None, pin: str | None = None, now_s: float) -> Invitation | None:
-        """The invitation that the words belong to, which is used up by it; None: they belong to none.
+        """Use up and return the invitation with this token or PIN; None: there is none.
 
-        All are compared, each in a time that tells nothing of where they differ.
+        All are compared in constant time.
         """
         found = None
         for one in self.standing(now_s):
@@ -76,7 +76,7 @@ class Invitations:
         return found
 
     def withdraw(self, invitation: Invitation) -> None:
-        """It lets nobody in any more."""
+        """Withdraw the invitation."""
         self._standing = [one for one in self._standing if one is not invitation]
 
 

@@ -17,17 +17,17 @@ VARIABLES = {"CATGRAPH_KEY": Role.OPERATOR, "CATGRAPH_VIEWER_KEY": Role.VIEWER} 
 
 
 class BadKey(ValueError):
-    """A key that must not be used; `str()` is one sentence, which does not tell the key."""
+    """A key that must not be used; `str()` is one sentence without the key."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Keys:
-    """The hashes of the keys, so that no error report can tell one."""
+    """The hashes of the keys, so that no error report contains a key."""
 
     hashes: tuple[tuple[bytes, Role], ...] = ()
 
     def who(self, authorization: str) -> Principal | None:
-        """The program whose key this header holds. All are compared, in a time that tells nothing."""
+        """The program with the key in this header. All keys are compared in constant time."""
         scheme, _, key = authorization.partition(" ")
         if scheme.lower() != "bearer" or len(key) > _LONGEST:
             return None

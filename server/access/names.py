@@ -1,7 +1,7 @@
-"""By which names this server may be called, and from which pages it may be asked: Host and Origin, by equality.
+"""The allowed values of Host and Origin, compared by equality.
 
-A page of a stranger's whose name was made to point here (DNS rebinding) calls this server by that name, and a page of
-a stranger's that asks this server from afar (cross-site requests, sockets) says so in its Origin. Both are refused.
+This refuses DNS rebinding (a foreign name that resolves to this server is in Host) and cross-site requests and sockets
+(the foreign page is in Origin).
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class Names:
         return origin.lower() in {f"{scheme}://{host.lower()}", self._origins.get(host.lower(), "")} - {""}
 
     def is_behind_tls(self, host: str) -> bool:
-        """Whether a proxy that ends TLS stands before this server under that name."""
+        """Whether a proxy with TLS serves this name."""
         return self._origins.get(host.lower(), "").startswith("https://")
 
     def _is_own_address(self, text: str) -> bool:

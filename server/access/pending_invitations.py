@@ -54,7 +54,7 @@ def running(folder: Path) -> str | None:
 
 
 def lay(folder: Path, role: Role, *, wall_ms: int) -> Invitation:
-    """A new invitation, laid into the folder. Its end is reckoned by whoever takes it. Raises OSError."""
+    """Write a new invitation into the folder; its reader computes the expiry. Raises OSError."""
     made = Invitation(token=new_token(), pin=new_pin(), role=role, until_s=0.0)
     content = {"token": made.token, "pin": made.pin, "role": made.role, "made_ms": wall_ms}
     secret_file.write(folder / _FOLDER / f"{secrets.token_hex(8)}.json", content)

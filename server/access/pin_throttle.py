@@ -1,8 +1,8 @@
-"""How long one waits after wrong PINs: growing, by who guesses and for the whole server. Time is an argument.
+"""Growing waits after wrong PINs, per peer and for the whole server. Time is an argument.
 
-A PIN has a million values and stands for ten minutes. All peers together get MANY tries at once and then one in
+A PIN has a million values and is valid for ten minutes. All peers together get MANY tries at once and then one in
 LONGEST_ALL_S: some 30 in the life of a PIN, so that it is guessed once in thirty thousand lives. The address of a peer
-opens nothing: it only makes one who guesses wait sooner than the others.
+grants nothing: it only makes a guesser wait earlier than others.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ class _Tries:
     last_s: float = 0.0
 
 
-class Guesses:
-    """Counts wrong tries. A try is asked for and judged without a pause between, so that none slips by in parallel."""
+class PinThrottle:
+    """Counts wrong tries. A try is admitted and checked without an await between, so that parallel tries all count."""
 
     def __init__(self) -> None:
         self._all = _Tries()

@@ -1,7 +1,7 @@
-"""What each request needs, in one table: who is not named here needs the role that its method asks for.
+"""The required role of each request, in one table; other requests need the role of their method.
 
-Reading needs a viewer, everything else an operator; a new route is behind that without a line here. What needs nobody
-is named with its method, and the test of this file walks all routes of the app.
+Reading needs a viewer, everything else an operator, new routes included. Public routes are listed with their method,
+and a test goes through all routes of the app.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ _ANY_METHOD = "*"
 _SHELL = "manifest.webmanifest worker.js offline favicon.ico apple-touch-icon.png".split()
 
 RULES: tuple[tuple[str, str, Needs], ...] = (  # methods, pattern of the whole path, who; the first that fits holds
-    (_READS, r"/", Needs.NOBODY),  # the shell of the page: no word of the car is in it
+    (_READS, r"/", Needs.NOBODY),  # the page's shell, which contains no data of the car
     (_READS, r"/static/.+", Needs.NOBODY),
     (_READS, "/(" + "|".join(map(re.escape, _SHELL)) + ")", Needs.NOBODY),
     (_READS, r"/api/health", Needs.NOBODY),  # status and version, for who is not known
     ("POST", r"/api/pair", Needs.NOBODY),
-    ("POST", r"/api/ticket", Needs.VIEWER),  # for the socket, which asks for more itself
+    ("POST", r"/api/ticket", Needs.VIEWER),  # the socket has further checks
     (_ANY_METHOD, r"/api/devices(/.*)?", Needs.OPERATOR),  # who else is paired
     (_ANY_METHOD, r"/api/mail(/.*)?", Needs.OPERATOR),  # addresses of people, the login of the mail server
 )

@@ -14,9 +14,9 @@ _MOST_BYTES = 1024 * 1024
 
 
 def read(path: Path) -> Any:
-    """What stands in it; None where there is none. A mode that others could read by is taken back.
+    """The content of the file; None: there is none. A mode that others could read is corrected.
 
-    Raises OSError where it cannot be read, ValueError where it is no JSON or far too large.
+    Raises OSError if it cannot be read, ValueError if it is not JSON or far too large.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
@@ -32,7 +32,7 @@ def read(path: Path) -> Any:
 
 
 def write(path: Path, content: Any) -> None:
-    """Puts it there: after a loss of power either the old or the new stands in it. Raises OSError."""
+    """Write the file atomically: after a power loss it has the old or the new content. Raises OSError."""
     folder(path.parent)
     durable_file.write(path, orjson.dumps(content, option=orjson.OPT_INDENT_2), mode=0o600)
 

@@ -1,7 +1,7 @@
-"""One-shot tickets for the socket: asked for by a request that proves itself, used up by the next socket.
+"""One-shot tickets for the socket: issued to an authenticated request, used up by the next socket.
 
-A browser opens a socket to anybody's server from anybody's page, and sends the cookies along; a ticket can only be
-read by a page of this server. Time is an argument.
+A browser opens sockets from any page to any server and sends the cookies; only a page of this server can read a
+ticket. Time is an argument.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ def _slow_downs(run: Rehearsed) -> list[dict[str, Any]]:
             "countdown_s": _number(one.countdown_s),
             "at_s": _number(one.at_s),
         }
-        for one in run.slowed
+        for one in run.simulated_orders
     ]
 
 
@@ -165,7 +165,7 @@ def episode_json(episode: Episode) -> dict[str, Any]:
         "trip_text": episode.trip_text,
         "worst": _finding(episode.worst),
         "causes": list(episode.causes),
-        "announcements": [{"at_s": _number(s.at_s), "change": s.change, "text": s.text} for s in episode.said],
+        "announcements": [{"at_s": _number(s.at_s), "change": s.change, "text": s.text} for s in episode.announcements],
         "suppressed": [[_number(from_s), _number(to_s)] for from_s, to_s in episode.suppressed],
     }
 

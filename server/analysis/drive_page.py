@@ -1,5 +1,5 @@
-"""One drive as one page that works offline: the page of `catgraph check`, with what the recording says was told and
-done, and the settings in force."""
+"""One drive as one page that works offline: the page of `catgraph check`, with the recorded log and
+the settings in force."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from server.analysis.page import page
-from server.analysis.recorded_events import told_by
+from server.analysis.recorded_log import read_recorded_log
 from server.analysis.rehearse import rehearse
 from server.analysis.report import Report
 from server.recording.export.outcome import Outcome
@@ -20,19 +20,19 @@ def write_drive_page(
 ) -> Outcome:
     """Writes the page; `name` is what it calls the drive. Raises RecordingUnreadable, AssetsMissing, OSError.
 
-    Where the recording is ours, the alarms are those that were told while the car drove; the checks beside the curves
-    are judged again by the settings that were in force when it began.
+    Where the recording is ours, the alarms are those that were announced during the drive; the checks beside the curves
+    are judged again.
     """
     length_s = max(recording.duration_s, 1e-9)
-    told = told_by(recording)
+    log = read_recorded_log(recording)
     run = rehearse(
         recording,
         with_traces=True,
         on_progress=lambda at_s: progress(min(1.0, at_s / length_s)),
     )
-    if told is not None:
-        run = replace(run, episodes=told.episodes, load=told.load, titles={**told.titles, **run.titles})
-    path.write_text(page(Report(files=[name], recording=recording, run=run, told=told)), encoding="utf-8")
+    if log is not None:
+        run = replace(run, episodes=log.episodes, load=log.load, titles={**log.titles, **run.titles})
+    path.write_text(page(Report(files=[name], recording=recording, run=run, recorded_log=log)), encoding="utf-8")
     notes = [f"{sentence}." for sentence in run.damage]
     notes += [
         f"{count} messages on {topic} could not be decoded: {recording.why_rejected.get(topic, 'not JSON')}."

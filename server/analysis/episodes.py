@@ -11,7 +11,7 @@ from monitor.check import Finding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Said:
+class Announcement:
     """One announcement to the operator."""
 
     at_s: float
@@ -33,7 +33,7 @@ class Episode:
     worst: Finding | None  # furthest beyond its limit, where it measures against one
     causes: tuple[str, ...] = ()
     advice: str = ""
-    said: tuple[Said, ...] = ()
+    announcements: tuple[Announcement, ...] = ()
     suppressed: tuple[tuple[float, float], ...] = ()  # from, to: explained by another alarm meanwhile
 
     @property
@@ -71,7 +71,7 @@ class Diary:
 
     def _note(self, transition: Transition, alarm: Alarm) -> None:
         alarm_id, at_s = transition.alarm_id, transition.at_s
-        said = Said(at_s=at_s, text=transition.text, change=transition.change)
+        announcement = Announcement(at_s=at_s, text=transition.text, change=transition.change)
         episode = self._open.get(alarm_id)
         match transition.change:
             case "raised":
@@ -86,7 +86,7 @@ class Diary:
                     worst=alarm.worst,
                     causes=() if alarm.trip is None else alarm.trip.causes,
                     advice=alarm.spec.advice,
-                    said=(said,),
+                    announcements=(announcement,),
                 )
             case "cleared" if episode is not None:
                 done = self._with_worst(self._open.pop(alarm_id), alarm, at_s)
@@ -98,7 +98,9 @@ class Diary:
             case _ if episode is not None and transition.announces:
                 causes = () if alarm.trip is None else alarm.trip.causes
                 self._open[alarm_id] = replace(
-                    episode, said=(*episode.said, said), causes=tuple(dict.fromkeys((*episode.causes, *causes)))
+                    episode,
+                    announcements=(*episode.announcements, announcement),
+                    causes=tuple(dict.fromkeys((*episode.causes, *causes))),
                 )
 
     def _with_worst(self, episode: Episode, alarm: Alarm, at_s: float) -> Episode:

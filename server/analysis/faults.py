@@ -15,7 +15,7 @@ FROZEN_FOUND_AFTER_S = 2.0
 BRIDGE_SILENT_S = 1.4  # and so long until it no longer counts as answering
 
 _LOST = {
-    "freeze": "The bridge stopped answering (an injected fault).",
+    "freeze": "The bridge stopped answering (injected fault).",
     "kill": "The bridge closed the connection (an injected fault).",
 }
 

@@ -65,10 +65,10 @@ def _facts(report: Report) -> dict[str, Any]:
         "name": ", ".join(report_text.printable(_base(file), 80) for file in report.files),
         "files": report.files,
         "report": report,
-        "told": report.told,
+        "recorded_log": report.recorded_log,
         "brand": "catgraph check"
-        if report.told is None
-        else f"catgraph {'incident' if report.told.clip_of else 'drive'}",
+        if report.recorded_log is None
+        else f"catgraph {'incident' if report.recorded_log.clip_of else 'drive'}",
         "run": run,
         "recording": recording,
         "recorded": report.recorded,
@@ -112,7 +112,7 @@ def _bar(episode: Episode) -> dict[str, Any]:
         "from": round(episode.raised_s, 3),
         "to": round(episode.until_s, 3),
         "open": episode.cleared_s is None,
-        "said": [round(said.at_s, 3) for said in episode.said],
+        "said": [round(said.at_s, 3) for said in episode.announcements],
         "hidden": [[round(from_s, 3), round(to_s, 3)] for from_s, to_s in episode.suppressed],
     }
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from monitor.signals import SIGNALS
 from server.analysis.traces import Measure, Series, Traces
 
 Ink = Literal["ink", "ink2", "order", "you"]
@@ -33,7 +34,7 @@ class Panel:
     curves: tuple[Curve, ...]
 
 
-PANELS = (
+_PANELS = (
     Panel(
         title="Speed",
         unit="m/s",
@@ -61,6 +62,16 @@ PANELS = (
     Panel(title="Steering", unit="%", digits=1, curves=(Curve(signal="steering", label="steering"),)),
     Panel(title="Heading", unit="°", digits=0, curves=(Curve(signal="heading", label="heading"),)),
     Panel(title="Diagnostics, worst level", unit="", digits=0, curves=(Curve(signal="diagnostics", label="level"),)),
+)
+_DRAWN = frozenset(curve.signal for panel in _PANELS for curve in panel.curves)
+# A signal whose last minute is kept for Home has a panel of its own where none above shows it.
+PANELS = (
+    *_PANELS,
+    *(
+        Panel(title=signal.label, unit=signal.unit, digits=2, curves=(Curve(signal=name, label=signal.label.lower()),))
+        for name, signal in SIGNALS.items()
+        if signal.trend and name not in _DRAWN
+    ),
 )
 
 

@@ -16,8 +16,7 @@ from server.analysis.alarm_load import Load, load_of
 from server.analysis.check_timelines import Coverage, Ribbon, Ribbons, Unchecked
 from server.analysis.episodes import Diary, Episode
 from server.analysis.faults import Faults, Laid
-from server.analysis.own_events import read_recorded_events
-from server.analysis.simulated_slowdown import Slowed, WouldSlow
+from server.analysis.simulated_slowdown import SimulatedOrder, SimulatedSlowDown
 from server.analysis.traces import Traces
 from server.judge.active_settings import ActiveSettings
 from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
@@ -27,6 +26,7 @@ from server.judge.reception_stats import Reception
 from server.judge.settings_override import SettingsOverride
 from server.judge.topics import Source
 from server.recording.delay import recorded_delay
+from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, RecordingUnreadable
 from server.simulator.scenarios import Planned
 
@@ -65,7 +65,7 @@ class Rehearsed:
     crashes: Sequence[Crash]
     faults: Sequence[Laid]
     traces: Traces | None
-    slowed: Sequence[Slowed] = ()  # orders that the rules would have given
+    simulated_orders: Sequence[SimulatedOrder] = ()  # orders that the rules would have given
     notes: Sequence[str] = field(default_factory=list)
     broke_off: str | None = None  # why the recording could not be read to its end
     damage: Sequence[str] = ()  # what within it could not be read
@@ -139,7 +139,7 @@ class _Rehearsal(Observer):
         self._ribbons = Ribbons()
         self._coverage = Coverage()
         self._traces = Traces() if with_traces else None
-        self._would_slow = WouldSlow(self._drive.epochs[0].tuning.limits.slow_down)
+        self._simulated = SimulatedSlowDown(self._drive.epochs[0].tuning.limits.slow_down)
         self._crashes: dict[str, Crash] = {}
         self._ticks = 0
         self._broke_off: str | None = None
@@ -191,7 +191,7 @@ class _Rehearsal(Observer):
             crashes=tuple(self._crashes.values()),
             faults=self._faults.laid,
             traces=self._traces,
-            slowed=self._would_slow.slowed,
+            simulated_orders=self._simulated.orders,
             notes=self.notes,
             broke_off=self._broke_off,
             damage=self._recording.damage,
@@ -216,7 +216,7 @@ class _Rehearsal(Observer):
     def ticked(self, run: OfflineRun, now_s: float) -> None:
         """Draws the curves of the checks, and once a second takes a sample of what each of them finds."""
         monitor = run.run_state.monitor
-        self._would_slow.look(monitor.alarms, now_s)
+        self._simulated.judged(monitor.alarms, now_s)
         if monitor.crashes:
             self._crashes |= {name: crash for name, crash in monitor.crashes.items() if name not in self._crashes}
         if self._traces is not None:

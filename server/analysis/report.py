@@ -10,7 +10,7 @@ from monitor import catalog
 from monitor.alarm_spec import Priority
 from monitor.signals import SIGNALS
 from server.analysis.compare import Change, compare
-from server.analysis.recorded_events import Told
+from server.analysis.recorded_log import RecordedLog
 from server.analysis.rehearse import Rehearsed
 from server.judge.settings_override import SettingsOverride
 from server.recording.read.read import Recording
@@ -45,7 +45,7 @@ class Report:
     run: Rehearsed
     before: Rehearsed | None = None  # with the first settings of two, or without the injected faults
     open_s: float = 0.0  # what opening the files took
-    told: Told | None = None  # what the recording says was told and done: of a drive's own page
+    recorded_log: RecordedLog | None = None  # of the page of a drive
 
     @property
     def changes(self) -> list[Change]:
@@ -89,16 +89,16 @@ def why_nothing(run: Rehearsed, recording: Recording) -> str | None:
     if any(tally.received > tally.rejected for tally in run.reception.by_signal.values()):
         return None
     if not recording.count:
-        return "Nothing could be judged: the recording has no message."
+        return "Nothing could be evaluated: the recording has no message."
     if not run.sources:
         none_is = f"none of its {len(recording.topics)} topics is" if len(recording.topics) > 1 else "its topic is not"
         return (
-            f"Nothing could be judged: {none_is} one that catgraph knows. "
+            f"Nothing could be evaluated: {none_is} one that catgraph knows. "
             "Name the topics of the signals in a file for --settings."
         )
     if not any(tally.received for tally in run.reception.by_signal.values()):
-        return "Nothing could be judged: the topics that catgraph knows have no message here."
-    return "Nothing could be judged: no message on a topic that catgraph knows could be read."
+        return "Nothing could be evaluated: the topics that catgraph knows have no message here."
+    return "Nothing could be evaluated: no message on a topic that catgraph knows could be read."
 
 
 def settings_of(run: Rehearsed) -> list[tuple[str, str, float, str]]:

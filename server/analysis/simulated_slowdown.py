@@ -11,7 +11,7 @@ from monitor.triggers import COUNTDOWN_S, Due, Triggers, is_any_on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Slowed:
+class SimulatedOrder:
     """One order that would have been given. Times are seconds since the beginning of the recording."""
 
     trigger: str
@@ -21,7 +21,7 @@ class Slowed:
     at_s: float
 
 
-class WouldSlow:
+class SimulatedSlowDown:
     """Follows the rules over one drive. A recorded car drives on as it did, so a rule whose order was given once is not
     due again until its fault has gone."""
 
@@ -30,13 +30,14 @@ class WouldSlow:
         self._is_on = is_any_on(limits)
         self._triggers = Triggers()
         self._counting: tuple[Due, float] | None = None
-        self.slowed: list[Slowed] = []
+        self.orders: list[SimulatedOrder] = []
 
-    def look(self, alarms: Mapping[str, Alarm], now_s: float) -> None:
+    def judged(self, alarms: Mapping[str, Alarm], now_s: float) -> None:
         """Call with each tick, after the alarms were judged."""
         if not self._is_on:
             return
-        due = self._triggers.look(alarms, self._limits, now_s)
+        counts = None if self._counting is None else self._counting[0].trigger.id
+        due = self._triggers.look(alarms, self._limits, now_s, counting=counts)
         if self._counting is None:
             self._counting = (due, now_s) if due is not None else None
             return
@@ -46,8 +47,8 @@ class WouldSlow:
         elif now_s - began_s >= COUNTDOWN_S:
             self._counting = None
             self._triggers.veto(counting.trigger.id)
-            self.slowed.append(
-                Slowed(
+            self.orders.append(
+                SimulatedOrder(
                     trigger=counting.trigger.id,
                     title=counting.trigger.title,
                     text=counting.text,

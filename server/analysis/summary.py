@@ -32,16 +32,16 @@ def _head(report: Report) -> Iterator[str]:
         f"{counted(recording.count, 'message')} on {counted(len(recording.topics), 'topic')}"
     )
     if run.messages and (run.from_s > 0.05 or run.to_s < recording.duration_s - 0.05):
-        yield f"  Judged from {clock(run.from_s)} to {clock(run.to_s)}: {counted(run.messages, 'message')}"
+        yield f"  Evaluated from {clock(run.from_s)} to {clock(run.to_s)}: {counted(run.messages, 'message')}"
     settings = report.settings()
     by = f"{printable(name_of(run.override))}" + (f": {len(settings)} of them changed" if settings else "")
-    yield f"  Taken for: {run.tuning.profile.title}. Settings: {by}"
+    yield f"  Vehicle profile: {run.tuning.profile.title}. Settings: {by}"
     for _, label, value, unit in settings:
         yield f"    {label} {value:g} {unit}".rstrip()
     for laid in run.faults:
         yield f"  Injected: {laid.name} from {clock(laid.from_s)} to {clock(laid.to_s)}, {_touched(laid.touched)}"
     if report.took_s > 0 and run.judged_s > 0:
-        yield f"  Judged in {report.took_s:.2f} s: {report.times_real:.0f} × real time"
+        yield f"  Evaluated in {report.took_s:.2f} s: {report.times_real:.0f} × real time"
 
 
 def _touched(count: int) -> str:
@@ -82,7 +82,7 @@ def _signal(row: SignalRow, width: int) -> str:
 def _alarms(report: Report) -> Iterator[str]:
     run = report.run
     if not run.messages:
-        yield "No alarms, for there is no message in it to judge."
+        yield "No alarms: there is no message to evaluate."
         return
     if not run.episodes:
         yield "No alarms"
@@ -100,16 +100,16 @@ def _episode(episode: Episode) -> Iterator[str]:
     yield f"{'':23}{printable(episode.trip_text)}"
     if episode.worst_text:
         yield f"{'':23}worst: {printable(episode.worst_text)}"
-    for said in episode.said[1:4]:
+    for said in episode.announcements[1:4]:
         yield f"{'':23}again at {clock(said.at_s)}: {printable(said.text)}"
-    if len(episode.said) > 4:
-        yield f"{'':23}and {len(episode.said) - 4} times more"
+    if len(episode.announcements) > 4:
+        yield f"{'':23}and {len(episode.announcements) - 4} times more"
 
 
 def _slowed(report: Report) -> Iterator[str]:
-    if report.run.slowed:
-        yield "Would have slowed the car, armed and without a veto"
-        for one in report.run.slowed:
+    if report.run.simulated_orders:
+        yield "Would have slowed the car if armed and without a veto"
+        for one in report.run.simulated_orders:
             yield f"  {clock(one.at_s):>9}  {printable(one.title)}, after a count-down from {clock(one.countdown_s)}"
             yield f"{'':23}{printable(one.text)}"
 
@@ -117,7 +117,7 @@ def _slowed(report: Report) -> Iterator[str]:
 def _not_checked(report: Report) -> Iterator[str]:
     rows = not_checked(report.run)
     if rows:
-        yield "Never checked, so nothing is said about it"
+        yield "Never checked, state unknown"
         for why, labels in rows:
             yield f"  {', '.join(printable(label) for label in labels)}: {printable(why)}"
 
@@ -127,8 +127,8 @@ def _load(report: Report) -> Iterator[str]:
         return
     load = report.run.load
     words = {
-        "bearable": f"bearable (at most {BEARABLE_IN_10_MIN:g} in 10 min)",
-        "demanding": f"demanding (bearable is {BEARABLE_IN_10_MIN:g} in 10 min)",
+        "bearable": f"acceptable (at most {BEARABLE_IN_10_MIN:g} in 10 min)",
+        "demanding": f"demanding (acceptable is {BEARABLE_IN_10_MIN:g} in 10 min)",
         "flood": f"a flood (more than {FLOOD_IN_10_MIN} in 10 min)",
     }
     yield (
@@ -144,7 +144,7 @@ def _comparison(report: Report) -> Iterator[str]:
     before, run = report.before, report.run
     assert before is not None
     if run.faults:
-        yield "Compared with the recording as it is"
+        yield "Compared with the unchanged recording"
     else:
         yield f"{printable(name_of(before.override))} → {printable(name_of(run.override))}"
         for label, old, new, unit in differences(before, run):
@@ -169,6 +169,6 @@ def _span(episode: Episode) -> str:
 
 def _notes(report: Report) -> Iterator[str]:
     if report.run.broke_off is not None:
-        yield f"Broken off at {clock(report.run.to_s)}: {printable(report.run.broke_off)}"
+        yield f"Aborted at {clock(report.run.to_s)}: {printable(report.run.broke_off)}"
     for note in report.run.notes:
         yield f"Note: {printable(note)}"

@@ -38,7 +38,7 @@ def read_override(path: Path) -> SettingsOverride:
     profile = body.get("profile", AUTO)
     known = (AUTO, *profiles.load())
     if profile not in known:
-        wrong.append(f"{path}: profile: there is {_listed(known)}, not {_shown(profile)}.")
+        wrong.append(f"{path}: profile: known are {_listed(known)}, not {_shown(profile)}.")
     if wrong:
         raise BadSettingsFile(*wrong)
     return SettingsOverride(name=path.name, values=values, topics=topics, profile=str(profile))
@@ -71,7 +71,7 @@ def _values(path: Path, tables: Mapping[str, Any], wrong: list[str]) -> dict[str
     values: dict[str, float] = {}
     for group, table in tables.items():
         if group not in groups:
-            wrong.append(f"{path}: [{_shown(group)}]: there is no such group of settings{_guess(group, groups)}.")
+            wrong.append(f"{path}: [{_shown(group)}]: unknown group of settings{_guess(group, groups)}.")
             continue
         if not isinstance(table, dict):
             wrong.append(f"{path}: {group}: this is a group of settings: write [{group}], and its settings below.")
@@ -79,7 +79,7 @@ def _values(path: Path, tables: Mapping[str, Any], wrong: list[str]) -> dict[str
         for threshold, value in table.items():
             name = f"{group}.{threshold}"
             if name not in schema:
-                wrong.append(f"{path}: {_shown(name)}: there is no such setting{_guess(name, schema)}.")
+                wrong.append(f"{path}: {_shown(name)}: unknown setting{_guess(name, schema)}.")
                 continue
             try:
                 change(Settings(), GENERIC, values={name: value})
@@ -97,9 +97,9 @@ def _topics(path: Path, given: Any, wrong: list[str]) -> dict[str, str]:
     topics: dict[str, str] = {}
     for signal, topic in given.items():
         if signal not in SIGNALS:
-            wrong.append(f"{path}: topics.{_shown(signal)}: there is no such signal{_guess(signal, SIGNALS)}.")
+            wrong.append(f"{path}: topics.{_shown(signal)}: unknown signal{_guess(signal, SIGNALS)}.")
         elif not isinstance(topic, str) or not 1 <= len(topic) <= 300:
-            wrong.append(f"{path}: topics.{signal}: a topic is given as text.")
+            wrong.append(f"{path}: topics.{signal}: a topic must be text.")
         else:
             topics[signal] = topic
     return topics

@@ -19,6 +19,7 @@ from server.web.middleware.headers import SecurityHeaders
 from server.web.middleware.throttle import Throttle
 from server.web.routes import (
     alarms,
+    commands,
     devices,
     docs,
     exports,
@@ -30,7 +31,6 @@ from server.web.routes import (
     pages,
     recordings,
     settings,
-    slow_down,
     state,
     third_party,
 )
@@ -40,10 +40,10 @@ ROUTERS = tuple(
     module.router
     for module in (
         state,
+        commands,
         alarms,
         settings,
         page_socket,
-        slow_down,
         devices,
         log,
         exports,
@@ -76,8 +76,7 @@ def create_app(
         version=running.version,
         description="Operator control unit for a test vehicle: its state, its alarms, its connection.",
         lifespan=lambda _: lifespan(running, journal, storage),
-        docs_url=None,  # FastAPI's own page loads its scripts from the internet
-        redoc_url=None,
+        openapi_url=None,  # FastAPI's own makes it on the event loop, and its page loads scripts from the internet
     )
     app.state.services = running
     app.state.strict_transport = config.tls is not None and config.tls.mode == "files"

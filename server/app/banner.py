@@ -1,4 +1,4 @@
-"""What the terminal says when a server starts: where it is, how a phone gets in, and how to know that it is this one.
+"""The start-up text of the terminal: addresses, how to pair a phone, and the fingerprint of the authority.
 
 The first line is for scripts too: `catgraph listens on URL`.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import segno
 
 from server.app.config import Config
-from server.tls.setup import Whereabouts
+from server.tls.setup import SetupAddresses
 
 _WHITE_ON_BLACK, _AS_BEFORE = "\x1b[97;40m", "\x1b[0m"  # the blocks are the light modules
 WITHOUT_HTTPS = (
@@ -32,7 +32,7 @@ class Pairing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Announcement:
-    """All there is to say of one server."""
+    """The contents of the start-up text."""
 
     config: Config
     url: str  # of the page, with a slash at its end
@@ -50,16 +50,16 @@ def lines(said: Announcement, *, draws: bool) -> Iterator[str]:
     config = said.config
     yield f"catgraph listens on {said.url}"
     for vehicle in config.vehicles:
-        yield f"  {vehicle.name}: {vehicle.address or 'waits for an address from the page'}"
+        yield f"  {vehicle.name}: {vehicle.address or 'no address yet, set on the page'}"
     if config.is_open:
-        yield "  Only this machine can open it; for phones start it with --host 0.0.0.0."
+        yield "  Only this machine can open it; for phones use --host 0.0.0.0."
     if said.others and not config.is_open:
         yield f"  Also: {'  '.join(said.others)}"
     if said.warning:
-        yield f"  Mind: {said.warning}."
+        yield f"  Warning: {said.warning}."
     if said.left_out:
         shown = ", ".join(said.left_out)
-        yield f"  Not covered by the server's own certificate, for they are not private: {shown} (use --tls CERT KEY)."
+        yield f"  Not covered by the server's own certificate (not private): {shown} (use --tls CERT KEY)."
     if not config.is_tls and not config.is_open:
         yield from (f"  {line}" for line in WITHOUT_HTTPS)
     if said.setup is not None and said.fingerprint is not None:
@@ -71,7 +71,8 @@ def lines(said: Announcement, *, draws: bool) -> Iterator[str]:
         yield from (f"       {line}" for line in fingerprint_lines(said.fingerprint))
         yield ""
     yield from _pairing(said, draws=draws)
-    yield "  Ctrl-C ends it."
+    yield from (f"  {line}" for line in config.next_steps)
+    yield "  Press Ctrl-C to stop."
 
 
 def _pairing(said: Announcement, *, draws: bool) -> Iterator[str]:
@@ -103,7 +104,7 @@ def fingerprint_lines(fingerprint: str) -> list[str]:
     return [" ".join(pairs[i : i + 8]) for i in range(0, len(pairs), 8)]
 
 
-def addresses(where: Whereabouts) -> tuple[str, tuple[str, ...]]:
+def addresses(where: SetupAddresses) -> tuple[str, tuple[str, ...]]:
     """The page's likeliest address, and the others that another device may try."""
     first = where.secure()
     others = [where.secure(host) for host in where.hosts if not _is_of_this_machine(host)]

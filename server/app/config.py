@@ -37,15 +37,16 @@ class Config:
     maps: tuple[Path, ...] = ()  # MBTiles under the map, the last on top
     site_image: Path | None = None  # above them; its corners stand in a .toml beside it
     map_upstream: MapUpstream | None = None  # below the maps; None: no tile is ever fetched
-    worker: bool = True  # phones keep the page's shell; False: what they kept goes at their next visit
+    worker: bool = True  # phones store the page's shell; False: they delete it at the next visit
     names: tuple[str, ...] = ()  # what else this server is called: hosts, or origins (https://…) of a proxy before it
     keys: Keys = field(default_factory=Keys)  # of programs, where devices are paired
     tls: Tls | None = None  # None: off on loopback, else auto
     limits: Limits = field(default_factory=Limits)
+    next_steps: tuple[str, ...] = ()  # printed at the start below the addresses, a line each
 
     @property
     def is_open(self) -> bool:
-        """Whether only programs of this machine can reach it: nobody pairs then."""
+        """Whether only programs of this machine can reach the server, which then needs no pairing."""
         return is_loopback(self.host)
 
     @property

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 
 from server.bus.journal import Journal
@@ -13,16 +14,23 @@ from server.recording.folder import RecordingsFolder
 from server.recording.recover import Recovered
 from server.recording.recovery import recover_left
 from server.storage.storage_thread import StorageThread
+from server.system import log_context
 from server.web.services import Services
 
 log = logging.getLogger("catgraph.app")
 
 
+STOPS_WITHIN_S = 30.0  # a slow disk is given time for what is not written yet; a disk that hangs is not waited for
+_AT_LEAST_S = 0.5  # for each part, also of a server that has no time left
+
+
 @asynccontextmanager
-async def lifespan(running: Services, journal: Journal, storage: StorageThread) -> AsyncIterator[None]:
+async def lifespan(
+    running: Services, journal: Journal, storage: StorageThread, *, stops_within_s: float = STOPS_WITHIN_S
+) -> AsyncIterator[None]:
     """From the start-up of a server to its shut-down; the journal is closed after all that writes to it.
 
-    A disk that hangs holds the shut-down: what waits for it is written first.
+    A part that does not stop in time, as behind a disk that hangs, is left, and the log tells what was not written.
     """
     recovering = await _start(running)
     try:
@@ -30,11 +38,7 @@ async def lifespan(running: Services, journal: Journal, storage: StorageThread) 
     finally:
         if recovering is not None:
             recovering.cancel()  # what it was at is done again at the next start
-        await _stop(running)
-        await asyncio.to_thread(_close, storage, journal)
-        running.ground.close()
-        if running.folder is not None:
-            running.folder.close()
+        await _stop(running, partial(asyncio.to_thread, _close, storage, journal), stops_within_s)
 
 
 def _close(storage: StorageThread, journal: Journal) -> None:
@@ -51,26 +55,41 @@ async def _start(running: Services) -> asyncio.Task[None] | None:
         await running.exports.start()
     if running.mailer is not None:
         await running.mailer.start()
-    for session in running.sessions.values():
-        await session.start()
+    for name, session in running.sessions.items():
+        with log_context.about(name if len(running.sessions) > 1 else ""):
+            await session.start()
     return recovering
 
 
-async def _stop(running: Services) -> None:
-    """Stop all parts: first what records and judges, then what works on recordings."""
-    await running.replays.close_all()
-    await asyncio.gather(*(session.stop() for session in running.sessions.values()))
-    if running.mailer is not None:
-        await running.mailer.stop()
-    if running.exports is not None:
-        await running.exports.stop()
-    if running.recordings is not None:
-        await running.recordings.stop()
+async def _stop(running: Services, close: Callable[[], Awaitable[None]], within_s: float) -> None:
+    """Stop all parts: first what records and judges, then what works on recordings, at last what writes."""
+    ends_s = running.now() + within_s
+
+    async def ends(part: str, stop: Callable[[], Awaitable[object]]) -> bool:
+        stopping = asyncio.ensure_future(stop())
+        done, _ = await asyncio.wait([stopping], timeout=max(_AT_LEAST_S, ends_s - running.now()))
+        if done:
+            stopping.result()
+            return True
+        jobs, events = running.storage.waiting, running.unwritten_events()
+        log.error("shutdown_incomplete part=%s unwritten_jobs=%d unwritten_events=%d", part, jobs, events)
+        return False
+
+    sessions = running.sessions
+    await ends("replays", running.replays.close_all)
+    await ends("sessions", lambda: asyncio.gather(*(session.stop() for session in sessions.values())))
+    for part, one in (("mail", running.mailer), ("exports", running.exports), ("recordings", running.recordings)):
+        if one is not None:
+            await ends(part, one.stop)
     running.access.stop()
+    await ends("storage", close)
+    running.ground.close()
+    if running.folder is not None:
+        running.folder.close()
 
 
 def _recover(running: Services) -> asyncio.Task[None] | None:
-    """Begins to make whole what the last run left, which must be looked for before anything is recorded anew."""
+    """Start to recover the files of the last run; they are listed before a new recording starts."""
     recordings = running.recordings
     if recordings is None:
         return None
@@ -81,11 +100,13 @@ def _recover(running: Services) -> asyncio.Task[None] | None:
         log.error("the recordings cannot be looked through: %s", why)
         return None
 
-    def told(path: Path, found: Recovered) -> None:
+    def on_recovered(path: Path, found: Recovered) -> None:
         if found.path is not None:
             recordings.add(found.path)
         for name, session in running.sessions.items():
             if folder.place(name, found.id).parent == path.parent:
                 session.recovered(found)
 
-    return asyncio.create_task(recover_left(left, told=told), name="recover recordings") if left else None
+    return (
+        asyncio.create_task(recover_left(left, on_recovered=on_recovered), name="recover recordings") if left else None
+    )

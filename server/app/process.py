@@ -7,8 +7,10 @@ import asyncio
 import contextlib
 import gc
 import logging
+import os
 import socket
 import sys
+import threading
 from collections.abc import Coroutine
 from dataclasses import replace
 from pathlib import Path
@@ -27,13 +29,15 @@ from server.storage.data_folder import DataFolderRefused
 from server.system.page_files import AssetsMissing
 from server.tls.authority import TlsRefused
 from server.tls.probe import Probe
-from server.tls.setup import Whereabouts
+from server.tls.setup import SetupAddresses
 from server.web.maps import map_options
 from server.web.maps.mbtiles import MapRefused
 from server.web.middleware import http_protocol
 from server.web.services import Services
 
 log = logging.getLogger("catgraph.serving")
+
+EXITS_WITHIN_S = 5.0  # once all parts have stopped, or were left (server/app/lifespan.py)
 
 
 class CannotServe(Exception):
@@ -45,14 +49,12 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
         "--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1: this machine only)"
     )
     parser.add_argument("--port", type=int, default=8000, help="port to listen on, 0 for a free one (default 8000)")
-    parser.add_argument(
-        "--data", type=Path, default=default_data(), help="folder for what is kept (default %(default)s)"
-    )
+    parser.add_argument("--data", type=Path, default=default_data(), help="data folder (default %(default)s)")
     parser.add_argument(
         "--name",
         action="append",
         default=[],
-        help="what else this server is called by those who open it: a host, or https://HOST of a proxy before it",
+        help="another name of this server: a host, or https://HOST of a proxy; can be repeated",
     )
     tls_options.add_arguments(parser)
     parser.add_argument(
@@ -61,27 +63,43 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE.mbtiles",
-        help="a map to draw under the car: raster MBTiles; several lie on each other, the last on top",
+        help="a map (raster MBTiles); can be repeated, the last is on top",
     )
     parser.add_argument(
         "--site-image",
         type=Path,
         metavar="FILE",
-        help="a picture of the site to draw above the maps; its corners stand in FILE.toml (docs/guide/map.md)",
+        help="an image of the site above the maps; FILE.toml has its corners (docs/guide/map.md)",
     )
     map_options.add_arguments(parser)
     parser.add_argument(
         "--no-worker",
         action="store_true",
-        help="phones keep nothing of the page; without the server they then show their browser's own error",
+        help="no service worker: phones store nothing of the page and show a browser error without the server",
     )
 
 
 def run(work: Coroutine[Any, Any, int]) -> int:
     """Runs the server's work to its end; 130 when interrupted."""
-    with uvloop_runner() as runner, contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
-        return runner.run(work)
-    return 130
+    with uvloop_runner() as runner:
+        code = 130
+        with contextlib.suppress(KeyboardInterrupt, asyncio.CancelledError):
+            code = runner.run(work)
+        _exit_soon(code)
+    return code
+
+
+def _exit_soon(code: int) -> None:
+    """Ends the process where a thread behind a disk that hangs would keep it: Python waits for all threads."""
+
+    def end() -> None:
+        log.error("exit_forced after_s=%g", EXITS_WITHIN_S)
+        logging.shutdown()
+        os._exit(code)
+
+    timer = threading.Timer(EXITS_WITHIN_S, end)
+    timer.daemon = True
+    timer.start()
 
 
 def uvloop_runner() -> asyncio.Runner:
@@ -147,7 +165,7 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 def _listen_to_explain(config: Config, secured: Secured | None, port: int) -> socket.socket | None:
-    """The plain port beside the page's. Where nobody chose it and it is taken, the page's own port does both."""
+    """The plain HTTP port. If the default is in use, the page's own port serves both."""
     if secured is None:
         return None
     asked = (config.tls or Tls()).setup_port
@@ -159,20 +177,20 @@ def _listen_to_explain(config: Config, secured: Secured | None, port: int) -> so
     except CannotServe as why:
         if asked is not None:
             raise
-        log.warning("%s The page that explains how a phone is set up is on the page's own port.", why)
+        log.warning("%s The instructions for phones are on the page's own port.", why)
         return None
 
 
 def _announce(
     config: Config, port: int, secured: Secured | None, explainer: socket.socket | None, running: Services
 ) -> None:
-    """Tells people (and, on the first line, scripts) where it is."""
+    """Print the addresses; the first line is for scripts too."""
     said = Announcement(config=config, url=_plain_url(config.host, port))
     if not config.is_open:
         said = replace(said, pairing=_pairing(running))
     if secured is not None:
         setup_port = explainer.getsockname()[1] if explainer is not None else port
-        where = Whereabouts(hosts=secured.hosts(), port=port, setup_port=setup_port)
+        where = SetupAddresses(hosts=secured.hosts(), port=port, setup_port=setup_port)
         url, others = addresses(where)
         said = replace(said, url=url, others=others)
         if secured.authority is not None:

@@ -20,12 +20,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--setup-port",
         type=int,
         metavar="PORT",
-        help="port of the plain page that explains how a phone comes to trust this server (default: after --port)",
+        help="port of the plain page with instructions for phones (default: after --port)",
     )
 
 
 def read(args: argparse.Namespace) -> Tls | None:
-    """What was asked for; None: nothing. Raises ValueError with one sentence."""
+    """The parsed options; None: none given. Raises ValueError with one sentence."""
     match args.tls, args.setup_port:
         case None, None:
             return None
@@ -34,7 +34,7 @@ def read(args: argparse.Namespace) -> Tls | None:
         case ["off"], None:
             return Tls(mode="off")
         case ["off"], _:
-            raise ValueError("--setup-port has no use with --tls off: there is nothing to set up.")
+            raise ValueError("--setup-port has no effect with --tls off.")
         case [cert, key], port:
             return Tls(mode="files", cert=Path(cert), key=Path(key), setup_port=port)
     raise ValueError("--tls takes auto, off, or two files: the certificate and its key.")

@@ -22,10 +22,10 @@ from server.access.names import is_in_container
 from server.app.config import Config, Tls
 from server.tls import server_certificate
 from server.tls.authority import Authority, TlsRefused
-from server.tls.certificate_renewal import GivenCertificate, OwnCertificate, keep
-from server.tls.host_addresses import Outside
+from server.tls.certificate_renewal import OwnCertificate, ProvidedCertificateRenewal, keep
+from server.tls.host_addresses import HostAddresses
 from server.tls.names import Names, addresses_now, host_now, names_of
-from server.tls.setup import Whereabouts, explaining, leading
+from server.tls.setup import SetupAddresses, explaining, leading
 from server.tls.tls_sniffer import Factory, TlsSniffer
 from server.web.middleware import http_protocol
 
@@ -37,7 +37,7 @@ def utc_now() -> dt.datetime:
 
 
 class Server(uvicorn.Server):
-    """uvicorn's server, which says when its application has started."""
+    """uvicorn's server with an event for the start of its application."""
 
     def __init__(self, config: uvicorn.Config) -> None:
         super().__init__(config)
@@ -52,10 +52,10 @@ class Server(uvicorn.Server):
 class Secured:
     """What HTTPS needs of one server that is to start."""
 
-    certificate: OwnCertificate | GivenCertificate
+    certificate: OwnCertificate | ProvidedCertificateRenewal
     tls: Tls
     host: str  # listened on
-    outside: Outside | None = None  # in a container
+    outside: HostAddresses | None = None  # in a container
     now: Callable[[], dt.datetime] = utc_now
 
     @property
@@ -84,7 +84,7 @@ class Secured:
 
     def hosts(self) -> tuple[str, ...]:
         """What may stand in the page's address, the likeliest first."""
-        if isinstance(self.certificate, GivenCertificate):
+        if isinstance(self.certificate, ProvidedCertificateRenewal):
             return tuple(name for name in self.certificate.given.names if "*" not in name) or (host_now(),)
         names = self.names
         heard = [ip for ip in names.ips if ip.version == 4 or ":" in self.host]
@@ -96,23 +96,25 @@ class Secured:
 def secure(
     config: Config, *, now: Callable[[], dt.datetime] = utc_now, in_container: bool | None = None
 ) -> Secured | None:
-    """The certificate that `config` asks for; None: plain HTTP. Raises TlsRefused."""
+    """The certificate that `config` requires; None: plain HTTP. Raises TlsRefused."""
     if not config.is_tls:
         return None
     tls = config.tls or Tls()
-    certificate: OwnCertificate | GivenCertificate
-    outside: Outside | None = None
+    certificate: OwnCertificate | ProvidedCertificateRenewal
+    outside: HostAddresses | None = None
     if tls.mode == "files":
         if tls.cert is None or tls.key is None:
             raise TlsRefused("A given certificate needs its key, and a key its certificate.")
-        certificate = GivenCertificate(tls.cert, tls.key, now=now())
+        certificate = ProvidedCertificateRenewal(tls.cert, tls.key, now=now())
     else:
         if config.data is None:
-            raise TlsRefused("An authority of our own needs a data folder to be kept in.")
+            raise TlsRefused("The server's own authority needs a data folder.")
         folder = config.data / "tls"
         if is_in_container() if in_container is None else in_container:
             before = server_certificate.load(folder)
-            outside = Outside(() if before is None else server_certificate.addresses_of(before), now=time.monotonic)
+            outside = HostAddresses(
+                () if before is None else server_certificate.addresses_of(before), now=time.monotonic
+            )
         names = functools.partial(_names_now, config.names, outside)
         certificate = OwnCertificate(folder, names, host=host_now(), now=now())
     return Secured(certificate=certificate, tls=tls, host=config.host, outside=outside, now=now)
@@ -189,14 +191,14 @@ class _Plain:
 
 
 def _plain_app(secured: Secured, port: int, setup_port: int) -> ASGIApp:
-    def where() -> Whereabouts:
-        return Whereabouts(hosts=secured.hosts(), port=port, setup_port=setup_port)
+    def where() -> SetupAddresses:
+        return SetupAddresses(hosts=secured.hosts(), port=port, setup_port=setup_port)
 
     return leading(where) if secured.authority is None else explaining(secured.authority, where, secured.typed)
 
 
 def _supervised(work: Callable[[], Coroutine[Any, Any, None]]) -> asyncio.Task[None]:
-    """Runs `work` until cancelled; where it fails, that is logged and it begins anew."""
+    """Run `work` until cancelled; a failure is logged and `work` is restarted."""
 
     async def again() -> None:
         while True:
@@ -204,7 +206,7 @@ def _supervised(work: Callable[[], Coroutine[Any, Any, None]]) -> asyncio.Task[N
                 await work()
                 return
             except Exception:
-                log.exception("a part of HTTPS failed and begins anew")
+                log.exception("a task of HTTPS failed and is restarted")
                 await asyncio.sleep(1.0)
 
     return asyncio.create_task(again())
@@ -215,7 +217,7 @@ async def _cancelled(task: asyncio.Task[None]) -> None:
     await asyncio.wait([task])
 
 
-def _names_now(given: tuple[str, ...], outside: Outside | None) -> Names:
+def _names_now(given: tuple[str, ...], outside: HostAddresses | None) -> Names:
     learnt = outside.addresses if outside is not None else ()
     return names_of(addresses_now(), host_now(), (*given, *learnt))
 

@@ -1,29 +1,27 @@
-"""The only thing between a session and the pages: newest frames by key, numbered events, requests with a deadline.
+"""The contract between sessions and pages: newest frames by key, numbered events, requests with a deadline.
 
-A session puts and serves, a page's handler reads and asks; neither knows the other. `LocalBus` is the one in this
-process; a broker can take its place.
+A session uses a `SessionBus`, a page's handler a `PageBus`; neither knows the other, nor whether they share a process.
 """
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
-from server.bus.journal import Journal
-from server.storage.storage_thread import StorageThread
-
-Handler = Callable[[Mapping[str, Any]], Awaitable[dict[str, Any]]]
+Handler = Callable[[Mapping[str, Any]], Awaitable[Mapping[str, Any]]]
 Watcher = Callable[[str], None]
-SHOWN_AFTER_S = 0.05  # an event that waits longer for the disk is shown without it
-FRAME_LIVES_S = 2.0  # an older frame is nobody's newest: the session behind it has stopped
+ALL = ""  # in the place of a vehicle, whose name is never empty: what is of all of them
+FRAME_LIVES_S = 2.0  # an older frame is outdated: its session has stopped
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """Bytes ready to send, made once for all pages."""
+    """Bytes ready to send, made once for all pages.
+
+    `put_s`: when it was put, by the clock of this process in seconds; where it came from another one, it was not put
+    earlier than that.
+    """
 
     number: int
     payload: str | bytes
@@ -31,165 +29,74 @@ class Frame:
 
 
 class NotServed(LookupError):
-    """Nobody answers for that vehicle, or not in time."""
+    """No session serves the vehicle, or it did not answer in time."""
 
 
-class LocalBus:
-    """One process's bus. `now` is a monotonic clock in seconds.
-
-    Pages get an event once the journal has it on the disk, so that no number is given twice after a crash; but no later
-    than `SHOWN_AFTER_S`, for a slow disk delays no alarm.
-    """
-
-    def __init__(self, journal: Journal, *, now: Callable[[], float], storage: StorageThread | None = None) -> None:
-        """`storage`: the thread that writes the journal; None: it is written at once by the caller."""
-        self._journal = journal
-        self._now = now
-        self._storage = storage
-        self._held: dict[str, int] = {}  # number of each vehicle's first event that no page gets yet
-        self._changed = asyncio.Event()  # something was released
-        self._frames: dict[tuple[str, str], Frame] = {}
-        self._handlers: dict[str, Handler] = {}
-        self._watchers: dict[str, dict[int, Watcher]] = {}
-        self._next_watcher = 0
-        self._wanted: dict[tuple[str, str], int] = {}
+class SessionBus(Protocol):
+    """What a session needs: to publish, to serve, and to know whether anybody looks."""
 
     def put(self, vehicle: str, kind: str, payload: str | bytes) -> None:
         """Replaces the newest frame of a kind and wakes those who watch the vehicle."""
-        previous = self._frames.get((vehicle, kind))
-        number = previous.number + 1 if previous else 1
-        self._frames[vehicle, kind] = Frame(number=number, payload=payload, put_s=self._now())
-        self._wake(vehicle, kind)
-
-    def newest(self, vehicle: str, kind: str) -> Frame | None:
-        frame = self._frames.get((vehicle, kind))
-        return frame if frame is not None and self._now() - frame.put_s <= FRAME_LIVES_S else None
 
     def append(self, vehicle: str, events: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-        """Numbers events and returns them with their numbers; wakes the watchers once pages may have them."""
-        if not events:
-            return []
-        if self._storage is None:
-            numbered = self._journal.append(vehicle, events)
-            self._wake(vehicle, "events")
-            return numbered
-        loop = asyncio.get_running_loop()
-        self._journal.on_saved = lambda: _call_soon(loop, self._release_saved)
-        numbered = self._journal.append(vehicle, events)
-        self._held.setdefault(vehicle, numbered[0]["n"])
-        loop.call_later(SHOWN_AFTER_S, self._release, vehicle, numbered[-1]["n"])
-        return numbered
-
-    def _release_saved(self) -> None:
-        for vehicle in tuple(self._held):
-            self._release(vehicle, self._journal.saved(vehicle))
-
-    def _release(self, vehicle: str, n: int) -> None:
-        """From now on pages get the events up to number `n`."""
-        held = self._held.get(vehicle)
-        if held is None or n < held:
-            return
-        if n >= self._journal.last(vehicle):
-            del self._held[vehicle]
-        else:
-            self._held[vehicle] = n + 1
-        self._changed.set()
-        self._changed = asyncio.Event()
-        self._wake(vehicle, "events")
-
-    def recent_events(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]] | None:
-        """The events after number `n` that pages may have, from memory; None where the disk must be read."""
-        events = self._journal.recent_after(vehicle, n, limit)
-        return None if events is None else self._released(vehicle, events)
-
-    async def events_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
-        """The events after number `n` that pages may have, in order, at most `limit`."""
-        recent = self.recent_events(vehicle, n, limit)
-        if recent is not None:
-            return recent
-        return self._released(vehicle, await self._read(lambda: self._journal.stored_after(vehicle, n, limit)))
-
-    async def find_events(self, vehicle: str, **filters: Any) -> list[dict[str, Any]]:
-        """As `Journal.find`: all there are, whether or not the disk has them yet."""
-        return await self._read(lambda: self._journal.find(vehicle, **filters))
-
-    async def _read(self, read: Callable[[], list[dict[str, Any]]]) -> list[dict[str, Any]]:
-        return read() if self._storage is None else await self._storage.run(read)
-
-    def _released(self, vehicle: str, events: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        held = self._held.get(vehicle)
-        return events if held is None else [event for event in events if event["n"] < held]
-
-    def last_event(self, vehicle: str) -> int:
-        """The number of the newest event that pages may have."""
-        held = self._held.get(vehicle)
-        return self._journal.last(vehicle) if held is None else held - 1
+        """Numbers events and returns them with their numbers `n`; pages are woken once they may have them."""
 
     def past_events(self, vehicle: str, **filters: Any) -> list[dict[str, Any]]:
         """As `Journal.find`; for the start of a session, as it waits for the disk."""
-        return self._journal.find(vehicle, **filters)
 
     def logged_alarms(self, vehicle: str) -> list[str]:
         """The ids of all alarms that any event was ever of; for the start of a session, as it waits for the disk."""
-        return self._journal.alarms(vehicle)
+
+    def last_event(self, vehicle: str) -> int:
+        """The number of the newest event that pages may have."""
 
     def save_events(self) -> str | None:
         """Tries again to keep what the disk refused; why events are not kept, as a sentence, or None."""
-        self._journal.save_soon()
-        return self._journal.trouble
 
     @property
     def log_complaint(self) -> str | None:
         """What was wrong with the log when the server started, and was put right."""
-        return self._journal.complaint
 
     def serve(self, vehicle: str, handler: Handler) -> None:
-        """From now on `handler` answers what is asked of the vehicle."""
-        self._handlers[vehicle] = handler
+        """Register `handler` for requests to the vehicle."""
+
+    def watched(self, vehicle: str) -> int:
+        """The number of viewers of the vehicle."""
+
+    def wanted(self, vehicle: str, kind: str) -> bool:
+        """Whether any viewer wants this kind of frame, which is built only then."""
+
+
+class PageBus(Protocol):
+    """What a page's handler needs: to read, to ask, and to say what it looks at."""
+
+    def newest(self, vehicle: str, kind: str) -> Frame | None:
+        """The newest frame of a kind; None where there is none that is younger than `FRAME_LIVES_S`."""
+
+    def put(self, vehicle: str, kind: str, payload: str | bytes) -> None:
+        """For `ALL` only: a frame that this process composes of what it has of all vehicles."""
+
+    def recent_events(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]] | None:
+        """The events after number `n` that pages may have, from memory; None where they must be read."""
+
+    async def events_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
+        """The events after number `n` that pages may have, in order, at most `limit`."""
+
+    async def find_events(self, vehicle: str, **filters: Any) -> list[dict[str, Any]]:
+        """As `Journal.find`: all there are, whether or not the disk has them yet."""
+
+    def last_event(self, vehicle: str) -> int:
+        """The number of the newest event that pages may have."""
 
     @property
     def vehicles(self) -> tuple[str, ...]:
-        return tuple(self._handlers)
+        """The vehicles that are served."""
 
-    async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> dict[str, Any]:
+    async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> Mapping[str, Any]:
         """The answer to a command, once the events that it caused may be shown. Raises NotServed."""
-        handler = self._handlers.get(vehicle)
-        if handler is None:
-            raise NotServed(f"no vehicle is named {vehicle}")
-        try:
-            async with asyncio.timeout(deadline_s):
-                answer = await handler(command)
-        except TimeoutError:
-            raise NotServed(f"{vehicle} did not answer within {deadline_s:g} s") from None
-        last = self._journal.last(vehicle)
-        while self._held.get(vehicle, last + 1) <= last:  # what is answered survives a crash; `SHOWN_AFTER_S` at most
-            await self._changed.wait()
-        return answer
 
     def watch(self, vehicle: str, watcher: Watcher) -> Callable[[], None]:
         """Calls `watcher(kind)` whenever something new is there; answers how to end that."""
-        self._next_watcher += 1
-        key = self._next_watcher
-        self._watchers.setdefault(vehicle, {})[key] = watcher
-        return lambda: self._watchers[vehicle].pop(key, None) and None
-
-    def watched(self, vehicle: str) -> int:
-        """How many look at the vehicle."""
-        return len(self._watchers.get(vehicle, ()))
 
     def want(self, vehicle: str, kind: str, change: int) -> None:
-        """One looker more (+1) or fewer (−1) for a kind of frame that is only made while somebody looks."""
-        self._wanted[vehicle, kind] = self._wanted.get((vehicle, kind), 0) + change
-
-    def wanted(self, vehicle: str, kind: str) -> bool:
-        return self._wanted.get((vehicle, kind), 0) > 0
-
-    def _wake(self, vehicle: str, kind: str) -> None:
-        for watcher in tuple(self._watchers.get(vehicle, {}).values()):
-            watcher(kind)
-
-
-def _call_soon(loop: asyncio.AbstractEventLoop, callback: Callable[[], None]) -> None:
-    """From another thread; a loop that was closed meanwhile needs nothing any more."""
-    with contextlib.suppress(RuntimeError):
-        loop.call_soon_threadsafe(callback)
+        """Add (+1) or remove (−1) a viewer of a frame kind that is built only while it is viewed."""

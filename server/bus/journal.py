@@ -1,7 +1,7 @@
-"""The numbered log of what happened to each vehicle, in SQLite, one row an event, never rewritten.
+"""The numbered event log of each vehicle, in SQLite: one row per event, append-only.
 
-Numbers count from 1 for each vehicle and go on over restarts, so that a page can ask for what it missed. A disk that
-takes nothing more stops nobody: events stay in memory, are kept as soon as it takes them, and `trouble` says so.
+Numbers start at 1 for each vehicle and continue over restarts, so that a page can request what it missed. If the disk
+fails, events stay in memory until they can be stored, and `trouble` reports it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from server.storage.storage_thread import StorageThread
 log = logging.getLogger("catgraph.journal")
 
 _PORTION = 100  # events a transaction: one that is refused has cost little
-RECENT = 200  # events of a vehicle that are told from memory: every page asks for each of them as it comes
+RECENT = 200  # recent events of a vehicle, served from memory, because every page requests each one
 MAX_UNSAVED = 10_000  # events of a vehicle that wait in memory for the disk; some 5 MB
 SLOW_DISK_S = 5.0  # a disk that takes longer for one portion is reported
 T = TypeVar("T")
@@ -72,7 +72,7 @@ class Journal:
             waiting = sum(len(events) for events in self._unsaved.values())
         in_memory = f" {_events(waiting)} in memory only." if waiting else ""
         lost = f" {_events(self._lost)} lost." if self._lost else ""
-        return f"The alarm log is not kept: {why}.{in_memory}{lost}"
+        return f"The alarm log is not stored: {why}.{in_memory}{lost}"
 
     def last(self, vehicle: str) -> int:
         """The number of the newest event, 0 where there is none."""
@@ -111,7 +111,7 @@ class Journal:
             self._thread.submit(self._save_scheduled)
 
     def _save_scheduled(self) -> None:
-        self._is_scheduled = False  # before it looks: what is appended from now on schedules the next
+        self._is_scheduled = False  # before reading: events appended from now on schedule the next run
         self.save()
         self.on_saved()
 
@@ -128,7 +128,7 @@ class Journal:
                             unsaved.popleft()
                     self._waits_since_s = self._now() if any(self._unsaved.values()) else None
                 if self._why is not None:
-                    log.warning("the alarm log is kept again")
+                    log.warning("alarm log stored again")
                     self._why = None
 
     def _next(self) -> list[tuple[str, dict[str, Any]]]:
@@ -186,9 +186,9 @@ class Journal:
     ) -> list[dict[str, Any]]:
         """Events newest first, numbered below `before`, of one alarm, one kind of change, one span of time.
 
-        `alarm` "" asks for those of no alarm.
+        `alarm` "" selects those without an alarm.
         """
-        conditions: list[str] = ["vehicle = ?"]  # `unlikely` has SQLite look into the index of the alarms
+        conditions: list[str] = ["vehicle = ?"]  # `unlikely` makes SQLite use the index of the alarms
         values: list[str | int] = [vehicle]
         for condition, value in (
             ("n < ?", before),
@@ -216,7 +216,7 @@ class Journal:
         return [*(event for event in waiting if event["n"] not in written), *found][:limit]
 
     def alarms(self, vehicle: str) -> list[str]:
-        """The ids of all alarms that anything was ever told of."""
+        """The ids of all alarms in the log."""
         database = self._database
         waiting = {event["alarm"] for event in self._waiting(vehicle) if event.get("alarm")}
         if database is None:
@@ -267,7 +267,7 @@ class Journal:
                     log.debug("nothing to roll back", exc_info=True)
             why = journal_db.why(error)
             if why != self._why:
-                log.error("the alarm log is not kept: %s (%s)", why, error)
+                log.error("alarm log not stored: %s (%s)", why, error)
             self._why = why
             return else_
 

@@ -36,7 +36,7 @@ _WHY = {
     sqlite3.SQLITE_CORRUPT: "the file is damaged",
     sqlite3.SQLITE_NOTADB: "the file is damaged",
     sqlite3.SQLITE_CONSTRAINT: "another server writes into the same file",
-    sqlite3.SQLITE_IOERR: "the disk does not take it",
+    sqlite3.SQLITE_IOERR: "the disk does not accept it",
     sqlite3.SQLITE_CANTOPEN: "the file cannot be opened",
 }
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
@@ -110,7 +110,7 @@ def _begin_anew(path: Path) -> Opened:
                 old.rename(aside.with_name(aside.name + suffix))
         opened = _open(path)
     except (OSError, sqlite3.Error) as error:
-        log.error("the damaged log %s cannot be set aside: %s", path, error)
+        log.error("damaged log not set aside: path=%s error=%s", path, error)
         return Opened(database=None, why="the file is damaged")
     assert opened.database is not None
     saved = _take_over(aside, opened.database)
@@ -138,7 +138,7 @@ def _take_over(old: Path, new: sqlite3.Connection) -> int:
                 while (row := rows.fetchone()) is not None:
                     new.execute("INSERT OR IGNORE INTO event VALUES (?, ?, ?, ?, ?, ?)", row)
             except sqlite3.Error as error:
-                log.warning("%s can be read no further: %s", old.name, error)
+                log.warning("damaged log read stopped: path=%s error=%s", old.name, error)
             else:
                 break
     finally:

@@ -11,21 +11,28 @@ from server.app import tls_options
 from server.app.config import Config
 from server.app.process import CannotServe, add_common_arguments, serve
 from server.app.process import run as run_server
-from server.cli.simulate import CarService
+from server.simulator.console import Console, need_stdin
+from server.simulator.service import CarService
+from server.system.loopback import is_loopback
 from server.vehicle.vehicle import Vehicle
 from server.web.maps import map_options
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seed", type=int, default=1, help="another seed, another noise (default 1)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the noise (default 1)")
     parser.add_argument(
-        "--scenario", action="append", default=[], metavar="NAME[@T[+D]]", help="a fault at T s for D s; see simulate"
+        "--scenario",
+        action="append",
+        default=[],
+        metavar="NAME[@T[+D]]",
+        help="a fault at T s for D s; see catgraph simulate --help",
     )
     add_common_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Serves until it is ended; 2 when it cannot start."""
+    need_stdin()
     try:
         return run_server(_demo(args))
     except (CannotServe, ValueError) as why:
@@ -50,8 +57,28 @@ async def _demo(args: argparse.Namespace) -> int:
         keys=keys_from(os.environ),
         map_upstream=map_options.read(args),
         worker=not args.no_worker,
+        next_steps=next_steps(args.host, sys.argv[0]),
     )
+    console = Console.of_stdin(service)
+    console.open()
     try:
         return await serve(config)
     finally:
+        console.close()
         await service.stop()
+
+
+def next_steps(host: str, program: str) -> tuple[str, ...]:
+    """What to do after the start, a line each; `program`: as it was called."""
+    command = f"{os.path.relpath(sys.executable)} -m server" if program.endswith("__main__.py") else program
+    phone = (
+        f"A phone: press Ctrl-C, start `{command} demo --host 0.0.0.0`, and scan the code that it prints."
+        if is_loopback(host)
+        else "A phone: pair it as described above."
+    )
+    return (
+        "Next:",
+        "  An alarm: open the address, type `speeding 20` here and press Enter. The car drives too fast for 20 s.",
+        "  More faults: type `list` here; `stop` ends them.",
+        f"  {phone}",
+    )

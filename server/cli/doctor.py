@@ -10,7 +10,8 @@ import time
 from typing import Any
 
 from server.judge.reception_stats import Reception
-from server.judge.topics import BY_SIGNAL, TOPICS, Source, map_signals
+from server.judge.signals import TOPICS
+from server.judge.topics import BY_SIGNAL, Source, map_signals
 from server.rosbridge.address import Address, BadAddress, parse
 from server.rosbridge.connection_errors import LOGIN_WANTED, ROSAPI_ENDED, ROSAPI_MISSING, Problem, not_proved
 from server.rosbridge.diagnosis import SILENT_S, Diagnosis
@@ -27,11 +28,11 @@ ROS_SILENT = "DOES NOT ANSWER (get_time); after a restart of roscore restart ros
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("address", help="the car's rosbridge: host, host:port, ws:// or wss://")
-    parser.add_argument("--seconds", type=float, default=5.0, help="how long to listen (default 5)")
+    parser.add_argument("--seconds", type=float, default=5.0, help="listening time (default 5)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: every report signal is there and speaks; 1: something is missing; 2: the car cannot be reached."""
+    """Return 0: every report signal is received, 1: something is missing, 2: the car cannot be reached."""
     try:
         address = parse(args.address)
     except BadAddress as why:
@@ -43,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         return 130
 
 
-class _Ear:
+class _Listener:
     """Listens to the link for the doctor."""
 
     def __init__(self) -> None:
@@ -91,7 +92,7 @@ class _Ear:
 
 
 async def _examine(address: Address, seconds: float) -> int:
-    ear = _Ear()
+    ear = _Listener()
     link = RosLink(address, ear, now=time.monotonic)
     link.start()
     try:
@@ -121,7 +122,7 @@ def _cannot(problem: Problem | None) -> int:
     return 2
 
 
-async def _report(address: Address, link: RosLink, ear: _Ear, seconds: float) -> int:
+async def _report(address: Address, link: RosLink, ear: _Listener, seconds: float) -> int:
     diagnosis = Diagnosis()
     asks = Questions(link, diagnosis, now=time.monotonic)
     try:
@@ -131,19 +132,19 @@ async def _report(address: Address, link: RosLink, ear: _Ear, seconds: float) ->
 
 
 async def _tell(
-    address: Address, link: RosLink, ear: _Ear, asks: Questions, diagnosis: Diagnosis, seconds: float
+    address: Address, link: RosLink, ear: _Listener, asks: Questions, diagnosis: Diagnosis, seconds: float
 ) -> int:
     server_software = link.server_software
     asked_s = time.monotonic()
-    offer = await discovery.ask_topics(asks)
-    alive = await discovery.ask_alive(asks)
+    offer = await discovery.fetch_topics(asks)
+    alive = await discovery.fetch_alive(asks)
     if asks.login is not None or (ear.problem is not None and ear.problem.code == LOGIN_WANTED):
         return _cannot(asks.login or ear.problem)
     if not alive:
         while (wait_s := asked_s + SILENT_S + 0.2 - time.monotonic()) > 0 and not alive:
             await asyncio.sleep(min(wait_s, 0.5))  # ROS 2 finds rosapi a little later; an answer may be late
-            alive = await discovery.ask_alive(asks)
-        offer = offer or (await discovery.ask_topics(asks) if alive else None)
+            alive = await discovery.fetch_alive(asks)
+        offer = offer or (await discovery.fetch_topics(asks) if alive else None)
     behind = diagnosis.problem(time.monotonic(), flows=False)
     if offer is None and not diagnosis.is_rosbridge and not ear.spoke.is_set():
         return _cannot(not_proved(address, server_software, link.junk_count))
@@ -184,24 +185,26 @@ async def _map(asks: Questions, offer: discovery.Offer) -> dict[str, Source]:
         if not unknown:
             return sources
         for topic in sorted(unknown):
-            nodes = await discovery.ask_publishers(asks, topic, and_bridge=True)
+            nodes = await discovery.fetch_publishers(asks, topic, and_bridge=True)
             (unpublished if nodes == () else published).add(topic)
 
 
-async def _not_passed(offer: discovery.Offer, sources: dict[str, Source], ear: _Ear, asks: Questions) -> Problem | None:
+async def _not_passed(
+    offer: discovery.Offer, sources: dict[str, Source], ear: _Listener, asks: Questions
+) -> Problem | None:
     """Why topics of signals that have a publisher do not come through the bridge; None: they do, or it is not known."""
     silent = [topic for topic in {source.topic for source in sources.values()} if not ear.counts.get(topic)]
-    published = [topic for topic in silent if await discovery.ask_publishers(asks, topic)]
+    published = [topic for topic in silent if await discovery.fetch_publishers(asks, topic)]
     passing = Passing()
     passing.follow(published, 0.0)
     passing.counted(ear.client_count)
-    passing.bridges = frozenset(await discovery.ask_publishers(asks, CLIENT_COUNT, and_bridge=True) or ())
+    passing.bridges = frozenset(await discovery.fetch_publishers(asks, CLIENT_COUNT, and_bridge=True) or ())
     for topic in published if passing.bridges else ():
-        passing.answered(topic, await discovery.ask_subscribers(asks, topic), 0.0)
+        passing.answered(topic, await discovery.fetch_subscribers(asks, topic), 0.0)
     return passing.problem(BLOCKED_AFTER_S)
 
 
-def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Ear, seconds: float) -> int:
+def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Listener, seconds: float) -> int:
     missing = []
     print(f"\n{'signal':<14}{'topic':<46}{'type':<34}{'rate':>9}")
     for row in TOPICS:
@@ -232,12 +235,12 @@ def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Ear, second
         )
     needed = [signal for signal in missing if signal in REPORT_SIGNALS]
     optional = [signal for signal in missing if signal not in REPORT_SIGNALS]
-    print(f"\n{'Missing or silent: ' + ', '.join(needed) if needed else 'Every signal that the page needs is there.'}")
+    print(f"\n{'Missing or silent: ' + ', '.join(needed) if needed else 'All required signals are present.'}")
     if optional:
-        print(f"Not there, and not needed: {', '.join(optional)}")
+        print(f"Missing and optional: {', '.join(optional)}")
     print(
-        "rosbridge asks nobody who they are: everyone on this network can read this car and command it. "
-        "docs/safety.md says how to close it."
+        "rosbridge has no login: everyone on this network can read this car and command it. "
+        "docs/safety.md explains how to restrict it."
     )
     return 1 if needed else 0
 

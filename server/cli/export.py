@@ -1,7 +1,7 @@
-"""`catgraph export`: a recording in the forms that others read.
+"""`catgraph export`: convert a recording to another format.
 
-With --background it is the worker of a server: it works when nobody else needs the machine, tells its progress as lines
-of JSON, and ends when the server does.
+With --background it is a server's worker: it runs at low priority, reports progress as lines of JSON, and ends with the
+server.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from server.system.page_files import AssetsMissing
 
 WHOLE, NOT_ALL, CANNOT = 0, 1, 2
 _NICENESS = 10
-_EVERY_S = 0.1  # progress is told
+_EVERY_S = 0.1  # interval of progress lines
 _LOOK_EVERY_S = 0.5
 MOST_NOTES = 100
 LEAVE_FREE = 500_000_000  # bytes on the disk, for the recording that may be going on
@@ -50,14 +50,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help="a recording of catgraph, ROS 1 bag, ROS 2 bag directory, .mcap, .db3; several are one recording",
+        help="catgraph recording, ROS 1 bag, ROS 2 bag directory, .mcap or .db3; several files are one recording",
     )
-    forms = ", ".join(f"{form.name}: {form.what}" for form in FORMATS.values())
+    forms = "; ".join(f"{form.name}: {form.label}, {form.use}" for form in FORMATS.values())
     parser.add_argument(
-        "--format", required=True, choices=[*FORMATS, CLIP], help=f"{forms}, {CLIP}: with --at, cut out as it is"
+        "--format", required=True, choices=[*FORMATS, CLIP], help=f"{forms}; {CLIP}: with --at, cut out as it is"
     )
-    parser.add_argument("--out", type=Path, metavar="OUT", help="the file to write; else named after the recording")
-    parser.add_argument("--compression", choices=COMPRESSIONS, default="none", help="of a bag's chunks (default: none)")
+    parser.add_argument("--out", type=Path, metavar="OUT", help="the output file (default: named after the recording)")
+    parser.add_argument(
+        "--compression",
+        choices=COMPRESSIONS,
+        default="none",
+        help="compression compression of a bag's chunks (default: none)",
+    )
     parser.add_argument(
         "--without-own", action="store_true", help="leave catgraph's own channels (/catgraph/*) out of a bag"
     )
@@ -87,14 +92,14 @@ def run(args: argparse.Namespace) -> int:
     except (RecordingUnreadable, ExportRefused, AssetsMissing, _Impossible) as error:
         return speaker.refused(str(error))
     except BrokenPipeError:
-        return speaker.refused("It cannot be written: nobody reads it to its end.")
+        return speaker.refused("It cannot be written: the reader closed the pipe.")
     except OSError as error:
         return speaker.refused(f"It cannot be written: {error.strerror or error}.")
     except MemoryError:
         return speaker.refused(f"{args.files[0]}: {TOO_LARGE}")
-    except Exception as error:  # the one net: 1 would say that something was written
+    except Exception as error:  # last resort: 1 would mean that something was written
         traceback.print_exc()
-        return speaker.refused(f"a fault of catgraph itself, please report it: {type(error).__name__}: {error}")
+        return speaker.refused(f"internal error of catgraph, please report it: {type(error).__name__}: {error}")
     is_whole = is_whole and not outcome.notes
     speaker.done(out, outcome, is_whole=is_whole)
     return WHOLE if is_whole else NOT_ALL
@@ -104,7 +109,7 @@ def _with_room(out: Path, progress: Callable[[float], None]) -> Callable[[float]
     """Progress that stops where the disk gets full: an export must not take the room of a recording."""
     next_s = 0.0
 
-    def told(part: float) -> None:
+    def on_progress(part: float) -> None:
         nonlocal next_s
         now_s = time.monotonic()
         if now_s >= next_s:
@@ -114,11 +119,11 @@ def _with_room(out: Path, progress: Callable[[float], None]) -> Callable[[float]
                 raise _Impossible(f"The disk has only {amount(free)} left: there is no room for an export.")
         progress(part)
 
-    return told
+    return on_progress
 
 
 class _Impossible(Exception):
-    """What was asked for cannot be done. The text is one sentence."""
+    """The request cannot be fulfilled. The text is one sentence."""
 
 
 def _export(recording: Recording, args: argparse.Namespace, out: Output, progress: Callable[[float], None]) -> Outcome:
@@ -133,7 +138,7 @@ def _export(recording: Recording, args: argparse.Namespace, out: Output, progres
 def _cut(
     recording: Recording, new: Path, name: str, args: argparse.Namespace, progress: Callable[[float], None]
 ) -> Outcome:
-    """The time around a moment, as a recording, and that in the format asked for."""
+    """Cut the time around a moment out as a recording, and convert it to the requested format."""
     clip = new.with_name("clip.mcap")
     window = Window(at_ns=_moment_ns(recording, args.at), before_s=args.before, after_s=args.after)
     share = 1.0 if args.format == CLIP else 0.5
@@ -144,7 +149,7 @@ def _cut(
     with open_recording([clip]) as cut:
         made = _write(cut, new, f"{name}, clip", args, lambda part: progress(share + part * (1.0 - share)))
     made.notes[:0] = outcome.notes
-    made.remarks[:0] = outcome.remarks
+    made.notices[:0] = outcome.notices
     return made
 
 
@@ -163,15 +168,15 @@ def _target(args: argparse.Namespace) -> Output:
     """Where to write, found to be writable before the work and not after it."""
     if args.format == CLIP and args.at is None:
         raise _Impossible("--format mcap cuts out the time around a moment: name it with --at.")
-    ending = CLIP if args.format == CLIP else FORMATS[args.format].ending
+    ending = CLIP if args.format == CLIP else FORMATS[args.format].extension
     part = "_clip" if args.at is not None else ""
     out: Path = args.out or Path(f"{_stem(args.files[0])}{part}.{ending}")
     if out.is_dir():
         out = out / f"{_stem(args.files[0])}{part}.{ending}"
     if any(out.exists() and file.exists() and out.samefile(file) for file in args.files):
-        raise _Impossible(f"{out} is the recording itself: name another file with --out.")
+        raise _Impossible(f"{out} is the recording itself: choose another file with --out.")
     if args.out is None and out.exists():
-        raise _Impossible(f"{out} is there already: name the file with --out.")
+        raise _Impossible(f"{out} exists already: choose another file with --out.")
     try:
         return output_of(out)
     except OSError as error:
@@ -188,7 +193,7 @@ def _moment_ns(recording: Recording, text: str) -> int:
     with contextlib.suppress(ValueError):
         moment = datetime.fromisoformat(text)
         if moment.tzinfo is None:
-            raise _Impossible(f"--at {text}: say which time that is, as {text}Z for UTC.")
+            raise _Impossible(f"--at {text}: add the time zone, as {text}Z for UTC.")
         return round((moment - datetime(1970, 1, 1, tzinfo=UTC)).total_seconds() * 1e9)
     found = first_raised_ns(recording, text)
     if found is None:
@@ -215,10 +220,10 @@ def _seconds(text: str) -> float:
 
 
 class _Person:
-    """Tells somebody at a terminal."""
+    """Reports to a terminal."""
 
     def __init__(self, what: str) -> None:
-        self._bar = Progress(0.0, 1.0, f"Exporting {what}", in_seconds=False)
+        self._bar = Progress(f"Exporting {what}")
 
     def progress(self, part: float) -> None:
         self._bar(part)
@@ -230,17 +235,17 @@ class _Person:
 
     def done(self, out: Output, outcome: Outcome, *, is_whole: bool) -> None:
         self._bar.close()
-        for note in (*outcome.remarks, *outcome.notes):
+        for note in (*outcome.notices, *outcome.notes):
             print(f"catgraph export: {note}", file=sys.stderr)
         if not is_whole:
-            print("catgraph export: the file does not hold all of the recording.", file=sys.stderr)
+            print("catgraph export: the export is incomplete.", file=sys.stderr)
         with contextlib.suppress(BrokenPipeError):  # who read the other end of a pipe has seen enough
             size = f" ({amount(out.file.stat().st_size)})" if out.file is not None else ""
             print(f"{out.path}{size}", file=sys.stderr if out.is_stdout else sys.stdout, flush=True)
 
 
 class _Lines:
-    """Tells a server, a line of JSON at a time."""
+    """Reports to a server, as lines of JSON."""
 
     def __init__(self) -> None:
         self._next_s = 0.0
@@ -256,7 +261,7 @@ class _Lines:
         return CANNOT
 
     def done(self, out: Output, outcome: Outcome, *, is_whole: bool) -> None:
-        notes = [*outcome.remarks, *outcome.notes][:MOST_NOTES]
+        notes = [*outcome.notices, *outcome.notes][:MOST_NOTES]
         self._tell({"done": str(out.path), "entries": outcome.entries, "notes": notes, "is_whole": is_whole})
 
     def _tell(self, what: dict[str, Any]) -> None:
@@ -269,7 +274,7 @@ def _live_with_the_server() -> None:
     """Steps behind whatever else runs here, and ends with the server: its end of our input is closed then."""
     with contextlib.suppress(OSError):
         os.nice(_NICENESS)
-    signal.signal(signal.SIGTERM, _stop)  # what lies half-made is swept up on the way out
+    signal.signal(signal.SIGTERM, _stop)  # unfinished files are deleted at the end
 
     def wait() -> None:
         while os.read(0, 1):  # not through a buffer: its lock would be in the way when Python ends

@@ -1,7 +1,7 @@
-"""`catgraph health`: asks a running server whether it is well; what a container's health check calls.
+"""`catgraph health`: report the health of a running server; what a container's health check calls.
 
-Without an address it asks this machine, by HTTPS and by HTTP. The server's certificate is not looked at there: its own
-authority signed it, and nobody stands between two programs of one machine.
+Without an address it requests this machine, by HTTPS and by HTTP. The certificate is not verified there: the server's
+own authority signed it, and there is no network between two programs of one machine.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _HERE = ("https://127.0.0.1:8000", "http://127.0.0.1:8000")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("url", nargs="?", help=f"the server (default: {_HERE[0]}, then {_HERE[1]})")
+    parser.add_argument("url", nargs="?", help=f"the server's address (default: {_HERE[0]}, then {_HERE[1]})")
     parser.add_argument(
-        "--ca", type=Path, metavar="FILE", help="authority to trust for another machine's HTTPS: its ca.crt"
+        "--ca", type=Path, metavar="FILE", help="certificate authority of another machine's HTTPS: its ca.crt"
     )
 
 
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     except OSError as why:
         print(f"catgraph: {args.ca} cannot be read: {why.strerror or why}.", file=sys.stderr)
         return 2
-    vehicles = body.get("vehicles")  # told only to who is known there
+    vehicles = body.get("vehicles")  # present only for an authenticated client
     print(f"catgraph {body.get('version')}: {body.get('status')}{f', {vehicles}' if vehicles else ''}")
     for problem in body.get("problems", ()):
         print(f"  {problem}")
@@ -60,7 +60,7 @@ def _ask(addresses: Sequence[str], ca: Path | None) -> dict[str, Any]:
                 body = json.load(answer)
                 if isinstance(body, dict):
                     return body
-                failed.append(f"{address} does not answer as catgraph does")
+                failed.append(f"{address} is not a catgraph server")
         except urllib.error.HTTPError as refused:  # 503: it answers, and is not well
             with contextlib.suppress(ValueError), refused:
                 body = json.load(refused)
@@ -68,7 +68,7 @@ def _ask(addresses: Sequence[str], ca: Path | None) -> dict[str, Any]:
                     return body
             failed.append(f"{address} does not answer: {refused.reason}")
         except json.JSONDecodeError:
-            failed.append(f"{address} does not answer as catgraph does")
+            failed.append(f"{address} is not a catgraph server")
         except (urllib.error.URLError, OSError, ValueError) as why:
             failed.append(f"{address} does not answer: {getattr(why, 'reason', why)}")
     raise _NoAnswer("; ".join(failed))

@@ -7,6 +7,8 @@ import sys
 import unicodedata
 from typing import Any
 
+from server.system.log_context import with_vehicle
+
 FORMAT = "%(levelname)s %(name)s: %(message)s"
 LONGEST = 4000  # letters of one message
 
@@ -16,7 +18,7 @@ class OneLine(logging.Formatter):
     is told with its trace, each line of it is set in, so that no line of it can pass for a line of the log."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:
-        return _seen(super().formatMessage(record))
+        return _seen(with_vehicle(super().formatMessage(record)))
 
     def formatException(self, told: Any) -> str:
         return _set_in(super().formatException(told))

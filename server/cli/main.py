@@ -24,17 +24,17 @@ class _Command:
 
 
 COMMANDS = {
-    "serve": _Command(module="server.cli.serve", help="watch a car and serve the page"),
-    "pair": _Command(module="server.cli.pair", help="a code and a PIN that let one more device into a running server"),
-    "demo": _Command(module="server.cli.demo", help="a simulated car, its bridge and the page, in one process"),
-    "simulate": _Command(module="server.cli.simulate", help="a simulated car behind a rosbridge of its own"),
-    "replay": _Command(module="server.cli.replay", help="a recording behind a rosbridge, at its true speed"),
-    "check": _Command(module="server.cli.check", help="every check over a recording, faster than real time"),
-    "export": _Command(
-        module="server.cli.export", help="a recording as ROS 1 bag, tables, tracks or page, or a part of it"
+    "serve": _Command(module="server.cli.serve", help="monitor cars and serve the page"),
+    "pair": _Command(
+        module="server.cli.pair", help="show a code and a PIN to pair one more device with a running server"
     ),
-    "doctor": _Command(module="server.cli.doctor", help="what a car publishes and how it maps to signals"),
-    "health": _Command(module="server.cli.health", help="asks a running server whether it is well"),
+    "demo": _Command(module="server.cli.demo", help="run a simulated car, its bridge and the server in one process"),
+    "simulate": _Command(module="server.cli.simulate", help="run a simulated car behind its own rosbridge server"),
+    "replay": _Command(module="server.cli.replay", help="play a recording behind a rosbridge server, in real time"),
+    "check": _Command(module="server.cli.check", help="run every check over recordings, faster than real time"),
+    "export": _Command(module="server.cli.export", help="convert a recording, or a part of it, to another format"),
+    "doctor": _Command(module="server.cli.doctor", help="list what a car publishes and how it maps to signals"),
+    "health": _Command(module="server.cli.health", help="report the health of a running server"),
 }
 
 

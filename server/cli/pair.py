@@ -17,9 +17,9 @@ from server.app.config import default_data
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--data", type=Path, default=default_data(), help="data folder of the server that runs (default %(default)s)"
+        "--data", type=Path, default=default_data(), help="data folder of the running server (default %(default)s)"
     )
-    parser.add_argument("--viewer", action="store_true", help="for a device that only looks (default: an operator's)")
+    parser.add_argument("--viewer", action="store_true", help="pair a viewer (default: an operator)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
         address = pending_invitations.running(folder)
         if address is None:
             print(
-                f"catgraph: no server that pairs devices runs with the data folder {args.data}. It does when it is "
+                f"catgraph: no server with pairing uses the data folder {args.data}. It does when it is "
                 "started with --host 0.0.0.0; on this machine alone nobody pairs.",
                 file=sys.stderr,
             )
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
         return 2
     pairing = Pairing(token=made.token, pin=made.pin, minutes=round(LASTS_S / 60))
     shown = list(invitation(address, pairing, f"Pair {'a viewer' if args.viewer else 'an operator'}:"))
-    if not sys.stdout.isatty():  # nobody can scan it there
+    if not sys.stdout.isatty():  # not a terminal: a code cannot be scanned
         shown = [shown[0], f"{address}#pair={made.token}"]
     print("\n".join(shown), flush=True)
     return 0

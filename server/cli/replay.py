@@ -1,4 +1,4 @@
-"""`catgraph replay`: a recording behind a rosbridge, at its true speed."""
+"""`catgraph replay`: play a recording behind a rosbridge server, in real time."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--host", default="127.0.0.1", help="address to listen on; 0.0.0.0 for all (default: %(default)s)"
     )
     parser.add_argument("--port", type=int, default=9090, help="port, 0 for any free one (default: %(default)s)")
-    parser.add_argument("--rate", type=_rate, default=1.0, metavar="X", help="so many times true speed (default: 1)")
-    parser.add_argument("--start", type=_seconds, default=0.0, metavar="S", help="begin S seconds after the start")
-    parser.add_argument("--loop", action="store_true", help="begin again at the end, until interrupted")
+    parser.add_argument("--rate", type=_rate, default=1.0, metavar="X", help="playback rate (default: 1)")
+    parser.add_argument("--start", type=_seconds, default=0.0, metavar="S", help="start S seconds after the beginning")
+    parser.add_argument("--loop", action="store_true", help="repeat until interrupted")
     parser.add_argument(
         "--remap",
         type=_remap,
         action="append",
         default=[],
         metavar="A:=B",
-        help="publish topic A as B; may be repeated",
+        help="publish topic A as B; can be repeated",
     )
     parser.add_argument(
-        "--wait", action="store_true", help="begin when a client has subscribed, so that it misses no message"
+        "--wait", action="store_true", help="start when a client has subscribed, so that it receives every message"
     )
-    parser.add_argument("--stay", action="store_true", help="keep the bridge up after the end, until interrupted")
+    parser.add_argument("--stay", action="store_true", help="keep the bridge running after the end, until interrupted")
     parser.add_argument(
         "--like",
         choices=("helpful", "real"),
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 class _Impossible(Exception):
-    """What was asked for cannot be played. The text is one sentence."""
+    """The recording cannot be played. The text is one sentence."""
 
 
 class _Replay:
@@ -86,10 +86,10 @@ class _Replay:
         self._report = Report(recording, self._bridge)
         self._subscribed = asyncio.Event()  # a client subscribed to something
         if not any(recording.topics[topic].count for topic in self._names):
-            raise _Impossible(f"{args.files[0]} holds no messages that can be played")
+            raise _Impossible(f"{args.files[0]} has no playable messages")
         if args.start > recording.duration_s:
             raise _Impossible(
-                f"--start {args.start:g} lies behind the end: the recording has {recording.duration_s:.1f} s"
+                f"--start {args.start:g} is after the end: the recording has {recording.duration_s:.1f} s"
             )
 
     async def run(self) -> int:
@@ -109,14 +109,14 @@ class _Replay:
             if playing.done():
                 playing.result()  # raises what went wrong
                 if not await self._bridge.drain(LAST_BYTES_S):
-                    print("catgraph replay: a client did not fetch the last messages in time", file=sys.stderr)
+                    print("catgraph replay: a client did not receive the last messages in time", file=sys.stderr)
         finally:
             for task in (playing, progress):
                 task.cancel()
             await asyncio.wait({playing, progress})
             self._report.close()
             if self._args.stay and not interrupted.done() and _is_well(playing):
-                say("The bridge stays up until interrupted (Ctrl-C).")
+                say("The bridge runs until interrupted (Ctrl-C).")
                 code = int(await interrupted)
             await self._bridge.stop()
         return code
@@ -159,7 +159,7 @@ class _Replay:
 
 
 class Rounds:
-    """One playing after the other: the clock in the stamps goes on where it was, as a car's does."""
+    """Repeat the recording; the stamps of each round continue those of the last, as a car's clock does."""
 
     def __init__(self, rate: float) -> None:
         self._rate = rate
@@ -196,7 +196,7 @@ def _renamed(recording: Recording, remap: dict[str, str]) -> dict[str, str]:
 def _rate(text: str) -> float:
     value = _number(text)
     if not 0.001 <= value <= 1000.0:
-        raise argparse.ArgumentTypeError("must lie between 0.001 and 1000")
+        raise argparse.ArgumentTypeError("must be between 0.001 and 1000")
     return value
 
 

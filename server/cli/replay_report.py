@@ -1,4 +1,4 @@
-"""What a replay tells the person at the terminal."""
+"""Terminal output of a replay."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from server.rosbridge_server.server import RosBridge
 
 
 class Report:
-    """Says what will be played and where, how far it is, and in the end what became of it."""
+    """Prints the start text, the progress and the result."""
 
     def __init__(self, recording: Recording, bridge: RosBridge) -> None:
         self._recording = recording
@@ -33,7 +33,7 @@ class Report:
         say(
             f"  ROS {recording.ros_version}, recorded {when:%Y-%m-%d %H:%M:%S} UTC, {recording.duration_s:.1f} s, "
             f"{_counted(recording.count, 'message')} on {_counted(len(recording.topics), 'topic')}"
-            + (f", at {args.rate:g} × true speed" if args.rate != 1 else "")
+            + (f", at {args.rate:g}× real time" if args.rate != 1 else "")
             + (f", from {args.start:g} s on" if args.start else "")
         )
         rows = [

@@ -1,4 +1,4 @@
-"""`catgraph serve`: watch a car and serve the page."""
+"""`catgraph serve`: monitor cars and serve the page."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="[NAME=]ws://CAR:9090",
-        help="a car to watch from the start; several make several vehicles; without it the page asks for an address",
+        help="a car to connect to at the start; can be repeated; without it the page asks for an address",
     )
     parser.add_argument(
         "--only",
         action="append",
         default=[],
         metavar="HOST",
-        help="dial nothing but this host (may be given several times)",
+        help="connect to this host only; can be repeated",
     )
     add_common_arguments(parser)
 

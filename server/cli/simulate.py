@@ -1,15 +1,13 @@
-"""`catgraph simulate`: a simulated car behind a rosbridge of its own, with faults on demand."""
+"""`catgraph simulate`: run a simulated car behind its own rosbridge server, with faults on demand."""
 
 from __future__ import annotations
 
 import argparse
 import asyncio
-import contextlib
-import os
 import sys
 
 from server.rosbridge_server.server import CannotListen
-from server.simulator.console import HELP, Console
+from server.simulator.console import HELP, Console, need_stdin, say
 from server.simulator.scenarios import SCENARIOS
 from server.simulator.service import CarService, serve_car
 
@@ -30,24 +28,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME[@T[+D]]",
-        help="start a scenario, T seconds after the beginning, for D seconds; may be given several times",
+        help="start a scenario at T seconds for D seconds; can be repeated",
     )
-    parser.add_argument("--ros", type=int, choices=(1, 2), default=1, help="ROS version to look like (default 1)")
-    parser.add_argument("--seed", type=int, default=0, help="another seed, another noise (default 0)")
+    parser.add_argument("--ros", type=int, choices=(1, 2), default=1, help="ROS version to imitate (default 1)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the noise (default 0)")
     parser.add_argument(
-        "--scan-beams", type=int, metavar="N", help="N beams all round at 20 Hz instead of the interlaced 181 and 180"
+        "--scan-beams",
+        type=int,
+        metavar="N",
+        help="N beams of a full circle at 20 Hz instead of the interlaced 181 and 180",
     )
     parser.add_argument(
         "--no-obstacle-stopper",
         action="store_true",
-        help="no obstacle stopper between the commands and the wheels: in silence the car keeps its last speed",
+        help="no obstacle stopper: without commands the car keeps its last speed",
     )
     parser.add_argument(
         "--competing-controller",
         action="store_true",
-        help="whoever drives the lap goes on commanding while somebody else does: the last message wins",
+        help="the lap controller keeps publishing beside other commands: the last message wins",
     )
-    parser.add_argument("--rate", type=float, default=1.0, metavar="X", help="X times as fast as real (default 1)")
+    parser.add_argument("--rate", type=float, default=1.0, metavar="X", help="speed relative to real time (default 1)")
     parser.add_argument(
         "--like",
         choices=("helpful", "real"),
@@ -59,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serves until it is ended; 2 when it cannot start, 130 when interrupted."""
-    _need_stdin()
+    need_stdin()
     try:
         with _runner() as runner:
             runner.run(_simulate(args))
@@ -73,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
 
 async def _simulate(args: argparse.Namespace) -> None:
     if args.seed < 0:
-        raise ValueError("The seed must be 0 or above.")
+        raise ValueError("The seed must be 0 or more.")
     service = CarService(
         host=args.host,
         port=args.port,
@@ -88,8 +89,8 @@ async def _simulate(args: argparse.Namespace) -> None:
     )
     port = await service.start()
     host = f"[{args.host}]" if ":" in args.host else args.host
-    _say(f"Simulated car on ws://{host}:{port} (ROS {args.ros}, seed {args.seed}). Ctrl-C ends it.\n{HELP}")
-    console = Console(service, 0, _say)
+    say(f"Simulated car on ws://{host}:{port} (ROS {args.ros}, seed {args.seed}). Press Ctrl-C to stop.\n{HELP}")
+    console = Console.of_stdin(service)
     console.open()
     try:
         await service.wait()
@@ -98,25 +99,12 @@ async def _simulate(args: argparse.Namespace) -> None:
         await service.stop()
 
 
-def _need_stdin() -> None:
-    """Gives the process an empty stdin where it was started without one: uvloop would use the number 0 and fail."""
-    try:
-        os.fstat(0)
-    except OSError:
-        os.open(os.devnull, os.O_RDONLY)
-
-
 def _runner() -> asyncio.Runner:
     if sys.platform == "win32":
         return asyncio.Runner()
     import uvloop
 
     return asyncio.Runner(loop_factory=uvloop.new_event_loop)
-
-
-def _say(text: str) -> None:
-    with contextlib.suppress(BrokenPipeError):  # nobody reads us any more; the car drives on
-        print(text, flush=True)
 
 
 def _sentence(text: str) -> str:

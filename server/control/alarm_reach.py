@@ -1,25 +1,23 @@
-"""Which phones can alarm right now: from what each page says of itself once a second. Pure: time is an argument."""
+"""Which phones can sound alarms now, by the status each page reports once a second. Pure: time is an argument."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
 
 from monitor.reach import ReachFacts
 from server.control.lease import Operator
 from server.protocol import serialize
+from server.protocol.operator_state import ReachState, ReaderEnded, Ready
 
 FRESH_S = 3.0  # a page that said nothing for longer: its phone sleeps, or the radio is gone
-BLIND_S = 2.0  # a page that heard nothing for longer covers its values, and hears of no alarm
-FORGOTTEN_S = 300.0  # a phone that sleeps still counts as one that should hear, for so long
+BLIND_S = 2.0  # a page without data for longer covers its values and gets no alarm
+FORGOTTEN_S = 300.0  # a sleeping phone still counts among the operators for this time
 MOST = 64
 MOST_SHOWN = 12
 
-Ready = Literal["ready", "refused", "asks", "missing", "interrupted"]
-Why = Literal["silent", "blind", "hidden", "undrawn", "sound", "replay"]
-WORDS: dict[Why, str] = {
+WORDS: dict[ReaderEnded, str] = {
     "silent": "not heard",
     "blind": "link slow",
     "hidden": "page in the background",
@@ -31,13 +29,13 @@ WORDS: dict[Why, str] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Present:
-    """What a page says of itself."""
+    """The status that a page reports."""
 
     is_visible: bool
     sound: Ready
     awake: Ready  # whether the screen is kept on: a phone without that can alarm, until it falls asleep
     vibrates: bool = False
-    battery: float | None = None  # 0 … 1; None: the browser does not tell
+    battery: float | None = None  # 0 … 1; None: not available in the browser
     is_charging: bool | None = None
     lag_s: float = 0.0  # age of the newest state there
     is_replaying: bool = False
@@ -45,8 +43,8 @@ class Present:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Here:
-    """One page of an operator, as last heard."""
+class PageStatus:
+    """The last status of one operator's page."""
 
     of: Operator
     word: Present
@@ -59,8 +57,8 @@ class Here:
         """Whether somebody may be looking at it now."""
         return self.word.is_visible and self.is_fresh(now_s)
 
-    def why_not(self, now_s: float) -> Why | None:
-        """Why an alarm would not be heard from it now; None: it would."""
+    def why_not(self, now_s: float) -> ReaderEnded | None:
+        """Why the page cannot sound an alarm now; None: it can."""
         if not self.is_fresh(now_s):
             return "silent"
         if not self.word.is_visible:
@@ -74,22 +72,35 @@ class Here:
         return None if self.word.sound == "ready" else "sound"
 
 
-class Reach:
+class AlarmReach:
     """The pages of operators that are here, or were within the last minutes."""
 
     def __init__(self) -> None:
-        self._pages: dict[tuple[str, str], Here] = {}  # the one heard longest ago first
+        self._pages: dict[tuple[str, str], PageStatus] = {}  # oldest status first
+        self._elsewhere: dict[tuple[str, str], PageStatus] = {}  # pages of other cars that announce this one's alarms
 
     def hear(self, operator: Operator, word: Present, now_s: float) -> None:
-        """One page says how it stands."""
+        """Store the status of one page."""
         key = operator.who, operator.page
         self._pages.pop(key, None)
-        self._pages[key] = Here(of=operator, word=word, heard_s=now_s)
+        self._pages[key] = PageStatus(of=operator, word=word, heard_s=now_s)
         self._forget(now_s)
 
     def leave(self, operator: Operator) -> None:
-        """A page said farewell: nobody looks at it, and nobody expects it to alarm."""
+        """Remove a page that was closed."""
         self._pages.pop((operator.who, operator.page), None)
+
+    def hear_elsewhere(self, operator: Operator, word: Present, now_s: float) -> None:
+        """Store the status of a page that shows another car and announces this one's alarms: it is not here."""
+        key = operator.who, operator.page
+        self._elsewhere.pop(key, None)
+        self._elsewhere[key] = PageStatus(of=operator, word=word, heard_s=now_s)
+        for old in list(self._elsewhere)[:-MOST]:
+            del self._elsewhere[old]
+
+    def leave_elsewhere(self, operator: Operator) -> None:
+        """Remove a page that announces this car's alarms no more."""
+        self._elsewhere.pop((operator.who, operator.page), None)
 
     def _forget(self, now_s: float) -> None:
         old = [key for key, one in self._pages.items() if now_s - one.heard_s > FORGOTTEN_S]
@@ -97,7 +108,7 @@ class Reach:
             self._pages.pop(key, None)
 
     def heard_s(self) -> float | None:
-        """When any page was heard last; None: none is here."""
+        """The time of the newest status of any page; None: no page."""
         return max((one.heard_s for one in self._pages.values()), default=None)
 
     def is_here(self, operator: Operator, now_s: float) -> bool:
@@ -108,14 +119,18 @@ class Reach:
         """The operator of a page that is here and seen."""
         return next((one.of for one in self._pages.values() if one.of.page == page and one.is_seen(now_s)), None)
 
-    def all(self, now_s: float) -> list[Here]:
+    def all(self, now_s: float) -> list[PageStatus]:
         """Every page that counts, in the order of their names."""
         self._forget(now_s)
         return sorted(self._pages.values(), key=lambda one: (one.of.name, one.of.page))
 
+    def _announcing(self, now_s: float) -> list[PageStatus]:
+        """The pages of other cars that would sound an alarm of this one now; of the others nothing is expected."""
+        return [one for one in self._elsewhere.values() if one.why_not(now_s) is None]
+
     def facts(self, now_s: float) -> ReachFacts:
         """For the check. Two pages of one device are one operator."""
-        best = _by_device(self.all(now_s), now_s)
+        best = _by_device((*self.all(now_s), *self._announcing(now_s)), now_s)
         reasons = Counter(WORDS[why] for why in best.values() if why is not None)
         return ReachFacts(
             can=sum(why is None for why in best.values()),
@@ -123,7 +138,7 @@ class Reach:
             why=", ".join(why if many == 1 else f"{many} × {why}" for why, many in sorted(reasons.items())),
         )
 
-    def as_json(self, now_s: float) -> dict[str, Any]:
+    def as_json(self, now_s: float) -> ReachState:
         """The `reach` of a state."""
         pages, facts = self.all(now_s), self.facts(now_s)
         return {
@@ -150,9 +165,9 @@ class Reach:
         }
 
 
-def _by_device(pages: Iterable[Here], now_s: float) -> dict[tuple[str, str], Why | None]:
+def _by_device(pages: Iterable[PageStatus], now_s: float) -> dict[tuple[str, str], ReaderEnded | None]:
     """Of each operator's device why none of its pages can alarm; None: one of them can."""
-    best: dict[tuple[str, str], Why | None] = {}
+    best: dict[tuple[str, str], ReaderEnded | None] = {}
     for one in pages:
         key, why = (one.of.who, one.of.name), one.why_not(now_s)
         if key not in best or why is None:

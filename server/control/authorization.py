@@ -1,33 +1,29 @@
-"""The one gate through which the orders to a vehicle pass: who may order what now, from a page or a program.
+"""Authorizes all commands to a vehicle, from pages and programs.
 
-It keeps the lease of control and what the pages say of themselves, and writes both into the log.
+It holds the control lease and the status of the pages, and logs changes of both.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from monitor.reach import ReachFacts
 from monitor.runner import Refused
 from server.control import display_name
-from server.control.alarm_reach import Present, Reach
+from server.control.alarm_reach import AlarmReach, Present
 from server.control.lease import ANSWER_S, LEASE_S, RETURN_S, Act, Control, NotInControl, Operator
 from server.protocol import commands, serialize
+from server.protocol.alarm_state import Note
+from server.protocol.operator_state import OperatorsState
 
 MAX_FENCE = 2**53
 
 
-class Note(Protocol):
-    """Writes an event of no alarm into the log."""
-
-    def __call__(self, change: str, text: str, *, by: str | None = None, **more: Any) -> None: ...
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Caller:
-    """Who sent an order, as the edge of the server found out: nothing of it is the page's own word but the number."""
+    """The sender of a command, as the server determined it; only the lease number comes from the page."""
 
     name: str
     who: str = ""
@@ -61,7 +57,7 @@ class Authorization:
         """`fence`: no number up to this one is ever given: numbers do not come twice, restarts included."""
         self._note = note
         self._control = Control(fence)
-        self._reach = Reach()
+        self._reach = AlarmReach()
 
     def tick(self, now_s: float) -> bool:
         """Time passes; whether control changed by it."""
@@ -71,8 +67,8 @@ class Authorization:
         return bool(acts)
 
     def admit(self, command: commands.Command, caller: Caller, now_s: float) -> None:
-        """Lets an order pass or raises NotInControl. What needs control takes it for a page that is seen, where nobody
-        has it: so the tap on Connect does."""
+        """Authorize a command or raise NotInControl. If nobody is in control, a command that needs it takes control
+        for a visible page, as the tap on Connect does."""
         if command.needs != "control":
             return
         self.tick(now_s)
@@ -90,13 +86,13 @@ class Authorization:
             raise NotInControl(f"{lease.holder.name} is in control.", lease.holder)
 
     def obey(self, command: commands.TakeControl, caller: Caller, now_s: float) -> int | None:
-        """Control is taken, given, asked for. The number of the lease, where this page has it now. Raises Refused."""
+        """Take, hand over or request control; return the lease number if this page holds it. Raises Refused."""
         self.tick(now_s)
         by, control, fence = caller.operator, self._control, caller.fence
         if by is None:
-            raise Refused("Only a page can be in control: a program cannot show that somebody looks.")
+            raise Refused("Only a page can be in control: a program cannot show that somebody is watching.")
         if command.do in ("take", "take_over", "request") and not self._reach.is_here(by, now_s):
-            raise Refused("Only a page that is seen can be in control: this one is in the background.")
+            raise Refused("Only a visible page can be in control: this one is in the background.")
         acts: list[Act | None] = []
         match command.do:
             case "take":
@@ -112,7 +108,7 @@ class Authorization:
             case "hand_over":
                 to = self._reach.find(command.to or "", now_s)
                 if to is None:
-                    raise Refused("That page is not there any more, or nobody sees it.")
+                    raise Refused("That page is closed or not visible.")
                 acts = [control.hand_over(by, fence, to, now_s)]
             case "keep":
                 acts = [control.keep(by, fence, command.to or "")]
@@ -121,7 +117,7 @@ class Authorization:
         return self.fence_of(caller)
 
     def hear(self, word: commands.PresentWord, caller: Caller, now_s: float) -> bool:
-        """A page says how it stands; whether control changed by it."""
+        """Store a page's status; return whether control changed."""
         operator = caller.operator
         if operator is None:
             return False
@@ -131,18 +127,7 @@ class Authorization:
             for released in given_up:
                 self._tell(released)
             return bool(given_up)
-        said = Present(
-            is_visible=word.visible,
-            sound=word.sound,
-            awake=word.awake,
-            vibrates=word.vibrates,
-            battery=word.battery,
-            is_charging=word.charging,
-            lag_s=word.lag_s,
-            is_drawing=word.draws,
-            is_replaying=caller.is_replaying,
-        )
-        self._reach.hear(operator, said, now_s)
+        self._reach.hear(operator, _present(word, caller), now_s)
         changed = self.tick(now_s)
         if word.visible:
             act = self._control.present(operator, now_s)
@@ -150,19 +135,28 @@ class Authorization:
             changed = changed or act is not None
         return changed
 
+    def hear_elsewhere(self, word: commands.PresentWord, caller: Caller, now_s: float) -> None:
+        """Store the status of a page that shows another car: it may hear alarms, and has no part in control."""
+        if (operator := caller.operator) is None:
+            return
+        if word.leaves:
+            self._reach.leave_elsewhere(operator)
+        else:
+            self._reach.hear_elsewhere(operator, _present(word, caller), now_s)
+
     def fence_of(self, caller: Caller) -> int | None:
         """The number of the lease that this page has; None: it has none."""
         lease, operator = self._control.lease, caller.operator
         return lease.fence if lease is not None and operator is not None and operator.is_same(lease.holder) else None
 
     def heard_s(self) -> float | None:
-        """When a page of an operator was heard last; None: none is here."""
+        """The time of the newest status of an operator's page; None: no page."""
         return self._reach.heard_s()
 
     def facts(self, now_s: float) -> ReachFacts:
         return self._reach.facts(now_s)
 
-    def as_json(self, now_s: float, wall_ms: float) -> dict[str, Any]:
+    def as_json(self, now_s: float, wall_ms: float) -> OperatorsState:
         """The `control` and the `reach` of a state."""
         control = self._control
         lease, lapsed = control.lease, control.lapsed
@@ -179,13 +173,13 @@ class Authorization:
                 else {
                     "name": lapsed.holder.name,
                     "page": lapsed.holder.page,
-                    "may_return_s": serialize.plain(max(0.0, RETURN_S - (now_s - lapsed.at_s)), 1),
+                    "may_return_s": round(max(0.0, RETURN_S - (now_s - lapsed.at_s)), 1),
                 },
                 "requests": [
                     {
                         "page": one.of.page,
                         "name": one.of.name,
-                        "left_s": serialize.plain(max(0.0, ANSWER_S - (now_s - one.asked_s)), 1),
+                        "left_s": round(max(0.0, ANSWER_S - (now_s - one.asked_s)), 1),
                     }
                     for one in control.requests
                 ],
@@ -207,3 +201,17 @@ class Authorization:
                 before_page=act.before.page if act.before else None,
                 fence=act.fence,
             )
+
+
+def _present(word: commands.PresentWord, caller: Caller) -> Present:
+    return Present(
+        is_visible=word.visible,
+        sound=word.sound,
+        awake=word.awake,
+        vibrates=word.vibrates,
+        battery=word.battery,
+        is_charging=word.charging,
+        lag_s=word.lag_s,
+        is_drawing=word.draws,
+        is_replaying=caller.is_replaying,
+    )

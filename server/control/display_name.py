@@ -9,10 +9,9 @@ NAMELESS = "operator"  # a page that gives no name
 
 
 def clean(text: object) -> str | None:
-    """The label in one line of at most 40 letters that are seen; None where nothing of it is left.
+    """The label as one line of at most 40 printable characters; None if nothing remains.
 
-    Control characters go, and so do the signs that turn the direction of writing: a name must not rewrite the line of
-    the log it stands in.
+    Control and bidirectional characters are removed, because a name must not change the log line that it is in.
     """
     if not isinstance(text, str):
         return None

@@ -1,9 +1,9 @@
-"""Who is in control: a lease of three seconds with a fencing number. Pure: time is an argument, nobody is asked.
+"""The control lease: three seconds, with a fencing number. Pure: time is an argument.
 
-A page that is seen renews its lease by saying so. When it falls silent the lease lapses, and anybody may take control
-at once; the former holder, back within 30 s with nobody in between, has it again. Each lease has a number of its own
-that was never given before, and an order that carries the number of another lease is refused (after Kleppmann,
-Designing Data-Intensive Applications, 8.4): an order that hung in the radio while control went elsewhere cannot count.
+The status of a visible page renews its lease. Without it the lease lapses and anybody may take control at once; the
+former holder gets it back within 30 s if nobody took it. Each lease has a unique number, and a command with the number
+of another lease is refused (after Kleppmann, Designing Data-Intensive Applications, 8.4), so that a command delayed by
+the radio cannot take effect after control changed.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import Literal
 
 from monitor.runner import Refused
 
-LEASE_S = 3.0  # a page says once a second that it is seen
+LEASE_S = 3.0  # a visible page reports once a second
 RETURN_S = 30.0
 ANSWER_S = 10.0  # the holder sees a request so long; silence grants it
 MOST_REQUESTS = 8
 
-# taken: nobody had it · granted: a request was, or its time was over · kept: a request was refused
+# taken: it was free · granted: a request, accepted or timed out · kept: a request was refused
 Change = Literal["taken", "released", "handed_over", "granted", "taken_over", "lapsed", "returned", "requested",
                  "withdrawn", "kept"]  # fmt: skip
 
@@ -48,7 +48,7 @@ class Lease:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """Somebody asks the holder for control."""
+    """A request to the holder for control."""
 
     of: Operator
     asked_s: float
@@ -56,7 +56,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lapsed:
-    """The last lease ended because nobody renewed it, and none came after it."""
+    """The last lease lapsed, and none followed."""
 
     holder: Operator
     at_s: float
@@ -99,8 +99,8 @@ class Control:
     # -- time --------------------------------------------------------------------------------------------------------
 
     def advance(self, now_s: float, is_here: Callable[[Operator], bool]) -> list[Act]:
-        """Time passes: a lease that nobody renewed lapses, a request that nobody answered is granted. `is_here`:
-        whether a page is there and seen; a request of one that is not is forgotten."""
+        """Advance the time: lapse a lease that was not renewed, grant a request that was not answered. `is_here`:
+        whether a page is open and visible; requests of other pages are dropped."""
         self.requests = tuple(one for one in self.requests if is_here(one.of))
         if self.lapsed is not None and now_s - self.lapsed.at_s > RETURN_S:
             self.lapsed = None
@@ -127,12 +127,11 @@ class Control:
         if self.lapsed is None or not operator.is_same(self.lapsed.holder):
             return None
         away_s = now_s - self.lapsed.at_s + LEASE_S
-        text = f"{operator.name} is back after {away_s:.0f} s and in control again: nobody had taken it."
+        text = f"{operator.name} is back after {away_s:.0f} s and in control again: nobody else had taken it."
         return self._grant("returned", operator, None, now_s, None, text)
 
     def leave(self, operator: Operator, now_s: float) -> list[Act]:
-        """This page was closed or loaded anew: nobody needs to wait for its lease to run out. One that is loaded anew
-        is back within the time in which it has it again."""
+        """End the lease of a page that was closed or reloaded. A reloaded page returns in time to get it back."""
         if not operator.is_same(self.holder):
             return []
         return self._lapse(f"{operator.name} left", now_s)
@@ -140,8 +139,8 @@ class Control:
     # -- what an operator does ---------------------------------------------------------------------------------------
 
     def admit(self, operator: Operator, fence: int | None) -> None:
-        """Whether an order that needs control counts now. Without a number it counts where nobody is in control, and
-        of the holder itself. Raises NotInControl."""
+        """Authorize a command that needs control. Without a number it is accepted from the holder, and if nobody is in
+        control. Raises NotInControl."""
         holder = self.holder
         if holder is not None and not operator.is_same(holder):
             raise NotInControl(f"{holder.name} is in control.", holder)
@@ -150,19 +149,19 @@ class Control:
     def admit_fence(self, fence: int | None) -> None:
         """Raises NotInControl where an order is of a lease that is over."""
         if fence is not None and (self.lease is None or fence != self.lease.fence):
-            raise NotInControl("This was ordered while control was another: look, then order it again.", self.holder)
+            raise NotInControl("Control changed since this command: check, then send it again.", self.holder)
 
     def take(self, operator: Operator, now_s: float) -> Act | None:
-        """Control that nobody has. None: it was this page's already. Raises NotInControl."""
+        """Take control that is free. None: this page already has it. Raises NotInControl."""
         holder = self.holder
         if holder is None:
             return self._grant("taken", operator, operator, now_s, None, f"{operator.name} is in control.")
         if operator.is_same(holder):
             return None
-        raise NotInControl(f"{holder.name} is in control: ask for it, or take it over.", holder)
+        raise NotInControl(f"{holder.name} is in control: request control, or take it over.", holder)
 
     def take_over(self, operator: Operator, now_s: float) -> Act | None:
-        """Control, whoever has it."""
+        """Take control from any holder."""
         holder = self.holder
         if holder is None or operator.is_same(holder):
             return self.take(operator, now_s)
@@ -170,23 +169,23 @@ class Control:
         return self._grant("taken_over", operator, operator, now_s, holder, text)
 
     def request(self, operator: Operator, now_s: float) -> Act | None:
-        """Asks the holder; where nobody is in control it is taken. None: it was asked for already."""
+        """Request control from the holder, or take it if it is free. None: already requested."""
         holder = self.holder
         if holder is None or operator.is_same(holder):
             return self.take(operator, now_s)
         if any(operator.is_same(one.of) for one in self.requests):
             return None
         if len(self.requests) >= MOST_REQUESTS:
-            raise NotInControl(f"{len(self.requests)} operators ask {holder.name} already.", holder)
+            raise NotInControl(f"{len(self.requests)} operators are already asking {holder.name}.", holder)
         self.requests = (*self.requests, Request(of=operator, asked_s=now_s))
-        return self._act("requested", f"{operator.name} asks {holder.name} for control.", operator)
+        return self._act("requested", f"{operator.name} requests control from {holder.name}.", operator)
 
     def withdraw(self, operator: Operator) -> Act | None:
         """A request is taken back."""
         if not any(operator.is_same(one.of) for one in self.requests):
             return None
         self.requests = tuple(one for one in self.requests if not operator.is_same(one.of))
-        return self._act("withdrawn", f"{operator.name} does not ask for control any more.", operator)
+        return self._act("withdrawn", f"{operator.name} cancelled the request for control.", operator)
 
     def hand_over(self, by: Operator, fence: int | None, to: Operator, now_s: float) -> Act | None:
         """The holder gives control to another page; so it also grants a request. Raises NotInControl."""
@@ -202,31 +201,31 @@ class Control:
         self._demand(by, fence)
         one = next((one.of for one in self.requests if one.of.page == page), None)
         if one is None:
-            raise Refused("Nobody asks for control any more.")
+            raise Refused("Nobody is requesting control now.")
         self.requests = tuple(other for other in self.requests if not other.of.is_same(one))
-        return self._act("kept", f"{by.name} keeps control: {one.name} had asked for it.", by)
+        return self._act("kept", f"{by.name} keeps control; the request of {one.name} was declined.", by)
 
     def release(self, by: Operator, fence: int | None, now_s: float) -> list[Act]:
-        """The holder gives control up; the first who asked for it has it, else nobody. Raises NotInControl."""
+        """Give up control; the first requester gets it, else nobody. Raises NotInControl."""
         self._demand(by, fence)
         self.lease = self.lapsed = None
         acts = [self._act("released", f"{by.name} gave control up: nobody is in control.", by, by)]
         if self.requests:
             one = self.requests[0].of
-            acts.append(self._grant("granted", one, None, now_s, None, f"{one.name}, who asked for it, is in control."))
+            acts.append(self._grant("granted", one, None, now_s, None, f"{one.name}, who requested it, is in control."))
         return acts
 
     # -- within ------------------------------------------------------------------------------------------------------
 
     def _lapse(self, why: str, now_s: float) -> list[Act]:
-        """The lease ends because nobody renews it; the first who asked for it has it, else nobody."""
+        """End a lease that was not renewed; the first requester gets it, else nobody."""
         assert self.lease is not None
         was = self.lease.holder
         self.lease, self.lapsed = None, Lapsed(holder=was, at_s=now_s)
         acts = [self._act("lapsed", f"{why}: nobody is in control.", None, was)]
         if self.requests:
             one = self.requests[0].of
-            text = f"{one.name}, who asked for it, is in control."
+            text = f"{one.name}, who requested it, is in control."
             acts.append(self._grant("granted", one, None, now_s, None, text))
         return acts
 
@@ -240,7 +239,7 @@ class Control:
     def _grant(
         self, change: Change, to: Operator, by: Operator | None, now_s: float, before: Operator | None, text: str
     ) -> Act:
-        """Another lease, with a number of its own; whoever asks must ask the new holder anew."""
+        """Start a new lease with its own number; open requests are dropped."""
         self._fence += 1
         self.lease = Lease(holder=to, fence=self._fence, since_s=now_s, renewed_s=now_s)
         self.lapsed, self.requests = None, ()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 from monitor import catalog
 from monitor.catalog import AllLimits
 from server.judge import profiles
 from server.judge.profiles import GENERIC, Profile
 from server.judge.settings import AUTO, Conflict, Settings, SettingsFile, change, differences, from_toml, to_toml
+from server.protocol.answers import SettingField, SettingsAnswer
 
 PERCENT_A_RAD = -1 / 0.00536  # the CATVehicle's steering: measured on its recordings, negative percent = left
 
@@ -34,14 +35,14 @@ class ActiveSettings:
 
     @property
     def limits(self) -> AllLimits:
-        """Asked for many times a tick, and made anew only when what they follow from is another."""
+        """Cached, because they are used many times a tick; recomputed only when their inputs change."""
         known, profile = self._limits, self.profile
         if known is None or known[0] is not self.settings or known[1] is not profile:
             known = self._limits = (self.settings, profile, self.settings.limits(profile))
         return known[2]
 
     def recognise(self, topics: Mapping[str, str], ros: int | None) -> bool:
-        """Looks at what the car offers; True when it is now taken for another kind of car."""
+        """Select the profile for the offered topics; True if it changed."""
         before = self.profile
         self._recognised = profiles.choose(self._profiles, topics, ros)
         return self.profile is not before
@@ -99,7 +100,7 @@ class ActiveSettings:
         return {"profile": self.profile.name, "topics": dict(self.settings.topics)} | catalog.flat(self.limits)
 
     def changes(self) -> dict[str, list[Any]]:
-        """What is in force otherwise than when this was last asked: name → [from, to]; topics are "topics.speed"."""
+        """Changes of the active settings since the last call: name → [from, to]; topics are "topics.speed"."""
         before, after = _flat(self._told), _flat(now := self.in_force())
         self._told = now
         names = sorted({*before, *after})
@@ -108,8 +109,8 @@ class ActiveSettings:
     def as_toml(self) -> str:
         return to_toml(self.settings)
 
-    def as_json(self) -> dict[str, Any]:
-        """What `GET /api/settings` answers; `schema` says what may be set, `defaults` what the profile gives."""
+    def as_json(self) -> SettingsAnswer:
+        """The response of `GET /api/settings`; `schema` has the possible settings, `defaults` those of the profile."""
         return {
             "version": self.settings.version,
             "profile": {
@@ -123,7 +124,7 @@ class ActiveSettings:
             "defaults": catalog.flat(catalog.changed(catalog.AllLimits(), self.profile.limits)),
             "changed": sorted(self.settings.values),
             "topics": dict(self.settings.topics),
-            "schema": catalog.schema(),
+            "schema": cast(dict[str, SettingField], catalog.schema()),
         }
 
     def _profile_named(self, name: str) -> Profile:
@@ -146,7 +147,7 @@ class ActiveSettings:
 
     def _demand(self, version: int | None) -> None:
         if version is not None and version != self.settings.version:
-            raise Conflict("Somebody else has changed the settings meanwhile. Look at them again.")
+            raise Conflict("Somebody else changed the settings meanwhile. Check them again.")
 
 
 def _flat(in_force: Mapping[str, Any]) -> dict[str, Any]:

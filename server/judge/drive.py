@@ -12,7 +12,7 @@ from server.judge.message import Json, RosVersion
 from server.judge.recorded_events import NewSettings, RecordedEvents
 from server.judge.ros_names import BadName, canonical_name
 from server.judge.settings import BadSetting
-from server.judge.settings_override import SettingsOverride, override_of, tuning_for
+from server.judge.settings_override import SettingsOverride, recorded_override, tuning_for
 from server.judge.topics import Source, map_signals
 
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, message
@@ -76,7 +76,7 @@ class Drive:
     """The constant part of a run through a recording. Times are seconds since its beginning.
 
     `override` replaces all settings that the recording holds; without it they count, and where there are none
-    `fallback`, a file of all settings, does.
+    `fallback`, a file of all settings, does. `signals`: those that are decoded; None: all.
     """
 
     def __init__(
@@ -87,7 +87,9 @@ class Drive:
         delay: LinkHistory | None = None,
         override: SettingsOverride | None = None,
         fallback: str = "",
+        signals: Collection[str] | None = None,
     ) -> None:
+        self._signals = signals
         self.start_s = source.start_s
         self.length_s = source.duration_s
         self.ros_version = source.ros_version
@@ -98,24 +100,26 @@ class Drive:
             try:
                 self._names[topic] = canonical_name(topic)
             except BadName:
-                self.notes.append(f"{topic[:60]!r} is no name that a topic can have: it is left out.")
+                self.notes.append(f"{topic[:60]!r} is not a valid topic name and is ignored.")
         self.offered = {name: source.topics[topic].type for topic, name in self._names.items()}
         self.settings_from_recording = override is None and recorded.settings is not None
         if override is not None:
-            words = tuple(word for word in recorded.words if not isinstance(word[1], NewSettings))
-            self.recorded = replace(recorded, words=words, settings=None)
+            events = tuple(event for event in recorded.events if not isinstance(event[1], NewSettings))
+            self.recorded = replace(recorded, events=events, settings=None)
             self.epochs = [self._epoch(override)]
         else:
             self.recorded = recorded
             self.epochs = [self._recorded_epoch(recorded.settings if recorded.settings is not None else fallback)]
             self.epochs += [
-                self._recorded_epoch(word.toml) for _, word in recorded.words if isinstance(word, NewSettings)
+                self._recorded_epoch(event.toml) for _, event in recorded.events if isinstance(event, NewSettings)
             ]
         self.topics = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
 
     def _recorded_epoch(self, toml: str) -> SettingsEpoch:
+        override, left_out = recorded_override(toml)
+        self.notes += left_out
         try:
-            return self._epoch(override_of(toml))
+            return self._epoch(override)
         except BadSetting as why:
             self.notes.append(f"The settings cannot be used, so the defaults are: {why}")
             return self._epoch(SettingsOverride())
@@ -124,7 +128,8 @@ class Drive:
         """Raises BadSetting."""
         tuning = tuning_for(override, self.offered, self.ros_version)
         sources = map_signals(self.offered, tuning.settings.topics)
-        by_topic = pipeline.by_topic(sources.values())
+        wanted = self._signals
+        by_topic = pipeline.by_topic(one for one in sources.values() if wanted is None or one.signal in wanted)
         found = {topic: by_topic.get(name, ()) for topic, name in self._names.items()}
         listeners = {
             topic: sources for topic, sources in found.items() if any(source.decode is not None for source in sources)

@@ -12,11 +12,11 @@ RosVersion = Literal[1, 2]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Message:
-    """One ROS message on its way.
+    """One ROS message.
 
     `message` has the field names of ROS as rosbridge spells them. Numbers may be NaN or infinite and arrays may be
     numpy
-    arrays: whoever writes JSON turns those into null and lists. Stamps are `secs`/`nsecs` in ROS 1, `sec`/`nanosec`
+    arrays; a JSON writer must convert those to null and lists. Stamps are `secs`/`nsecs` in ROS 1, `sec`/`nanosec`
     in ROS 2.
     """
 

@@ -22,8 +22,8 @@ class Rejected(ValueError):
 
 
 def number(message: Any, *path: str) -> float:
-    """The number at a path of fields; NaN where it is null, and where it is infinite, which JSON says as null too: a
-    recording tells nothing that its replay would not tell. Raises Rejected for what is missing or is no number."""
+    """The number at a path of fields; NaN for null, and for infinity, which is null in JSON too, so that a recording
+    and its replay agree. Raises Rejected if it is missing or not a number."""
     value = message
     try:
         for name in path:
@@ -52,7 +52,7 @@ def finite(message: Any, *path: str) -> float:
         if type(found) is float and math.isfinite(found):
             return found  # nearly always
     except (KeyError, TypeError, IndexError):
-        pass  # `number` says what is wrong
+        pass  # `number` raises with the reason
     value = number(message, *path)
     if not math.isfinite(value):
         raise Rejected(f"{'.'.join(path)} is not a number")
@@ -113,3 +113,13 @@ def inner(message: Any, name: str) -> Any:
     if not isinstance(value, Mapping):
         raise Rejected(f"{name} is missing")
     return value
+
+
+def yaw(pose: Any) -> float | None:
+    """Yaw in rad, counter-clockwise from the frame's x axis (REP-103), from the pose's quaternion; None where it
+    is none."""
+    x, y, z, w = (number(pose, "orientation", axis) for axis in "xyzw")
+    norm = x * x + y * y + z * z + w * w
+    if not 0.5 < norm < 1.5:  # NaN and the all-zero quaternion of drivers without a compass both fall out here
+        return None
+    return math.atan2(2 * (w * z + x * y), norm - 2 * (y * y + z * z))

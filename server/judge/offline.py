@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from typing import Any
 
 from monitor.alarm import Transition
-from monitor.phones import PhoneWord
+from monitor.phones import PhoneReport
+from monitor.response import SHELVE_AT_MOST_MIN
 from monitor.restoring import restore
-from monitor.runner import Monitor
+from monitor.runner import Monitor, Refused
 from monitor.signal_limits import expected_rates
 from monitor.state import LinkFacts, State
 from monitor.trends import Trends
 from server.judge import pipeline
 from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
 from server.judge.pipeline import TICK_S
-from server.judge.recorded_events import NewSettings, Pause
-from server.judge.recorded_slowdown import SlowDownTold
+from server.judge.recorded_events import ChosenPhone, NewSettings, Pause
+from server.judge.recorded_slowdown import SlowDownEvent
 from server.judge.run_state import RunState
 
 SILENCE_S = 600.0  # after so long without a message nothing new can be said: the judge is not stepped through the rest
-LOOK_EVERY = 24  # steps between two looks at the clock: some 2 ms
+STEPS_PER_CLOCK_READ = 24  # some 2 ms
 
 
 class Observer:
@@ -28,6 +31,9 @@ class Observer:
 
     def message_received(self, topic: str, now_s: float) -> None:
         """A message of any topic came."""
+
+    def value_decoded(self, signal: str, value: Any, now_s: float, stamp_s: float | None) -> None:
+        """A message holds this value; `stamp_s`: by its header, on the car's clock."""
 
     def signals_changed(self, changed: tuple[str, ...], state: State, now_s: float) -> None:
         """A message changed these signals; what comes of it was judged."""
@@ -50,7 +56,7 @@ class Observer:
 
 
 class OfflineRun:
-    """One run through a recording. It goes forward only; for another moment begin another, or go on from a RunState.
+    """One run through a recording, forward only; to seek, start another run or continue from a RunState.
 
     Times are seconds since the beginning of the recording.
     """
@@ -64,14 +70,17 @@ class OfflineRun:
         opens_with_message: bool = False,
         run_state: RunState | None = None,
         observer: Observer | None = None,
+        with_checks: bool = True,
     ) -> None:
-        """Begins at `from_s` without any knowledge, or goes on from `run_state`.
+        """Start at `from_s` with an empty state, or continue from `run_state`.
 
-        `opens_with_message`: the link opens with the first message from `from_s` on, and not at `from_s`. Raises
-        RecordingUnreadable.
+        `opens_with_message`: the link opens with the first message from `from_s` on, and not at `from_s`.
+        `with_checks` False: messages are decoded and change the state, but there are no ticks and nothing is judged.
+        Raises RecordingUnreadable.
         """
         self.drive = drive
         self._source = source
+        self._with_checks = with_checks
         self._observer = Observer() if observer is None else observer
         is_new = run_state is None
         self.run_state = self._begin(from_s) if run_state is None else run_state
@@ -81,7 +90,7 @@ class OfflineRun:
         if is_new:
             if opens_with_message and self._next is not None:
                 from_s = self.run_state.opened_s = self._next[0] - drive.start_s
-            self._skip_words(from_s)
+            self._skip_events(from_s)
 
     def _begin(self, from_s: float) -> RunState:
         epoch = self.drive.epochs[0]
@@ -123,21 +132,21 @@ class OfflineRun:
 
         `to_last_message`: not beyond the last message that is not after `until_s`. Raises RecordingUnreadable.
         """
-        run_state, words = self.run_state, self.drive.recorded.words
+        run_state, events = self.run_state, self.drive.recorded.events
         steps = 0
         while True:
             message_s = self.next_s
             if to_last_message and (self._next is None or message_s > until_s):
                 return True
             tick_s = self._tick_s(message_s)
-            word_s = words[run_state.words][0] if run_state.words < len(words) else math.inf
-            moment_s = min(message_s, tick_s, word_s)
+            event_s = events[run_state.events_taken][0] if run_state.events_taken < len(events) else math.inf
+            moment_s = min(message_s, tick_s, event_s)
             if moment_s > until_s:
                 run_state.at_s = max(run_state.at_s, until_s)
                 return True
-            if word_s <= moment_s:
-                run_state.words += 1
-                self._apply(words[run_state.words - 1][1], word_s)
+            if event_s <= moment_s:
+                run_state.events_taken += 1
+                self._apply(events[run_state.events_taken - 1][1], event_s)
             elif tick_s <= moment_s:
                 run_state.ticks += 1
                 self._tick(tick_s)
@@ -146,7 +155,7 @@ class OfflineRun:
                 self._next = next(self._rows, None)
             run_state.at_s = max(run_state.at_s, moment_s)
             steps += 1
-            if steps % LOOK_EVERY == 0 and is_over():
+            if steps % STEPS_PER_CLOCK_READ == 0 and is_over():
                 return False
 
     def _read(self) -> Iterator[Row]:
@@ -160,13 +169,15 @@ class OfflineRun:
 
     def _tick_s(self, message_s: float) -> float:
         run_state = self.run_state
+        if not self._with_checks:
+            return math.inf
         tick_s = run_state.opened_s + run_state.ticks * TICK_S
-        heard_s = run_state.opened_s if run_state.last_message_s is None else run_state.last_message_s
-        if tick_s - heard_s > SILENCE_S and min(message_s, self.drive.length_s) - tick_s > 1.0:
+        received_s = run_state.opened_s if run_state.last_message_s is None else run_state.last_message_s
+        if tick_s - received_s > SILENCE_S and min(message_s, self.drive.length_s) - tick_s > 1.0:
             until_s = min(message_s, self.drive.length_s)
             run_state.ticks = max(run_state.ticks, math.floor((until_s - run_state.opened_s) / TICK_S) - 5)
             tick_s = run_state.opened_s + run_state.ticks * TICK_S
-            self._observer.skipped(heard_s, until_s)
+            self._observer.skipped(received_s, until_s)
         return tick_s
 
     # -- what comes --------------------------------------------------------------------------------------------------
@@ -178,7 +189,7 @@ class OfflineRun:
         sources = self._epoch.listeners.get(topic)
         if sources is None:
             return
-        run_state.heard.add(topic)
+        run_state.topics_received.add(topic)
         run_state.last_message_s = now_s
         changed = pipeline.receive(
             sources,
@@ -190,10 +201,12 @@ class OfflineRun:
             profile=self._epoch.tuning.profile,
             tyre_rad_per_unit=run_state.monitor.limits.steering.tyre_rad_per_unit,
             transport=self.drive.delay,
+            on_value=self._observer.value_decoded,
         )
         if changed:
-            self._report(pipeline.judge(run_state.monitor, run_state.state, now_s, changed), now_s)
-            run_state.trends.hear(changed, run_state.state, now_s)
+            if self._with_checks:
+                self._report(pipeline.judge(run_state.monitor, run_state.state, now_s, changed), now_s)
+            run_state.trends.receive(changed, run_state.state, now_s)
             self._observer.signals_changed(changed, run_state.state, now_s)
             if "scan" in changed:
                 run_state.scans += 1
@@ -202,8 +215,9 @@ class OfflineRun:
     def _tick(self, now_s: float) -> None:
         run_state = self.run_state
         run_state.state.link(self._observer.link(self._link(now_s), now_s))
-        run_state.state.slow(run_state.slowed.facts(now_s, self._epoch.tuning.limits.slow_down))
+        run_state.state.slow(run_state.slow_down.facts(now_s, self._epoch.tuning.limits.slow_down))
         self._report(pipeline.judge(run_state.monitor, run_state.state, now_s, None), now_s)
+        run_state.minute.note(run_state.monitor.findings, now_s)
         self._observer.ticked(self, now_s)
 
     def _report(self, transitions: tuple[Transition, ...], now_s: float) -> None:
@@ -212,20 +226,24 @@ class OfflineRun:
                 self.run_state.load.add(transitions)
             self._observer.judged(transitions, now_s)
 
-    def _apply(self, word: object, now_s: float) -> None:
+    def _apply(self, event: object, now_s: float) -> None:
         run_state = self.run_state
-        match word:
+        match event:
             case Transition():
-                self._restore([word])
-                run_state.load.add([word])
-                self._observer.alarms_recorded([word])
+                self._restore([event])
+                run_state.load.add([event])
+                self._observer.alarms_recorded([event])
+                if self._with_checks and event.by is not None:
+                    self._respond(event, now_s)
             case Pause():
-                run_state.paused_s, run_state.paused_by = (now_s, word.by) if word.is_paused else (None, None)
-                run_state.state.set_paused(word.is_paused, run_state.paused_s)
-            case SlowDownTold():
-                run_state.slowed = run_state.slowed.after(word, now_s)
-            case PhoneWord():
-                run_state.state.hear_phone(word, now_s)
+                run_state.paused_s, run_state.paused_by = (now_s, event.by) if event.is_paused else (None, None)
+                run_state.state.set_paused(event.is_paused, run_state.paused_s)
+            case SlowDownEvent():
+                run_state.slow_down = run_state.slow_down.after(event, now_s)
+            case PhoneReport():
+                run_state.state.receive_phone(event, now_s)
+            case ChosenPhone():
+                run_state.state.ride(event.phone, now_s)
             case NewSettings():
                 run_state.epoch += 1
                 self._epoch = self.drive.epochs[run_state.epoch]
@@ -233,21 +251,26 @@ class OfflineRun:
                 run_state.monitor.limits = limits
                 run_state.state.expect(expected_rates(limits))
 
+    def _respond(self, event: Transition, now_s: float) -> None:
+        """What an operator did about an alarm counts where the alarm is raised now as it was then."""
+        with suppress(Refused):
+            self._report(_answered(self.run_state.monitor, event, now_s), now_s)
+
     def _restore(self, transitions: Sequence[Transition]) -> None:
         self.run_state.recorded_alarms = restore(self.run_state.recorded_alarms, transitions)
 
-    def _skip_words(self, from_s: float) -> None:
+    def _skip_events(self, from_s: float) -> None:
         """A run that begins in the middle knows what was recorded before: what stood, who paused, which settings."""
-        words, run_state = self.drive.recorded.words, self.run_state
+        events, run_state = self.drive.recorded.events, self.run_state
         before: list[Transition] = []
-        while run_state.words < len(words) and words[run_state.words][0] < from_s:
-            at_s, word = words[run_state.words]
-            run_state.words += 1
-            if isinstance(word, Transition):
-                before.append(word)
-                run_state.load.add([word])
-            elif not isinstance(word, PhoneWord):
-                self._apply(word, at_s)
+        while run_state.events_taken < len(events) and events[run_state.events_taken][0] < from_s:
+            at_s, event = events[run_state.events_taken]
+            run_state.events_taken += 1
+            if isinstance(event, Transition):
+                before.append(event)
+                run_state.load.add([event])
+            elif not isinstance(event, PhoneReport):
+                self._apply(event, at_s)
         if before:
             self._restore(before)
 
@@ -269,3 +292,19 @@ class OfflineRun:
             published=self._epoch.published,
             wall_zero_s=self.drive.start_s,
         )
+
+
+def _answered(monitor: Monitor, event: Transition, now_s: float) -> tuple[Transition, ...]:
+    """What the operator's answer that `event` records brings about here; raises Refused."""
+    alarm_id, by = event.alarm_id, event.by or ""
+    match event.change:
+        case "acknowledged":
+            return monitor.acknowledge(alarm_id, event.occurrence, by, now_s)
+        case "silenced":
+            return monitor.silence(alarm_id, event.occurrence, by, now_s)
+        case "shelved" if event.shelved_until_s is not None:
+            minutes = min((event.shelved_until_s - now_s) / 60, SHELVE_AT_MOST_MIN)  # the log has whole ms
+            return monitor.shelve(alarm_id, event.occurrence, minutes, by, now_s)
+        case "unshelved":
+            return monitor.unshelve(alarm_id, by, now_s)
+    return ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from monitor.runner import Monitor, Transition
@@ -49,10 +49,11 @@ def receive(
     profile: Profile,
     tyre_rad_per_unit: float,
     transport: Delays | None = None,
+    on_value: Callable[[str, Any, float, float | None], None] | None = None,
 ) -> tuple[str, ...]:
     """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock;
     `tyre_rad_per_unit` of the steering signal, 0: not known; `transport` None: it came without
-    delay, as far as is known.
+    delay, as far as is known. `on_value` receives each decoded value: signal, value, `at_s`, stamp.
     """
     reception.received += 1
     stamp = stamp_s(message)
@@ -68,6 +69,8 @@ def receive(
             continue
         if type(value) is Steering:
             value = steered(value, profile, tyre_rad_per_unit)
+        if on_value is not None:
+            on_value(source.signal, value, at_s, stamp)
         changed += state.receive(source.signal, value, at_s, stamp, delay_s)
     if not is_proper:
         reception.rejected += 1

@@ -1,4 +1,4 @@
-"""What was heard on each topic: counted, decoded, and where it was no proper message, rejected with its reason."""
+"""Statistics per topic: messages received, decoded, and rejected with the reason."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Reception:
     frames: Tally = field(default_factory=Tally)  # what was no message at all
     received: int = 0
     rejected: int = 0
-    unasked: int = 0  # messages on topics nobody subscribed to
+    unasked: int = 0  # messages on topics without a subscription
 
     def tally(self, signal: str) -> Tally:
         found = self.by_signal.get(signal)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from monitor.alarm import Transition
-from monitor.phones import PhoneWord
-from server.judge.recorded_slowdown import SlowDownTold
+from monitor.phones import PhoneReport
+from server.judge.recorded_slowdown import SlowDownEvent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,14 +24,21 @@ class NewSettings:
     toml: str
 
 
-Word = Transition | Pause | NewSettings | PhoneWord | SlowDownTold
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChosenPhone:
+    """The operator chose the phone that rides in the car; None: no phone any more."""
+
+    phone: str | None
+
+
+RecordedEvent = Transition | Pause | NewSettings | PhoneReport | ChosenPhone | SlowDownEvent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedEvents:
     """Everything of one recording, in the order of time. Times are seconds since its beginning."""
 
-    words: tuple[tuple[float, Word], ...] = ()
+    events: tuple[tuple[float, RecordedEvent], ...] = ()
     has_alarms: bool = False  # it holds the alarms as they were announced
-    settings: str | None = None  # that were in force at its beginning; None: it does not say
+    settings: str | None = None  # that were in force at its start; None: unknown
     notes: tuple[str, ...] = field(default=())

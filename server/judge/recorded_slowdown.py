@@ -1,20 +1,21 @@
-"""The slow-down as the recording tells it: armed, ordered, on its way, proven or not, released."""
+"""The slow-down as the recording has it: armed, ordered, on its way, proven or not, released."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 from monitor.checks.slow_down import SlowDownLimits
 from monitor.slowing import SlowingFacts
 from server.protocol import serialize
+from server.protocol.slow_down_state import SlowDownOrder, SlowDownPhase, SlowDownState
 
 CHANGES = ("armed", "disarmed", "slow_down")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SlowDownTold:
+class SlowDownEvent:
     """One event of the log."""
 
     change: str
@@ -28,7 +29,7 @@ class SlowDownTold:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OrderTold:
+class RecordedOrder:
     """An order that stood. Times are seconds since the recording's beginning."""
 
     number: int
@@ -36,39 +37,39 @@ class OrderTold:
     why: str
     ordered_s: float
     sent_s: float | None = None  # the first command
-    ramp_s: float | None = None  # when the ramp that goes on began; None: no commands go out
+    ramp_s: float | None = None  # start of the current ramp; None: no commands are sent
     from_mps: float | None = None  # where it began
     ramp_mps: float = 0.0
     slows_s: float | None = None
     is_unconfirmed: bool = False
-    stands: str | None = None  # as in a live order
+    stands: Literal["before", "unproven"] | None = None  # as in a live order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Slowed:
+class RecordedSlowDown:
     """What is known of it at one moment."""
 
     armed_by: str | None = None
     topic: str | None = None
-    order: OrderTold | None = None
+    order: RecordedOrder | None = None
 
-    def after(self, told: SlowDownTold, at_s: float) -> Slowed:
+    def after(self, event: SlowDownEvent, at_s: float) -> RecordedSlowDown:
         """With one event more."""
-        topic = told.topic or self.topic
-        if told.change == "armed":
-            return replace(self, armed_by=told.by or "somebody")
-        if told.change == "disarmed":
+        topic = event.topic or self.topic
+        if event.change == "armed":
+            return replace(self, armed_by=event.by or "somebody")
+        if event.change == "disarmed":
             return replace(self, armed_by=None)
         order = self.order
-        match told.step:
+        match event.step:
             case "released" | "ended":
                 return replace(self, order=None)
             case "ordered" | "resumed" | "sent" | "slows" | "stands" | "not_confirmed" | "cut" if (
-                told.order is not None
+                event.order is not None
             ):
-                if order is None or order.number != told.order:
-                    order = OrderTold(number=told.order, by=told.by or "catgraph", why=told.why, ordered_s=at_s)
-                return replace(self, topic=topic, order=_after(order, told, at_s))
+                if order is None or order.number != event.order:
+                    order = RecordedOrder(number=event.order, by=event.by or "catgraph", why=event.why, ordered_s=at_s)
+                return replace(self, topic=topic, order=_after(order, event, at_s))
         return self
 
     def facts(self, now_s: float, limits: SlowDownLimits) -> SlowingFacts:
@@ -83,11 +84,11 @@ class Slowed:
             commanded_mps=_commanded(order, now_s, limits) if order else None,
         )
 
-    def as_json(self, now_s: float, start_s: float, limits: SlowDownLimits) -> dict[str, Any]:
+    def as_json(self, now_s: float, start_s: float, limits: SlowDownLimits) -> SlowDownState:
         """The `decelerate` of a replay's state; `start_s`: since 1970."""
         order = self.order
         ordered_mps = _commanded(order, now_s, limits) if order else None
-        state = "safe" if self.armed_by is None else "armed"
+        state: SlowDownPhase = "safe" if self.armed_by is None else "armed"
         if order is not None:
             state = "holding" if ordered_mps == 0.0 and order.ramp_s is not None else "ordered"
         return {
@@ -97,34 +98,34 @@ class Slowed:
             "type": None,
             "rivals": None,
             "armed_by": self.armed_by,
-            "deceleration_mps2": serialize.plain(limits.deceleration_mps2, 2),
+            "deceleration_mps2": round(limits.deceleration_mps2, 2),
             "order": None if order is None else _order(order, ordered_mps, now_s, start_s, limits),
             "countdown": None,
             "guard": None,
         }
 
 
-def read(event: Mapping[str, Any]) -> SlowDownTold | None:
-    """The word in an event of the log; None: it is of something else."""
-    if event.get("change") not in CHANGES:
+def read(row: Mapping[str, Any]) -> SlowDownEvent | None:
+    """The event from its row of the log; None: it is of something else."""
+    if row.get("change") not in CHANGES:
         return None
-    number, speed = event.get("order"), event.get("commanded_mps")
-    by = event.get("by") or event.get("ordered_by")
-    return SlowDownTold(
-        change=str(event["change"]),
-        step=str(event.get("step") or ""),
+    number, speed = row.get("order"), row.get("commanded_mps")
+    by = row.get("by") or row.get("ordered_by")
+    return SlowDownEvent(
+        change=str(row["change"]),
+        step=str(row.get("step") or ""),
         by=by if isinstance(by, str) else None,
         order=number if type(number) is int else None,
-        why=str(event.get("why") or ""),
-        topic=event["topic"] if isinstance(event.get("topic"), str) else None,
+        why=str(row.get("why") or ""),
+        topic=row["topic"] if isinstance(row.get("topic"), str) else None,
         commanded_mps=float(speed) if isinstance(speed, int | float) and not isinstance(speed, bool) else None,
-        stood_before=event.get("stands") == "before",
+        stood_before=row.get("stands") == "before",
     )
 
 
-def _after(order: OrderTold, told: SlowDownTold, at_s: float) -> OrderTold:
-    speed_mps = told.commanded_mps
-    match told.step:
+def _after(order: RecordedOrder, event: SlowDownEvent, at_s: float) -> RecordedOrder:
+    speed_mps = event.commanded_mps
+    match event.step:
         case "sent":
             order = replace(order, sent_s=at_s, ramp_s=at_s, ramp_mps=speed_mps or 0.0, from_mps=speed_mps)
         case "resumed" if speed_mps is not None:
@@ -134,14 +135,14 @@ def _after(order: OrderTold, told: SlowDownTold, at_s: float) -> OrderTold:
         case "slows":
             order = replace(order, slows_s=order.slows_s or at_s, is_unconfirmed=False, stands=None)
         case "stands":
-            order = replace(order, is_unconfirmed=False, stands="before" if told.stood_before else "unproven")
+            order = replace(order, is_unconfirmed=False, stands="before" if event.stood_before else "unproven")
         case "not_confirmed":
             order = replace(order, is_unconfirmed=True, stands=None)
     return order
 
 
-def _commanded(order: OrderTold, now_s: float, limits: SlowDownLimits) -> float | None:
-    """Reckoned from the last command that is told: the ramp says the rest."""
+def _commanded(order: RecordedOrder, now_s: float, limits: SlowDownLimits) -> float | None:
+    """From the last recorded command and the ramp."""
     if order.ramp_s is None:
         return None
     left_mps = abs(order.ramp_mps) - limits.deceleration_mps2 * max(0.0, now_s - order.ramp_s)
@@ -149,8 +150,8 @@ def _commanded(order: OrderTold, now_s: float, limits: SlowDownLimits) -> float 
 
 
 def _order(
-    order: OrderTold, ordered_mps: float | None, now_s: float, start_s: float, limits: SlowDownLimits
-) -> dict[str, Any]:
+    order: RecordedOrder, ordered_mps: float | None, now_s: float, start_s: float, limits: SlowDownLimits
+) -> SlowDownOrder:
     def at_ms(moment_s: float | None) -> int | None:
         return None if moment_s is None else round((start_s + moment_s) * 1000)
 
@@ -158,10 +159,10 @@ def _order(
         "number": order.number,
         "by": order.by,
         "why": order.why,
-        "for_s": serialize.plain(now_s - order.ordered_s, 1),
+        "for_s": round(now_s - order.ordered_s, 1),
         "from_mps": serialize.plain(order.from_mps, 2),
         "ordered_mps": serialize.plain(ordered_mps, 2),
-        "deceleration_mps2": serialize.plain(limits.deceleration_mps2, 2),
+        "deceleration_mps2": round(limits.deceleration_mps2, 2),
         "sending": order.ramp_s is not None,
         "confirmed": False if order.is_unconfirmed else True if order.slows_s is not None else None,
         "stands": order.stands,
@@ -171,5 +172,5 @@ def _order(
             "bridge_ms": at_ms(order.sent_s),
             "slows_ms": at_ms(order.slows_s),
         },
-        "longest_s": serialize.plain(limits.longest_s, 0),
+        "longest_s": round(limits.longest_s, 0),
     }

@@ -1,6 +1,6 @@
-"""What an operator set for one vehicle: thresholds, topics, kind of car; a TOML file, changed as a whole.
+"""An operator's settings for one vehicle: thresholds, topics, profile; a TOML file, replaced as a whole.
 
-Only what differs from the profile's defaults is kept, so that a better default reaches a car nobody changed.
+Only differences from the profile's defaults are stored, so that a better default reaches an unchanged car.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ log = logging.getLogger("catgraph.settings")
 
 AUTO = "auto"  # the profile follows from what the car offers
 MAX_TOML_BYTES = bounded_toml.MAX_BYTES
-_MAX_VERSION = 2**53  # a larger one could not be told to a page
+_MAX_VERSION = 2**53  # a larger one is not exact in JSON on a page
 _HUGE = 1e12
 _SECTIONS = {"version", "profile", "topics", "limits"}
 _TOLD = 5  # things left out that a complaint names
@@ -68,7 +68,7 @@ def change(
     profile_name: str | None = None,
     known_profiles: Mapping[str, Profile] | None = None,
 ) -> Settings:
-    """The next version. A value or topic of None goes back to its default. Raises BadSetting, naming the field."""
+    """The next version. A value or topic of None is reset to its default. Raises BadSetting with the field."""
     new_values = {**settings.values}
     for name, value in (values or {}).items():
         if value is None:
@@ -85,7 +85,7 @@ def change(
         if topic is None:
             new_topics.pop(signal, None)
         elif not topic.strip() or len(topic) > 300 or not topic.isprintable():
-            raise BadSetting(f"topics.{signal}", "A topic's name has 1 to 300 letters that can be seen.")
+            raise BadSetting(f"topics.{signal}", "A topic name has 1 to 300 printable characters.")
         else:
             new_topics[signal] = topic
     chosen = settings.profile if profile_name is None else profile_name
@@ -101,7 +101,7 @@ def _validate(flat: Mapping[str, Any], *, named: Mapping[str, Any]) -> None:
             raise BadSetting(_seen(name), f"There is no setting named {_seen(name)}.")
     for name, value in flat.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise BadSetting(name, f"{_label(name)}: a number is needed.")
+            raise BadSetting(name, f"{_label(name)}: a number is required.")
         if abs(value) > _HUGE:  # an int of a thousand digits is no float
             raise BadSetting(name, _sentence(name, "too large"))
     try:
@@ -125,11 +125,11 @@ def _sentence(name: str, message: str) -> str:
     row = catalog.schema().get(name)
     if row is None:
         return f"{_seen(name)}: {message}."
-    return f"{row['title']}: {row['minimum']:g} to {row['maximum']:g} {row['unit']} is possible."
+    return f"{row['title']}: {row['minimum']:g} to {row['maximum']:g} {row['unit']} is allowed."
 
 
 def differences(old: Settings, new: Settings, profile: Profile, new_profile: Profile | None = None) -> list[str]:
-    """What changed between two versions, a line each, as the log tells it; `new_profile` where the kind of car did."""
+    """The changes between two versions, as lines for the log; `new_profile` if the profile changed."""
     before, after = catalog.flat(old.limits(profile)), catalog.flat(new.limits(new_profile or profile))
     lines = [
         f"{_label(name)}: {before[name]:g} → {after[name]:g} {catalog.schema()[name]['unit']}".rstrip()
@@ -165,17 +165,17 @@ def from_toml(text: str, profile: Profile = GENERIC, known_profiles: Mapping[str
     body = _toml(text)
     version = body.get("version", 0)
     if type(version) is not int or not 0 <= version <= _MAX_VERSION:
-        raise BadSetting("version", "The version is a whole number.")
+        raise BadSetting("version", "The version must be an integer.")
     values: dict[str, Any] = {}
     for group in _table(body, "limits"):
         for threshold, value in _table(body["limits"], group, within="limits.").items():
             values[f"{group}.{threshold}"] = value
     topics = _table(body, "topics")
     if not all(isinstance(topic, str) for topic in topics.values()):
-        raise BadSetting("topics", "A topic is given as text.")
+        raise BadSetting("topics", "A topic must be text.")
     name = body.get("profile", AUTO)
     if not isinstance(name, str):
-        raise BadSetting("profile", "The profile is given by its name.")
+        raise BadSetting("profile", "The profile must be a name.")
     unknown = sorted(set(body) - _SECTIONS)
     if unknown:
         raise BadSetting(_seen(unknown[0]), f"There is no section named {_seen(unknown[0])}.")
@@ -212,7 +212,7 @@ def salvage(text: str, known_profiles: Mapping[str, Profile]) -> tuple[Settings,
     version = body.pop("version", 0)
     if type(version) is int and 0 <= version <= _MAX_VERSION:
         settings = replace(settings, version=version)
-    for name in sorted(body, key=lambda name: name != "profile"):  # it says what the defaults of the others are
+    for name in sorted(body, key=lambda name: name != "profile"):  # it determines the defaults of the others
         rows = body[name]
         if name == "limits" and isinstance(rows, dict):
             for group, thresholds in rows.items():
@@ -252,8 +252,8 @@ class SettingsFile:
         self.complaint: str | None = None  # why what was found could not be used
 
     def read(self) -> Settings:
-        """What was kept, or the defaults; a file that cannot be used is set aside beside itself, never overwritten.
-        What can be used of it is in force and kept anew."""
+        """The stored settings, or the defaults; an unusable file is set aside, never overwritten. Its usable values are
+        in force and stored again."""
         if self._path is None:
             return Settings()
         try:
@@ -266,7 +266,7 @@ class SettingsFile:
             self.complaint = f"The settings cannot be read ({why.strerror or why}); the defaults are in force."
             return Settings()
         except UnicodeDecodeError:
-            return self._rescue(Settings(), ["It is no text in UTF-8."])
+            return self._rescue(Settings(), ["It is not UTF-8 text."])
         known = profiles.load()
         try:
             return from_toml(text, known_profiles=known)
@@ -283,10 +283,10 @@ class SettingsFile:
             if settings != Settings():
                 self.write(settings)
         except OSError:
-            log.exception("the settings in %s could not be set aside or kept anew", self._path)
-        told = " ".join(left_out[:_TOLD]) + (f" And {len(left_out) - _TOLD} more." if len(left_out) > _TOLD else "")
+            log.exception("settings not set aside or saved: path=%s", self._path)
+        listed = " ".join(left_out[:_TOLD]) + (f" And {len(left_out) - _TOLD} more." if len(left_out) > _TOLD else "")
         rest = "the rest is in force" if settings != Settings() else "the defaults are in force"
-        self.complaint = f"The settings kept in {aside.name} cannot all be used; {rest}. {told}"
+        self.complaint = f"The settings kept in {aside.name} cannot all be used; {rest}. {listed}"
         return settings
 
     def write(self, settings: Settings) -> None:
@@ -298,7 +298,7 @@ class SettingsFile:
             return
         if self._is_unread:
             with contextlib.suppress(FileNotFoundError):
-                log.warning("%s could not be read and is set aside as %s", self._path, set_aside(self._path))
+                log.warning("settings unreadable, set aside: path=%s aside=%s", self._path, set_aside(self._path))
             self._is_unread = False
         self._path.parent.mkdir(parents=True, exist_ok=True)
         durable_file.write(self._path, to_toml(settings).encode())

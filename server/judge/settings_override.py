@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from server.judge import profiles
 from server.judge.active_settings import ActiveSettings
 from server.judge.message import RosVersion
-from server.judge.settings import AUTO, SettingsFile, from_toml
+from server.judge.settings import AUTO, BadSetting, SettingsFile, from_toml, salvage
+
+MOST_LEFT_OUT = 10  # sentences of one file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,10 +23,16 @@ class SettingsOverride:
     profile: str = AUTO
 
 
-def override_of(toml: str) -> SettingsOverride:
-    """A file of all settings, as a recording holds it. Raises BadSetting."""
-    read = from_toml(toml)
-    return SettingsOverride(name="as recorded", values=read.values, topics=read.topics, profile=read.profile)
+def recorded_override(toml: str) -> tuple[SettingsOverride, list[str]]:
+    """What can be used of the settings in a recording, and a sentence for each that cannot."""
+    left_out: list[str] = []
+    try:
+        read = from_toml(toml)
+    except BadSetting:
+        read, found = salvage(toml, profiles.load())
+        left_out = [f"The settings cannot be used as they are: {why}" for why in found[:MOST_LEFT_OUT]]
+    override = SettingsOverride(name="as recorded", values=read.values, topics=read.topics, profile=read.profile)
+    return override, left_out
 
 
 def tuning_for(override: SettingsOverride, topics: Mapping[str, str], ros: RosVersion) -> ActiveSettings:

@@ -1,136 +1,13 @@
-"""Every signal's topics: the names looked for, the types accepted, how each is decoded, and which found topic
-fills it."""
+"""Which topic of a car fills which signal."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
-from server.judge import decoders as decode
-from server.judge.decoders import Decode
-
-FLOATS = ("std_msgs/Float32", "std_msgs/Float64")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Topic:
-    """A row of the table: how ROS carries one signal."""
-
-    signal: str
-    names: tuple[str, ...]  # tried in this order, whatever the case of their letters
-    types: Mapping[str, Decode]  # ROS 1 spelling; the first is the expected one
-    by_type: tuple[
-        str, ...
-    ] = ()  # types that only this signal has: taken under any name when none of the names is there
-    # Messages the bridge keeps for us in a burst: what comes in some 0.15 s or more, for what waits there grows old
-    # unseen, and what does not fit is lost; 1 for what is large.
-    queue_length: int = 5
-    compression: str = "none"
-
-    @property
-    def expected_type(self) -> str:
-        return next(iter(self.types))
-
-
-def _floats(read: Decode) -> dict[str, Decode]:
-    return dict.fromkeys(FLOATS, read)
-
-
-TOPICS = (
-    Topic(
-        signal="speed",
-        names=("/catvehicle/vel", "/vel", "/vehicle/twist", "/twist", "/vehicle/speed", "/speed"),
-        types={
-            "geometry_msgs/Twist": decode.twist,
-            "geometry_msgs/TwistStamped": decode.twist_stamped,
-            "nav_msgs/Odometry": decode.twist_of_odometry,
-            **_floats(decode.speed_of_float),
-        },
-        by_type=("nav_msgs/Odometry",),
-    ),
-    Topic(
-        signal="acceleration",
-        names=("/catvehicle/acceleration", "/acceleration", "/catvehicle/imu", "/imu/data", "/imu"),
-        types={"sensor_msgs/Imu": decode.acceleration_of_imu, **_floats(decode.acceleration_of_float)},
-    ),
-    Topic(
-        signal="brake",
-        names=("/catvehicle/brake", "/vehicle/brake", "/brake"),
-        types={"geometry_msgs/Wrench": decode.effort, **_floats(decode.effort_of_float)},
-    ),
-    Topic(
-        signal="accelerator",
-        names=("/catvehicle/accelerator", "/vehicle/accelerator", "/accelerator", "/throttle"),
-        types={"geometry_msgs/Wrench": decode.effort, **_floats(decode.effort_of_float)},
-    ),
-    Topic(
-        signal="steering",
-        names=("/catvehicle/steering", "/vehicle/steering", "/steering"),
-        types={"geometry_msgs/Wrench": decode.steering, **_floats(decode.steering_of_float)},
-    ),
-    Topic(
-        signal="distance",
-        queue_length=10,
-        names=(
-            "/DistanceEstimator/dist",
-            "/catvehicle/distanceEstimator/dist",
-            "/catvehicle/distanceEstimatorSteeringBased/dist",
-        ),
-        types=_floats(decode.distance),
-    ),
-    Topic(
-        signal="bearing",
-        queue_length=10,
-        names=(
-            "/DistanceEstimator/angle",
-            "/catvehicle/distanceEstimator/angle",
-            "/catvehicle/distanceEstimatorSteeringBased/angle",
-        ),
-        types=_floats(decode.bearing),
-    ),
-    Topic(
-        signal="position",
-        names=("/gps_fix", "/catvehicle/gps_fix", "/fix", "/gps/fix", "/navsat/fix"),
-        types={"sensor_msgs/NavSatFix": decode.nav_sat_fix},
-        by_type=("sensor_msgs/NavSatFix",),
-    ),
-    Topic(
-        signal="odometry",
-        names=("/catvehicle/odom", "/gps_odom", "/utm_odom", "/odom", "/odometry"),
-        types={"nav_msgs/Odometry": decode.odometry},
-        by_type=("nav_msgs/Odometry",),
-    ),
-    Topic(
-        signal="heading",
-        names=("/catvehicle/heading", "/heading"),
-        types={**_floats(decode.heading_of_float), "sensor_msgs/Imu": decode.heading_of_imu},
-    ),
-    Topic(
-        signal="scan",
-        names=("/catvehicle/front_laser_points", "/scan", "/catvehicle/scan", "/front/scan", "/laser/scan"),
-        types={"sensor_msgs/LaserScan": decode.laser_scan},
-        by_type=("sensor_msgs/LaserScan",),
-        queue_length=1,
-        compression="cbor",
-    ),
-    Topic(
-        signal="diagnostics",
-        names=("/diagnostics",),
-        types={"diagnostic_msgs/DiagnosticArray": decode.diagnostics},
-        by_type=("diagnostic_msgs/DiagnosticArray",),
-    ),
-    Topic(
-        signal="command",
-        queue_length=10,
-        names=("/catvehicle/cmd_vel", "/cmd_vel"),
-        types={"geometry_msgs/Twist": decode.command, "geometry_msgs/TwistStamped": decode.command_stamped},
-    ),
-    Topic(
-        signal="fuel",
-        names=("/catvehicle/fuel", "/fuel", "/fuel_level", "/battery_state"),
-        types={**_floats(decode.level), "sensor_msgs/BatteryState": decode.battery},
-    ),
-)
+from server.judge.signals import TOPICS
+from server.judge.topic import Decode, Topic
+from server.protocol.answers import TopicOffer
 
 COMMAND = "command"
 BY_SIGNAL = {topic.signal: topic for topic in TOPICS}
@@ -142,7 +19,7 @@ def plain_type(ros_type: str) -> str:
 
 
 def ros_version(types: Mapping[str, str]) -> int | None:
-    """1 or 2 from the spelling of the types found (topic → type); None where they do not tell."""
+    """1 or 2, by the spelling of the types (topic → type); None: undecided."""
     spellings = [kind for kind in types.values() if "/" in kind]
     if not spellings:
         return None
@@ -160,10 +37,10 @@ class Source:
     note: str | None = None  # what the operator should know of the choice
 
 
-def candidates(found: Mapping[str, str]) -> dict[str, list[dict[str, str]]]:
+def candidates(found: Mapping[str, str]) -> dict[str, list[TopicOffer]]:
     """Signal → the topics of a car (topic → type) whose type can be read as that signal, those of the expected type
     first."""
-    fitting = {}
+    fitting: dict[str, list[TopicOffer]] = {}
     for row in TOPICS:
         order = list(row.types)
         rows = [
@@ -176,7 +53,7 @@ def candidates(found: Mapping[str, str]) -> dict[str, list[dict[str, str]]]:
 def map_signals(
     found: Mapping[str, str], chosen: Mapping[str, str] | None = None, unpublished: Collection[str] = ()
 ) -> dict[str, Source]:
-    """Signal → Source for the topics a car has (topic → type). `chosen` are the operator's picks, signal → topic.
+    """Signal → Source for a car's topics (topic → type). `chosen` are the operator's choices, signal → topic.
 
     `unpublished` are topics that no node publishes. Such a one is not read; it stands for its signal, with a note, only
     where the operator picked it or nothing else could carry the signal. The command topic is kept by its name: the car

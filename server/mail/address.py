@@ -1,7 +1,7 @@
-"""One address of a mail, checked so strictly that nothing else can ride in it; and who may be written to.
+"""Strict parsing of one mail address, and the list of allowed recipients.
 
-Taken is what RFC 5321 calls Mailbox without quoted local parts and without address literals, with letters of all
-scripts as RFC 6531 has them. A domain is kept as it goes over the wire: ASCII, by IDNA 2008.
+Accepted is a Mailbox of RFC 5321 without quoted local parts and address literals, in all scripts (RFC 6531). A domain
+is stored as transmitted: ASCII, by IDNA 2008.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class MailAddress:
 
     @property
     def text(self) -> str:
-        """As it goes over the wire."""
+        """The address as transmitted."""
         return f"{self.local}@{self.domain}"
 
     @property
@@ -59,7 +59,7 @@ def parse(text: str) -> MailAddress:
         raise BadAddress(f"“{said}” is not one address, such as name@example.org.")
     local, _, domain = unicodedata.normalize("NFC", text).partition("@")
     if not _is_local(local):
-        raise BadAddress(f"“{said}” is not an address: what stands before the @ may hold letters, digits, . _ + and -.")
+        raise BadAddress(f"“{said}” is not an address: before the @ it may have letters, digits, . _ + and -.")
     address = MailAddress(local=local, domain=parse_domain(domain))
     if len(address.text.encode()) > LONGEST:
         raise BadAddress(f"“{said}” is too long for an address.")
@@ -67,7 +67,7 @@ def parse(text: str) -> MailAddress:
 
 
 def parse_domain(text: str) -> str:
-    """A domain as it goes over the wire. Raises BadAddress."""
+    """A domain as transmitted. Raises BadAddress."""
     try:
         domain = idna.encode(text, uts46=True, std3_rules=True).decode("ascii").lower()
     except (idna.IDNAError, UnicodeError):

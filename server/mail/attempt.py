@@ -70,8 +70,8 @@ def _again(
 
 
 def _named(some: Sequence[Recipient]) -> str:
-    told = ", ".join(f"{one.address}: {one.said}" if one.said else one.address for one in some[:_TOLD])
-    return told + (f" and {len(some) - _TOLD} more" if len(some) > _TOLD else "")
+    listed = ", ".join(f"{one.address}: {one.said}" if one.said else one.address for one in some[:_TOLD])
+    return listed + (f" and {len(some) - _TOLD} more" if len(some) > _TOLD else "")
 
 
 def _count(recipients: Sequence[Recipient]) -> str:

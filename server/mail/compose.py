@@ -1,4 +1,4 @@
-"""Writes one mail as a file, as it goes over the wire: head, text, a stretch of a file in base64. Never in memory."""
+"""Writes one mail as a file: headers, text, a range of a file in base64. Streamed, never whole in memory."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ class DeliveryQueue:
         self._files = files
 
     def requeue(self) -> None:
-        """Nothing is on its way any more: whoever sent was ended in the midst of it."""
+        """Requeue mails that were being sent when the sender was killed."""
         with transaction(self._database) as database:
             database.execute(
                 "UPDATE mail SET state = 'cancelled' WHERE state IN ('sending', 'queued') "
@@ -97,8 +97,8 @@ class DeliveryQueue:
             )
 
     def try_all_again(self, sender: str, now_ms: int) -> None:
-        """The settings are others now: what waits is due, what failed for the account waits again, and what was
-        composed for another sender is composed anew."""
+        """Apply changed settings: waiting mails are due, account failures are requeued, and mails composed for another
+        sender are composed again."""
         with transaction(self._database) as database:
             database.execute(
                 "UPDATE mail SET state = 'queued', next_ms = ?, done_ms = NULL, of_account = 0 "

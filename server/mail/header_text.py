@@ -1,4 +1,4 @@
-"""Checks of text before it goes into a header: `email.message` refuses CR and LF and nothing else."""
+"""Checks of header text: `email.message` refuses CR and LF only."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def needs_encoding(text: str) -> bool:
 
 
 class EncodedText:
-    """A header whose text goes out as encoded words, as `EmailPolicy` takes it: an object with a name and `fold`.
+    """A header that is written as encoded words, in the form that `EmailPolicy` accepts: a name and `fold`.
 
-    The headers of `email.headerregistry` decode an encoded word that they are given, and a line break that it may
-    hold gets out; and they lose blanks between encoded words. `email.header.Header` does neither.
+    The headers of `email.headerregistry` decode a given encoded word, so that a line break in it becomes real, and lose
+    blanks between encoded words. `email.header.Header` does neither.
     """
 
     def __init__(self, name: str, text: str, rest: str = "") -> None:

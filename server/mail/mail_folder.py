@@ -33,7 +33,7 @@ class MailFolder:
     """One server's mail on the disk; one server at a time has it."""
 
     def __init__(self, folder: Path) -> None:
-        self.work = folder / "work"  # what lies there while mails are made
+        self.work = folder / "work"  # working files while mails are prepared
         self.complaints: list[str] = []  # what was found wrong at the start
         self.trouble: str | None = None  # why nothing can be kept or sent now
         self._folder = folder
@@ -43,12 +43,12 @@ class MailFolder:
 
     @property
     def files(self) -> Path:
-        """Where the composed mails lie."""
+        """The folder of the composed mails."""
         assert self._outbox is not None
         return self._outbox.files
 
     async def open(self) -> MailSettings | None:
-        """The settings that are kept; None: it cannot be opened, and `trouble` says why."""
+        """The stored settings; None: the folder cannot be opened, and `trouble` has the reason."""
         try:
             return await self._in_thread(self._open)
         except (OSError, sqlite3.Error) as why:

@@ -1,4 +1,4 @@
-"""What stands in a mail beside what the operator wrote: what is attached, how parts are joined, where a link leads."""
+"""The generated text of a mail: attachments, how to join parts, links."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class Mailer:
         return self._sender.under_way
 
     async def start(self) -> None:
-        """Opens the outbox and begins to send. Never raises for what the disk does: `trouble` says it."""
+        """Open the outbox and start sending. Disk errors are in `trouble`, never raised."""
         settings = await self._folder.open()
         if settings is None:
             return
@@ -94,6 +94,8 @@ class Mailer:
 
     def share_of(self, letter: Letter) -> float | None:
         """How much of it is made, or sent of the mail that is on its way: 0 to 1; None: neither is going on."""
+        if letter.state not in ("queued", "sending"):
+            return None  # the connection may still be ending
         for under_way in (self.making, self.sending):
             if under_way is not None and under_way.letter == letter.n:
                 return round(under_way.share, 3)
@@ -102,7 +104,7 @@ class Mailer:
     async def order(self, key: str, order: Order) -> Letter:
         """Takes an order; it is on the disk when this returns. Raises MailRefused."""
         if not self.settings.is_complete:
-            raise MailRefused("Mail is not set up: give SMTP host and sender in Settings, E-mail.", status=409)
+            raise MailRefused("Mail is not set up: enter SMTP host and sender in Settings, E-mail.", status=409)
         for one in order.to:
             self._allow(one)
         for recording in order.recordings:
@@ -111,7 +113,7 @@ class Mailer:
         try:
             letter = await self._folder.ask(lambda outbox: outbox.add(key, order, self._wall_ms()))
         except OutboxFull:
-            raise MailRefused("The outbox is full: cancel or resend what failed.", status=409) from None
+            raise MailRefused("The outbox is full: cancel or resend failed mails.", status=409) from None
         self._preparer.look()
         return letter
 
@@ -169,10 +171,10 @@ class Mailer:
         while True:
             try:
                 await work()
-            except MailRefused as why:  # the disk, told in `trouble`
+            except MailRefused as why:  # a disk error, reported in `trouble`
                 log.error("%s: %s", what, why)
             except Exception:
-                log.exception("%s failed; it is begun again", what)
+                log.exception("task failed, restarting: task=%s", what)
             await asyncio.sleep(retry_backoff.AGAIN_S)
 
 

@@ -13,7 +13,7 @@ Way = Literal["attached", "split", "link"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Order:
-    """What somebody asked for; never changed."""
+    """The order as given; immutable."""
 
     recordings: tuple[str, ...]
     format: Format
@@ -114,7 +114,7 @@ def state_of(mails: tuple[Mail, ...]) -> State:
 
 
 def said_of(mails: tuple[Mail, ...]) -> str:
-    """What is to be told of them in one line: the newest word of the mail that keeps the letter where it is."""
+    """The status text of a letter: the newest reply for the mail that determines its state."""
     state = state_of(mails)
     telling = [mail for mail in mails if mail.state == state and mail.said]
     if not telling:

@@ -1,6 +1,6 @@
-"""Every letter that was ordered and where each of its mails stands: on the disk before anybody is told.
+"""The outbox database: every letter and the state of its mails, on the disk before anything is reported.
 
-Used from one thread at a time. A mail's file lies beside it for as long as it may have to be sent.
+Used from one thread at a time. A mail's file is stored beside it as long as it may have to be sent.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Outbox:
         self._database.close()
 
     def recover(self) -> None:
-        """After a start: what was on its way waits again, what was cancelled stays so, files nobody needs go."""
+        """Recover after a start: mails being sent are requeued, cancelled ones stay so, unused files are deleted."""
         self.queue.requeue()
         self.sweep()
 
@@ -127,7 +127,7 @@ class Outbox:
         with transaction(self._database) as database:
             letter = self._reader.known(n)
             if letter.state in ("sent", "cancelled"):
-                raise WrongState("It was sent already." if letter.state == "sent" else "It is cancelled already.")
+                raise WrongState("It was already sent." if letter.state == "sent" else "It is already cancelled.")
             database.execute("UPDATE letter SET stage = 'cancelled', said = '' WHERE n = ?", (n,))
             database.execute(
                 "UPDATE mail SET state = 'cancelled', next_ms = NULL "
@@ -147,7 +147,7 @@ class Outbox:
         with transaction(self._database) as database:
             letter = self._reader.known(n)
             if letter.state == "sending" or (letter.state == "queued" and not letter.is_ready):
-                raise WrongState("It is on its way.")
+                raise WrongState("It is being sent.")
             is_whole = letter.state == "sent"
             again = [mail for mail in letter.mails if is_whole or mail.state != "sent"]
             for mail in again:

@@ -57,7 +57,7 @@ _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 
 def open_at(folder: Path) -> tuple[sqlite3.Connection, str | None]:
-    """The outbox in `folder`, and a sentence where it was damaged and is begun anew. Raises sqlite3.Error, OSError."""
+    """Open the outbox in `folder`; with a sentence if it was damaged and recreated. Raises sqlite3.Error, OSError."""
     path = folder / "outbox.sqlite"
     try:
         return _open(path), None
@@ -67,8 +67,10 @@ def open_at(folder: Path) -> tuple[sqlite3.Connection, str | None]:
         log.error("the outbox %s is damaged: %s", path, error)
     aside = _set_aside(folder, path)
     waiting = sum(1 for _ in (folder / aside.name).glob("*.eml"))
-    told = f"{waiting} composed mails lie there too" if waiting != 1 else "1 composed mail lies there too"
-    return _open(path), f"The outbox was damaged and is begun anew; the old one is set aside as {aside.name}, {told}."
+    lost_text = f"{waiting} composed mails lie there too" if waiting != 1 else "1 composed mail lies there too"
+    return _open(
+        path
+    ), f"The outbox was damaged and is begun anew; the old one is set aside as {aside.name}, {lost_text}."
 
 
 @contextmanager

@@ -62,7 +62,9 @@ def pack(
     done = 0
     with zipfile.ZipFile(into, "x", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
         for path in files:
-            info = zipfile.ZipInfo(path.name, stamp)  # not the file's own time: a copy made anew would be another zip
+            info = zipfile.ZipInfo(
+                path.name, stamp
+            )  # not the file's own time, so that a repeated copy gives the same zip
             info.compress_type = zipfile.ZIP_DEFLATED
             info.external_attr = 0o644 << 16
             with open(path, "rb") as source, archive.open(info, "w", force_zip64=_is_huge(path)) as entry:
@@ -95,7 +97,7 @@ def need_room(folder: Path, size_bytes: int) -> None:
     """Raises NoRoom where the disk would be filled."""
     free = shutil.disk_usage(folder).free
     if free < size_bytes + _SPARE_BYTES:
-        raise NoRoom(f"The disk has {free / 1e6:.0f} MB left; {(size_bytes + _SPARE_BYTES) / 1e6:.0f} MB are needed.")
+        raise NoRoom(f"The disk has {free / 1e6:.0f} MB left; {(size_bytes + _SPARE_BYTES) / 1e6:.0f} MB are required.")
 
 
 def _is_huge(path: Path) -> bool:

@@ -31,9 +31,9 @@ class CannotPrepare(Exception):
 async def prepare(
     letter: Letter, settings: MailSettings, source: Source, folder: Path, files: Path, progress: Callable[[float], None]
 ) -> Prepared:
-    """Writes the mails of a letter into `files`; `folder` takes what lies between. Raises CannotPrepare, OSError."""
+    """Write the mails of a letter into `files`, with working files in `folder`. Raises CannotPrepare, OSError."""
     if not settings.is_complete:
-        raise CannotPrepare("Mail is not set up: give SMTP host and sender in Settings, E-mail.")
+        raise CannotPrepare("Mail is not set up: enter SMTP host and sender in Settings, E-mail.")
     work = folder / letter.key
     stop = threading.Event()
     try:
@@ -64,7 +64,7 @@ def _begin(work: Path) -> None:
 
 
 async def _in_thread(work: Callable[[], T], stop: threading.Event) -> T:
-    """Work in a thread, which is told to stop and waited for when the task is cancelled."""
+    """Run work in a thread; a cancelled task stops the thread and waits for it."""
     running = asyncio.ensure_future(asyncio.to_thread(work))
     try:
         return await asyncio.shield(running)
@@ -86,18 +86,20 @@ async def _exported(
     for i, recording in enumerate(order.recordings):
         path = await asyncio.to_thread(source.path_of, recording)
         if path is None:
-            raise CannotPrepare(f"There is no recording {recording} any more.")
+            raise CannotPrepare(f"The recording {recording} no longer exists.")
         if order.format != "mcap":
             into = work / f"{i}"
             await asyncio.to_thread(into.mkdir)
-            told = partial(_part_of, progress, i, len(order.recordings))
+            on_progress = partial(_part_of, progress, i, len(order.recordings))
             try:
-                made = await source.export(path, order.format, into, told)
+                made = await source.export(path, order.format, into, on_progress)
             except (OSError, ValueError, RuntimeError) as why:
                 raise CannotPrepare(f"{recording} cannot be written as {order.format}: {why}") from None
             path = made.path
             if not made.is_whole:
-                missing += [f"{recording}: {note}" for note in made.notes] or [f"{recording}: something is not in it."]
+                missing += [f"{recording}: {note}" for note in made.notes] or [
+                    f"{recording}: the export is incomplete."
+                ]
         found.append(path)
         progress((i + 1) / len(order.recordings))
     return found, missing
@@ -128,7 +130,7 @@ def _write(
     sender = address.parse(settings.sender)
     made: list[Composed] = []
     for number, text in enumerate(texts, 1):
-        # The content is in the name: the same mail made anew is known as the same, another content is another mail.
+        # The id contains a hash of the content: the same mail composed again has the same id, other content another.
         message_id = f"<{letter.key}.{packed.sha256[:12]}.{number}of{len(texts)}@{sender.domain}>"
         stretch = parts[number - 1]
         draft = compose.Draft(

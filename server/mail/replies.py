@@ -1,4 +1,4 @@
-"""What a mail server says, as it may be shown; and what kept a mail from being handed over."""
+"""Mail server replies in displayable form, and the reason why a mail was not accepted."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class Sender:
         self._pause_s = pause_s
         self._due = asyncio.Event()
         self._failures = 0  # of the account, one after the other
-        self._held: tuple[int, str] | None = None  # until when the server is not asked again [ms], and why
+        self._held: tuple[int, str] | None = None  # no attempt before this time [ms], and why
 
     def look(self) -> None:
         """Something may be due: a clock was moved, or mail was ordered."""
@@ -51,7 +51,7 @@ class Sender:
         self._held = None
 
     def forget_failures(self) -> None:
-        """The account is another: its pauses begin anew."""
+        """Reset the back-off for a changed account."""
         self._failures = 0
         self._held = None
 
@@ -141,8 +141,8 @@ class Sender:
 
     def _fault(self, mail: Mail, error: BaseException) -> Trouble:
         """A fault of ours must not keep a mail "sending" for ever."""
-        log.error("mail %d could not be sent", mail.letter, exc_info=error)
-        return Trouble(f"The server made a mistake ({type(error).__name__}), which is in its log.")
+        log.error("mail not sent: mail=%d", mail.letter, exc_info=error)
+        return Trouble(f"Internal server error ({type(error).__name__}); the server's log has the details.")
 
     def _troubled(self, mail: Mail, trouble: Trouble, under_way: Underway, now_ms: int) -> Outcome:
         is_doubtful = under_way.connection is not None and under_way.connection.is_doubtful
@@ -163,26 +163,26 @@ class Sender:
             ),
         )
 
-        def told(sent: int) -> None:
+        def on_progress(sent: int) -> None:
             under_way.share = sent / max(1, mail.size_bytes)
 
         try:
-            return await under_way.connection.hand_over(envelope, told)
+            return await under_way.connection.hand_over(envelope, on_progress)
         except FileNotFoundError:
-            raise Trouble("Its file is gone from the outbox: send it again.", is_permanent=True) from None
+            raise Trouble("Its file is missing from the outbox: send it again.", is_permanent=True) from None
 
     def _refusal(self, mail: Mail) -> str | None:
         """Why it may not be sent any more."""
         if not self._settings().is_complete:
-            return "Mail is not set up: give SMTP host and sender in Settings, E-mail."
+            return "Mail is not set up: enter SMTP host and sender in Settings, E-mail."
         for one in mail.recipients:
             if one.state == "waiting" and not address.is_allowed(address.parse(one.address), self._settings().allowed):
                 return f"{one.address} is not among the allowed recipients."
         return None
 
     async def _account_refused(self, trouble: Trouble, now_ms: int) -> None:
-        """What holds for one mail holds for all: the server is not asked once for each. The pause is counted from
-        the end of the attempt, `now_ms`, however long the disk took since."""
+        """Back off for all mails after a failure of the account. The pause starts at the end of the attempt, `now_ms`,
+        however long the disk took since."""
         if trouble.is_permanent:
             await self._folder.ask(lambda outbox: outbox.queue.refuse_all(str(trouble), now_ms))
             return
@@ -196,7 +196,7 @@ class Sender:
             await self._folder.ask(lambda outbox: outbox.queue.hold(why, until_ms, _LONGEST_MS))
 
     def _is_held(self) -> bool:
-        """The server was asked in vain a short while ago: what was ordered since waits with the others."""
+        """Apply a running back-off of the account to newly ordered mails."""
         if self._held is None:
             return False
         left_ms = self._held[0] - self._wall_ms()
@@ -210,7 +210,7 @@ class Sender:
                 await self._folder.ask(lambda outbox: outbox.queue.settle(mail.n, outcome, self._wall_ms()))
                 return
             except MailRefused as why:
-                log.error("what became of mail %d is not kept yet: %s", mail.letter, why)
+                log.error("mail state not saved yet: mail=%d error=%s", mail.letter, why)
                 await asyncio.sleep(retry_backoff.AGAIN_S)
 
 

@@ -51,7 +51,7 @@ class MailSettings:
     sender_name: str = ""
     allowed: tuple[str, ...] = ()  # empty: everyone
     limit_mb: float = LIMIT_MB  # raw size of what is attached to one mail [10⁶ bytes]
-    link_base: str = ""  # where this server is reached by whom a link is sent to; empty: as the page that ordered it
+    link_base: str = ""  # this server's address in links; empty: the address of the ordering page
     ca: str = ""  # PEM; only these are trusted then
 
     @property
@@ -65,15 +65,15 @@ class MailSettings:
 
     @property
     def account(self) -> tuple[str, int, str]:
-        """Whom the password belongs to."""
+        """The account of the password."""
         return self.host.lower(), self.port, self.user
 
 
 def checked(body: Mapping[str, Any], old: MailSettings) -> MailSettings:
     """The settings in `body`, which names all but the password; without one the old password stays.
 
-    A password is told to nobody but the account it was given for: with another host, port or user, or without TLS
-    where there was TLS, it must be given again. Raises BadMailSetting.
+    A password is bound to its account: another host, port or user, or a change from TLS to none, needs it again.
+    Raises BadMailSetting.
     """
     given = body.get("password")
     bare = MailSettings(
@@ -92,9 +92,9 @@ def checked(body: Mapping[str, Any], old: MailSettings) -> MailSettings:
     if not bare.user:
         bare = replace(bare, password="")
     if given is None and bare.password and (bare.account != old.account or _is_weaker(bare, old)):
-        raise BadMailSetting("password", f"Give the password again: it was for {old.user} at {old.host}:{old.port}.")
+        raise BadMailSetting("password", f"Enter the password again: it was for {old.user} at {old.host}:{old.port}.")
     if bare.password and bare.security == "none" and not _is_this_machine(bare.host):
-        raise BadMailSetting("security", "Without TLS anybody on the way reads the password: choose STARTTLS or TLS.")
+        raise BadMailSetting("security", "Without TLS the password can be intercepted: choose STARTTLS or TLS.")
     return bare
 
 
@@ -134,7 +134,7 @@ def _security(value: Any) -> Security:
 
 def _line(name: str, text: str, most: int) -> str:
     if len(text) > most or not is_one_line(text):
-        raise BadMailSetting(name, f"This is one line of at most {most} letters that can be seen.")
+        raise BadMailSetting(name, f"This is one line of at most {most} printable characters.")
     return text
 
 
@@ -184,7 +184,7 @@ def _link_base(text: str) -> str:
     except ValueError:
         is_good = False
     if not is_good:
-        raise BadMailSetting("link_base", "The address for links is such as http://192.168.4.1:8000.")
+        raise BadMailSetting("link_base", "The address for links must look like http://192.168.4.1:8000.")
     return text.rstrip("/")
 
 
@@ -193,11 +193,11 @@ def _ca(text: str) -> str:
     if not text:
         return ""
     if len(text) > _MAX_CA or not text.isascii():
-        raise BadMailSetting("ca", "The certificate is text in PEM of at most 32 kB.")
+        raise BadMailSetting("ca", "The certificate must be PEM text of at most 32 kB.")
     try:
         ssl.create_default_context(cadata=text)
     except (ssl.SSLError, ValueError):
-        raise BadMailSetting("ca", "This is not a certificate in PEM.") from None
+        raise BadMailSetting("ca", "This is not a PEM certificate.") from None
     return text + "\n"
 
 

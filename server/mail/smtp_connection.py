@@ -1,7 +1,7 @@
-"""One connection to the SMTP server: dialled, encrypted, logged in, mails handed over piece by piece.
+"""One connection to the SMTP server: dial, encrypt, log in, send mails in pieces.
 
-aiosmtplib (written against 5.1) dials, encrypts, logs in and speaks. Its own way of sending takes a whole mail as bytes
-and works through it with expressions on the loop; here `smtp_stream` sends the text.
+aiosmtplib (written against 5.1) dials, encrypts, logs in and sends commands. Its own send method takes a whole mail as
+bytes and blocks the loop with regular expressions; here `smtp_stream` sends the text.
 """
 
 from __future__ import annotations
@@ -66,18 +66,20 @@ class Connection:
 
     @property
     def largest_bytes(self) -> int | None:
-        """The largest mail the server takes, as it says (RFC 1870); None: it does not say."""
-        told = self._smtp.esmtp_extensions.get("size", "")
-        return int(told) if told.isdigit() and int(told) > 0 else None
+        """The server's size limit (RFC 1870) [B]; None: not declared."""
+        on_progress = self._smtp.esmtp_extensions.get("size", "")
+        return int(on_progress) if on_progress.isdigit() and int(on_progress) > 0 else None
 
-    async def hand_over(self, mail: Envelope, told: Callable[[int], None]) -> tuple[dict[str, Reply], Reply | None]:
+    async def hand_over(
+        self, mail: Envelope, on_progress: Callable[[int], None]
+    ) -> tuple[dict[str, Reply], Reply | None]:
         """The server's answer to each recipient, and to the mail; None where no recipient was taken.
 
-        `told` is called with the bytes that are on their way. Raises Trouble: then nothing is settled, and where
+        `on_progress` is called with the bytes that are on their way. Raises Trouble: then nothing is settled, and where
         `is_doubtful` is true the mail may have arrived.
         """
         self.is_doubtful = False
-        with self._in_words("while the mail was handed over"):
+        with self._in_words("while the mail was sent"):
             await self._sender(mail)
             answers = {one: await self._recipient(one, mail.needs_utf8) for one in mail.to}
             if any(answer.code in (421, 0) for answer in answers.values()) and not self._smtp.is_connected:
@@ -88,7 +90,7 @@ class Connection:
             start = await self._smtp.execute_command(b"DATA", timeout=REPLY_S)
             if start.code != 354:
                 return answers, self._reply(start.code, start.message)
-            return answers, await self._text(mail, told)
+            return answers, await self._text(mail, on_progress)
 
     async def _sender(self, mail: Envelope) -> None:
         options = []
@@ -122,7 +124,7 @@ class Connection:
             return self._reply(refused.code, refused.message)
         return self._reply(answer.code, answer.message)
 
-    async def _text(self, mail: Envelope, told: Callable[[int], None]) -> Reply:
+    async def _text(self, mail: Envelope, on_progress: Callable[[int], None]) -> Reply:
         protocol = self._smtp.protocol
         if protocol is None:
             raise Trouble("The connection was lost.")
@@ -138,7 +140,7 @@ class Connection:
                         break
                     await write(protocol, piece, answer)
                     sent += length
-                    told(sent)
+                    on_progress(sent)
             if not answer.done():
                 self.is_doubtful = True
                 protocol.write(b".\r\n")
@@ -153,7 +155,7 @@ class Connection:
         return self._reply(said.code, said.message)
 
     async def close(self) -> None:
-        """Says goodbye where anybody listens."""
+        """Send QUIT if the connection is open."""
         with contextlib.suppress(aiosmtplib.SMTPException, OSError, TimeoutError):
             await self._smtp.quit(timeout=2.0)
         self._smtp.close()
@@ -233,7 +235,7 @@ async def _log_in(smtp: aiosmtplib.SMTP, account: Account) -> None:
         if isinstance(error, (aiosmtplib.SMTPServerDisconnected, aiosmtplib.SMTPTimeoutError)):
             raise
         raise Trouble(
-            f"{account.shown} offers no login that is known here.", is_permanent=True, is_of_account=True
+            f"{account.shown} offers no supported login method.", is_permanent=True, is_of_account=True
         ) from None
 
 

@@ -16,7 +16,7 @@ DIAL_S = 20.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Account:
-    """Whom to dial and how to log in."""
+    """The server to dial and the login."""
 
     host: str
     port: int
@@ -30,7 +30,7 @@ class Account:
 
     @classmethod
     def of(cls, settings: MailSettings) -> Account:
-        """Whom these settings name."""
+        """The account in these settings."""
         return cls(
             host=settings.host,
             port=settings.port,
@@ -52,7 +52,7 @@ async def dial(account: Account) -> socket.socket:
         try:
             found = await loop.getaddrinfo(account.host, account.port, type=socket.SOCK_STREAM)
         except socket.gaierror:
-            raise Trouble(f"No host named {account.host} is known here.", is_of_account=True) from None
+            raise Trouble(f"There is no host named {account.host}.", is_of_account=True) from None
         last: OSError | None = None
         for family, _, protocol, _, where in found:
             try:

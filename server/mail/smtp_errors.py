@@ -31,7 +31,7 @@ def in_words(account: Account, when: str) -> Iterator[None]:
         trusted = _of_trust(error)
         if trusted is not None:
             raise Trouble(
-                f"{account.shown} does not prove who it is: {trusted}.", is_permanent=True, is_of_account=True
+                f"{account.shown} cannot be verified: {trusted}.", is_permanent=True, is_of_account=True
             ) from None
         raise Trouble(
             f"{account.shown} {_how(error)}{'' if is_dialling else f' {when}'}.", is_of_account=is_dialling
@@ -54,12 +54,12 @@ def _how(error: BaseException) -> str:
         if isinstance(one, ConnectionRefusedError):
             return "refuses the connection"
         if isinstance(one, ssl.SSLError):
-            return "does not speak TLS as it should"
+            return "does not speak TLS correctly"
         one = one.__cause__ or one.__context__
     if isinstance(error, TimeoutError):
-        return "gave no answer in time"
+        return "did not answer in time"
     if isinstance(error, (ConnectionError, aiosmtplib.SMTPServerDisconnected)):
         return "closed the connection"
     if isinstance(error, OSError) and error.strerror:
         return f"cannot be reached ({error.strerror.lower()})"
-    return "did not answer as a mail server does"
+    return "does not answer like a mail server"

@@ -15,10 +15,10 @@ _PIECE = 1 << 18
 def next_piece(file: BinaryIO, is_line_start: bool) -> tuple[bytes, bool, int]:
     """The next piece with its dots doubled (RFC 5321 4.5.2), whether it ends a line, and how long it was."""
     piece = file.read(_PIECE)
-    told = piece.replace(b"\n.", b"\n..")
+    escaped = piece.replace(b"\n.", b"\n..")
     if is_line_start and piece.startswith(b"."):
-        told = b"." + told
-    return told, piece.endswith(b"\n"), len(piece)
+        escaped = b"." + escaped
+    return escaped, piece.endswith(b"\n"), len(piece)
 
 
 async def write(protocol: SMTPProtocol, piece: bytes, answer: asyncio.Future[Any]) -> None:

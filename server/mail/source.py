@@ -16,7 +16,7 @@ class Source(Protocol):
         """The finished recording of that name; None where there is none. May be called from any thread."""
 
     async def export(self, path: Path, format: str, into: Path, progress: Callable[[float], None]) -> Made:
-        """Writes a recording in another format into the folder `into`. Progress goes from 0 to 1.
+        """Writes a recording in another format into the folder `into`. Progress is 0 to 1.
 
-        Raises OSError, ValueError or RuntimeError with a sentence where it cannot be done.
+        Raises OSError, ValueError or RuntimeError with a sentence.
         """

@@ -19,7 +19,7 @@ from server.mail.smtp_dial import Account
 WITHIN_S = 45.0
 
 
-class TrialFailed(Exception):
+class MailTestFailed(Exception):
     """It did not work; `str()` is a sentence with the server's words."""
 
 
@@ -34,12 +34,12 @@ class Trial:
 
 
 async def try_out(settings: MailSettings, to: MailAddress | None, now_ms: int) -> Trial:
-    """Raises TrialFailed."""
+    """Raises MailTestFailed."""
     account = Account.of(settings)
     try:
         async with asyncio.timeout(WITHIN_S), connected(account) as connection:
             how = f"{account.shown} answers" + (", encrypted" if settings.security != "none" else ", NOT encrypted")
-            how += f", and takes the login of {settings.user}." if settings.user else "."
+            how += f", and accepts the login of {settings.user}." if settings.user else "."
             said = ""
             if to is not None:
                 with tempfile.TemporaryDirectory(prefix="catgraph-mail-") as folder:
@@ -49,16 +49,18 @@ async def try_out(settings: MailSettings, to: MailAddress | None, now_ms: int) -
                 answer = answers[to.text] if of_mail is None else of_mail
                 said = answer.text
                 if refused:
-                    raise TrialFailed(f"{account.shown} refuses the mail to {to.shown}: {said}")
-                how += f" It took a mail to {to.shown}."
+                    raise MailTestFailed(f"{account.shown} refuses the mail to {to.shown}: {said}")
+                how += f" It accepted a mail to {to.shown}."
             largest = connection.largest_bytes
             if largest is not None and largest < settings.limit_bytes * 1.37:
-                how += f" It takes mails of at most {largest / 1e6:.1f} MB: set the limit to {largest / 1.4e6:.1f} MB."
+                how += (
+                    f" It accepts mails of at most {largest / 1e6:.1f} MB: set the limit to {largest / 1.4e6:.1f} MB."
+                )
             return Trial(sentence=how, said=said, is_encrypted=settings.security != "none", largest_bytes=largest)
     except Trouble as why:
-        raise TrialFailed(str(why)) from None
+        raise MailTestFailed(str(why)) from None
     except TimeoutError:
-        raise TrialFailed(f"{account.shown} gave no answer in time.") from None
+        raise MailTestFailed(f"{account.shown} did not answer in time.") from None
 
 
 def _written(settings: MailSettings, to: MailAddress, now_ms: int, folder: Path) -> Envelope:
@@ -68,10 +70,10 @@ def _written(settings: MailSettings, to: MailAddress, now_ms: int, folder: Path)
         sender=sender,
         sender_name=settings.sender_name,
         to=[to],
-        subject="catgraph: trial mail",
+        subject="catgraph: test mail",
         at_ms=now_ms,
         message_id=f"<{secrets.token_hex(12)}.trial@{sender.domain}>",
-        text="This mail was sent from catgraph's settings, to try them. Recordings will come from this address.",
+        text="This mail tests catgraph's mail settings. Recordings will come from this address.",
     )
     size = compose.write(draft, path, threading.Event())
     return Envelope(

@@ -32,7 +32,7 @@ class Underway:
 
 
 async def joined(task: asyncio.Future[Any]) -> None:
-    """Waits for a task to end, however; whoever is cancelled meanwhile takes it along."""
+    """Wait for a task to end; a cancellation of the caller cancels the task too."""
     try:
         await asyncio.wait([task])
     except asyncio.CancelledError:
@@ -41,7 +41,7 @@ async def joined(task: asyncio.Future[Any]) -> None:
 
 
 async def _ended(task: asyncio.Future[Any]) -> None:
-    """Ends a task; told again and again, for wait_for of Python 3.11 (aiosmtplib uses it) may swallow the word."""
+    """Cancel a task repeatedly, because wait_for of Python 3.11 (used by aiosmtplib) can swallow a cancellation."""
     while not task.done():
         task.cancel()
         await asyncio.wait([task], timeout=0.5)

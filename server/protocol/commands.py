@@ -1,66 +1,97 @@
-"""What a page may ask for: one model a command, refused with a sentence where it does not fit."""
+"""What a page or a program may order: one model a command, refused with a sentence where it does not fit.
+
+Each model says who may, whether it is served over HTTP as well, and whether a page that replays may send it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from server.protocol.command_base import BaseCommand, Name, Needs, Number, PageName
+from server.protocol.doc import doc
+
 MAX_COMMAND_BYTES = 16 * 1024
-PAGE = r"^[0-9a-z-]{4,40}$"
-Name = Annotated[str, Field(min_length=1, max_length=120)]
-Number = Annotated[int, Field(ge=0, le=2**53)]
-PageName = Annotated[str, Field(pattern=PAGE)]  # by which a page, and the phone it is on, knows itself
-# Any operator, or only the one who is in control. Slowing the car is to need no more than an operator, letting it go
-# control.
-Needs = Literal["operator", "control"]
 
 
-class _Command(BaseModel):
-    model_config = ConfigDict(extra="ignore", strict=True, frozen=True)
-    needs: ClassVar[Needs] = "control"  # what is not said to need less
-    id: Annotated[str, Field(max_length=80)] | None = None
+class Connect(BaseCommand):
+    """Dials a car; it is tried until disconnected."""
 
-
-class Connect(_Command):
-    """Without an address: to the car that was configured when the server was started."""
-
+    http: ClassVar[str] = "Dial a car's rosbridge; it is tried until disconnected"
     kind: Literal["connect"]
-    address: Annotated[str, Field(max_length=300)] = ""
+    address: Annotated[
+        str,
+        Field(
+            max_length=300,
+            examples=["ws://192.168.4.1:9090"],
+            description="host, host:port, ws:// or wss://; empty: the car that was configured",
+        ),
+    ] = ""
 
 
-class Retry(_Command):
+class Retry(BaseCommand):
+    """Dials at once."""
+
     kind: Literal["retry"]
 
 
-class Disconnect(_Command):
+class Disconnect(BaseCommand):
+    """Ends monitoring: the session is idle."""
+
+    http: ClassVar[str] = "End monitoring"
     kind: Literal["disconnect"]
 
 
-class Pause(_Command):
+class Pause(BaseCommand):
+    """Pauses monitoring: values go on, no alarm comes."""
+
+    http: ClassVar[str] = "Pause monitoring: values continue, no alarm is raised"
     kind: Literal["pause"]
 
 
-class Resume(_Command):
+class Resume(BaseCommand):
+    """Ends the pause."""
+
+    http: ClassVar[str] = "Monitor again"
     kind: Literal["resume"]
 
 
-class Record(_Command):
-    """Begin to record, or end it, by hand."""
+class Record(BaseCommand):
+    """Begins or ends a recording by hand; refused with the reason, the disk's too."""
 
+    http: ClassVar[str] = "Begin to record, or end it, by hand"
     kind: Literal["record"]
-    on: bool
+    on: Annotated[bool, doc("true begins a recording, false ends the one that is made")]
 
 
-class Acknowledge(_Command):
+class Acknowledge(BaseCommand):
+    """The operator has seen this occurrence."""
+
     needs: ClassVar[Needs] = "operator"
+    http: ClassVar[str] = "The operator has seen this occurrence"
+    path: ClassVar[str] = "/api/alarms/{alarm}/acknowledge"
     kind: Literal["acknowledge"]
     alarm: Name
-    occurrence: Number
+    occurrence: Annotated[Number, doc("which occurrence was seen; an older one is refused")]
 
 
-class Shelve(_Command):
+class Silence(BaseCommand):
+    """No sound of this occurrence for 30 s; it still waits for its acknowledgement."""
+
+    needs: ClassVar[Needs] = "operator"
+    http: ClassVar[str] = "No sound of this occurrence for 30 s; it is not acknowledged by that"
+    path: ClassVar[str] = "/api/alarms/{alarm}/silence"
+    kind: Literal["silence"]
+    alarm: Name
+    occurrence: Annotated[Number, doc("which occurrence is silenced; an older one is refused")]
+
+
+class Shelve(BaseCommand):
+    """Hides an alarm for a time."""
+
     needs: ClassVar[Needs] = "operator"
     kind: Literal["shelve"]
     alarm: Name
@@ -68,23 +99,32 @@ class Shelve(_Command):
     minutes: Annotated[float, Field(gt=0, le=15)] = 5.0
 
 
-class Unshelve(_Command):
+class Unshelve(BaseCommand):
+    """Ends the shelving of an alarm."""
+
     needs: ClassVar[Needs] = "operator"
     kind: Literal["unshelve"]
     alarm: Name
 
 
-class Set(_Command):
-    """Settings to change; null takes one back to its default. `version`: refused when they changed since."""
+class Set(BaseCommand):
+    """Changes settings."""
 
     kind: Literal["set"]
-    values: dict[Name, float | None] = Field(default_factory=dict, max_length=500)
-    topics: dict[Name, str | None] = Field(default_factory=dict, max_length=50)
-    profile: Name | None = None
-    version: Number | None = None
+    values: dict[Name, float | None] = Field(
+        default_factory=dict,
+        max_length=500,
+        examples=[{"speed_limit.max_mps": 9.0}],
+        description="in SI; null goes back to the default",
+    )
+    topics: dict[Name, str | None] = Field(
+        default_factory=dict, max_length=50, description="signal → topic; null: as found"
+    )
+    profile: Annotated[Name | None, doc("a profile's name, or auto")] = None
+    version: Annotated[Number | None, doc("refused where the settings are no longer at this version")] = None
 
 
-class Import(_Command):
+class Import(BaseCommand):
     """All settings at once, from a TOML file."""
 
     kind: Literal["import"]
@@ -109,10 +149,11 @@ class Fix(BaseModel):
     held_s: Annotated[float, Field(ge=0, le=86_400)]
 
 
-class Position(_Command):
-    """Where this phone is, or why it cannot tell."""
+class Position(BaseCommand):
+    """Where this phone is, or why that is not known: either `fix` or `why`."""
 
     needs: ClassVar[Needs] = "operator"
+    passes_replay: ClassVar[bool] = True  # the live monitor must know, whatever the page shows
     kind: Literal["position"]
     phone: PageName
     handheld: bool
@@ -122,66 +163,90 @@ class Position(_Command):
     @model_validator(mode="after")
     def _is_either(self) -> Self:
         if (self.fix is None) == (self.why is None):
-            raise PydanticCustomError("position", "it says either where the phone is or why it cannot tell")
+            raise PydanticCustomError("position", "it needs either a position or the reason for having none")
         return self
 
 
-class Ride(_Command):
-    """Which phone rides in the car and is compared with it; null: nobody says, one is found."""
+class Ride(BaseCommand):
+    """Chooses the phone that is in the car and is compared with it."""
 
     kind: Literal["ride"]
-    phone: PageName | None
+    phone: Annotated[PageName | None, doc("null: none is chosen, one is found")]
 
 
-class TakeControl(_Command):
-    """Control is taken, given, asked for; server/control/lease.py says who may do what."""
+class TakeControl(BaseCommand):
+    """Takes, gives or requests control; server/control/lease.py says who may do what."""
 
     needs: ClassVar[Needs] = "operator"
+    passes_replay: ClassVar[bool] = True  # a page that is asked for control answers
     kind: Literal["control"]
     do: Literal["take", "take_over", "release", "request", "withdraw", "hand_over", "keep"]
-    to: PageName | None = None  # of hand_over and keep: the page
+    to: Annotated[PageName | None, doc("of hand_over: the page that gets it; of keep: whose request is refused")] = None
 
     @model_validator(mode="after")
     def _says_whom(self) -> Self:
         if (self.to is not None) != (self.do in ("hand_over", "keep")):
-            raise PydanticCustomError("control", "it says to whom where control is handed over or kept, and only there")
+            raise PydanticCustomError(
+                "control", "`to` is required to hand over or keep control, and not allowed otherwise"
+            )
         return self
 
 
-class PresentWord(_Command):
-    """How a page stands, once a second: whether it is seen, and whether an alarm would be heard from it. It is no
-    order: nothing answers it but its refusal."""
+class PresentWord(BaseCommand):
+    """How a page stands, once a second and at each change: whether it is seen, and whether an alarm would be heard from
+    it. Nothing answers it but its refusal."""
 
     needs: ClassVar[Needs] = "operator"
     kind: Literal["present"]
     visible: bool
-    draws: bool = True  # false: what shows its values and alarms has failed
+    draws: Annotated[bool, doc("false: drawing fails, and the page covers its values")] = True
     sound: Literal["ready", "refused", "asks", "missing", "interrupted"]
     awake: Literal["ready", "refused", "asks", "missing"]
     vibrates: bool = False
     battery: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = None
     charging: bool | None = None
-    lag_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0  # age of its newest state
-    leaves: bool = False  # it is closed, or another page takes its place
+    lag_s: Annotated[float, Field(ge=0, allow_inf_nan=False, description="age of its newest state")] = 0.0
+    leaves: Annotated[bool, doc("it is closed, or another page takes its place")] = False
+    announces: list[Name] = Field(
+        default_factory=list, max_length=100, description="the other cars whose next alarm would be heard from it"
+    )
 
 
-class Arm(_Command):
+class OfCar(BaseCommand):
+    """Acts on the car itself: refused where it was meant for another one."""
+
+    vehicle: Annotated[Name | None, doc("the car that the page named to its operator; refused by any other")] = None
+
+
+class Arm(OfCar):
     """Slow-down may be ordered from now on."""
 
+    http: ClassVar[str] = "Slow-down may be ordered from now on"
+    path: ClassVar[str] = "/api/slow-down/arm"
+    has_body: ClassVar[bool] = False
     kind: Literal["arm"]
 
 
-class Disarm(_Command):
+class Disarm(OfCar):
+    """Slow-down may not be ordered any more."""
+
+    http: ClassVar[str] = "Nothing can be ordered any more"
+    path: ClassVar[str] = "/api/slow-down/disarm"
+    has_body: ClassVar[bool] = False
     kind: Literal["disarm"]
 
 
-class Decelerate(_Command):
-    """Slow the car. `pressed_ago_s`: since the finger let go, when it was sent; `heard_ms` and `held_s` as in a Fix:
-    what took too long on its way is not obeyed. A program gives none of them."""
+class Decelerate(OfCar):
+    """Slows the car, once armed; refused where it took longer than 300 ms on its way."""
 
     needs: ClassVar[Needs] = "operator"
+    http: ClassVar[str] = "Slow the car, and hold it until it is released; no emergency stop"
+    path: ClassVar[str] = "/api/slow-down/order"
+    has_body: ClassVar[bool] = False
     kind: Literal["slow_down"]
-    pressed_ago_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 0.0
+    pressed_ago_s: Annotated[
+        float, Field(ge=0, le=86_400, allow_inf_nan=False, description="since the finger let go, when it was sent")
+    ] = 0.0
     heard_ms: Annotated[float, Field(ge=0, le=2**53, allow_inf_nan=False)] | None = None
     held_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 0.0
 
@@ -191,23 +256,28 @@ class Decelerate(_Command):
         return self.pressed_ago_s + way_s / 2
 
 
-class Release(_Command):
-    """Whoever drives may drive on: ends the order, or the guard's hold, of this number."""
+class Release(OfCar):
+    """Ends the order, or the guard's hold, of this number: whoever drives may drive on."""
 
+    http: ClassVar[str] = "The driver or controller may continue"
+    path: ClassVar[str] = "/api/slow-down/release"
     kind: Literal["release"]
-    number: Number
+    number: Annotated[Number, doc("of the very order that ends, as the state names it")]
 
 
-class Veto(_Command):
-    """Not slowed by itself this time."""
+class Veto(OfCar):
+    """Stops a count-down: the car is not slowed by itself this time."""
 
     needs: ClassVar[Needs] = "operator"
+    http: ClassVar[str] = "Not slowed by itself this time"
+    path: ClassVar[str] = "/api/slow-down/veto"
+    passes_replay: ClassVar[bool] = True
     kind: Literal["veto"]
-    trigger: Name
+    trigger: Annotated[Name, doc("as the count-down names it")]
 
 
 SlowingCommand = Arm | Disarm | Decelerate | Release | Veto
-Command = (
+LoggedCommand = (
     Connect
     | Retry
     | Disconnect
@@ -215,6 +285,7 @@ Command = (
     | Resume
     | Record
     | Acknowledge
+    | Silence
     | Shelve
     | Unshelve
     | Set
@@ -222,17 +293,22 @@ Command = (
     | Position
     | Ride
     | TakeControl
-    | PresentWord
     | SlowingCommand
 )
-KINDS = frozenset(get_args(one.model_fields["kind"].annotation)[0] for one in get_args(Command))
-NO_SUCH = "There is no such command."
+Command = LoggedCommand | PresentWord
+
+
+def kind_of(command: type[Command]) -> str:
+    """The `kind` by which a command is sent."""
+    kind: str = get_args(command.model_fields["kind"].annotation)[0]
+    return kind
+
+
+BY_KIND: Mapping[str, type[Command]] = {kind_of(one): one for one in get_args(Command)}
+KINDS = frozenset(BY_KIND)
+SLOW_DOWN = frozenset(kind for kind, one in BY_KIND.items() if one in get_args(SlowingCommand))
+NO_SUCH = "Unknown command."
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
-
-
-def is_of_settings(command: Command) -> bool:
-    """Whether it makes another version of the settings."""
-    return isinstance(command, (Set, Import))
 
 
 class NotUnderstood(ValueError):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-SLOW_DOWN = ("slow_down", "release", "veto", "arm", "disarm")  # commands with an allowance of their own
 MAX_DEPTH = 32  # of what a page sends; its deepest message nests three deep
 
 

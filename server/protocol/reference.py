@@ -1,118 +1,54 @@
-"""All alarms and thresholds as a page of Markdown, made from their declarations: docs/alarms.md.
+"""What is made from the declarations: docs/alarms.md, the tables of docs/protocol.md and the types of the page.
 
-To be written anew when a declaration changes: python -m server.protocol.reference > docs/alarms.md
+python -m server.protocol.reference --write  brings all of them up to date; without --write it names what is not.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from functools import partial
-from typing import Any
+from collections.abc import Callable
+from pathlib import Path
 
-from monitor import catalog
-from monitor.alarm_spec import AlarmSpec
-from monitor.catalog import CHECKS, AnyCheck
-from monitor.runner import IMPAIRED, IMPAIRED_SPEC
-from monitor.signals import SIGNALS
+from server.protocol import alarm_reference, tables, typescript
+from server.protocol.shapes import definitions
 
-HEAD = """# Alarms and thresholds
-
-Made from the declarations in `monitor/checks/` by `python -m server.protocol.reference > docs/alarms.md`.
-A test fails when it is out of date.
-
-Each check answers *OK*, *FAULT* or *not checked* (why). A fault that lasts for the *on* delay raises the alarm, *OK*
-that lasts for the *off* delay clears it; *not checked* does neither. While an alarm of the column *explained by*
-stands, this one is not announced. *Ack*: it stays, although its condition has gone, until somebody has acknowledged it.
-*Repeats after*: within this time what was announced is not announced again; it stands in the list as it was left.
-`<signal>` stands for each of: {signals}.
-
-"""
+TYPES = "static/js/core/protocol-types.d.ts"
+HEAD = "// Made from server/protocol by `python -m server.protocol.reference --write`.\n\n"
+ROOT = Path(__file__).resolve().parent.parent.parent
 
 
-def text() -> str:
-    """The whole page."""
-    head = HEAD.format(signals=", ".join(f"`{name}`" for name in SIGNALS))
-    return head + "\n".join([*_alarms(), "", *_thresholds(), ""])
+def _types(_: str) -> str:
+    return HEAD + "\n".join(typescript.declarations(definitions()))
 
 
-def _alarms() -> Iterator[str]:
-    yield "## Alarms"
-    yield ""
-    yield "| Alarm | What is asked | Priority, place | On / off | Repeats after | Ack | Explained by | What to do |"
-    yield "|---|---|---|---|---|---|---|---|"
-    families: dict[str, list[AnyCheck]] = {}
-    for check in CHECKS:
-        families.setdefault(_family(check.id), []).append(check)
-    for family in families.values():
-        yield _row(family)
-    yield _alarm_row(IMPAIRED, IMPAIRED_SPEC, "Does a check fail?", IMPAIRED_SPEC.inhibited_by)
+# Each file, and how it is made from what it holds now.
+FILES: dict[str, Callable[[str], str]] = {
+    "docs/alarms.md": lambda _: alarm_reference.text(),
+    "docs/protocol.md": tables.filled,
+    TYPES: _types,
+}
 
 
-def _row(family: list[AnyCheck]) -> str:
-    """One check, or one of a family that has a member for each signal."""
-    first = family[0]
-    signal = first.id.partition(".")[2]
-    if not signal:
-        return _alarm_row(first.id, first.alarm, _question(first), first.alarm.inhibited_by)
-    by = dict.fromkeys(
-        name.replace(f".{check.id.partition('.')[2]}", ".<signal>") if _family(name) != _family(check.id) else name
-        for check in family
-        for name in check.alarm.inhibited_by
-    )
-    row = _alarm_row(first.id.replace(f".{signal}", ".<signal>"), first.alarm, _question(first), tuple(by))
-    return row.replace(f"**{SIGNALS[signal].label}", "**(signal)")
+def out_of_date(root: Path = ROOT) -> dict[Path, str]:
+    """What each file would have to hold that does not hold it."""
+    found: dict[Path, str] = {}
+    for name, made in FILES.items():
+        path = root / name
+        now = path.read_text(encoding="utf-8") if path.exists() else ""
+        if (text := made(now)) != now:
+            found[path] = text
+    return found
 
 
-def _family(alarm_id: str) -> str:
-    return alarm_id.partition(".")[0]
-
-
-def _alarm_row(alarm_id: str, spec: AlarmSpec, question: str, inhibited_by: tuple[str, ...]) -> str:
-    cells = (
-        f"**{spec.title}** `{alarm_id}`",
-        question,
-        f"{spec.priority}, {spec.place}",
-        f"{spec.on_delay_s:g} / {spec.off_delay_s:g} s",
-        f"{spec.repeat_after_s / 60:g} min" if spec.repeat_after_s else "",
-        "yes" if spec.needs_ack else "",
-        ", ".join(f"`{name}`" for name in inhibited_by),
-        spec.advice,
-    )
-    return f"| {' | '.join(cells)} |"
-
-
-def _question(check: AnyCheck) -> str:
-    """The first sentence of the check's own file."""
-    find: Any = check.find
-    if isinstance(find, partial):
-        find = find.func
-    said = " ".join((sys.modules[find.__module__].__doc__ or "").split())
-    ends = [at for at in (said.find("? "), said.find(". "), said.find(": ")) if at > 0]
-    return said[: min(ends) + 1].removesuffix(":") if ends else said
-
-
-def _thresholds() -> Iterator[str]:
-    yield "## Thresholds"
-    yield ""
-    yield "In SI, as in files of settings: `[speed_limit]` and below it `max_mps = 11.0`."
-    yield ""
-    yield "| Name | What | Default | Range | |"
-    yield "|---|---|---|---|---|"
-    is_rate_told = False
-    for name, field in catalog.schema().items():
-        group, _, short = name.partition(".")
-        title = field["title"]
-        if group == "signals" and short.removesuffix("_hz") in SIGNALS:
-            if is_rate_told:
-                continue
-            is_rate_told = True
-            name, title = "signals.<signal>_hz", "(signal): expected rate"
-        span = f"{field['minimum']:g} … {field['maximum']:g}".replace("-", "−")
-        yield (
-            f"| `{name}` | {title} | {field['default']:g} {field['unit']} | {span} | {field.get('description') or ''} |"
-        )
+def main(arguments: list[str]) -> int:
+    """Writes or names what is out of date."""
+    stale = out_of_date()
+    for path, text in stale.items():
+        if "--write" in arguments:
+            path.write_text(text, encoding="utf-8")
+        print(path.relative_to(ROOT))
+    return 1 if stale and "--write" not in arguments else 0
 
 
 if __name__ == "__main__":
-    print(text(), end="")
+    sys.exit(main(sys.argv[1:]))

@@ -6,7 +6,7 @@ import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,6 +19,12 @@ from monitor.obstacle_view import ANGLE_STEP_RAD
 from monitor.runner import Tile
 from monitor.scan import usable
 from monitor.trends import STEP_S, Piece
+from server.protocol.alarm_state import AlarmLoad as LoadState
+from server.protocol.alarm_state import NewEvent, StandingAlarm, SuppressedAlarm, Worst
+from server.protocol.alarm_state import Quantity as QuantityState
+from server.protocol.alarm_state import Tile as TileState
+from server.protocol.signal_state import ComponentState, ScanValue, SignalValue
+from server.protocol.state import Step, Trends
 
 SCAN_MAGIC = 0x53
 SCAN_VERSION = 2
@@ -36,7 +42,7 @@ def plain(number: float | None, digits: int = 4) -> float | None:
     return round(float(number), digits) if number is not None and math.isfinite(number) else None
 
 
-def value(reading: Any) -> dict[str, Any] | None:
+def value(reading: Any) -> SignalValue | None:
     """The fields of a signal's value, as the table of docs/protocol.md names them."""
     match reading:
         case values.Twist():
@@ -58,7 +64,7 @@ def value(reading: Any) -> dict[str, Any] | None:
                 "alt_m": plain(reading.alt_m, 2),
                 "status": reading.status,
                 "sigma_m": plain(reading.sigma_m, 2),
-                "covariance_m2": [plain(one, 4) for one in reading.covariance_m2] if reading.covariance_m2 else None,
+                "covariance_m2": _rounded(reading.covariance_m2) if reading.covariance_m2 else None,
             }
         case values.Odometry():
             return {
@@ -73,16 +79,23 @@ def value(reading: Any) -> dict[str, Any] | None:
             return _scan_summary(reading)
         case values.Diagnostics():
             shown = sorted(reading.components, key=lambda c: -c.level)[:SHOWN_COMPONENTS]
-            rows = [{"name": c.name, "level": c.level, "message": c.message} for c in shown]
+            rows: list[ComponentState] = [{"name": c.name, "level": c.level, "message": c.message} for c in shown]
             return {"worst": max((c.level for c in reading.components), default=0), "components": rows}
         case values.MotionCommand():
             return {"speed_mps": plain(reading.speed_mps), "tyre_angle_rad": plain(reading.tyre_angle_rad)}
         case values.Level():
             return {"value": plain(reading.value, 1), "unit": reading.unit}
+        case values.Number():
+            return {"value": plain(reading.value)}
     return None
 
 
-def _scan_summary(scan: values.LaserScan) -> dict[str, Any]:
+def _rounded(covariance_m2: tuple[float, float, float]) -> tuple[float, float, float]:
+    east, north, both = covariance_m2
+    return round(east, 4), round(north, 4), round(both, 4)
+
+
+def _scan_summary(scan: values.LaserScan) -> ScanValue:
     good = usable(scan.ranges_m, scan.range_min_m, scan.range_max_m)
     nearest = bearing = None
     if good.any():
@@ -158,75 +171,81 @@ def _nearest_beam(scan: values.LaserScan, judged: Judged) -> int:
     return round((judged.bearing_rad - scan.angle_min_rad) / scan.angle_increment_rad)
 
 
-def tile(tile: Tile) -> dict[str, Any]:
+def tile(tile: Tile) -> TileState:
     return {
         "id": tile.id,
         "label": tile.label,
-        "verdict": str(tile.verdict),
+        "verdict": tile.verdict,
         "text": tile.text,
         "brief": tile.brief,
         "checks": list(tile.checks),
     }
 
 
-def alarm(alarm: Alarm, now_s: float, wall_ms: int) -> dict[str, Any]:
+def alarm(alarm: Alarm, now_s: float, wall_ms: int) -> StandingAlarm:
     """A standing alarm. Its times are turned from the monitor's clock into time of day by their age."""
     spec = alarm.spec
     finding = alarm.finding or alarm.trip
     raised_for_s = now_s - alarm.raised_s if alarm.raised_s is not None else 0.0
     place = spec.place if alarm.active or spec.place_after is None else spec.place_after
-    until_s = alarm.shelved_until_s
+    until_s, quiet_s = alarm.shelved_until_s, alarm.silenced_until_s
     return {
         "id": alarm.id,
         "occurrence": alarm.occurrence,
         "title": spec.title,
-        "priority": str(spec.priority),
-        "place": str(place),
-        "sound": str(spec.sound),
-        "state": str(alarm.state),
+        "priority": spec.priority,
+        "place": place,
+        "sound": spec.sound,
+        "state": alarm.state,
         "active": alarm.active,
         "needs_ack": spec.needs_ack,
         "raised_ms": round(wall_ms - raised_for_s * 1000),
         "for_s": round(raised_for_s, 1),
-        "verdict": str(finding.verdict if finding else Verdict.UNKNOWN),
+        "verdict": finding.verdict if finding else Verdict.UNKNOWN,
         "text": finding.text if finding else "",
         "trip_text": alarm.trip.text if alarm.trip else "",
-        "measured": _quantity(finding.measured if finding else None),
-        "limit": _quantity(finding.limit if finding else None),
+        "measured": quantity(finding.measured if finding else None),
+        "limit": quantity(finding.limit if finding else None),
         "worst": _worst(alarm.worst),
         "causes": list(finding.causes) if finding else [],
-        "actions": [str(action) for action in alarm.actions],
+        "actions": list(alarm.actions),
         "advice": spec.advice,
         "acknowledged_by": alarm.acknowledged_by if alarm.acknowledged else None,
         "shelved_until_ms": round(wall_ms + (until_s - now_s) * 1000) if until_s is not None else None,
         "shelved_by": alarm.shelved_by,
+        "silenced_until_ms": round(wall_ms + (quiet_s - now_s) * 1000) if quiet_s is not None else None,
+        "silenced_by": alarm.silenced_by,
     }
 
 
-def suppressed(alarm: Alarm, alarms: Mapping[str, Alarm], now_s: float, wall_ms: int) -> dict[str, Any]:
+def suppressed(alarm: Alarm, alarms: Mapping[str, Alarm], now_s: float, wall_ms: int) -> SuppressedAlarm:
     """An alarm that is not announced because others explain it, or because monitoring is paused."""
     raised_for_s = now_s - alarm.raised_s if alarm.active and alarm.raised_s is not None else None
-    by = [alarms[name].spec.title if name in alarms else "Monitoring is paused" for name in alarm.suppressed_by]
     return {
         "id": alarm.id,
         "title": alarm.spec.title,
-        "priority": str(alarm.spec.priority),
-        "by": by,
+        "priority": alarm.spec.priority,
+        "by": explained_by(alarm, alarms),
         "raised_ms": round(wall_ms - raised_for_s * 1000) if raised_for_s is not None else None,
     }
 
 
-def _quantity(quantity: Quantity | None) -> dict[str, Any] | None:
-    if quantity is None:
+def explained_by(alarm: Alarm, alarms: Mapping[str, Alarm]) -> list[str]:
+    """Titles of what explains the alarm away now."""
+    return [alarms[name].spec.title if name in alarms else "Monitoring is paused" for name in alarm.suppressed_by]
+
+
+def quantity(of: Quantity | None) -> QuantityState | None:
+    if of is None:
         return None
-    return {"label": quantity.label, "value": plain(quantity.value), "unit": quantity.unit}
+    return {"label": of.label, "value": plain(of.value), "unit": of.unit}
 
 
-def _worst(finding: Finding | None) -> dict[str, Any] | None:
+def _worst(finding: Finding | None) -> Worst | None:
     """The measured value that was furthest beyond its limit, and on which side of it."""
     if finding is None or finding.measured is None or finding.limit is None:
         return None
-    side = "above" if finding.measured.value >= finding.limit.value else "below"
+    side: Literal["above", "below"] = "above" if finding.measured.value >= finding.limit.value else "below"
     return {
         "label": finding.measured.label,
         "value": plain(finding.measured.value),
@@ -235,16 +254,16 @@ def _worst(finding: Finding | None) -> dict[str, Any] | None:
     }
 
 
-def load(load: AlarmLoad, alarms: Mapping[str, Alarm]) -> dict[str, Any]:
+def load(load: AlarmLoad, alarms: Mapping[str, Alarm]) -> LoadState:
     """What the alarms ask of the operator now."""
     titles = [alarms[name].spec.title for name in load.chattering if name in alarms]
     return {"in_10_min": load.in_10_min, "flood": load.is_flood, "bearable": load.is_bearable, "chattering": titles}
 
 
-def trends(piece: Piece) -> dict[str, Any]:
+def trends(piece: Piece) -> Trends:
     """Steps of the last minute: of each signal its lowest and highest in a step, "none" or null."""
 
-    def ends(which: int) -> dict[str, list[float | str | None]]:
+    def ends(which: int) -> dict[str, list[Step]]:
         return {
             name: [plain(row[which], 3) if isinstance(row, tuple) else row for row in rows]
             for name, rows in piece.rows.items()
@@ -260,9 +279,7 @@ def trends(piece: Piece) -> dict[str, Any]:
     }
 
 
-def event(
-    transition: Transition, spec: AlarmSpec, at_ms: int, *, now_s: float, settings_version: int
-) -> dict[str, Any]:
+def event(transition: Transition, spec: AlarmSpec, at_ms: int, *, now_s: float, settings_version: int) -> NewEvent:
     """A transition as the log keeps it and the pages get it, at `at_ms`, which is `now_s`; the log adds its number.
 
     With it alone a restart knows where the alarm stands (`server.vehicle.restore`).
@@ -275,17 +292,18 @@ def event(
         "occurrence": transition.occurrence,
         "change": transition.change,
         "title": spec.title,
-        "priority": str(spec.priority),
-        "place": str(spec.place),
-        "sound": str(spec.sound),
+        "priority": spec.priority,
+        "place": spec.place,
+        "sound": spec.sound,
         "text": transition.text,
         "by": transition.by,
         "announces": transition.announces,
-        "state": str(transition.state),
+        "state": transition.state,
         "causes": list(transition.causes),
         "suppressed_by": list(transition.suppressed_by),
         "shelved_until_ms": round(at_ms + (until_s - now_s) * 1000) if until_s is not None else None,
         "settings_version": settings_version,
-        "measured": _quantity(finding.measured if finding else None),
-        "limit": _quantity(finding.limit if finding else None),
+        "measured": quantity(finding.measured if finding else None),
+        "limit": quantity(finding.limit if finding else None),
+        "worst": _worst(transition.worst),
     }

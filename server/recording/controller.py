@@ -1,4 +1,4 @@
-"""When one vehicle is recorded and in which parts: with monitoring or by hand, held while the link is lost, until told.
+"""Controls when one vehicle is recorded and in which parts: with monitoring or manually, held while the link is lost.
 
 A session of recording is one id and one or more parts, a file each: a part ends when the link is lost, and the next
 begins when it returns in time. What is recorded is handed to the recorder's thread; nothing here waits for a disk.
@@ -14,6 +14,7 @@ from typing import Any
 from monitor.recorder import RecorderFacts
 from monitor.runner import Refused
 from server.judge.active_settings import ActiveSettings
+from server.protocol.recording_state import RecordingState
 from server.recording.delay import LinkDelay
 from server.recording.folder import RecordingsFolder
 from server.recording.own import Own
@@ -26,8 +27,8 @@ from server.rosbridge.address import without_login
 
 
 class SessionRecording:
-    """One vehicle's. `now` is a monotonic clock in seconds, `wall_ms` the time of day in ms since 1970. `told(path)` is
-    called for each finished part; `folder` None: this server keeps nothing."""
+    """Of one vehicle. `now` is a monotonic clock [s], `wall_ms` the time of day [ms since 1970]. `on_finished(path)` is
+    called for each finished part; `folder` None: this server stores nothing."""
 
     def __init__(
         self,
@@ -37,7 +38,7 @@ class SessionRecording:
         *,
         now: Callable[[], float],
         wall_ms: Callable[[], int],
-        told: Callable[[Path], None] = lambda _: None,
+        on_finished: Callable[[Path], None] = lambda _: None,
         unreadable: Callable[[str, str], None] = lambda *_: None,
     ) -> None:
         """`unreadable(topic, why)` is called for each message that came unparsed and could not be read."""
@@ -52,7 +53,7 @@ class SessionRecording:
             self._state,
             now=now,
             wall_ms=wall_ms,
-            on_finished=told,
+            on_finished=on_finished,
             on_unreadable=unreadable,
         )
         self._status = RecordingStatus(self._state, self._parts, self._settings, has_folder=folder is not None)
@@ -79,10 +80,10 @@ class SessionRecording:
         """Gets ready to record, so that the first message finds all that it needs."""
         self._parts.prepare()
 
-    # -- what the session says ---------------------------------------------------------------------------------------
+    # -- events of the session ---------------------------------------------------------------------------------------
 
     def link_opened(self, address: str | None) -> None:
-        """Monitoring of a car begins, or goes on after its link was lost."""
+        """Monitoring of a car starts, or resumes after a lost link."""
         self._state.address = address
         self._state.is_monitoring = True
         session, now_s = self._state.session, self._now()
@@ -129,15 +130,15 @@ class SessionRecording:
         if self._folder is None:
             raise Refused(NOWHERE)
         if not self._state.is_monitoring:
-            raise Refused("No car is connected: there is nothing to record.")
+            raise Refused("No car is connected, so there is nothing to record.")
         if self._state.session is not None and self._status.state() != "stopped":
-            raise Refused("It is being recorded already.")
+            raise Refused("It is already being recorded.")
         self._state.session = None
         self._state.stopped_by = None
         self._parts.begin(self._parts.start(by=by))
 
     async def demand_settled(self, *, within_s: float = 2.0) -> None:
-        """Waits until the disk has said whether it takes the part that was just begun. Raises Refused where not."""
+        """Wait until the disk accepts the new part. Raises Refused if it does not."""
         until_s = self._now() + within_s
         session = self._state.session
 
@@ -164,7 +165,7 @@ class SessionRecording:
         self._parts.own(channel, said)
 
     def asked(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
-        """What a page asked for, and why it was refused, if it was. Where a phone is has a channel of its own."""
+        """Record a page's command and the reason of a refusal. Phone positions have their own channel."""
         said = {name: value for name, value in message.items() if name not in ("id", "by")}
         if isinstance(said.get("address"), str):
             said["address"] = without_login(said["address"])
@@ -174,7 +175,7 @@ class SessionRecording:
             self.own("operator", {"by": by, "ok": reason is None, "reason": reason} | said)
 
     def delays(self, delays: Mapping[str, float], link: LinkDelay) -> None:
-        """How old what comes is, once a tick: whoever judges the recording must know it."""
+        """Record the delay of messages once a tick, because a later evaluation needs it."""
         self._parts.delays(delays, link)
 
     def events(self, numbered: list[dict[str, Any]]) -> None:
@@ -211,14 +212,14 @@ class SessionRecording:
         return "all" if self._settings.value("bulky") >= 1 else "light"
 
     def tick(self, now_s: float) -> None:
-        """Time passes: a link that does not return ends the session, a car that says nothing is recorded as such."""
+        """Advance the time: a link that does not return ends the session; a silent car is recorded as such."""
         session = self._state.session
         if session is None:
             return
         if session.due_s is not None and now_s >= session.due_s:
             self._parts.begin(session)
         if session.is_open and session.begun is not None and self.ros_version not in (None, session.begun.version):
-            self._parts.close("The version of ROS became known: the recording goes on in another part.")
+            self._parts.close("The ROS version became known: the recording continues in another part.")
             self._parts.begin(session)
         if session.lost_s is not None and now_s - session.lost_s > self._settings.value("hold_s"):
             self._state.session = None
@@ -234,6 +235,6 @@ class SessionRecording:
         """For the checks."""
         return self._status.facts(now_s)
 
-    def frame(self, now_s: float) -> dict[str, Any]:
+    def frame(self, now_s: float) -> RecordingState:
         """The `recording` of a state, as docs/protocol.md has it."""
         return self._status.frame(now_s)

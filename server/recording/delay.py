@@ -1,8 +1,7 @@
-"""The delay of the link, kept in our recordings: without it a drive would be judged again as if all had come at once.
+"""The delay of the link in our recordings; without it a re-evaluation would assume no delay.
 
-Rows stand on the channel `/catgraph/delay`, one a tick at most, and only where something changed: the delay of the
-newest message of each topic, how late the link was, and what was asked for less. Recordings without rows came without
-delay, as far as anybody knows.
+Rows are on the channel `/catgraph/delay`, at most one per tick, and only after a change: the delay of each topic's
+newest message, the delay of the link, and its throttling. A recording without rows counts as one without delay.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from server.recording.own import PREFIX
 if TYPE_CHECKING:
     from server.recording.read.read import Recording
 
-EVERY_S = 0.1  # a row tells of the messages that came so long before it
+EVERY_S = 0.1  # a row applies to the messages of this time before it
 FINE_S = 0.005  # a change of a delay that is written
 COARSE_S, COARSE_BELOW_S = 0.05, 0.3  # … where both are small: no check is near its limit
 MOST_ROWS = 2_000_000  # that are read: two days of a slow link
@@ -61,7 +60,7 @@ class DelayWriter:
 
 
 class RecordedDelay:
-    """What a recording tells of it. Times are seconds since its beginning; any moment may be asked for at any time."""
+    """The recorded delay. Times are seconds since the start of the recording, in any order."""
 
     def __init__(self, recording: Recording) -> None:
         self._times: dict[str, list[float]] = {}  # by topic
@@ -98,7 +97,7 @@ class RecordedDelay:
 
 
 def recorded_delay(recording: Recording) -> RecordedDelay | None:
-    """None where the recording says nothing of it."""
+    """None if the recording has no delay."""
     delay = RecordedDelay(recording)
     return delay if delay.is_known else None
 

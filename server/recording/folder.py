@@ -1,4 +1,4 @@
-"""Where recordings lie: one folder a vehicle, a name that says whose and when, and what is being written told apart.
+"""The folder of recordings: one subfolder per vehicle, names with vehicle and time, and unfinished files marked.
 
 recordings/<vehicle>/<id>.mcap           closed, whole, never changed again
 recordings/<vehicle>/<id>.mcap.writing   being written, or left by a server that was killed
@@ -51,7 +51,7 @@ class RecordingsFolder:
         return sorted(self._files(DAMAGED))
 
     def first_id(self, vehicle: str, at_ms: int) -> str:
-        """The name for what begins at that time of day. Looks at no disk: something may have it already."""
+        """The name for a recording that starts at this time. The disk is not checked: the name may be in use."""
         stamp = datetime.fromtimestamp(at_ms / 1000, UTC).strftime("%Y%m%dT%H%M%SZ")
         return f"{_letters(vehicle)}_{stamp}"
 
@@ -71,7 +71,7 @@ class RecordingsFolder:
     def place(self, vehicle: str, id: str) -> Path:
         """Where the finished recording is to stand."""
         if not is_id(id):
-            raise ValueError(f"{id[:90]!r} is no name for a recording")
+            raise ValueError(f"{id[:90]!r} is not a valid name for a recording")
         return self.root / _letters(vehicle) / f"{id}{FINISHED}"
 
     def _all(self) -> Iterator[Path]:
@@ -106,7 +106,7 @@ def is_id(text: str) -> bool:
 
 
 def writing_path(finished: Path) -> Path:
-    """Where a recording stands until it is closed."""
+    """The path of a recording until it is closed."""
     return finished.with_name(id_of(finished) + WRITING)
 
 

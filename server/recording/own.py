@@ -1,4 +1,4 @@
-"""catgraph's own channels in a recording: what was judged, asked, set and ordered while the car drove, as JSON."""
+"""catgraph's own channels in a recording: alarms, commands, settings and orders, as JSON."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import orjson
 from server.recording.read.schemas import Schema
 
 PREFIX = "/catgraph/"
-LIBRARY = "catgraph"  # how the header of our files begins to say who wrote them
-METADATA = "catgraph"  # the name of the metadata record that says whose drive it is
+LIBRARY = "catgraph"  # prefix of the library name in the header of our files
+METADATA = "catgraph"  # the name of the metadata record with vehicle and recording
 
 Own = Literal["alarms", "phone", "operator", "settings", "link", "commands", "delay"]
 
@@ -21,15 +21,15 @@ _WHOLE: dict[str, Any] = {"type": "integer"}
 # channel → (what it is, fields); each has time_ms besides, and may have more fields than these
 _CHANNELS: dict[Own, tuple[str, dict[str, Any]]] = {
     "alarms": (
-        "Every numbered event of the log: alarms, and what monitoring itself did.",
+        "Every numbered event of the log: alarms, and events of the monitoring itself.",
         {"n": _WHOLE, "at_ms": _WHOLE, "alarm": _MAYBE_TEXT, "change": _TEXT, "text": _MAYBE_TEXT, "by": _MAYBE_TEXT},
     ),
     "phone": (
-        "What an operator's phone said of its own position, WGS84, or why it could not.",
+        "The position reported by an operator's phone (WGS84), or the reason for none.",
         {"phone": _TEXT, "by": _MAYBE_TEXT, "handheld": {"type": "boolean"}, "why": _MAYBE_TEXT, "fix": {}},
     ),
     "operator": (
-        "What an operator asked for, and whether it was done.",
+        "A command of an operator, and its result.",
         {"kind": _TEXT, "by": _MAYBE_TEXT, "ok": {"type": "boolean"}, "reason": _MAYBE_TEXT},
     ),
     "settings": (
@@ -45,7 +45,7 @@ _CHANNELS: dict[Own, tuple[str, dict[str, Any]]] = {
         {"late_s": {"type": ["number", "null"]}, "delays": {"type": "object"}},
     ),
     "commands": (
-        "What was sent to the car, exactly as it was sent.",
+        "Frames sent to the car, unchanged.",
         {"topic": _TEXT, "type": _MAYBE_TEXT, "message": {"type": "object"}, "by": _MAYBE_TEXT},
     ),
 }

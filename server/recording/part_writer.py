@@ -9,7 +9,7 @@ import orjson
 
 from server.recording.mcap.write import PartFile
 from server.recording.own import PREFIX, Own, own_schema
-from server.recording.read.encode import Misfit
+from server.recording.read.encode import TypeMismatch
 from server.recording.read.schemas import Schema, TypeBook
 from server.rosbridge.codec import TooManyParts
 from server.rosbridge.message_bytes import Unencodable, json_bytes
@@ -22,14 +22,14 @@ class PartWriter:
     def __init__(self, file: PartFile, book: TypeBook) -> None:
         self.file = file
         self.messages = 0  # of the car
-        self.misfits = 0  # of them, kept as JSON: not of their type, or of a type that nobody knows
+        self.misfits = 0  # of them, stored as JSON: not matching their type, or of an unknown type
         self._book = book
         # (topic, type) → its channel, its schema, and the channel of those that are not of their type
         self._channels: dict[tuple[str, str | None], tuple[int, Schema, int | None]] = {}
         self._own_channels: dict[Own, int] = {}
 
     def types_changed(self) -> None:
-        """The book has learnt definitions: schemas are looked up anew."""
+        """New definitions are known: look up schemas again."""
         self._channels.clear()
 
     def message(self, topic: str, type: str | None, at_ns: int, message: Any) -> None:
@@ -41,9 +41,9 @@ class PartWriter:
         if schema.encode is not None:
             try:
                 if text is not None:
-                    raise Misfit("it is too large to be parsed")
+                    raise TypeMismatch("it is too large to be parsed")
                 self.file.add(channel, at_ns, schema.encode(message))
-            except Misfit:
+            except TypeMismatch:
                 if loose is None:
                     loose = self.file.channel(topic, self._book.loose(type))
                     self._channels[topic, type] = (channel, schema, loose)

@@ -25,7 +25,7 @@ from server.version import catgraph_version
 
 EARLY_S = 10.0  # entries from before a session began are kept, if it was not long before: how it came to be connected
 NOTE_EVERY_S = 2.0  # at most: what is missing in a part, written into it
-BEGIN_AFTER_S = 2.0  # a car that says nothing is recorded all the same: that it said nothing
+BEGIN_AFTER_S = 2.0  # a silent car is recorded too, as silent
 SETTLE_S = 5.0  # a disk that takes longer is not waited for when the server ends
 
 
@@ -64,7 +64,7 @@ class RecordingParts:
         return self.recorder.status if self.recorder is not None else Status()
 
     def is_current(self, session: RecordingSession) -> bool:
-        """Whether the thread speaks of the newest part of this session."""
+        """Whether the thread's status is of the newest part of this session."""
         return session.begun is not None and self.status.part is session.begun
 
     def prepare(self) -> None:
@@ -146,7 +146,7 @@ class RecordingParts:
             self.early.hold(self._now(), channel, {"time_ms": self._wall_ms(), **said})
 
     def delays(self, delays: Mapping[str, float], link: LinkDelay) -> None:
-        """How old what comes is, once a tick: whoever judges the recording must know it."""
+        """Record the delay of messages once a tick, because a later evaluation needs it."""
         session = self._state.session
         if session is not None and session.is_open and self.recorder is not None:
             row = session.delays.row(delays, link)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 from server.judge.topics import plain_type
+from server.protocol.recording_state import MissingTopics
 from server.recording.own import PREFIX
 from server.rosbridge.outgoing import is_topic, is_type
 from server.system.clean_text import clean
@@ -28,7 +29,7 @@ class Missing:
     not_received: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # → the nodes that publish them
     too_large: Mapping[str, int] = field(default_factory=dict)  # → bytes of a message; not subscribed to any more
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> MissingTopics:
         """For the state, ten times a second to every page: at most MOST_NAMED of each, each at most LONGEST_NAME, and
         how many there are."""
         return {
@@ -98,7 +99,7 @@ BULKY = frozenset(
 def choose(
     offered: Mapping[str, str], *, without: Collection[str], also: Also, asked: Collection[str]
 ) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Topic → type of what is to be subscribed to besides, and the topics that are left out.
+    """Topic → type of the topics that are only recorded, and the topics that are left out.
 
     A topic waits until the definition of its type was `asked` for. Our own names are nobody else's in a recording, and
     names that are none in ROS are not sent to a bridge.

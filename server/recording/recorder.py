@@ -1,7 +1,7 @@
-"""Writes what one vehicle says while it is monitored: on a thread of its own, behind a queue that never waits.
+"""Writes the messages of one monitored vehicle, on its own thread, behind a queue that never blocks.
 
-The loop hands over and goes on; whoever judges never waits for a disk. What the queue cannot take is dropped and
-counted. A second thread has the disk keep what was written, for that may take seconds and writing must not wait for it.
+The loop never waits for a disk. Messages beyond the queue's bound are dropped and counted. A second thread syncs the
+disk, because that can take seconds and must not delay writing.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class Recorder:
         self._queue.own(OwnEntry(channel, at_ns, {"time_ms": at_ns // 1_000_000, **said}))
 
     def note(self, **more: str) -> None:
-        """What is known of the part by now; a part that is recovered after a kill says it too."""
+        """Write the current metadata of the part, so that it survives a kill."""
         self._queue.put(Note(more))
 
     def end(self, *, then: Callable[[], None] | None = None, **ended: str) -> None:

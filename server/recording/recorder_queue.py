@@ -20,7 +20,7 @@ KEPT_FOR_OWN = 5_000  # places behind the car's: a disk that hangs must not cost
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """One file to write: what it is called and what it says of itself."""
+    """One file to write: its name and metadata."""
 
     path: Path
     version: RosVersion
@@ -141,7 +141,7 @@ class RecorderQueue:
         self.wake.set()
 
     def forget_dropped(self) -> None:
-        """Counts anew."""
+        """Reset the counters."""
         self.dropped, self.dropped_at_s = 0, None
 
     # -- of the thread -----------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Mapping
+from contextvars import copy_context
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -49,10 +50,10 @@ class Status:
 
     state: Writing = "off"
     part: Part | None = None  # the one being written, or the last one
-    path: Path | None = None  # what it is called: another name than was asked for, where that was taken
+    path: Path | None = None  # the actual name, different if the requested one was in use
     size: int = 0
     messages: int = 0  # of the car, in this part
-    misfits: int = 0  # of them, kept as JSON: not of their type, or of a type that nobody knows
+    misfits: int = 0  # of them, stored as JSON: not matching their type, or of an unknown type
     space: Space | None = None
     trouble: str | None = None  # why it stopped by itself, as a sentence
 
@@ -90,8 +91,9 @@ class RecorderThread:
         self._flushed_s = 0.0
 
     def start(self) -> None:
-        threading.Thread(target=self._run, name="recorder", daemon=True).start()
-        threading.Thread(target=self._sync_forever, name="recorder sync", daemon=True).start()
+        for name, work in (("recorder", self._run), ("recorder sync", self._sync_forever)):
+            # With the context of who starts it: a line of the log says which car it is about.
+            threading.Thread(target=copy_context().run, args=(work,), name=name, daemon=True).start()
 
     def _run(self) -> None:
         while True:
@@ -100,12 +102,12 @@ class RecorderThread:
             try:
                 if self._drain():
                     return
-                self._keep_house(time.monotonic())
+                self._housekeeping(time.monotonic())
             except OSError as error:
                 self._give_up(f"Recording stopped: {space.why(error)}.")
             except Exception:  # the one net: a fault of ours must not end the recording of whatever comes next
-                log.exception("the recorder stumbled")
-                self._give_up("Recording stopped: catgraph itself stumbled; its log says how.")
+                log.exception("recorder failed")
+                self._give_up("Recording stopped: internal error; the server's log has the details.")
 
     def _wait_s(self) -> float | None:
         """Until the queue is looked at again; None: until something wakes the thread."""
@@ -163,7 +165,7 @@ class RecorderThread:
             self._queue.drop(item.now_s)
             if not self._stumbled:
                 self._stumbled = True
-                log.exception("a message of %s could not be written, told once", item.topic)
+                log.exception("message not written (logged once): topic=%s", item.topic)
 
     def _learn(self, definitions: Mapping[str, str]) -> None:
         if self._book is not None:
@@ -187,7 +189,7 @@ class RecorderThread:
                 file = PartFile(path, profile=f"ros{part.version}", metadata=part.metadata)
                 self._writer = PartWriter(file, self._book)
         except OSError as error:
-            log.error("a recording cannot begin: %s", error)
+            log.error("recording not started: %s", error)
             trouble = f"Recording cannot begin: {space.why(error)}."
             self.status = Status(state="stopped", part=part, trouble=trouble)
             return
@@ -209,16 +211,16 @@ class RecorderThread:
             path = writer.file.close(**ended)
         except Exception as error:  # one of the library too: what the disk has is of use in any case
             said = space.why(error) if isinstance(error, OSError) else type(error).__name__
-            log.error("a recording could not be completed: %s", said)
+            log.error("recording not completed: %s", said)
             self._unfinished.add(writing_path(writer.file.path), time.monotonic())
-            failed = f"The recording could not be completed: {said}. What the disk took is kept."
+            failed = f"The recording could not be completed: {said}. What was written is kept."
             self.status = replace(self.status, state="stopped", trouble=trouble or failed)
             return
         self.status = replace(self.status, state=state, size=writer.file.size, trouble=trouble)
         self._call(self._on_finished, path)
 
     def _give_up(self, sentence: str) -> None:
-        """The disk refused. What it took is completed if it can be, and nothing more is written until it is begun."""
+        """A disk error: complete the part if possible, and write nothing until the next part."""
         log.error("%s", sentence)
         if self._writer is None:
             self.status = replace(self.status, state="stopped", trouble=sentence)
@@ -227,7 +229,7 @@ class RecorderThread:
 
     # -- between the portions ----------------------------------------------------------------------------------------
 
-    def _keep_house(self, now_s: float) -> None:
+    def _housekeeping(self, now_s: float) -> None:
         writer = self._writer
         if writer is None:
             for path in self._unfinished.complete(now_s):
@@ -262,5 +264,5 @@ class RecorderThread:
                 try:
                     writer.file.sync()
                 except OSError as error:
-                    log.error("the disk does not keep what is recorded: %s", error)
+                    log.error("recording not synced to disk: %s", error)
                     writer.file.failed = error

@@ -23,7 +23,7 @@ class RecordingSession:
     is_open: bool = False  # the part is being written
     lost_s: float | None = None  # since when it is held
     due_s: float | None = None  # a part is to begin with the next message, or at this moment
-    noted: Missing | None = None  # what the part says already of what is missing in it
+    noted: Missing | None = None  # the missing topics that the part's metadata already has
     noted_s: float = -math.inf
     delays: DelayWriter = field(default_factory=DelayWriter)  # of the part
 

@@ -1,4 +1,4 @@
-"""The settings that recording goes by, as they are in force now, and all settings as a recording keeps them."""
+"""The active settings of the recorder, and all settings in the form that is recorded."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GB = 1e9
 
 
 class RecordingSettings:
-    """Read anew each time: settings change while a car is recorded."""
+    """Read each time, because settings change during a recording."""
 
     def __init__(self, tuning: ActiveSettings) -> None:
         self._tuning = tuning

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from monitor.recorder import RecorderFacts, RecorderState
 from server.protocol import serialize
+from server.protocol.recording_state import RecordingState
 from server.recording import space
 from server.recording.folder import id_of, part_id
 from server.recording.parts import RecordingParts
@@ -14,7 +13,7 @@ from server.recording.recorder_thread import Status
 from server.recording.recording_session import ControllerState
 from server.recording.recording_settings import GB, RecordingSettings
 
-NOWHERE = "This server keeps nothing: it was started without a folder for data."
+NOWHERE = "This server stores nothing: it was started without a data folder."
 
 
 class RecordingStatus:
@@ -56,7 +55,7 @@ class RecordingStatus:
             limit=limit,
         )
 
-    def frame(self, now_s: float) -> dict[str, Any]:
+    def frame(self, now_s: float) -> RecordingState:
         """The `recording` of a state, as docs/protocol.md has it."""
         session, status, recorder = self._controller.session, self._parts.status, self._parts.recorder
         is_mine = session is not None and self._parts.is_current(session)
@@ -91,16 +90,16 @@ class RecordingStatus:
                 return f"The link is lost. {self._parts.status.trouble or 'Nothing was recorded yet.'}"
             case "held":
                 return (
-                    "The link is lost: what was recorded is saved. A link that returns within "
-                    f"{self._settings.value('hold_s'):g} s goes on with it."
+                    "The link is lost; the recording is saved. A link that returns within "
+                    f"{self._settings.value('hold_s'):g} s, the recording continues."
                 )
             case "saving":
-                return "What was recorded is being saved."
+                return "The recording is being saved."
         if self._controller.stopped_by:
             return f"Recording was stopped by {self._controller.stopped_by}."
         if not self._controller.is_monitoring:
             return "No car is connected."
-        return "Recording begins by hand: a setting." if self._settings.value("automatic") < 1 else None
+        return "Recording starts manually (a setting)." if self._settings.value("automatic") < 1 else None
 
     def _room(self, status: Status) -> tuple[float | None, str]:
         """How many GB may still be recorded, and what ends it."""

@@ -1,4 +1,4 @@
-"""Makes a whole recording of what a server that was killed, or a full disk, left behind.
+"""Recovers recordings after a kill of the server or a full disk.
 
 The chunks that are whole are copied as they are, their index is made anew, and the new file gets its name only when the
 disk has it; only then what was left goes. Nothing that might still be of use is removed: what could not be read is kept
@@ -85,8 +85,8 @@ def _recover(left: Path) -> Recovered:
         if _is_whole(finished):
             left.unlink()
             sync_folder(left.parent)
-            return Recovered(id=id, path=finished, sentence=f"{id} had been recovered already.")
-        return _aside(left, f"{id} stands beside a finished recording of its name; both are kept")
+            return Recovered(id=id, path=finished, sentence=f"{id} had already been recovered.")
+        return _aside(left, f"{id} exists beside a finished recording of the same name; both are kept")
     with left.open("rb") as file:
         try:
             fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -108,7 +108,7 @@ def _recover(left: Path) -> Recovered:
                 if (walk.header is not None or not walk.size) and not unread and not new.bad:
                     left.unlink()
                     sync_folder(left.parent)
-                    return Recovered(id=id, sentence=f"{id} had only begun: nothing was recorded in it.")
+                    return Recovered(id=id, sentence=f"{id} had only started and is empty.")
                 return _aside(left, f"Nothing of {id} can be read")
             sentence = _words(id, new, unread)
             new.finish(walk, ended="recovered", why=sentence)
@@ -152,8 +152,8 @@ def _words(id: str, new: _Copy, unread: int) -> str:
     if new.bad:
         which = "1 part is" if new.bad == 1 else f"{new.bad} parts are"
         bad = f" {which} damaged and left out."
-    return f"{id} was cut off while it was recorded: {span_s:.1f} s with {new.messages} messages are whole.{bad} " + (
-        f"The last {space.amount(unread)} were only half written." if unread else "Nothing was half written."
+    return f"{id} is truncated: {span_s:.1f} s with {new.messages} messages are whole.{bad} " + (
+        f"The last {space.amount(unread)} were only partly written." if unread else "Nothing was partly written."
     )
 
 
@@ -183,7 +183,7 @@ class _Copy:
             self._begin(walk)
         self._schemas.update((schema.id, schema) for schema in chunk.schemas)
         self._channels.update((channel.id, channel) for channel in chunk.channels)
-        if not self._channels.keys() >= chunk.index.keys():  # what its messages are was told in a damaged one
+        if not self._channels.keys() >= chunk.index.keys():  # the definitions of its messages were in a damaged chunk
             self.bad += 1
             return
         if not chunk.index:

@@ -1,4 +1,4 @@
-"""At the start of a server: what its last run left cut off becomes whole recordings, while monitoring goes on."""
+"""Recovers truncated recordings of the last run at the start of a server, while monitoring runs."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from server.recording.recover import Recovered
 log = logging.getLogger("catgraph.recording")
 
 
-async def recover_left(left: Sequence[Path], *, told: Callable[[Path, Recovered], None]) -> None:
-    """Recovers each of the files, off the loop; `told(path, what became of it)` is called on the loop."""
+async def recover_left(left: Sequence[Path], *, on_recovered: Callable[[Path, Recovered], None]) -> None:
+    """Recovers each of the files, off the loop; `on_recovered(path, what became of it)` is called on the loop."""
     for path in left:
         found = await asyncio.to_thread(recover.recover, path)
         log.warning("%s", found.sentence)
-        told(path, found)
+        on_recovered(path, found)

@@ -18,7 +18,7 @@ class Allowance:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Space:
-    """What the disk says, in bytes."""
+    """Sizes of the disk [B]."""
 
     free: int  # for this user
     used: int  # by all recordings together
@@ -28,7 +28,7 @@ class Space:
         if self.free < allowance.min_free:
             return f"The disk has {amount(self.free)} left, and recording stops at {amount(allowance.min_free)}."
         if allowance.quota and self.used >= allowance.quota:
-            return f"Recordings take {amount(self.used)}, all of the {amount(allowance.quota)} they may have."
+            return f"Recordings take {amount(self.used)}, all of the {amount(allowance.quota)} that are allowed."
         return None
 
     def left(self, allowance: Allowance) -> int:
@@ -73,15 +73,15 @@ def amount(size: float) -> str:
 _WHY = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk is full for this user",
-    errno.EROFS: "the folder for recordings can only be read",
+    errno.EROFS: "the folder for recordings is read-only",
     errno.EACCES: "this user may not write into the folder for recordings",
     errno.EPERM: "this user may not write into the folder for recordings",
-    errno.ENOENT: "the folder or the file was taken away",
-    errno.ENOTDIR: "the folder for recordings is no folder",
+    errno.ENOENT: "the folder or the file was removed",
+    errno.ENOTDIR: "the folder for recordings is not a folder",
     errno.EIO: "the disk reports an error",
     errno.EFBIG: "the file has grown too large for its disk",
-    errno.ENODEV: "the disk was taken away",
-    errno.ESTALE: "the disk was taken away",
+    errno.ENODEV: "the disk was removed",
+    errno.ESTALE: "the disk was removed",
 }
 
 

@@ -1,4 +1,4 @@
-"""Asks the disk for its room, often, and counts the files of recordings up, seldom."""
+"""Reads the free space of the disk often, and sums up the recordings' files rarely."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from server.recording import space
 from server.recording.space import Space
 
-LOOK_S = 1.0  # how often the disk is asked for its room
+LOOK_S = 1.0  # interval of reading the free space
 COUNT_S = 15.0  # how often the folder's files are counted up
 
 
@@ -24,12 +24,12 @@ class SpaceWatch:
         return now_s - self._looked_s >= LOOK_S
 
     def count_up(self) -> None:
-        """Counts all files, before one is begun."""
+        """Sum up all files before a new one starts."""
         self._counted_s = time.monotonic()
         self._used_elsewhere = space.used_by(self._root)
 
     def look(self, now_s: float, size: int) -> Space:
-        """What the disk says now. Raises OSError."""
+        """Read the current sizes. Raises OSError."""
         self._looked_s = now_s
         if now_s - self._counted_s >= COUNT_S:
             self.count_up()

@@ -1,4 +1,5 @@
-"""Which alarms stand when a part of a drive begins: told in its metadata, for no message in it raised them."""
+"""What is in force when a part of a drive begins: alarms, pause, chosen phone, slow-down. Its metadata says so, for no
+message in it does."""
 
 from __future__ import annotations
 
@@ -7,38 +8,66 @@ from typing import Any
 
 import orjson
 
-STANDING = "standing"  # in the metadata: the newest event of each alarm that stood, as a JSON array
+STANDING = "standing"  # in the metadata: the newest event of each alarm that stood and of each mode, as a JSON array
 _STATES = ("UNACKED", "ACKED", "RTN_UNACKED", "SHELVED")
+
+_MODES = {  # change → the mode that it begins or ends
+    "paused": ("pause", True),
+    "resumed": ("pause", False),
+    "stopped": ("pause", False),
+    "armed": ("armed", True),
+    "disarmed": ("armed", False),
+    "ride": ("ride", True),
+    "slow_down": ("order", False),
+}
+_MOST_OF_ORDER = 50  # events
+_ORDER_ENDS = ("released", "ended")
 
 Event = Mapping[str, Any]
 
 
 class Stood:
-    """The newest event of each alarm that is not at rest."""
+    """The newest event of each alarm that is not at rest, and those of each mode that is in force."""
 
     def __init__(self) -> None:
         self._newest: dict[str, Event] = {}
+        self._modes: dict[str, list[Event]] = {}
 
     def note(self, event: Event) -> None:
-        """One event of the log, in their order; what is no event of an alarm changes nothing."""
+        """One event of the log, in their order."""
         alarm, state = event.get("alarm"), event.get("state")
         if not isinstance(alarm, str):
-            return
-        if state in _STATES or (state is None and event.get("change") in ("raised", "recaused")):
+            self._note_mode(event)
+        elif state in _STATES or (state is None and event.get("change") in ("raised", "recaused")):
             self._newest[alarm] = event
         elif state is not None or event.get("change") == "cleared":
             self._newest.pop(alarm, None)
+
+    def _note_mode(self, event: Event) -> None:
+        change, step = event.get("change"), event.get("step")
+        if change == "slow_down" and step not in _ORDER_ENDS:
+            if event.get("order") is not None:  # each event adds to what is known of the order
+                self._modes["order"] = [*self._modes.get("order", []), event][-_MOST_OF_ORDER:]
+            return
+        mode, begins = _MODES.get(str(change), ("", False))
+        if change == "ride":
+            begins = event.get("phone") is not None
+        if begins:
+            self._modes[mode] = [event]
+        else:
+            self._modes.pop(mode, None)
 
     def note_all(self, events: Iterable[Event]) -> None:
         for event in events:
             self.note(event)
 
     def as_metadata(self) -> dict[str, str]:
-        return {STANDING: orjson.dumps([*self._newest.values()]).decode()}
+        modes = [event for events in self._modes.values() for event in events]
+        return {STANDING: orjson.dumps([*self._newest.values(), *modes]).decode()}
 
 
 def read_standing(metadata: Mapping[str, str]) -> list[dict[str, Any]]:
-    """What a file says of it; nothing where it says nothing, or nothing that makes sense."""
+    """Read it from a file's metadata; empty if it is missing or invalid."""
     try:
         found = orjson.loads(metadata.get(STANDING) or "[]")
     except orjson.JSONDecodeError:

@@ -1,1 +1,1 @@
-"""Replay in the page: a recording goes through the same decoding and judging as the car, once for each who looks."""
+"""Replay in the page: a recording is decoded and judged like the live car, once per viewer."""

@@ -23,7 +23,7 @@ def save(run_state: RunState) -> bytes:
 
 
 def restore(saved: bytes) -> RunState:
-    """The state of a run, anew each time. Only for bytes that this very process has saved."""
+    """Restore the state of a run, a new object each time. Only for bytes that this process saved."""
     return cast(RunState, _Unpacker(io.BytesIO(zlib.decompress(saved))).load())
 
 

@@ -1,4 +1,4 @@
-"""The replays of one server: a process for each page that looks at a recording, so many and no more."""
+"""The replays of one server: one process per viewing page, limited in number."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ import logging
 import os
 import secrets
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import orjson
 
+from server.protocol.state import LiveState, LiveSummary, ReplayEnvelope, ReplayPosition, ReplayState, ServerState
 from server.replay.protocol import HEAD, KINDS, MOST_BYTES
 
 log = logging.getLogger("catgraph.playback")
@@ -22,10 +24,21 @@ log = logging.getLogger("catgraph.playback")
 MOST_REPLAYS = 8  # each is a process of some 100 MB
 OPENS_WITHIN_S = 20.0  # a long file that was never closed is read through first
 ANSWERS_WITHIN_S = 3.0
-HUNG_S = 2.0  # a process that tells nothing for so long is said to hang
+HUNG_S = 2.0  # a process without output for this time is reported as hanging
 LIVE_ALARMS = 8
 ROOT = str(Path(__file__).resolve().parent.parent.parent)  # where `server` is found
-ENDED = "The replay ended by itself: the server's log says why."
+ENDED = "The replay failed; the server's log has the reason."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplaySource:
+    """A finished recording, and what the catalog knows of it."""
+
+    path: Path
+    vehicle: str
+    title: str = ""
+    sketch: Sequence[float | None] = ()  # its speed in equal steps; empty: not known yet
+    trends: Mapping[str, Any] | None = None  # all its signals in some hundred buckets; None: not known yet
 
 
 class NoReplay(Exception):
@@ -33,7 +46,7 @@ class NoReplay(Exception):
 
 
 class ReplayClient:
-    """One page's replay: what its process last told, and the way to tell it something."""
+    """One page's replay: the last output of its process, and its command channel."""
 
     def __init__(self, recording: str, *, now: Callable[[], float], on_new: Callable[[str], None]) -> None:
         self.recording = recording
@@ -43,7 +56,9 @@ class ReplayClient:
         self.scan: bytes = b""
         self.timeline: bytes = b""
         self._state: bytes = b""
-        self._position: dict[str, Any] = {}
+        self._notes: list[str] = []  # of the file, as its time line has them
+        self._source: ReplaySource | None = None
+        self._position: ReplayPosition | None = None  # None: nothing received yet
         self._now = now
         self._on_new = on_new
         self._heard_s = now()
@@ -53,8 +68,9 @@ class ReplayClient:
         self._process: asyncio.subprocess.Process | None = None
         self._reader: asyncio.Task[None] | None = None
 
-    async def open(self, path: Path, opening: Mapping[str, Any]) -> None:
+    async def open(self, source: ReplaySource, opening: Mapping[str, Any]) -> None:
         """Starts the process and waits for its first state. Raises NoReplay."""
+        self._source = source
         paths = os.pathsep.join(filter(None, (ROOT, os.environ.get("PYTHONPATH"))))
         self._process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "server.replay.process"),
@@ -63,7 +79,8 @@ class ReplayClient:
             env={**os.environ, "PYTHONPATH": paths},
         )
         self._reader = asyncio.create_task(self._read(self._process), name=f"replay of {self.recording}")
-        self._order({"path": str(path), "name": self.recording, **opening})
+        sketches = {"sketch": list(source.sketch), "trends": source.trends}
+        self._order({"path": str(source.path), "name": self.recording, **sketches, **opening})
         try:
             async with asyncio.timeout(OPENS_WITHIN_S):
                 await self._ready.wait()
@@ -111,17 +128,29 @@ class ReplayClient:
         if self.failed is None:
             self._order({"kind": "scan", "wanted": is_wanted})
 
-    def compose(self, server: Mapping[str, Any], live: Mapping[str, Any] | None) -> str:
+    def compose(self, server: ServerState, live: LiveSummary | None) -> str:
         """The state a page gets: what was recorded, beside what is live now."""
+        envelope: ReplayEnvelope = {"server": server, "replay": self._shown(), "live": live}
+        head = orjson.dumps(envelope)
+        return (head[:-1] + b"," + self._state[1:]).decode()
+
+    def compose_beside(self) -> str:
+        """The state of a recording that is shown beside another one."""
+        head = orjson.dumps({"kind": "beside", "replay": self._shown(), "notes": self._notes})
+        return (head[:-1] + b',"state":' + self._state + b"}").decode()
+
+    def _shown(self) -> ReplayState:
+        assert self._position is not None  # `open` waits for it
+        assert self._source is not None
         silent_s = self._now() - self._heard_s
-        replay = {
-            "id": self.recording,
-            "token": self.token,
+        return {
             **self._position,
+            "id": self.recording,
+            "vehicle": self._source.vehicle,
+            "title": self._source.title,
+            "token": self.token,
             "hangs_s": round(silent_s, 1) if silent_s > HUNG_S else None,
         }
-        head = orjson.dumps({"server": dict(server), "replay": replay, "live": live})
-        return (head[:-1] + b"," + self._state[1:]).decode()
 
     def _order(self, order: Mapping[str, Any]) -> None:
         process = self._process
@@ -138,7 +167,7 @@ class ReplayClient:
                 self._take(KINDS[number], await process.stdout.readexactly(length))
         except (asyncio.IncompleteReadError, ConnectionError, ValueError, IndexError) as error:
             if self._process is not None and self.failed is None:
-                log.warning("the replay of %s ended: %r", self.recording, error)
+                log.warning("replay ended: recording=%s error=%r", self.recording, error)
                 self._fail(ENDED)
 
     def _take(self, kind: str, payload: bytes) -> None:
@@ -159,6 +188,7 @@ class ReplayClient:
                 self._on_new("scan")
             case "timeline":
                 self.timeline = payload
+                self._notes = orjson.loads(payload)["notes"]
                 self.numbers["timeline"] += 1
                 self._on_new("timeline")
             case "reply":
@@ -182,10 +212,10 @@ class ReplayClient:
 
 
 class ReplayManager:
-    """Opens replays and knows them by their tokens. `path_of` may look at the disk."""
+    """Opens replays and holds them by their tokens. `find` may read the disk; None: there is no such recording."""
 
-    def __init__(self, path_of: Callable[[str], Path | None], *, now: Callable[[], float]) -> None:
-        self._path_of = path_of
+    def __init__(self, find: Callable[[str], ReplaySource | None], *, now: Callable[[], float]) -> None:
+        self._find = find
         self._now = now
         self._clients: dict[str, ReplayClient] = {}
 
@@ -196,14 +226,14 @@ class ReplayManager:
     async def open(self, recording: str, opening: Mapping[str, Any], *, on_new: Callable[[str], None]) -> ReplayClient:
         """A replay that is ready to be shown. Raises NoReplay."""
         if len(self._clients) >= MOST_REPLAYS:
-            raise NoReplay(f"{MOST_REPLAYS} replays run already: somebody has to leave one first.")
+            raise NoReplay(f"{MOST_REPLAYS} replays are open already: close one first.")
         client = ReplayClient(recording, now=self._now, on_new=on_new)
         self._clients[client.token] = client
         try:
-            path = await asyncio.to_thread(self._path_of, recording)
-            if path is None:
+            source = await asyncio.to_thread(self._find, recording)
+            if source is None:
                 raise NoReplay(f"There is no recording named {_seen(recording)}.")
-            await client.open(path, opening)
+            await client.open(source, opening)
         except BaseException:
             await self.close(client)
             raise
@@ -224,8 +254,8 @@ class ReplayManager:
         return client
 
 
-def summary(state: Mapping[str, Any]) -> dict[str, Any]:
-    """Of the live state, what somebody must know who looks at a recording."""
+def summary(state: LiveState) -> LiveSummary:
+    """The part of the live state that is shown during a replay."""
     session, link = state["session"], state["link"]
     return {
         "phase": session["phase"],

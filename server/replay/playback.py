@@ -1,36 +1,40 @@
-"""One person's look at a recording: where it stands, whether it runs and how fast, and how it gets to another moment.
+"""The playback of one viewer: position, rate, and seeking.
 
-Where the time line is already made, a seek goes on from what was kept there and comes to the very state that playing
-would have come to. Ahead of it, the checks get some time to warm up before the moment; the replay says so, and puts it
-right once the time line has come so far.
+Within the finished time line a seek restores a checkpoint and plays on, and gives exactly the state of playing through.
+Beyond it the checks warm up before the requested time; the replay reports that, and corrects the state once the time
+line is that far.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from server.analysis.own_events import read_recorded_events
 from server.judge.drive import Drive
 from server.judge.offline import OfflineRun
-from server.protocol import serialize
+from server.protocol import drive_trends, serialize
+from server.protocol.messages import Timeline
+from server.protocol.state import RecordedState, ReplayPosition
 from server.recording.delay import recorded_delay
+from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, RecordingUnreadable
 from server.replay import replay_frames
 from server.replay.timeline import Index
 from server.vehicle import queries
+from server.vehicle.check_detail import check_answer
 
 RATES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 WARM_UP_S = 25.0  # of the recording, before a moment that the time line has not come to: less than a second of work
 REACH_S = 30.0  # a moment so little ahead is played to
-BEHIND_S = 0.3  # of our own time: further behind, it does not keep the pace that was asked for
+BEHIND_S = 0.3  # wall time: further behind, it does not reach the requested rate
 
 
 class Playback:
     """Times without a suffix are seconds since the beginning of the recording; `now_s` is the clock of whoever looks.
 
-    `open_again` gives the recording a second time, for the time line. Raises RecordingUnreadable.
+    `open_again` gives the recording a second time, for the time line; `sketch` is its speed in equal steps, `trends`
+    all its signals in few buckets, to be shown until the time line is made. Raises RecordingUnreadable.
     """
 
     def __init__(
@@ -41,13 +45,16 @@ class Playback:
         settings: str,
         now_s: float,
         at_s: float = 0.0,
+        sketch: Sequence[float | None] = (),
+        trends: drive_trends.DriveTrendsAnswer | None = None,
     ) -> None:
         self._recording = recording
+        self._trends = trends
         self.drive = Drive(
             recording, read_recorded_events(recording), delay=recorded_delay(recording), fallback=settings
         )
         self._index_recording = open_again()
-        self.index = Index(self._index_recording, self.drive)
+        self.index = Index(self._index_recording, self.drive, sketch)
         self._run = OfflineRun(recording, self.drive)
         self.is_playing = False
         self.rate = 1.0
@@ -93,14 +100,14 @@ class Playback:
     def set_rate(self, rate: float, now_s: float) -> None:
         """Raises ValueError where there is no such rate."""
         if rate not in RATES:
-            raise ValueError(f"A replay runs at {', '.join(f'{one:g}' for one in RATES)} times the pace.")
+            raise ValueError(f"A replay runs at {', '.join(f'{one:g}' for one in RATES)} times real time.")
         self.rate = rate
         self._keep_pace_from(self.at_s, now_s)
 
     def seek(self, at_s: float, now_s: float) -> None:
-        """To another moment; beyond the ends, to the end. Raises ValueError for what is no number."""
+        """To another moment; beyond the ends, to the end. Raises ValueError for what is not a number."""
         if not math.isfinite(at_s):
-            raise ValueError("That is no moment of the recording.")
+            raise ValueError("This time is outside the recording.")
         self.seeks += 1
         self._go_to(min(max(at_s, 0.0), self.length_s), now_s)
 
@@ -120,7 +127,7 @@ class Playback:
     # -- work --------------------------------------------------------------------------------------------------------
 
     def work(self, now_s: float, is_over: Callable[[], bool]) -> None:
-        """Comes as far as it should be at `now_s`, or as the time given lets it; the rest goes into the time line."""
+        """Advance to the position for `now_s`, within the time budget; the rest is spent on the time line."""
         try:
             self._work(now_s, is_over)
         except RecordingUnreadable as error:
@@ -186,12 +193,12 @@ class Playback:
 
     # -- what is shown -----------------------------------------------------------------------------------------------
 
-    def frame(self, **names: Any) -> dict[str, Any]:
+    def frame(self, **names: Any) -> RecordedState:
         """The state at the moment that has been reached, without `server`, `replay` and `live`."""
         return replay_frames.frame(self._run, track_number=self.seeks, **names)
 
-    def position(self) -> dict[str, Any]:
-        """Where the replay stands, as docs/protocol.md has it."""
+    def position(self) -> ReplayPosition:
+        """The replay's status, as in docs/protocol.md."""
         run_state = self._run.run_state
         silent_s = None if run_state.last_message_s is None else max(0.0, run_state.at_s - run_state.last_message_s)
         return {
@@ -211,25 +218,60 @@ class Playback:
             "settings_from": "recording" if self.drive.settings_from_recording else "now",
         }
 
-    def timeline(self) -> dict[str, Any]:
-        """The time line as far as it is made, and what there is to say of the recording."""
+    def timeline(self) -> Timeline:
+        """The time line so far, and the notes on the recording."""
         said = [*self.drive.notes]
         if self.index.is_done:
             said += [f"{sentence}." for sentence in self._index_recording.damage]
         for why in (self.index.broke_off, self.broke_off):
             if why is not None:
                 said.append(f"Not all of it can be read: {why}.")
-        return {"kind": "timeline"} | self.index.as_json() | {"notes": list(dict.fromkeys(said))[:20]}
+        return {"kind": "timeline", **self.index.as_json(), "notes": list(dict.fromkeys(said))[:20]}
 
     def scan_bytes(self) -> bytes | None:
         return replay_frames.scan_bytes(self._run)
 
-    def answer(self, message: dict[str, Any]) -> dict[str, Any]:
-        """What a page asks beside the state: `track_points` and `trends`, as the session answers them."""
+    def answer(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Answer a page's queries as a session does: `track_points`, `trends`, `drive_trends` and `check`."""
         run_state = self._run.run_state
+        if message.get("kind") == "drive_trends":
+            return self._drive_trends(drive_trends.Wanted.of(message))
         after = message.get("after")
         if message.get("kind") == "trends":
             return serialize.trends(run_state.trends.piece(run_state.at_s, after=after))
+        if message.get("kind") == "check":
+            return self._check(str(message.get("check")))
         return queries.track_points(
             run_state.state.glance(run_state.at_s), number=self.seeks, after=after if isinstance(after, int) else 0
         )
+
+    def _check(self, name: str) -> Mapping[str, Any]:
+        """One check at the moment that has been reached, with its alarms until then."""
+        run_state = self._run.run_state
+        now_s, monitor = run_state.at_s, run_state.monitor
+        answer = check_answer(monitor, name, now_s, run_state.minute)
+        if name not in monitor.alarms:
+            return dict(answer)
+        history = self.index.history(name, now_s)
+        spec, start_s = monitor.alarms[name].spec, self.drive.start_s
+        events = [
+            serialize.event(one, spec, round((start_s + one.at_s) * 1000), now_s=one.at_s, settings_version=0)
+            for one in history or ()
+        ]
+        numbered = [{**event, "n": n} for n, event in enumerate(events, 1)]
+        return {**answer, "history": None if history is None else numbered}
+
+    def _drive_trends(self, wanted: drive_trends.Wanted) -> drive_trends.DriveTrendsAnswer:
+        """A part of the recording, as far as the time line has read it."""
+        index = self.index
+        facts = drive_trends.DriveFacts(
+            now_s=self.length_s if index.is_done else index.at_s,
+            start_ms=round(self.drive.start_s * 1000),
+            length_s=self.length_s,
+            marks=index.alarm_marks,
+            marks_left_out=index.alarm_marks.left_out,
+        )
+        is_read = index.is_done or min(wanted.to_s, self.length_s) <= index.at_s
+        if is_read or self._trends is None:
+            return drive_trends.answer(index.trends, wanted, facts)
+        return drive_trends.of_sketch(self._trends, index.trends, wanted, facts)

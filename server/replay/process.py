@@ -1,7 +1,6 @@
-"""The process of one replay: reads and judges away from the server's loop, and below it in rank.
+"""The process of one replay: reads and judges outside the server's loop, at lower priority.
 
-Started by `server.replay.manager` alone. The first line it is given says what to open; it ends with its input, whatever
-became of the server.
+Started by `server.replay.manager` only. The first input line has the recording to open; it ends when its input closes.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -26,9 +25,9 @@ from server.replay.protocol import Kind, record
 NICE = 10
 MOST_MEMORY = 1536 * 1024 * 1024  # of its own data; a file that needs more is not of a car
 FRAME_S = 0.1  # while it runs
-REST_S = 0.2  # while it stands: a sign of life
+REST_S = 0.2  # heartbeat while paused
 SCAN_S = 0.05
-PORTION_S = 0.03  # of work between two looks at the orders
+PORTION_S = 0.03  # of work between two reads of commands
 TIMELINE_S = 1.0
 
 
@@ -62,7 +61,7 @@ class _Process:
         self._scan_key: tuple[int, float] = (-1, -1.0)
         self._sent_s: dict[str, float] = {"state": -1.0, "scan": -1.0, "timeline": -1.0}
         self._timeline_done = False
-        self._is_urgent = True  # somebody did something: the state is told at once
+        self._is_urgent = True  # after a command the state is sent at once
 
     def run(self) -> int:
         opening = self._read_opening()
@@ -81,15 +80,17 @@ class _Process:
                 settings=opening["settings"],
                 now_s=time.monotonic(),
                 at_s=opening["at_s"],
+                sketch=opening["sketch"],
+                trends=opening["trends"],
             )
             with contextlib.closing(playback):
                 self._play(playback)
         except RecordingUnreadable as error:
-            said = str(error).replace(str(paths[0]), paths[0].name)  # where it lies on the server is nobody's business
+            said = str(error).replace(str(paths[0]), paths[0].name)  # the path on the server is not disclosed
             self._say("failed", {"reason": _sentence(said)})
             return 2
         except MemoryError:
-            self._say("failed", {"reason": "This recording needs more memory than a replay may take."})
+            self._say("failed", {"reason": "This recording needs more memory than a replay may use."})
             return 3
         return 0
 
@@ -141,7 +142,7 @@ class _Process:
                 self._say("reply", {"n": order["n"], "answer": answer})
         return True
 
-    def _obey(self, playback: Playback, order: dict[str, Any], now_s: float) -> dict[str, Any]:
+    def _obey(self, playback: Playback, order: dict[str, Any], now_s: float) -> Mapping[str, Any]:
         self._is_urgent = True
         match order["kind"]:
             case "seek":
@@ -160,7 +161,7 @@ class _Process:
             case "scan":
                 self._wants_scan = order["wanted"] is True
                 self._scan_key = (-1, -1.0)
-            case "trends" | "track_points":
+            case "trends" | "track_points" | "drive_trends" | "check":
                 self._is_urgent = False
                 return playback.answer(order)
         return {"ok": True}
@@ -176,7 +177,7 @@ class _Process:
         if not self._is_urgent and now_s - self._sent_s["state"] < every_s:
             return self._show_scan(playback, now_s)
         self._is_urgent = playback.is_seeking and self._is_urgent
-        if not playback.is_seeking:  # else the picture of before stands until the moment sought is there
+        if not playback.is_seeking:  # otherwise the old state stays until the sought one is ready
             self._send("state", orjson.dumps(playback.frame(**self._names)), now_s)
         self._send("position", orjson.dumps(playback.position()), now_s)
         self._sent_s["state"] = now_s
@@ -186,7 +187,7 @@ class _Process:
         if not self._wants_scan or playback.is_seeking or now_s - self._sent_s["scan"] < SCAN_S:
             return
         key = (playback.seeks, playback.at_s)
-        if key != self._scan_key or now_s - self._sent_s["scan"] >= REST_S:  # one that stands is told again: it is seen
+        if key != self._scan_key or now_s - self._sent_s["scan"] >= REST_S:  # a paused one is sent again as a heartbeat
             scan = playback.scan_bytes()
             self._scan_key = key
             self._send("scan", scan if scan is not None else b"", now_s)

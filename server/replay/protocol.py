@@ -12,5 +12,5 @@ MOST_BYTES = 4 * 1024 * 1024
 
 
 def record(kind: Kind, payload: bytes) -> bytes:
-    """One answer as it goes through the pipe."""
+    """One message in the pipe's encoding."""
     return HEAD.pack(KINDS.index(kind), len(payload)) + payload

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from monitor.alarm import Alarm
 from monitor.alarm_order import standing
@@ -11,13 +10,14 @@ from monitor.check import Verdict
 from server.judge.offline import OfflineRun
 from server.judge.run_state import RunState
 from server.protocol import serialize
+from server.protocol.state import RecordedState
 from server.vehicle.scan_feed import judged
 from server.vehicle.state_frame import Facts, state_frame
 
 TRENDS_A_FRAME = 4
 
 
-def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, track_number: int) -> dict[str, Any]:
+def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, track_number: int) -> RecordedState:
     """The state of docs/protocol.md at this moment, without `server`, `replay` and `live`. Looking changes nothing
     of what is judged later."""
     run_state, epoch = run.run_state, run.epoch
@@ -25,7 +25,6 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
     wall_ms = round((run.drive.start_s + now_s) * 1000)
     facts = Facts(
         vehicle=vehicle,
-        server={},
         now_s=now_s,
         wall_ms=wall_ms,
         phase="monitoring",
@@ -51,18 +50,21 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
         bridge_answers=True,
         reception=run_state.reception,
         sources=epoch.sources,
-        topics_heard=len(run_state.heard),
+        topics_heard=len(run_state.topics_received),
         trends=run_state.trends.piece(now_s, at_most=TRENDS_A_FRAME),
         track_number=track_number,
+        recording={"state": "off", "for_s": None},
+        decelerate=run_state.slow_down.as_json(now_s, run.drive.start_s, epoch.tuning.limits.slow_down),
+        operators={"control": {"holder": None}, "reach": None},  # not applicable to a recording
     )
     shown = state_frame(facts, run_state.state.glance(now_s), run_state.monitor)
-    del shown["server"]
     shown["session"]["name"] = name
-    # Whatever is not in the file is nobody's silence: the band tells of it, and each value keeps its age.
-    shown["link"] |= {"cut": None, "since_ms": None, "problem": None, "topics_subscribed": len(epoch.published)}
-    shown["decelerate"] = run_state.slowed.as_json(now_s, run.drive.start_s, epoch.tuning.limits.slow_down)
+    # What is not in the file is no failure of a link: each value keeps its age.
+    link = shown["link"]
+    link["cut"] = link["since_ms"] = link["problem"] = None
+    link["topics_subscribed"] = len(epoch.published)
     if run.drive.recorded.has_alarms:
-        shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms) for alarm in _told_standing(run_state)]
+        shown["alarms"] = [serialize.alarm(alarm, now_s, wall_ms) for alarm in _recorded_standing(run_state)]
     return shown
 
 
@@ -88,8 +90,8 @@ def scan_bytes(run: OfflineRun) -> bytes | None:
     )
 
 
-def _told_standing(run_state: RunState) -> list[Alarm]:
-    """The alarms as they were told then, each with what its check says when it is asked anew."""
+def _recorded_standing(run_state: RunState) -> list[Alarm]:
+    """The alarms as they were announced then, each with the finding of its check as judged now."""
     findings = run_state.monitor.findings
     return [
         replace(alarm, finding=findings[alarm.id])

@@ -1,6 +1,6 @@
-"""The time line of a recording: speed, marks of alarms, gaps; and the moments from which a replay can go on at once.
+"""The time line of a recording: speed, alarm marks, gaps; and the checkpoints for seeking.
 
-Made by going once through the whole recording, in small portions, while somebody already looks at it.
+Built in one pass over the recording, in small portions, while it is already viewed.
 """
 
 from __future__ import annotations
@@ -8,48 +8,57 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from monitor.alarm import Transition
+from monitor.alarm_marks import AlarmMarks
 from monitor.catalog import CHECKS
+from monitor.drive_trends import DriveTrends
 from monitor.runner import IMPAIRED, IMPAIRED_SPEC
 from monitor.state import State
 from server.judge.drive import Drive
 from server.judge.offline import Observer, OfflineRun
+from server.judge.recorded_events import NewSettings
 from server.judge.run_state import RunState
+from server.judge.speed_trace import SpeedTrace
 from server.protocol import serialize
+from server.protocol.messages import IndexedTimeline, Mark
 from server.recording.read.read import Recording
+from server.replay.alarm_history import AlarmHistory
 from server.replay.checkpoint import restore, save
 
-BUCKETS = 360  # of the speed: two pixels each on a phone
-LEAST_BUCKET_S = 0.5
 GAP_S = 1.0  # nothing at all was recorded for longer: a gap
-KEYFRAMES = 240  # of 10 to 20 kB each
+KEYFRAMES = 240  # of some 20 kB each
 LEAST_KEYFRAME_S = 10.0
-MOST_MARKS = 400  # more alarms than a person can look at: the most urgent are kept
+MOST_MARKS = 400  # more alarms than a person can view: the most urgent are kept
 
 
 class Index(Observer):
     """Times are seconds since the beginning of the recording."""
 
-    def __init__(self, recording: Recording, drive: Drive) -> None:
+    def __init__(self, recording: Recording, drive: Drive, sketch: Sequence[float | None] = ()) -> None:
+        """`sketch`: the speed as the catalog has it, in equal steps; it stands where nothing has been read yet."""
         self._drive = drive
-        self._bucket_s = max(LEAST_BUCKET_S, drive.length_s / BUCKETS)
+        self._sketch = sketch
         self._every_s = max(LEAST_KEYFRAME_S, drive.length_s / KEYFRAMES)
-        self._speed: list[float | None] = [None] * (int(drive.length_s / self._bucket_s) + 1)
+        self._speed = SpeedTrace(drive.length_s)
         self._gaps: list[tuple[float, float]] = []
-        self._heard_s = 0.0
-        self._marks: list[tuple[int, float, dict[str, Any]]] = []
+        self._received_s = 0.0
+        self._marks: list[tuple[int, float, Mark]] = []
+        self._active: dict[str, list[Mark]] = {}  # by alarm: announced, and not returned to normal yet
         self._lost_marks = 0
         self._kept_s: list[float] = []
         self._kept: list[bytes] = []
+        self.trends = DriveTrends(0.0)
+        self.alarm_marks = AlarmMarks()
+        self._history = AlarmHistory()
+        self._set_limits()
         self.is_done = False
         self.broke_off: str | None = None  # why the recording could not be read to its end
         self._specs = {check.id: check.alarm for check in CHECKS} | {IMPAIRED: IMPAIRED_SPEC}
         if drive.recorded.has_alarms:
-            for at_s, word in drive.recorded.words:
-                if isinstance(word, Transition):
-                    self._mark(word, at_s)
+            for at_s, event in drive.recorded.events:
+                if isinstance(event, Transition):
+                    self._mark(event, at_s)
         self._run = OfflineRun(recording, drive, observer=self)
 
     @property
@@ -86,16 +95,22 @@ class Index(Observer):
         place = bisect_right(self._kept_s, at_s) - 1
         return (self._kept_s[place], lambda: restore(self._kept[place])) if place >= 0 else None
 
-    def as_json(self) -> dict[str, Any]:
+    def history(self, alarm: str, at_s: float) -> list[Transition] | None:
+        """The transitions of an alarm up to a moment; None: it has not been read so far, or is too long."""
+        is_read = self.is_done or self._drive.recorded.has_alarms or at_s <= self.at_s
+        return self._history.until(alarm, at_s) if is_read else None
+
+    def as_json(self) -> IndexedTimeline:
         """What docs/protocol.md calls the time line; without what only its session knows."""
         marks = sorted(self._marks, key=lambda mark: (mark[0], mark[1]))[:MOST_MARKS]
+        done_s = self._drive.length_s if self.is_done else self.at_s
         return {
             "length_s": round(self._drive.length_s, 3),
-            "done_s": round(self._drive.length_s if self.is_done else self.at_s, 1),
+            "done_s": round(done_s, 1),
             "is_done": self.is_done,
-            "bucket_s": self._bucket_s,
-            "speed_mps": [serialize.plain(speed, 2) for speed in self._speed],
-            "gaps": [[round(a, 2), round(b, 2)] for a, b in self._gaps],
+            "bucket_s": self._speed.bucket_s,
+            "speed_mps": self._speed.completed(done_s, self._sketch),
+            "gaps": [(round(a, 2), round(b, 2)) for a, b in self._gaps],
             "marks": [mark for _, _, mark in sorted(marks, key=lambda mark: mark[1])],
             "marks_left_out": len(self._marks) + self._lost_marks - len(marks),
         }
@@ -107,34 +122,48 @@ class Index(Observer):
                 self._mark(transition, transition.at_s)
 
     def _mark(self, transition: Transition, at_s: float) -> None:
+        self.alarm_marks.add(transition, at_s)
+        self._history.add(transition, at_s)
         spec = self._specs.get(transition.alarm_id)
+        if transition.change == "cleared":
+            for ended in self._active.pop(transition.alarm_id, ()):
+                ended["duration_s"] = round(max(0.0, at_s - ended["at_s"]), 1)
         if not transition.announces or spec is None:
             return
         if len(self._marks) >= 10 * MOST_MARKS:
             self._lost_marks += 1
             return
-        mark = {
+        mark: Mark = {
             "at_s": math.ceil(max(0.0, at_s) * 1000) / 1000,  # there it has been raised already
             "alarm": transition.alarm_id,
             "title": spec.title,
-            "priority": str(spec.priority),
+            "priority": spec.priority,
             "text": transition.text,
+            "duration_s": None,
         }
+        self._active.setdefault(transition.alarm_id, []).append(mark)
         self._marks.append((spec.priority.rank, at_s, mark))
 
     def signals_changed(self, changed: tuple[str, ...], state: State, now_s: float) -> None:
-        """The highest speed of each bucket is kept."""
+        """The highest speed of each bucket is kept, and the trends of every signal."""
+        self.trends.receive(changed, state, now_s)
         if "speed" not in changed:
             return
         reading = state.get("speed")
         speed = serialize.plain(reading.value.speed_mps, 2) if reading is not None else None
-        place = min(len(self._speed) - 1, int(now_s / self._bucket_s))
-        if speed is not None and place >= 0:
-            before = self._speed[place]
-            self._speed[place] = abs(speed) if before is None else max(before, abs(speed))
+        if speed is not None:
+            self._speed.add(now_s, speed)
+
+    def _set_limits(self) -> None:
+        """Which thresholds stood when is known before anything is read."""
+        epochs = iter(self._drive.epochs)
+        self.trends.set_limits(next(epochs).tuning.limits, 0.0)
+        for at_s, event in self._drive.recorded.events:
+            if isinstance(event, NewSettings):
+                self.trends.set_limits(next(epochs).tuning.limits, at_s)
 
     def message_received(self, topic: str, now_s: float) -> None:
         """Where none comes for long is a gap."""
-        if now_s - self._heard_s > GAP_S:
-            self._gaps.append((self._heard_s, now_s))
-        self._heard_s = max(self._heard_s, now_s)
+        if now_s - self._received_s > GAP_S:
+            self._gaps.append((self._received_s, now_s))
+        self._received_s = max(self._received_s, now_s)

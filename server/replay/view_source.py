@@ -1,4 +1,4 @@
-"""What one page looks at: the live car, or a recording while the live car goes on being told beside it."""
+"""The source of a page's view: the live car, or a recording with a summary of the live car."""
 
 from __future__ import annotations
 
@@ -9,38 +9,43 @@ from typing import Any
 
 import orjson
 
-from server.bus.bus import Frame, LocalBus, NotServed
-from server.replay import commands
+from server.bus.bus import ALL, Frame, NotServed, PageBus
+from server.protocol.messages import FrameKind
+from server.protocol.replay_commands import OpenBeside, OpenReplay, ReplayOrder
+from server.protocol.state import LiveSummary, ServerState
 from server.replay.manager import NoReplay, ReplayClient, ReplayManager, summary
 
-KINDS = ("state", "scan")
-REPLAY_KINDS = (*KINDS, "timeline")
+KINDS: tuple[FrameKind, ...] = ("state", "scan", "cars")
+REPLAY_KINDS: tuple[FrameKind, ...] = (*KINDS, "timeline")
+BESIDE_KINDS: tuple[FrameKind, ...] = (*REPLAY_KINDS, "beside")
+NO_REPLAY = "This page shows no replay."
 
 
 class ViewSource:
-    """Gives a page the newest of what it looks at. `on_new(kind)` is called when a replay has something new, and
-    `on_turned()` when the page looks at something else from now on."""
+    """Provides the newest frames of the page's source. `on_new(kind)` is called for new frames of a replay,
+    `on_turned()` when the source changes."""
 
     def __init__(
         self,
-        bus: LocalBus,
+        bus: PageBus,
         vehicle: str,
         replays: ReplayManager,
         *,
-        server: Callable[[], Mapping[str, Any]],
+        server: Callable[[], ServerState],
         on_new: Callable[[str], None],
         on_turned: Callable[[], None],
     ) -> None:
-        """`server`: what a state tells of the server."""
+        """`server`: the server's part of a state."""
         self._bus = bus
         self._vehicle = vehicle
         self._replays = replays
         self._server = server
         self._on_new, self._on_turned = on_new, on_turned
         self._client: ReplayClient | None = None
+        self._beside: ReplayClient | None = None  # a second recording; only while there is a first
         self._wants_scan = False
         self._live_number = 0  # of the newest live state that was seen …
-        self._live: dict[str, Any] | None = None  # … and its summary; None: the live car is not told at all
+        self._live: LiveSummary | None = None  # … and its summary; None: no summary of the live car
 
     @property
     def is_replaying(self) -> bool:
@@ -48,18 +53,27 @@ class ViewSource:
 
     @property
     def ended(self) -> str | None:
-        """Why the replay is over without the page's wish, as a sentence; None: it is not."""
+        """Why the replay ended without a request of the page, as a sentence; None: it did not."""
         return self._client.failed if self._client is not None else None
 
     @property
-    def kinds(self) -> tuple[str, ...]:
-        """The kinds of frame there are to look at."""
-        return KINDS if self._client is None else REPLAY_KINDS
+    def beside_ended(self) -> str | None:
+        """Why the second recording ended without a request of the page, as a sentence; None: it did not."""
+        return self._beside.failed if self._beside is not None else None
+
+    @property
+    def kinds(self) -> tuple[FrameKind, ...]:
+        """The kinds of frames of the source."""
+        if self._client is None:
+            return KINDS
+        return REPLAY_KINDS if self._beside is None else BESIDE_KINDS
 
     def number(self, kind: str) -> int:
         """Of the newest frame of a kind; 0: there is none."""
-        client, live = self._client, self._bus.newest(self._vehicle, kind)
-        if client is None:
+        if kind == "beside":
+            return self._beside.numbers["state"] if self._beside is not None else 0
+        client, live = self._client, self._live_frame(kind)
+        if client is None or kind == "cars":
             return live.number if live is not None else 0
         if kind != "state":
             return client.numbers[kind]
@@ -67,8 +81,10 @@ class ViewSource:
 
     def newest(self, kind: str) -> Frame | None:
         """A replay's state is as new as the newer of what was recorded and what is live."""
-        client, live = self._client, self._bus.newest(self._vehicle, kind)
-        if client is None:
+        if kind == "beside":
+            return self._newest_beside()
+        client, live = self._client, self._live_frame(kind)
+        if client is None or kind == "cars":
             return live
         if kind != "state":
             payload = client.scan if kind == "scan" else client.timeline.decode()
@@ -83,8 +99,18 @@ class ViewSource:
             put_s=0.0,
         )
 
+    def _newest_beside(self) -> Frame | None:
+        beside = self._beside
+        if beside is None:
+            return None
+        return Frame(number=beside.numbers["state"], payload=beside.compose_beside(), put_s=0.0)
+
+    def _live_frame(self, kind: str) -> Frame | None:
+        """The cars of the server are live also while a recording is shown."""
+        return self._bus.newest(ALL if kind == "cars" else self._vehicle, kind)
+
     def watch_scan(self, wanted: bool) -> None:
-        """Scans are made only while somebody looks at them."""
+        """Scans are built only while they are viewed."""
         if wanted != self._wants_scan:
             self._wants_scan = wanted
             if self._client is not None:
@@ -92,8 +118,37 @@ class ViewSource:
             else:
                 self._bus.want(self._vehicle, "scan", +1 if wanted else -1)
 
-    async def open(self, order: commands.Open) -> None:
-        """From now on a recording. What was looked at before goes on until it is there. Raises NoReplay."""
+    async def open(self, order: OpenReplay) -> None:
+        """Switch to a recording; the former source continues until it is open. Raises NoReplay."""
+        await self._turn_to(await self._opened(order))
+
+    async def open_beside(self, order: OpenBeside) -> None:
+        """Show a second recording beside the first; one that was there before is closed. Raises NoReplay."""
+        first = self._client
+        if first is None:
+            raise NoReplay(NO_REPLAY)
+        if order.recording == first.recording:
+            raise NoReplay("This recording is shown already: choose another one.")
+        client = await self._opened(order)
+        if self._client is not first:
+            await self._replays.close(client)
+            raise NoReplay("The replay was left meanwhile.")
+        before, self._beside = self._beside, client
+        self._on_turned()
+        await self._close(before)
+
+    async def close_beside(self) -> None:
+        """The first recording alone."""
+        before, self._beside = self._beside, None
+        self._on_turned()
+        await self._close(before)
+
+    async def leave(self) -> None:
+        """Back to live."""
+        if self._client is not None:
+            await self._turn_to(None)
+
+    async def _opened(self, order: OpenReplay | OpenBeside) -> ReplayClient:
         settings: Mapping[str, Any] = {}
         with contextlib.suppress(NotServed):
             settings = await self._bus.request(self._vehicle, {"kind": "settings"})
@@ -103,28 +158,28 @@ class ViewSource:
             "settings": settings.get("toml", ""),
             "settings_version": settings.get("version", 0),
         }
-        client = await self._replays.open(order.recording, opening, on_new=self._on_new)
-        await self._turn_to(client)
+        return await self._replays.open(order.recording, opening, on_new=self._on_new)
 
-    async def leave(self) -> None:
-        """Back to live."""
-        if self._client is not None:
-            await self._turn_to(None)
-
-    async def ask(self, order: commands.Order) -> dict[str, Any]:
-        """What the replay answers to an order."""
-        if self._client is None:
-            return {"ok": False, "reason": "This page replays nothing."}
+    async def ask(self, order: ReplayOrder) -> Mapping[str, Any]:
+        """What the replay answers to an order, or the recording beside it."""
+        is_beside = getattr(order, "beside", False)
+        client = self._beside if is_beside else self._client
+        if client is None:
+            return {"ok": False, "reason": "No recording is shown beside this one." if is_beside else NO_REPLAY}
         try:
-            return await self._client.ask(order.model_dump(exclude={"do"}) | {"kind": order.do})
+            return await client.ask(order.model_dump(exclude={"do", "kind", "id", "beside"}) | {"kind": order.do})
         except NoReplay as why:
             return {"ok": False, "reason": str(why)}
 
     async def _turn_to(self, client: ReplayClient | None) -> None:
-        wanted, before = self._wants_scan, self._client
+        wanted, before, beside = self._wants_scan, self._client, self._beside
         self.watch_scan(False)
-        self._client = client
+        self._client, self._beside = client, None
         self.watch_scan(wanted)
         self._on_turned()
-        if before is not None:
-            await asyncio.shield(self._replays.close(before))
+        await self._close(beside)
+        await self._close(before)
+
+    async def _close(self, client: ReplayClient | None) -> None:
+        if client is not None:
+            await asyncio.shield(self._replays.close(client))

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from urllib.parse import SplitResult, quote, urlsplit
 
 DEFAULT_PORT = 9090  # rosbridge's own
-MASTER_PORT = 11311  # a ROS master, which speaks XML-RPC and not rosbridge
+MASTER_PORT = 11311  # a ROS master, which uses XML-RPC and not rosbridge
 LONGEST = 300  # letters; a host name has at most 253
 
 _LABEL = r"[A-Za-z0-9_]([A-Za-z0-9_-]{0,61}[A-Za-z0-9_])?"
 _HOST = re.compile(rf"(?=.{{1,253}}\Z){_LABEL}(\.{_LABEL})*\.?\Z")
-# The services that tell a cloud's machines their keys; those of the large clouds are link-local besides.
+# Metadata services of clouds, which return keys; those of the large clouds are link-local too.
 _METADATA = frozenset(
     map(ipaddress.ip_address, ("169.254.169.254", "100.100.100.200", "192.0.0.192", "fd00:ec2::254", "fd20:ce::254"))
 )
@@ -49,7 +49,7 @@ class Address:
     host: str  # name or IP address, IPv6 without brackets
     port: int
     secure: bool = False
-    path: str = ""  # with its query, as it goes over the wire
+    path: str = ""  # with its query, as transmitted
 
     @property
     def shown(self) -> str:
@@ -78,7 +78,7 @@ def parse(text: str) -> Address:
         if slip := _FEW_SLASHES.match(typed):
             better = f"{slip[1].lower()}://{typed[slip.end() :]}"
             raise BadAddress(
-                f"After {slip[1].lower()}: stand two slashes.",
+                f"After {slip[1].lower()}: write two slashes.",
                 f"Most likely {better}.",
                 code="scheme",
                 suggestion=better,
@@ -88,7 +88,7 @@ def parse(text: str) -> Address:
         raise _wrong_scheme(scheme.lower(), rest)
     if scheme.lower() not in ("ws", "wss"):
         raise BadAddress(
-            f"“{scheme[:20]}” is not a way to reach a car.",
+            f"“{scheme[:20]}” is not a supported scheme.",
             "Use ws:// or wss://, or only host and port.",
             code="scheme",
         )
@@ -98,13 +98,13 @@ def parse(text: str) -> Address:
 def _split(typed: str) -> Address:
     parts = _url_parts(typed)
     if parts.username is not None or parts.password is not None:
-        raise BadAddress("An address with a user name is not accepted.", "Leave out what stands before the @.")
+        raise BadAddress("An address with a user name is not supported.", "Remove the part before the @.")
     port = _port(parts)
     host = _host_of(parts.hostname or "")
     if port == 0:
         raise BadAddress("Port 0 cannot be dialled.", "rosbridge usually listens on 9090.")
     if port == MASTER_PORT:
-        raise _master(host, f"Port {MASTER_PORT} is the ROS master; catgraph speaks to rosbridge.")
+        raise _master(host, f"Port {MASTER_PORT} is the ROS master; catgraph connects to rosbridge.")
     path = quote(parts.path, safe="/%:@!$&'()*+,;=~") if parts.path not in ("", "/") else ""
     if parts.query:
         path = f"{path or '/'}?{quote(parts.query, safe='/%:@!$&()*+,;=~?')}"
@@ -165,7 +165,7 @@ def _wrong_scheme(scheme: str, rest: str) -> BadAddress:
     except BadAddress:
         host, port = "", None
     if port == MASTER_PORT and host:
-        return _master(host, "This is a ROS master address; catgraph speaks to rosbridge.")
+        return _master(host, "This is a ROS master address; catgraph connects to rosbridge.")
     better = f"{'wss' if scheme == 'https' else 'ws'}://{_bracketed(host or 'host')}:{port or DEFAULT_PORT}"
     return BadAddress(
         f"{scheme}:// is for web pages; a rosbridge is reached with ws://."

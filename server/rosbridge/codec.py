@@ -13,7 +13,7 @@ import cbor2
 import numpy as np
 import orjson
 
-MAX_DEPTH = 64  # a ROS message nests a handful deep; what goes deeper was made to hurt
+MAX_DEPTH = 64  # a ROS message nests a few levels; deeper ones are hostile
 # What a frame may hold: parsing it holds up the event loop, and from any thread every other one. The figures are what
 # takes some 40 ms; 1.4 million objects took 2 s, twice.
 MAX_CONTAINERS = 50_000  # objects and arrays
@@ -32,14 +32,14 @@ _TYPED_ARRAYS = {
 
 
 class Unreadable(ValueError):
-    """A frame that is no rosbridge operation; `str()` says why, in few words."""
+    """A frame that is not a rosbridge operation; `str()` has the reason."""
 
 
 class TooManyParts(Unreadable):
     """A frame that would take too long to parse."""
 
     def __init__(self) -> None:
-        super().__init__("a message of too many parts")
+        super().__init__("a message with too many parts")
 
 
 def encode(operation: dict[str, Any]) -> bytes:
@@ -108,7 +108,7 @@ def _has_much_cbor(payload: bytes) -> bool:
 
 @contextlib.contextmanager
 def _without_gc(size: int) -> Iterator[None]:
-    """The collector would look through a large message again and again while it grows; nothing of it is garbage."""
+    """Disable the garbage collector while a large message is parsed; it would scan it repeatedly."""
     if size < _PAUSE_GC_BYTES or not gc.isenabled():
         yield
         return
@@ -163,7 +163,7 @@ def _whole(digits: str) -> int | float:
 def _number(digits: str) -> float:
     number = float(digits)
     if not math.isfinite(number):
-        raise ValueError("a number beyond every float")
+        raise ValueError("a number beyond the range of floats")
     return number
 
 
@@ -188,7 +188,7 @@ def _typed_array(tag: cbor2.CBORTag, immutable: bool) -> Any:
 
 
 def _refuse(value: Any, immutable: bool) -> NoReturn:
-    raise ValueError("a kind of value that no ROS message has")
+    raise ValueError("a value type that no ROS message has")
 
 
 def _bignum(value: Any, immutable: bool) -> int:

@@ -10,6 +10,7 @@ import ssl
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from server.protocol.state import ConnectionProblem
 from server.rosbridge.address import Address, BadAddress
 
 LOGIN_WANTED = "login_wanted"
@@ -20,14 +21,14 @@ MAX_NAMES = 3  # of topics in a sentence
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """What stands between the server and the bridge."""
+    """A connection problem between server and bridge."""
 
     code: str  # stable name for tests and pages
     title: str  # one sentence
     hint: str  # what to do
-    mark: str  # a word or two under the broken node of the chain
+    mark: str  # a short text under the broken node of the chain
 
-    def as_json(self) -> dict[str, str]:
+    def as_json(self) -> ConnectionProblem:
         return {"code": self.code, "title": self.title, "hint": self.hint, "mark": self.mark}
 
 
@@ -106,20 +107,20 @@ def _of_system_error(error: BaseException, address: Address) -> Problem:
     if isinstance(error, OSError) and error.errno in (errno.EHOSTUNREACH, errno.ENETUNREACH, errno.EHOSTDOWN):
         return Problem(
             code="unreachable",
-            title=f"No way leads from this server to {address.host}.",
+            title=f"There is no route from this server to {address.host}.",
             hint="Join the car's network and try again.",
             mark="no route",
         )
     return Problem(
         code="failed",
         title=f"{address.shown} cannot be reached.",
-        hint=f"The system says: {_sentence(str(error)[:120] or type(error).__name__)}",
+        hint=f"System error: {_sentence(str(error)[:120] or type(error).__name__)}",
         mark="failed",
     )
 
 
 def not_rosbridge(address: Address, what: str) -> Problem:
-    """Something answers there, but not as a rosbridge does; `what` says how it answered."""
+    """Another service answers at the address; `what` describes its answer."""
     return Problem(
         code="not_rosbridge",
         title=f"Something answers on {address.shown}, but it is not a rosbridge.",
@@ -152,7 +153,7 @@ def of_handshake(address: Address, reason: str, answer: bytes) -> Problem:
         return Problem(
             code="busy",
             title=f"{address.shown} takes no more connections.",
-            hint="Too many look at this car, or its bridge is still starting. It is tried again by itself.",
+            hint="Too many clients use this bridge, or it is still starting. The server tries again automatically.",
             mark="busy",
         )
     if status is not None:
@@ -160,7 +161,7 @@ def of_handshake(address: Address, reason: str, answer: bytes) -> Problem:
     if answer:
         return not_rosbridge(address, "It answers, but not as a WebSocket does.")
     if "timeout" in reason:
-        return not_rosbridge(address, "It accepts the connection and then says nothing.")
+        return not_rosbridge(address, "It accepts the connection and then sends nothing.")
     return not_rosbridge(address, "It closes the connection at once; a secure one wants wss://.")
 
 
@@ -170,13 +171,14 @@ def closed_by_bridge(address: Address, why: str) -> Problem:
     return Problem(
         code="closed",
         title="The bridge closed the connection.",
-        hint=f"rosbridge on {address.shown} stopped, or the network dropped{detail}. It is tried again by itself.",
+        hint=f"rosbridge on {address.shown} stopped, or the network dropped{detail}. "
+        "The server tries again automatically.",
         mark="closed",
     )
 
 
 def login_wanted(address: Address) -> Problem:
-    """rosbridge of ROS 1 with authenticate:=true closes after the first operation, without a code or a word."""
+    """rosbridge of ROS 1 with authenticate:=true closes after the first operation, without a code or reason."""
     return Problem(
         code=LOGIN_WANTED,
         title=f"The bridge on {address.shown} wants a login.",
@@ -203,7 +205,7 @@ def blocked_topics(topics: Sequence[str], clients: int) -> Problem:
     others = f"{clients} other client{'s are' if clients != 1 else ' is'} connected to this bridge"
     return Problem(
         code="topics_blocked",
-        title=f"No message comes through the bridge from {_names(topics)}.",
+        title=f"No message arrives through the bridge from {_names(topics)}.",
         hint=f"They have a publisher, and {others}: one that subscribed with cbor-raw before us blocks them. "
         "End that client; the subscription is renewed by itself. Or the publisher is idle.",
         mark="blocked topics",
@@ -213,6 +215,17 @@ def blocked_topics(topics: Sequence[str], clients: int) -> Problem:
 def _names(topics: Sequence[str]) -> str:
     more = len(topics) - MAX_NAMES
     return ", ".join(topics[:MAX_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def rosapi_failing(text: str) -> Problem:
+    """Every question to rosapi is answered with an error that is not known here."""
+    return Problem(
+        code="rosapi_failing",
+        title="The bridge answers every question to rosapi with an error.",
+        hint=f"It says: {_sentence(text)} Check that rosapi is installed where rosbridge runs, and restart both. "
+        "Until then topics and types are not known, and only the usual names are tried.",
+        mark="rosapi fails",
+    )
 
 
 def bridge_silent(address: Address) -> Problem:
@@ -254,7 +267,7 @@ NOTHING_KNOWN = Problem(
 )
 ROSAPI_MISSING = Problem(
     code="no_rosapi",
-    title="This is a rosbridge, but rosapi does not run beside it.",
+    title="This is a rosbridge, but rosapi is not running.",
     hint="Start the node rosapi_node of the package rosapi on the car: without it topics and types are not known, "
     "and only the usual names are tried.",
     mark="no rosapi",
@@ -275,8 +288,8 @@ ROSAPI_SILENT = Problem(
 )
 ROSCORE_GONE = Problem(
     code="roscore_gone",
-    title="roscore does not run any more.",
-    hint="What is connected still sends, but nothing new can connect. "
+    title="roscore is no longer running.",
+    hint="Existing connections still work, but nothing new can connect. "
     "Start roscore, then restart rosbridge, rosapi and the car's nodes.",
     mark="no roscore",
 )
@@ -290,7 +303,7 @@ ROSCORE_RESTARTED = Problem(
 BRIDGE_NODE_DEAD = Problem(
     code="bridge_node_dead",
     title="The bridge's ROS node has died; its process still accepts connections.",
-    hint="Nothing passes it any more. End the rosbridge process (kill -9) and start it again.",
+    hint="It no longer passes messages. End the rosbridge process (kill -9) and start it again.",
     mark="node died",
 )
 BRIDGE_DEAF = Problem(

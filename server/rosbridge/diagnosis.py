@@ -13,12 +13,13 @@ from server.rosbridge import connection_errors
 from server.rosbridge.connection_errors import Problem
 
 SILENT_S = 2.5  # questions without any answer for so long: one of them may be lost on the way
+FAILURES = 3  # in a row, for a reason that is not known: a passing one is over by then
 
 Cause = Literal["missing", "no_master", "no_node", "killed"]
 
 # The words of a failed call, in the order in which they are looked for.
 WORDS: tuple[tuple[str, Cause], ...] = (
-    ("context is invalid", "no_node"),  # ROS 2: the bridge's node was shut down, its process goes on
+    ("context is invalid", "no_node"),  # ROS 2: the bridge's node was shut down, its process continues
     ("context is not valid", "no_node"),
     ("communicate with master", "no_master"),  # ROS 1: roscore does not answer
     ("communicate with service", "killed"),  # ROS 1: rosapi was killed, and is still registered
@@ -37,9 +38,10 @@ class Diagnosis:
 
     is_rosbridge: bool = False  # it answered a call, well or badly: nothing else does
     _answered_s: float | None = None  # the newest good answer of rosapi
-    _asked_s: float | None = None  # the oldest question that was asked since the newest answer of any kind
+    _asked_s: float | None = None  # the oldest call since the newest answer of any kind
     _cause: Cause | None = None  # of the newest failed answer; None: the newest answer was good
     _failures: int = 0  # failed answers in a row
+    _text: str = ""  # of the newest failed answer
     _master_was_gone: bool = False  # on this opening
     _master_is_back: bool = False  # and rosapi answered since
 
@@ -58,19 +60,19 @@ class Diagnosis:
         self.is_rosbridge = True
         cause = cause_of(words)
         if cause == "killed" and self._asked_s is not None:
-            return  # a bridge of ROS 1 gives up after 5 s and says the same: rosapi hangs
+            return  # a ROS 1 bridge gives up after 5 s with the same error: rosapi hangs
         self._asked_s = None
         self._failures += 1
-        self._cause = cause
+        self._cause, self._text = cause, words
         if self._cause == "no_master":
             self._master_was_gone, self._master_is_back = True, False
 
     def unanswered(self, asked_s: float) -> None:
-        """A question that nothing held up was asked then and not answered in time."""
+        """A call at that time was not delayed by others and not answered in time."""
         if self._asked_s is None:
             self._asked_s = asked_s
 
-    def master_came_back(self) -> bool:
+    def master_restarted(self) -> bool:
         """Once after roscore was gone: rosapi answers again, with another roscore."""
         if not self._master_was_gone or self._master_is_back or self._cause is not None or self._failures:
             return False
@@ -98,6 +100,8 @@ class Diagnosis:
                 return connection_errors.ROSAPI_ENDED
         if self._master_was_gone:
             return connection_errors.ROSCORE_RESTARTED
+        if self._failures >= FAILURES:
+            return connection_errors.rosapi_failing(self._text)
         if self._asked_s is not None and now_s - self._asked_s > SILENT_S:
             if flows:
                 return connection_errors.ROSAPI_SILENT

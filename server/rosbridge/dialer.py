@@ -94,7 +94,7 @@ class Dialer(AsyncioRosBridgeClientFactory):  # type: ignore[misc]
                 connection = await self._dial()
             except Exception as error:  # whatever it was, the next try must come
                 if not isinstance(error, (OSError, ValueError)):
-                    log.exception("dialling %s failed in an unforeseen way", self.url)
+                    log.exception("dialling failed unexpectedly: address=%s", self.url)
                 self.owner.dial_failed(error)
             else:
                 opened_s = self._manager.loop.time()
@@ -122,8 +122,8 @@ class Dialer(AsyncioRosBridgeClientFactory):  # type: ignore[misc]
             self._lookup.cancel()
 
     async def _dial(self) -> BridgeProtocol:
-        """Resolves, refuses what is never dialled, and dials exactly the addresses that were looked at, in turn, until
-        one of them shakes hands. Raises what tells most of why none did."""
+        """Resolve the host, refuse forbidden addresses, and dial the checked ones in turn until a handshake succeeds.
+        Raises the most informative error."""
         self.owner.attempts += 1
         found = await self._addresses()
         failures: list[Exception] = []
@@ -181,7 +181,7 @@ async def _look_up(host: str, port: int) -> Any:
 
 
 def _rank(error: Exception) -> int:
-    """Of several failures the most telling is told: the farther a dial came, the more it tells."""
+    """The most informative of several errors: that of the dial that got farthest."""
     kinds = (NoWebSocket, ssl.SSLError, ConnectionRefusedError, ConnectionError, TimeoutError, OSError, BadAddress)
     return next((rank for rank, kind in enumerate(kinds) if isinstance(error, kind)), len(kinds))
 

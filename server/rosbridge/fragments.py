@@ -1,8 +1,8 @@
-"""Puts together what a bridge sends in fragments, within bounds.
+"""Assembles fragmented messages of a bridge, within bounds.
 
-ROS 2's rosbridge, and one of ROS 1 with a max_message_size, sends what is longer in pieces without being asked to:
-text, one piece after the other, the id 0 for every message of a topic, `total` with a fraction. A piece is not parsed:
-its head and its tail say what it is, and the JSON escapes of the pieces in a row are those of the whole.
+ROS 2's rosbridge, and ROS 1's with a max_message_size, fragments longer messages unasked: text, in order, the id 0 for
+every message of a topic, a fractional `total`. A fragment is not parsed: its head and tail identify it, and its JSON
+escapes are those of the whole.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _TAIL_BYTES = 200
 class TooLarge:
     """A message that is not put together."""
 
-    topic: str | None  # None: its beginning does not say
+    topic: str | None  # None: not in its head
     size: int  # bytes, as it is escaped
 
 
@@ -51,7 +51,7 @@ class Fragments:
         head, tail = _HEAD.match(payload), _TAIL.search(payload, max(0, len(payload) - _TAIL_BYTES))
         if head is None or tail is None or tail.start() < head.end():
             self._forget()
-            raise Unreadable("a fragment that says not what it is")
+            raise Unreadable("a fragment without a valid header")
         data, id, number, total = payload[head.end() : tail.start()], head[1], int(tail[1]), float(tail[2])
         size = 0  # of the whole
         if number == 0:

@@ -27,11 +27,11 @@ class Status(NamedTuple):
     text: str
 
 
-class Junk(NamedTuple):
+class InvalidFrame(NamedTuple):
     why: str
 
 
-Received = Publish | Answer | Status | Junk | TooLarge
+Received = Publish | Answer | Status | InvalidFrame | TooLarge
 
 
 class FrameReader:
@@ -53,17 +53,17 @@ class FrameReader:
         try:
             operation, note = codec.decode(payload, is_binary)
         except codec.Unreadable as error:
-            return Junk(str(error))
+            return InvalidFrame(str(error))
         return _received(operation, note)
 
     def _read_fragment(self, payload: bytes) -> Received | None:
         try:
             whole = self._fragments.add(payload)
         except codec.Unreadable as error:
-            return Junk(str(error))
+            return InvalidFrame(str(error))
         if whole is None or isinstance(whole, TooLarge):
             return whole
-        return Junk("fragments that hold a fragment") if is_fragment(whole, False) else self.read(whole, False)
+        return InvalidFrame("fragments that hold a fragment") if is_fragment(whole, False) else self.read(whole, False)
 
 
 def _received(operation: dict[str, Any], note: str | None) -> Received:
@@ -71,13 +71,13 @@ def _received(operation: dict[str, Any], note: str | None) -> Received:
         case "publish":
             topic = operation.get("topic")
             if not isinstance(topic, str) or "msg" not in operation:
-                return Junk("a publish without topic or msg")
+                return InvalidFrame("a publish without topic or msg")
             return Publish(topic, operation["msg"], note)
         case "service_response":
             return Answer(operation)
         case "status":
             return Status(short_text(operation.get("level"), 20), short_text(operation.get("msg"), 500))
         case "fragment":
-            return Junk("a fragment that cannot be put together")
+            return InvalidFrame("a fragment that cannot be put together")
         case _:
-            return Junk("an operation that rosbridge does not have")
+            return InvalidFrame("an operation that rosbridge does not have")

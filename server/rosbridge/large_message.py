@@ -13,8 +13,8 @@ _CBOR_KEY = b"\x65topic"  # a text of five letters
 
 
 def topic_of(head: bytes, tail: bytes, *, is_binary: bool) -> str | None:
-    """The topic of a publish operation; None where neither end has it. A bridge writes it before the message; where it
-    stands behind, it is the last one in the frame."""
+    """The topic of a publish operation; None if neither end has it. A bridge writes it before the message; if it is
+    behind, it is the last field of the frame."""
     return _of_cbor(head) or _of_cbor(tail, last=True) if is_binary else _of_json(head) or _of_json(tail, last=True)
 
 

@@ -1,13 +1,12 @@
 """The connection to one rosbridge: roslibpy on our own event loop, watched, and without its queues.
 
-Only `websocket`, `dialer` and this module import roslibpy, or know its inside and that of autobahn below it. They are
-written against the versions in `ASSUMPTIONS`; each thing assumed of them is named there and held by a test of its own.
-What is replaced, and why:
+Only `websocket`, `dialer` and this module use the internals of roslibpy and autobahn. They are written against the
+versions in `ASSUMPTIONS`, which lists each assumption; each has its own test. What is replaced, and why:
 
 - its transport runs a loop in a thread: `OwnLoop` adopts the running one;
 - its client queues what is sent while down and delivers it on reconnecting: `send_now` refuses instead;
-- its topics register anew with every failed attempt: the table of subscriptions here is sent once an opening;
-- its factory: `dialer` says why; its watch for silence and the limit of a message: `websocket` says why.
+- its topics register again with every failed attempt: here the table of subscriptions is sent once per opening;
+- its factory (see `dialer`), its detection of silence and its message limit (see `websocket`).
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from server.rosbridge.address import Address
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.dialer import RosClient
 from server.rosbridge.fragments import TooLarge
-from server.rosbridge.frame_reader import Answer, FrameReader, Junk, Publish, Status
+from server.rosbridge.frame_reader import Answer, FrameReader, InvalidFrame, Publish, Status
 from server.rosbridge.link_errors import LinkDown, NoWebSocket
 from server.rosbridge.link_listener import LinkListener, Marks
 from server.rosbridge.outgoing import NotAllowed, Outgoing
@@ -63,8 +62,8 @@ class RosLink:
         take_unparsed: Callable[[RawFrame], bool] = lambda _: False,
         marks: Marks | None = None,
     ) -> None:
-        """`take_unparsed` gets each publish first, as it came; True: it needs no parsing, and no listener is called.
-        `marks` follows how late the link is; None: nobody does."""
+        """`take_unparsed` gets each publish first, unparsed; True: it needs no parsing, and no listener is called.
+        `marks` measures the link's delay; None: it is not measured."""
         self.address = address
         self.attempts = 0
         self.heard_s: float | None = None  # when the bridge last sent anything, pongs included
@@ -82,7 +81,7 @@ class RosLink:
         self._was_asked = False  # anything, on this connection
         self.junk_count = 0  # frames that were no operations, on this connection
         self.server_software = ""  # what the other side called itself in its newest handshake
-        self._faults: set[str] = set()  # told already
+        self._faults: set[str] = set()  # already reported
 
     # -- for the session ---------------------------------------------------------------------------------------------
 
@@ -92,7 +91,7 @@ class RosLink:
 
     @property
     def frame_bytes(self) -> int:
-        """The size of the frame that is being told."""
+        """The size of the current frame."""
         return self._reader.frame_bytes
 
     def start(self) -> None:
@@ -102,8 +101,8 @@ class RosLink:
         self._ros.factory.retry_now()
 
     def stop(self, *, has_last_word: bool = False) -> None:
-        """Ends the link for good, and tells the listener nothing more. What was not yet sent is not sent;
-        `has_last_word`: but for what was written just now, which gets a moment to arrive."""
+        """Close the link finally, without further listener calls. Unsent data is dropped, except, with
+        `has_last_word`, what was written just now, which gets a moment to arrive."""
         self._stopped = True
         self._ros.factory.stop()
         self._calls.fail_all("the link was ended")
@@ -139,15 +138,11 @@ class RosLink:
             self._send_row("unsubscribe", row)
 
     def renew(self, topic: str) -> None:
-        """Subscribes to a topic of the table anew, where nothing comes on it."""
+        """Renew the subscription of a topic without messages."""
         row = self._table.get(topic)
         if row is not None and self.is_open:
             self._send_row("unsubscribe", row)
             self._send_row("subscribe", row)
-
-    def unsubscribe_all(self) -> None:
-        for topic in list(self._table):
-            self.unsubscribe(topic)
 
     @property
     def subscriptions(self) -> tuple[Subscription, ...]:
@@ -170,8 +165,12 @@ class RosLink:
         """As `ServiceCalls.call`."""
         return await self._calls.call(service, arguments, timeout_s=timeout_s)
 
+    def beside(self, listener: LinkListener) -> RosLink:
+        """Another connection to the same bridge, not started, for calls that may be held up."""
+        return RosLink(self.address, listener, now=self._now)
+
     def ping(self) -> None:
-        """Asks the bridge for a sign of life, behind all that was sent before. Raises LinkDown."""
+        """Send a ping behind all data sent before. Raises LinkDown."""
         if self._socket is None or not self.is_open:
             raise LinkDown("not sent: no connection to the car")
         self._socket.pings += 1
@@ -228,7 +227,7 @@ class RosLink:
 
     def closed(self, socket: BridgeProtocol) -> None:
         if socket is not self._socket:
-            return  # it never opened: whoever dialled it says so
+            return  # it never opened: the dialer reports it
         self._socket = None
         self._calls.fail_all("the connection to the bridge was lost")
         problem = _problem_of_end(socket, self.address, was_asked=self._was_asked)
@@ -250,12 +249,12 @@ class RosLink:
         match self._reader.read(payload, is_binary):
             case Publish(topic, message, note):
                 if not self._tell(self._listener.message_received, topic, message, note):
-                    self._junk(socket, "a message on which catgraph itself stumbled")
+                    self._junk(socket, "a message that caused an internal error")
             case Answer(operation):
                 self._calls.answered(operation)
             case Status(level, text):
                 self._tell(self._listener.status_received, level, text)
-            case Junk(why):
+            case InvalidFrame(why):
                 self._junk(socket, why)
             case TooLarge() as large:
                 self.skipped(socket, large.topic, large.size)
@@ -271,10 +270,10 @@ class RosLink:
         return self._tell(take, raw) and taken and not self._stopped
 
     def _tell(self, listener: Callable[..., None], *what: Any) -> bool:
-        """Tells the listener, unless stopped; False where it stumbled.
+        """Call the listener unless stopped; return False if it raised.
 
-        A fault of its own costs this one message and not the link: the next message of the kind would find the same
-        fault, and the operator would be blind to all the others.
+        A fault of the listener costs this message and not the link: otherwise each such message would end the link and
+        hide all others.
         """
         if self._stopped:
             return True
@@ -284,7 +283,7 @@ class RosLink:
             fault = f"{listener.__name__}: {type(error).__name__}"
             if fault not in self._faults:
                 self._faults.add(fault)
-                log.exception("%s, told once, on what came from %s", fault, self.address.shown)
+                log.exception("handler failed (logged once): error=%s source=%s", fault, self.address.shown)
             return False
         return True
 

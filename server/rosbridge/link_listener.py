@@ -1,4 +1,4 @@
-"""Who is told what happens on a link."""
+"""The listener of a link's events."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Marks(Protocol):
 
 
 class LinkListener(Protocol):
-    """Who is told what happens on the link; every method returns at once."""
+    """Listener of a link's events; every method returns at once."""
 
     def link_opened(self) -> None: ...
     def link_closed(self, problem: Problem) -> None: ...

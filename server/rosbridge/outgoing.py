@@ -32,7 +32,7 @@ Fields = Mapping[str, "Check | Fields | Stamp"]
 
 
 class NotAllowed(ValueError):
-    """An operation that is not sent, because it could harm the bridge, the car or other clients; `str()` says why."""
+    """An operation that is not sent, because it could harm the bridge, car or other clients; `str()` has the reason."""
 
 
 class Stamp:

@@ -46,7 +46,7 @@ class RawFrame:
 
 
 def raw_frame(payload: bytes, is_binary: bool) -> RawFrame | None:
-    """What a frame publishes, from its head alone; None where its head does not say: it has to be parsed.
+    """What a frame publishes, from its head alone; None: the frame must be parsed.
 
     The head is as every rosbridge writes it: op, topic, msg.
     """

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 
 from server.rosbridge.connection_errors import LOGIN_WANTED, Problem
 from server.rosbridge.diagnosis import Diagnosis
-from server.rosbridge.link import RosLink
 from server.rosbridge.link_errors import CallFailed, LinkDown, Refusal
+from server.rosbridge.live_source import LiveSource
 
 GIVE_UP_S = 6.0  # a quick question that is so old will not be answered on this connection
 GIVE_UP_LONG_S = 30.0  # the same of a question with a long answer, which a slow link takes long to carry
@@ -66,15 +66,15 @@ class _Silent:
 
 
 class Questions:
-    """Of one car, beside `main`: the link that carries its messages. What the answers mean goes to `diagnosis`."""
+    """Of one car, beside `main`, the link with its messages. `diagnosis` gets the meaning of the answers."""
 
-    def __init__(self, main: RosLink, diagnosis: Diagnosis, *, now: Callable[[], float]) -> None:
+    def __init__(self, main: LiveSource, diagnosis: Diagnosis, *, now: Callable[[], float]) -> None:
         self._main = main
         self._diagnosis = diagnosis
         self._now = now
-        self._own: RosLink | None = None
+        self._own: LiveSource | None = None
         self._listener = _Silent()
-        self._overdue: dict[asyncio.Task[Any], tuple[float, bool]] = {}  # when it was asked, whether it is quick
+        self._overdue: dict[asyncio.Task[Any], tuple[float, bool]] = {}  # time of the call, whether it is a quick one
         self._asking = 0
         self._pause_s = FIRST_PAUSE_S
         self._dial_again_s = 0.0
@@ -83,7 +83,7 @@ class Questions:
         """The values a service answers. Raises LinkDown where the car's link is down, CallFailed in all other cases."""
         if not self._main.is_open:
             self._drop()
-            raise LinkDown("not asked: no connection to the car")
+            raise LinkDown("not called: no connection to the car")
         link = await self._link()
         asked_s, is_quick = self._now(), service in SIGNS_OF_LIFE and not self._asking
         task = asyncio.ensure_future(link.call(service, arguments, timeout_s=LONGEST_S))
@@ -126,7 +126,7 @@ class Questions:
         """No question more."""
         self._drop()
 
-    async def _link(self) -> RosLink:
+    async def _link(self) -> LiveSource:
         """The connection to ask on. Raises CallFailed while it is held up."""
         now_s = self._now()
         if self._overdue:
@@ -135,12 +135,12 @@ class Questions:
                 self._drop()
                 self._dial_again_s = now_s + self._pause_s
                 self._pause_s = min(self._pause_s * 2, LAST_PAUSE_S)
-            raise CallFailed("not asked: an earlier question is not answered yet")
+            raise CallFailed("not called: an earlier call is unanswered")
         if now_s < self._dial_again_s:
-            raise CallFailed("not asked: earlier questions were not answered")
+            raise CallFailed("not called: earlier calls were not answered")
         if self._own is None:
             self._listener = _Silent()
-            self._own = RosLink(self._main.address, self._listener, now=self._now)
+            self._own = self._main.beside(self._listener)
             self._own.start()
         own = self._own
         if not own.is_open:
@@ -152,7 +152,7 @@ class Questions:
             return own
         if self._listener.failed and self._main.is_open:
             return self._main  # the bridge takes no second connection
-        raise CallFailed("not asked: no connection for questions yet")
+        raise CallFailed("not called: no connection for calls yet")
 
     def _answered(self, task: asyncio.Task[Any]) -> None:
         self._asking -= 1
@@ -163,7 +163,7 @@ class Questions:
             elif isinstance(error, Refusal):
                 self._diagnosis.failed(str(error))
 
-    def _suspect(self, link: RosLink) -> None:
+    def _suspect(self, link: LiveSource) -> None:
         """What is not answered is held against rosapi only where the bridge has read the question: it has answered
         the ping behind it."""
         if link is self._main or link.unanswered == 0:

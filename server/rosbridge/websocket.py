@@ -1,8 +1,7 @@
 """One WebSocket to a rosbridge, on roslibpy's and autobahn's protocol: watched for silence, and read in whole messages.
 
-A half-open connection goes unseen by autobahn: its own pings come by the thousand or give up after 0.1 s, because its
-timers round to whole seconds. A message beyond the limit would end the connection, to come again with the next one: it
-is skipped here.
+autobahn does not detect a half-open connection: its pings come by the thousand or give up after 0.1 s, because its
+timers round to whole seconds. It closes the connection for a message above the limit; here the message is skipped.
 """
 
 from __future__ import annotations
@@ -20,13 +19,13 @@ from roslibpy.comm.comm_asyncio import AsyncioRosBridgeProtocol
 
 from server.rosbridge.large_message import ENDS_BYTES, topic_of
 
-for _name in ("autobahn", "txaio", "roslibpy"):  # they log each dropped connection; the operator hears it from us
+for _name in ("autobahn", "txaio", "roslibpy"):  # they log each dropped connection; we report it to the operator
     logging.getLogger(_name).addHandler(logging.NullHandler())
     logging.getLogger(_name).propagate = False
 
 PING_EVERY_S = 0.1  # each answer bounds how old what comes after it can be
 SILENT_AFTER_S = 1.6  # the answer to a ping may take 1.3 s; a dead link is dropped, and named, within 2 s
-LATE_S = 0.1  # a look later than this shows that we were held up ourselves
+LATE_S = 0.1  # a later check means that our own process stalled
 GOODBYE_S = 0.5
 MAX_HANDSHAKE_BYTES = 64 * 1024
 # A 100 000-beam cloud fits; reading a message of 40 MB would stop the loop for a second.
@@ -75,7 +74,7 @@ class BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
     def _dataReceived(self, data: bytes) -> None:
         super()._dataReceived(data)
         if self.state == self.STATE_CONNECTING and len(self.data) > MAX_HANDSHAKE_BYTES:
-            self.failHandshake("it talks without end")
+            self.failHandshake("it sends without end")
 
     def onOpen(self) -> None:
         super().onOpen()
@@ -99,7 +98,7 @@ class BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
         self.gone.set()
 
     def onCloseFrame(self, code: int | None, reasonRaw: bytes | None) -> bool | None:
-        """The bridge says goodbye: it is answered, and not waited for."""
+        """The bridge's close frame is answered without waiting."""
         self.is_dismissed = code in (None, 1005)
         done: bool | None = super().onCloseFrame(code, reasonRaw)
         if self._timer is not None and self.transport is not None:
@@ -123,7 +122,7 @@ class BridgeProtocol(AsyncioRosBridgeProtocol):  # type: ignore[misc]
         loop = self.factory.loop
         now_s = loop.time()
         quiet_s = now_s - self.heard_s
-        is_late = now_s - due_s > LATE_S  # what was heard meanwhile may still wait to be read
+        is_late = now_s - due_s > LATE_S  # received data may still be unread
         if quiet_s >= SILENT_AFTER_S and not is_late:
             self.was_silent = True
             self.dropConnection(abort=True)

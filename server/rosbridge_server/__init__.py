@@ -1,3 +1,3 @@
-"""A rosbridge server of our own, so that recordings and the simulated car look like a real vehicle on the wire."""
+"""Our own rosbridge server, so that recordings and the simulated car behave like a real vehicle."""
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from server.judge.ros_names import BadName
 from server.rosbridge.message_bytes import Unencodable
 from server.rosbridge_server import fields
 from server.rosbridge_server.calls import Calls
-from server.rosbridge_server.completion import Misfit
+from server.rosbridge_server.completion import TypeMismatch
 from server.rosbridge_server.connection import Connection
 from server.rosbridge_server.encoding import Encoding, Outgoing, json_frame
 from server.rosbridge_server.fields import Refused
@@ -22,7 +22,7 @@ from server.rosbridge_server.fragments import Fragments
 from server.rosbridge_server.graph import Topic
 from server.rosbridge_server.interface import ClientHost
 from server.rosbridge_server.outbox import Outbox
-from server.rosbridge_server.subscription import Subscription, Wish
+from server.rosbridge_server.subscription import Subscription, SubscriptionRequest
 
 _log = logging.getLogger("catgraph.bridge")
 
@@ -41,7 +41,7 @@ NOT_OURS = {
 
 
 class Client:
-    """Lives as long as its connection; the bridge keeps the topics, the client what it asked of them."""
+    """One client, for the time of its connection; the bridge holds the topics, the client its requests."""
 
     def __init__(self, bridge: ClientHost, connection: Connection) -> None:
         self._bridge = bridge
@@ -70,7 +70,7 @@ class Client:
         self._outbox.on_replies_gone = self._may_listen.set
 
     async def run(self) -> None:
-        """Serves the client until it goes."""
+        """Serve the client until it disconnects."""
         turn_ends = time.monotonic() + TURN_S
         try:
             while True:
@@ -94,7 +94,7 @@ class Client:
         return self._outbox.is_empty and self._connection.is_drained
 
     def handle(self, raw: bytes, *, whole: bool = False) -> None:
-        """Does what one frame asks for, or says why not. Nothing a client sends can raise."""
+        """Execute one frame, or send the reason why not. No input of a client can raise."""
         id: object = None
         op = ""
         try:
@@ -107,11 +107,11 @@ class Client:
             if handler is None:
                 raise Refused(_unknown(op, self._operations))
             handler(operation, id)
-        except (Refused, BadName, Misfit, Unencodable) as error:
+        except (Refused, BadName, TypeMismatch, Unencodable) as error:
             self.say("error", f"{op[:40]}: {error}" if op else str(error), id)
         except Exception:  # our own mistake must not cost the client its connection
-            _log.exception("operation %r failed", op[:40])
-            self.say("error", f"{op[:40]}: this failed inside the bridge", id)
+            _log.exception("operation failed: op=%r", op[:40])
+            self.say("error", f"{op[:40]}: internal error of the bridge", id)
 
     def say(self, level: str, text: str, id: object = None) -> None:
         """Sends a status message, if the client wants those of this level."""
@@ -125,7 +125,7 @@ class Client:
     def _subscribe(self, operation: dict[str, Any], id: object) -> None:
         spelling = fields.text(operation, "topic")
         wanted = fields.optional_text(operation, "type")
-        wish = Wish(
+        requested = SubscriptionRequest(
             type=None if wanted is None else self._bridge.message_type(wanted),
             throttle_s=fields.whole_number(operation, "throttle_rate", 0) / 1000.0,
             queue_length=fields.whole_number(operation, "queue_length", 0),
@@ -135,15 +135,15 @@ class Client:
         if subscription is None and len(self._subscriptions) >= MOST_SUBSCRIPTIONS:
             raise Refused(f"a client may subscribe to {MOST_SUBSCRIPTIONS} topics")
         known = self._bridge.graph.find(spelling)
-        if known is not None and known.type is not None and wish.type not in (None, known.type):
-            raise Refused(f"{known.name} has the type {known.type}, not {wish.type}")
+        if known is not None and known.type is not None and requested.type not in (None, known.type):
+            raise Refused(f"{known.name} has the type {known.type}, not {requested.type}")
         if subscription is None:
             subscription = Subscription(spelling, self._outbox, self._bridge.counters, asyncio.get_running_loop())
             self._subscriptions[spelling] = subscription
-        elif id not in subscription.wishes and len(subscription.wishes) >= MOST_WISHES:
+        elif id not in subscription.requested_by_id and len(subscription.requested_by_id) >= MOST_WISHES:
             raise Refused(f"a client may subscribe {MOST_WISHES} times to one topic")
-        subscription.wishes[id] = wish
-        topic = self._bridge.graph.find_or_make(spelling, wish.type)
+        subscription.requested_by_id[id] = requested
+        topic = self._bridge.graph.find_or_make(spelling, requested.type)
         subscription.settle(topic.type)
         if subscription not in topic.subscribers:
             topic.subscribers[subscription] = self
@@ -161,10 +161,10 @@ class Client:
             self.say("warning", f"unsubscribe: not subscribed to {spelling[:100]}", id)
             return
         if id is None:
-            subscription.wishes.clear()
+            subscription.requested_by_id.clear()
         else:
-            subscription.wishes.pop(id, None)
-        if subscription.wishes:
+            subscription.requested_by_id.pop(id, None)
+        if subscription.requested_by_id:
             topic = self._bridge.graph.find(spelling)
             subscription.settle(topic.type if topic else None)
         else:
@@ -228,11 +228,11 @@ class Client:
             self.handle(whole, whole=True)
 
     def type_became(self, topic: Topic, subscription: Subscription) -> None:
-        """The topic exists now: those who asked for another type get an error and no data."""
+        """The topic exists now: clients that requested another type get an error and no data."""
         subscription.settle(topic.type)
-        for id, wish in subscription.wishes.items():
-            if wish.type not in (None, topic.type):
-                self.say("error", f"subscribe: {topic.name} has the type {topic.type}, not {wish.type}", id)
+        for id, requested in subscription.requested_by_id.items():
+            if requested.type not in (None, topic.type):
+                self.say("error", f"subscribe: {topic.name} has the type {topic.type}, not {requested.type}", id)
 
     def _end(self, spelling: str) -> None:
         subscription = self._subscriptions.pop(spelling)

@@ -32,20 +32,20 @@ _INTEGERS = {  # lowest, highest, numpy
 }
 
 
-class Misfit(ValueError):
+class TypeMismatch(ValueError):
     """A message that is not of its type. The text is one sentence for the client."""
 
 
 def complete(type: str, definitions: dict[str, Any], version: RosVersion, message: Json, now_s: float) -> Json:
     """The message with all fields of its type: zeros where nothing was given, header stamps `now_s`.
 
-    Numeric arrays become numpy, byte arrays bytes. Raises Misfit.
+    Numeric arrays become numpy, byte arrays bytes. Raises TypeMismatch.
     """
     return cast("Json", _Completion(definitions, version, type, now_s).message(type, message, "", 0))
 
 
 def zero(primitive: str) -> Any:
-    """What a field of this primitive type holds when nobody set it."""
+    """The default value of a primitive type."""
     return {"bool": False, "string": ""}.get(primitive, 0.0 if primitive in _FLOATS else 0)
 
 
@@ -66,7 +66,7 @@ class _Completion:
         fields = dict(self._definitions[type][1])
         for name in given:
             if name not in fields:
-                raise Misfit(f"{self._type} has no field {where}{name}"[:200])
+                raise TypeMismatch(f"{self._type} has no field {where}{name}"[:200])
         if type == HEADER:
             given = {"stamp": self._now(), **given}
         return {
@@ -94,7 +94,7 @@ class _Completion:
         else:
             raise self._misfit(where, "a list", given)
         if length and (len(values) != length if is_fixed else len(values) > length):
-            raise Misfit(f"{self._type} takes {length} values for {where}, got {len(values)}")
+            raise TypeMismatch(f"{self._type} takes {length} values for {where}, got {len(values)}")
         if is_bytes:
             return bytes(values)
         return _array(item[1][0], values) if item[0] == Nodetype.BASE else values
@@ -136,10 +136,10 @@ class _Completion:
     def _now(self) -> Json:
         return stamp(self._now_s, self._version)
 
-    def _misfit(self, where: str, expected: str, given: Any) -> Misfit:
+    def _misfit(self, where: str, expected: str, given: Any) -> TypeMismatch:
         shown = "a huge number" if isinstance(given, int) and abs(given) > 2**64 else repr(given)
         shown = shown if len(shown) <= 40 else f"{shown[:40]}…"
-        return Misfit(f"{self._type} takes {expected} for {where.rstrip('.')[:80] or 'the message'}, got {shown}")
+        return TypeMismatch(f"{self._type} takes {expected} for {where.rstrip('.')[:80] or 'the message'}, got {shown}")
 
 
 def stamp(at_s: float, version: RosVersion) -> Json:

@@ -1,4 +1,4 @@
-"""Reads the fields of a client's operation; says in one sentence what is wrong with them."""
+"""Reads the fields of a client's operation; errors are one sentence."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def id_of(operation: dict[str, Any]) -> str | int | float | None:
     if isinstance(value, bool) or not isinstance(value, str | int | float | None):
         raise Refused(f"the id must be text or a number, got {_kind(value)}")
     if isinstance(value, str) and len(value) > LONGEST_ID:
-        raise Refused(f"the id has {len(value)} letters, at most {LONGEST_ID} are taken")
+        raise Refused(f"the id has {len(value)} characters, at most {LONGEST_ID} are allowed")
     return value
 
 

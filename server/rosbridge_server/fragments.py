@@ -7,7 +7,7 @@ from typing import Any
 from server.rosbridge_server import fields
 from server.rosbridge_server.fields import Refused
 
-MOST_MESSAGES = 8  # begun and not yet whole, for one client
+MOST_MESSAGES = 8  # incomplete, for one client
 MOST_FRAGMENTS = 10_000
 
 
@@ -28,7 +28,7 @@ class Fragments:
         data = fields.text(operation, "data")
         number, total = fields.whole_number(operation, "num"), fields.whole_number(operation, "total")
         if not 1 <= total <= MOST_FRAGMENTS or number >= total:
-            raise Refused(f"fragment {number} of {total} makes no sense")
+            raise Refused(f"fragment {number} of {total} is invalid")
         if key not in self._unfinished:
             while len(self._unfinished) >= MOST_MESSAGES:
                 self._forget(next(iter(self._unfinished)))

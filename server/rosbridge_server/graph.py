@@ -18,7 +18,7 @@ class Subscriber(Protocol):
 
 
 class Owner(Protocol):
-    """Whoever a subscriber belongs to, and who may publish besides."""
+    """The owner of a subscriber, who may publish too."""
 
     def type_became(self, topic: Topic, subscription: Any, /) -> None: ...
 
@@ -66,7 +66,7 @@ class Graph:
         return topic
 
     def tidy(self, topic: Topic) -> None:
-        """Forgets a topic that nobody publishes and nobody listens to."""
+        """Drop a topic without publishers and subscribers."""
         if not topic.publishers:
             topic.latches, topic.latched = False, None
             if not topic.subscribers:

@@ -61,19 +61,19 @@ class Listener:
         if self._server is not None:
             raise RuntimeError("already listening")
         if not 0 <= port <= 65535:
-            raise CannotListen(f"{port} is not a port: it must lie between 1 and 65535")
+            raise CannotListen(f"{port} is not a port: it must be between 1 and 65535")
         try:
             self._server = await serve(
                 cast("Callable[[ServerConnection], Awaitable[None]]", self._serve),
                 host,
                 port,
                 compression=None,  # as rosbridge; frames are shared between clients
-                open_timeout=None,  # the connection keeps its own, which stands still while frozen
+                open_timeout=None,  # the connection has its own clock, which stops while frozen
                 ping_interval=None,
                 close_timeout=1.0,
                 max_size=self._max_message_bytes,
                 write_limit=WRITE_LIMIT,
-                process_request=self._turn_away,
+                process_request=self._reject,
                 server_header=self._server_header,
                 logger=_quiet,
                 create_connection=cast("type[ServerConnection]", self._make_connection),
@@ -126,11 +126,9 @@ class Listener:
     def _make_connection(self, protocol: ServerProtocol, server: Server, **options: Any) -> Connection:
         return Connection(self, protocol, server, **options)
 
-    def _turn_away(self, connection: ServerConnection, request: Request) -> Response | None:
+    def _reject(self, connection: ServerConnection, request: Request) -> Response | None:
         if self._clients >= self._max_clients:
-            return connection.respond(
-                HTTPStatus.SERVICE_UNAVAILABLE, "This bridge has as many clients as it may have.\n"
-            )
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "This bridge has reached its limit of clients.\n")
         return None
 
     async def _serve(self, connection: Connection) -> None:
@@ -147,7 +145,7 @@ def _why(host: str, port: int, error: OSError | UnicodeError) -> str:
         case errno.EADDRINUSE:
             return f"{where} is already in use by another program"
         case errno.EACCES | errno.EPERM:
-            return f"{where} needs rights that this user does not have: take a port above 1023"
+            return f"{where} needs rights that this user does not have: use a port above 1023"
         case errno.EADDRNOTAVAIL:
             return f"{host} is not an address of this machine"
         case int(number) if number > 0 and isinstance(error, OSError) and error.args and number == error.args[0]:

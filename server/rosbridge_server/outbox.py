@@ -1,4 +1,4 @@
-"""What waits to go out to one client: bounded, newest kept, drops counted; a slow client holds up nobody else."""
+"""The send queue of one client: bounded, newest kept, drops counted; a slow client delays no other."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Counters:
     def __init__(self) -> None:
         self.sent = 0
         self.dropped = 0
-        self.throttled = 0  # left out because the client asked for fewer: no loss
+        self.throttled = 0  # left out by the client's throttle: no loss
         self.bytes_sent = 0
 
 

@@ -29,10 +29,10 @@ async def play(
     on_message: Callable[[Message], None] | None = None,
     ahead: int = 0,
 ) -> int:
-    """Publishes every message when it is due, `rate` times as fast as it happened, and answers how many.
+    """Publish every message when it is due, at `rate` times real time; return their number.
 
-    All dues are reckoned from the one instant of the first message, so lateness never adds up: what is late is sent at
-    once, in order, until time is caught up with. The topics must have been advertised. `clock` tells seconds (monotonic
+    All due times are relative to the first message, so that delays never add up: late messages are sent at once, in
+    order, until none is late. The topics must have been advertised. `clock` tells seconds (monotonic
     where none is given) and `sleep` waits on it. `ahead`: so many messages are fetched in a thread before they are due,
     for sources that read files; 0 fetches each only when the one before it is out, for sources that react to what
     happens.
@@ -74,7 +74,7 @@ async def _fetched(source: Iterator[T], ahead: int) -> AsyncGenerator[T, None]:
             fetch = asyncio.create_task(asyncio.to_thread(_take, source, ahead))
             for item in batch:
                 yield item
-    finally:  # whoever stops us may close the source next: let the thread come out of it first
+    finally:  # the caller may close the source next: wait for the thread to leave it
         if not fetch.done():
             await asyncio.wait({fetch})
         if not fetch.cancelled():

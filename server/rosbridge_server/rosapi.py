@@ -1,4 +1,4 @@
-"""The rosapi services: what a client asks to learn which topics, types and nodes there are."""
+"""The rosapi services, which list topics, types and nodes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from server.rosbridge_server.completion import stamp
 from server.rosbridge_server.graph import SOURCE, Topic
 from server.rosbridge_server.interface import RosapiHost
 from server.rosbridge_server.real.loader import Malformed, Unknown, load
-from server.rosbridge_server.typedefs import TIME_TYPEDEF, Undescribable, describe
+from server.rosbridge_server.typedefs import TIME_TYPEDEF, TypeNotDescribable, describe
 
 _WIDE = re.compile(r"^\s*wstring\b", re.MULTILINE)  # the real rosapi of ROS 2 ends on it
 BRIDGE_NODE = "/rosbridge_websocket"
@@ -123,7 +123,7 @@ class _Rosapi:
         assert definitions is not None
         is_strict = self._bridge.like == "real"
         if is_strict and self._version == 2 and _WIDE.search(self._bridge.types.text(loaded)):
-            raise Undescribable(f"{type} has a field that is not a valid type string")
+            raise TypeNotDescribable(f"{type} has a field that is not a valid type string")
         return {"typedefs": describe(self._bridge.types.long_name(loaded), definitions, self._version, is_strict)}
 
     def publishers(self, args: Json) -> Json:
@@ -277,7 +277,7 @@ _ATOMICS = {
     },
 }  # fmt: skip
 
-__all__ = ["BRIDGE_NODE", "ROSAPI_NODE", "Undescribable", "add_rosapi"]
+__all__ = ["BRIDGE_NODE", "ROSAPI_NODE", "TypeNotDescribable", "add_rosapi"]
 
 
 def _text(args: Json, name: str) -> str:

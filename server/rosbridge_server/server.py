@@ -32,10 +32,10 @@ _SERVERS = {1: "AutobahnPython/22.7.1", 2: "TornadoServer/6.6.1"}
 
 
 class RosBridge:
-    """Speaks as the rosbridge of `ros_version` does; `now` is the ROS time that rosapi tells [s since 1970].
+    """Behaves as the rosbridge of `ros_version`; `now` is the ROS time of rosapi [s since 1970].
 
-    `like` "helpful" says in `status` messages what is wrong, and sends and survives what the real server loses or dies
-    of; "real" is that server, with its silences, `real` being how it was started.
+    `like` "helpful" reports errors in `status` messages, and sends and survives what the real server loses or crashes
+    on; "real" imitates that server without its error messages, started with the options `real`.
 
     Everything but start, stop, kill and revive is synchronous and belongs on the loop on which the bridge was started.
     """
@@ -108,7 +108,7 @@ class RosBridge:
         return port
 
     async def stop(self) -> None:
-        """Says goodbye to every client and stops listening."""
+        """Close every client's connection and stop listening."""
         self._address = None
         self.publishers.close()
         await self._listener.close(abruptly=False)
@@ -120,7 +120,7 @@ class RosBridge:
     async def revive(self) -> None:
         """Listens again on the same port. Raises CannotListen."""
         if self._address is None:
-            raise RuntimeError("the bridge was never started")
+            raise RuntimeError("the bridge was not started")
         await self._listener.open(*self._address)
 
     def freeze(self) -> None:
@@ -128,7 +128,7 @@ class RosBridge:
         self._listener.freeze()
 
     def thaw(self) -> None:
-        """Goes on where it was frozen: what waited is read and sent."""
+        """Resume after a freeze: read and send what was waiting."""
         self._listener.thaw()
 
     def message_type(self, name: str) -> str:
@@ -252,7 +252,7 @@ class RosBridge:
         return True
 
     def client(self, connection: Connection) -> Client | RealClient:
-        """Whoever serves one connection."""
+        """The handler of one connection."""
         return RealClient(self, connection) if self.like == "real" else Client(self, connection)
 
     async def _serve_client(self, connection: Connection) -> None:

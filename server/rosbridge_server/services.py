@@ -13,7 +13,7 @@ Handler = Callable[[Json], "Json | Awaitable[Json]"]
 
 
 class ServiceFailed(Exception):
-    """The call cannot be answered; the text goes to the caller with `result: false`."""
+    """The call cannot be answered; the text is sent to the caller with `result: false`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

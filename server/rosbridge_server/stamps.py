@@ -1,4 +1,4 @@
-"""Moves the stamps of messages, so that a recording played again and again has a clock that goes on."""
+"""Shifts the stamps of messages, so that the clock of a repeated recording advances."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ from server.rosbridge_server.outbox import Counters, Lane, Outbox
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wish:
-    """What one subscribe operation asked for."""
+class SubscriptionRequest:
+    """The request of one subscribe operation."""
 
     type: str | None  # canonical; None: whatever the topic has
     throttle_s: float
@@ -21,13 +21,13 @@ class Wish:
 
 
 class Subscription:
-    """A client may ask for one topic several times under several ids, and gets each message once, as from rosbridge:
-    with the highest rate and the shortest queue that was asked for, in CBOR when any asked for CBOR."""
+    """A client can subscribe to a topic several times under several ids, and gets each message once, as from rosbridge:
+    with the highest requested rate and the shortest queue, in CBOR if any request is for CBOR."""
 
     def __init__(self, spelling: str, outbox: Outbox, counters: Counters, loop: asyncio.AbstractEventLoop) -> None:
         self.spelling = spelling  # the topic's name as this client writes it
-        self.wishes: dict[object, Wish] = {}
-        self._is_muted = False  # the topic turned out to have another type than the one asked for
+        self.requested_by_id: dict[object, SubscriptionRequest] = {}
+        self._is_muted = False  # the topic has another type than the requested one
         self._outbox = outbox
         self._counters = counters
         self._loop = loop
@@ -39,12 +39,12 @@ class Subscription:
         self._timer: asyncio.TimerHandle | None = None
 
     def settle(self, type: str | None) -> None:
-        """Takes the wishes into account after they, or the topic's type, changed."""
-        wishes = self.wishes.values()
-        self._is_muted = type is not None and all(wish.type not in (None, type) for wish in wishes)
-        self._throttle_s = min((wish.throttle_s for wish in wishes), default=0.0)
-        self._lane.limit = min((wish.queue_length for wish in wishes), default=0)
-        self._encoding = "cbor" if any(wish.encoding == "cbor" for wish in wishes) else "json"
+        """Apply the requests after they, or the topic's type, changed."""
+        requested_by_id = self.requested_by_id.values()
+        self._is_muted = type is not None and all(requested.type not in (None, type) for requested in requested_by_id)
+        self._throttle_s = min((requested.throttle_s for requested in requested_by_id), default=0.0)
+        self._lane.limit = min((requested.queue_length for requested in requested_by_id), default=0)
+        self._encoding = "cbor" if any(requested.encoding == "cbor" for requested in requested_by_id) else "json"
         if not self._throttle_s or not self._lane.limit:
             self._release_all()
 

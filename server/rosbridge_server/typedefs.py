@@ -26,14 +26,14 @@ _CODES = {
 _FIRST_ADDRESS = 0x7F0000000000
 
 
-class Undescribable(Exception):
+class TypeNotDescribable(Exception):
     """A type that ends the real rosapi of ROS 2."""
 
 
 def describe(type: str, definitions: dict[str, Any], version: RosVersion, is_strict: bool = False) -> list[Json]:
     """The type, then every type it contains, each once. `type` is spelled as rosbags does.
 
-    `is_strict`: raises Undescribable where the real one fails.
+    `is_strict`: raises TypeNotDescribable where the real one fails.
     """
     found: dict[str, Json] = {}
     _Description(definitions, version, is_strict=is_strict).add(type, found, 0)
@@ -58,7 +58,7 @@ class _Description:
             return
         rows = fields(type, self._definitions)
         if self._is_strict and self._version == 2 and any(_ends_rosapi(row) for row in rows):
-            raise Undescribable(f"{name} has a field that is not a valid type string")
+            raise TypeNotDescribable(f"{name} has a field that is not a valid type string")
         constants = {
             constant: str(bytes((value,))) if self._version == 2 and kind == "byte" else _constant(value)
             for constant, kind, value in self._definitions[type][0]

@@ -44,7 +44,7 @@ class MessageTypes:
     def complete(self, type: str, message: Json, now_s: float) -> Json:
         """The message with every field that was left out, header stamps being now. Unknown types pass as they are.
 
-        Raises Misfit where a field does not exist or has a value of the wrong kind.
+        Raises TypeMismatch where a field does not exist or has a value of the wrong kind.
         """
         definitions = self.definitions(type)
         return message if definitions is None else complete(_long(type), definitions, self._version, message, now_s)
@@ -53,7 +53,7 @@ class MessageTypes:
         """The type and all it contains, as rosapi describes them. Raises LookupError where it is not known."""
         definitions = self.definitions(type)
         if definitions is None:
-            raise LookupError(f"the type {type} is not known here")
+            raise LookupError(f"the type {type} is unknown")
         return describe(_long(type), definitions, self._version)
 
     def has_package(self, package: str) -> bool:
@@ -79,7 +79,7 @@ class MessageTypes:
         if type not in self._parsed:
             try:
                 self._parsed[type] = dict(get_types_from_msg(self._texts[type], _long(type)))
-            except Exception:  # the parser says what is wrong in many ways; the standard messages may still know it
+            except Exception:  # the parser raises many exception types; the standard messages may still know it
                 self._parsed[type] = {}
         return self._parsed[type]
 

@@ -217,7 +217,7 @@ class SimulatedCar:
             case "gps":
                 return self._gps(now)
             case "rival":
-                return self._insist()
+                return self._continue_commands()
             case _:
                 return (self._writer.diagnostics(self.now_s, self._components()),)
 
@@ -245,7 +245,7 @@ class SimulatedCar:
             messages.append(writer.twist(CMD_VEL, at_s, command.speed_mps, command.tyre_rad))
         return messages
 
-    def _insist(self) -> Iterable[Message]:
+    def _continue_commands(self) -> Iterable[Message]:
         """A driver who competes says the last command again and again."""
         command = self._insists_on
         if command is None:

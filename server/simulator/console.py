@@ -73,6 +73,11 @@ class Console:
         self._rest = b""
         self._again: asyncio.TimerHandle | None = None
 
+    @classmethod
+    def of_stdin(cls, service: CarService) -> Console:
+        """On this terminal. Needs the running loop."""
+        return cls(service, 0, say)
+
     def open(self) -> None:
         """Begins to listen; where there is nothing to listen to, nothing happens."""
         with contextlib.suppress(OSError, ValueError):  # closed, or of a kind that cannot be waited for
@@ -111,3 +116,17 @@ class Console:
             return os.isatty(self._file) and os.getpgrp() != os.tcgetpgrp(self._file)
         except OSError:
             return False
+
+
+def say(text: str) -> None:
+    """Prints at once."""
+    with contextlib.suppress(BrokenPipeError):  # the reader of our output is gone; the car continues
+        print(text, flush=True)
+
+
+def need_stdin() -> None:
+    """Gives the process an empty stdin where it was started without one: uvloop would use the number 0 and fail."""
+    try:
+        os.fstat(0)
+    except OSError:
+        os.open(os.devnull, os.O_RDONLY)

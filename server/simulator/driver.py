@@ -66,7 +66,7 @@ def fastest_mps(sight_m: float) -> float:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Temper:
+class _DrivingStyle:
     """How somebody drives."""
 
     cruise_mps: float
@@ -76,9 +76,9 @@ class _Temper:
     heeds_zones: bool
 
 
-CALM = _Temper(cruise_mps=8.0, sideways_mps2=1.6, acceleration_mps2=1.0, braking_mps2=1.1, heeds_zones=True)
+CALM = _DrivingStyle(cruise_mps=8.0, sideways_mps2=1.6, acceleration_mps2=1.0, braking_mps2=1.1, heeds_zones=True)
 # one above the operator's usual limit of 11 m/s, and soon there
-HASTY = _Temper(cruise_mps=12.0, sideways_mps2=2.6, acceleration_mps2=1.4, braking_mps2=1.5, heeds_zones=False)
+HASTY = _DrivingStyle(cruise_mps=12.0, sideways_mps2=2.6, acceleration_mps2=1.4, braking_mps2=1.5, heeds_zones=False)
 
 
 @lru_cache(maxsize=1)
@@ -104,7 +104,7 @@ def _sight_mps() -> Floats:
 
 
 @lru_cache(maxsize=2)
-def _plan_mps(temper: _Temper) -> Floats:
+def _plan_mps(temper: _DrivingStyle) -> Floats:
     """At each station the speed to drive, slowing before what needs slowing. Twice round, as the lap is closed."""
     curvature = np.array([abs(lap().at(station).curvature) for station in lap().stations_m.tolist()])
     plan = np.minimum(_sight_mps(), temper.cruise_mps)
@@ -166,7 +166,7 @@ class Driver:
         return math.hypot(motion.x_m - pose.x_m, motion.y_m - pose.y_m) > 8.0
 
     def _speed_mps(
-        self, motion: Motion, now_s: float, temper: _Temper, orders: Set[Order], blocked_at_m: float | None
+        self, motion: Motion, now_s: float, temper: _DrivingStyle, orders: Set[Order], blocked_at_m: float | None
     ) -> float:
         if Order.STAND in orders:
             return 0.0

@@ -23,7 +23,7 @@ from server.simulator.effects import (
     Speeding,
 )
 from server.simulator.other_clock import OtherClock
-from server.simulator.sensor_faults import CutScan, FrozenPosition, FrozenScan, NearObject, NoFix
+from server.simulator.sensor_faults import FrozenPosition, FrozenScan, NearObject, NoFix, TruncatedScan
 
 BridgeFault = Literal["freeze", "kill"]
 
@@ -64,7 +64,7 @@ _SCENARIOS = (
     ),
     Scenario(
         name="obstacle",
-        sentence="Another car pulls across the way; the driver brakes and stops before it until it drives off.",
+        sentence="Another car crosses the path; the driver stops before it until it leaves.",
         duration_s=10.0,  # short of the ten seconds of standing after which that is told too
         alarm="obstacle in corridor",
         # where the car stood already, the obstacle stopper keeps it standing
@@ -75,14 +75,14 @@ _SCENARIOS = (
     ),
     Scenario(
         name="near-object",
-        sentence="The distance estimator tells of an object 3.5 m ahead; the laser sees none.",
+        sentence="The distance estimator reports an object 3.5 m ahead; the laser sees none.",
         duration_s=5.0,
         alarm="nearest object",
         effect=NearObject,
     ),
     Scenario(
         name="command-ignored",
-        sentence="Whoever drives orders a stop, and the car drives on as if nothing had been said.",
+        sentence="The controller commands a stop, and the car ignores it.",
         duration_s=6.0,
         alarm="command without response",
         effect=IgnoredCommand,
@@ -90,7 +90,7 @@ _SCENARIOS = (
     ),
     Scenario(
         name="standing",
-        sentence="The car stops on its way and stands there.",
+        sentence="The car stops on its lap and stays there.",
         duration_s=20.0,  # down to standstill, and ten seconds until that is told
         alarm="vehicle not moving",
         order=Order.STAND,
@@ -105,7 +105,7 @@ _SCENARIOS = (
     ),
     Scenario(
         name="gps-drift",
-        sentence="The car stops, and while it stands its position wanders off by 16 m.",
+        sentence="The car stops, and its position drifts by 16 m.",
         # 5 s down to standstill, 3 s for the judge to take its anchor, 7 s of wandering, and time to notice
         duration_s=24.0,
         alarm="GPS drift at standstill",
@@ -116,7 +116,7 @@ _SCENARIOS = (
     ),
     Scenario(
         name="gps-jump",
-        sentence="The position runs away at 23 m/s, as a real receiver's did, and is right again at once.",
+        sentence="The position moves away at 23 m/s, as a real receiver's did, then is correct again.",
         duration_s=6.0,
         alarm="GPS jump",
         consequences=("GPS drift at standstill", "phone and car disagree"),
@@ -124,7 +124,7 @@ _SCENARIOS = (
     ),
     Scenario(
         name="phone-mismatch",
-        sentence="The position creeps 60 m aside while the car drives; a phone in the car knows better.",
+        sentence="The position drifts 60 m aside while the car drives; a phone in the car stays correct.",
         duration_s=90.0,
         alarm="phone and car disagree",
         # 60 m lies beyond the gate of the worst phone fix that is used (50 m)
@@ -132,7 +132,7 @@ _SCENARIOS = (
     ),
     Scenario(
         name="stale-gps",
-        sentence="No position comes any more; all else goes on.",
+        sentence="The position stops; everything else continues.",
         duration_s=10.0,
         alarm="GPS stale",
         consequences=("signal stale: position",),
@@ -140,28 +140,28 @@ _SCENARIOS = (
     ),
     Scenario(
         name="no-fix",
-        sentence="The receiver loses its satellites and says so; its coordinates go on.",
+        sentence="The receiver reports no fix; its coordinates continue.",
         duration_s=10.0,
         alarm="GPS no fix",
         effect=NoFix,
     ),
     Scenario(
         name="silent-scan",
-        sentence="No laser scan comes any more; all else goes on.",
+        sentence="The laser scan stops; everything else continues.",
         duration_s=10.0,
         alarm="signal stale: scan",
         effect=lambda: Silence("scan"),
     ),
     Scenario(
         name="blind-laser",
-        sentence="Scans come, but no beam returns from anything.",
+        sentence="Scans arrive, but no beam has a return.",
         duration_s=10.0,
         alarm="laser cannot see",
         effect=BlindLaser,
     ),
     Scenario(
         name="frozen-speed",
-        sentence="The car drives on, but its speed messages repeat one value.",
+        sentence="The car keeps driving, but its speed messages repeat one value.",
         duration_s=10.0,
         alarm="signal frozen: speed",
         # braking does not show, and where the car slows for a bend its stopping distance is reckoned too long
@@ -171,14 +171,14 @@ _SCENARIOS = (
     ),
     Scenario(
         name="short-scan",
-        sentence="Each scan lacks ten of the beams that its own angles promise.",
+        sentence="Each scan lacks ten of the beams that its angles declare.",
         duration_s=6.0,
         alarm="scan inconsistent",
-        effect=CutScan,
+        effect=TruncatedScan,
     ),
     Scenario(
         name="frozen-position",
-        sentence="The car drives on, but its positions repeat one place, with new stamps.",
+        sentence="The car keeps driving, but its positions repeat one place, with new stamps.",
         duration_s=10.0,
         alarm="signal frozen: position",
         consequences=("phone and car disagree", "GPS drift at standstill"),  # it ends with a leap
@@ -202,14 +202,14 @@ _SCENARIOS = (
     ),
     Scenario(
         name="all-slow",
-        sentence="Of all topics only every second message comes, as over an overloaded radio.",
+        sentence="Every second message of all topics is lost, as over an overloaded radio.",
         duration_s=15.0,
         alarm="all signals slow",
         effect=SlowRate,
     ),
     Scenario(
         name="clock-jump",
-        sentence="The car's clock is set back by half a minute, and right again after some seconds.",
+        sentence="The car's clock is set back by half a minute, then corrected after some seconds.",
         duration_s=5.0,
         alarm="clock jump",
         effect=lambda: OtherClock(step_s=-30.0),
@@ -237,7 +237,7 @@ _SCENARIOS = (
     ),
     Scenario(
         name="controller-silent",
-        sentence="Whoever drives commands nothing any more: the obstacle stopper brakes, if the car has one.",
+        sentence="The controller stops publishing commands: the obstacle stopper brakes, if the car has one.",
         duration_s=20.0,
         alarm="vehicle not moving",
         order=Order.SILENCE,
@@ -245,7 +245,7 @@ _SCENARIOS = (
     ),
     Scenario(
         name="all-silent",
-        sentence="Nothing comes from the car any more; the bridge answers as before.",
+        sentence="The car sends nothing; the bridge still answers.",
         duration_s=10.0,
         alarm="connection lost",
         consequences=("signal stale",),

@@ -43,7 +43,7 @@ class FrozenScan(Effect):
         return (with_fields(message, self._scan),)
 
 
-class CutScan(Effect):
+class TruncatedScan(Effect):
     """Of each scan the last ten beams are missing, though its angles promise them."""
 
     MISSING = 10

@@ -49,7 +49,7 @@ class CarService:
         like: Like = "helpful",
     ) -> None:
         if not 0 < rate <= 100:
-            raise ValueError(f"The rate must lie above 0 and be at most 100, not {rate:g}.")
+            raise ValueError(f"The rate must be above 0 and at most 100, not {rate:g}.")
         plan = tuple(planned(entry) if isinstance(entry, str) else entry for entry in scenarios)
         self._host, self._port, self._rate, self._clock = host, port, rate, clock
         self.car = SimulatedCar(
@@ -150,7 +150,7 @@ class CarService:
         try:
             await self.bridge.revive()
         except CannotListen as error:
-            log.warning("the bridge cannot come back yet: %s", error)
+            log.warning("bridge not restarted yet: error=%s", error)
             await asyncio.sleep(REVIVE_AGAIN_S)
             return False
         return True

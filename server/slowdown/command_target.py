@@ -9,7 +9,7 @@ from server.judge.topics import Source
 from server.rosbridge.outgoing import is_topic
 from server.slowdown.twist import Kind, kind_of
 
-GUARD_CMD = "/ocu_guard/cmd_vel"  # a guard on the car: commanded here, it goes before the controllers
+GUARD_CMD = "/ocu_guard/cmd_vel"  # a guard on the car: its commands have priority over the controllers
 GUARD_STATE = "/ocu_guard/state"
 GUARD_HEARTBEAT = "/ocu_guard/heartbeat"
 GUARD_RELEASE = "/ocu_guard/release"
@@ -27,7 +27,7 @@ class CommandTarget:
 
 
 def target_of(*, phase: str, sources: Mapping[str, Source], offered: Mapping[str, str] | None) -> CommandTarget:
-    """`sources` by signal; `offered` topic → type of all that the car has, None while its bridge does not say."""
+    """`sources` by signal; `offered` topic → type of all topics, None while unknown."""
     if phase not in ("monitoring", "lost"):
         return CommandTarget(problem="No car is connected.")
     if offered is None:
@@ -40,7 +40,7 @@ def target_of(*, phase: str, sources: Mapping[str, Source], offered: Mapping[str
     type = offered.get(topic) or (None if source is None else source.type)
     kind = kind_of(type or "")
     if kind is None:
-        return CommandTarget(topic=topic, type=type, problem=f"{topic} is {type or 'of unknown type'}, no Twist.")
+        return CommandTarget(topic=topic, type=type, problem=f"{topic} is {type or 'of unknown type'}, not a Twist.")
     if not is_topic(topic):
         return CommandTarget(topic=topic, type=type, problem=f"{topic} is not a topic name that ROS accepts.")
     return CommandTarget(topic=topic, type=type, kind=kind, has_guard=has_guard)

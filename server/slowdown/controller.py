@@ -13,13 +13,15 @@ from monitor.checks.slow_down import SlowDownLimits
 from monitor.slowing import SlowingFacts
 from monitor.state import Snapshot
 from server.protocol import commands
-from server.rosbridge.link import RosLink
+from server.protocol.alarm_state import Note
+from server.protocol.slow_down_state import SlowDownState
+from server.rosbridge.live_source import CommandChannel
 from server.slowdown.command_target import CommandTarget
 from server.slowdown.countdown import Countdown
 from server.slowdown.frame import facts, slow_down_frame
 from server.slowdown.guard_client import GuardClient
 from server.slowdown.measured_car import MeasuredCar
-from server.slowdown.note import Note, never_raising, recording_safely
+from server.slowdown.note import never_raising, recording_safely
 from server.slowdown.order import BY_HAND, DESERTED_S, LATE_S, SlowDown
 from server.slowdown.order_log import OrderLog, commanded
 from server.slowdown.response import Response
@@ -66,17 +68,17 @@ class SlowDownController:
 
     # -- the link ----------------------------------------------------------------------------------------------------
 
-    def link_opened(self, link: RosLink) -> None:
-        """An order that stands goes on."""
+    def link_opened(self, link: CommandChannel) -> None:
+        """Resume an active order."""
         self.car.opened_s = self._now()
         self.sender.attach(link)
 
     def link_closed(self) -> None:
-        """An order stands, and goes on once the link is back."""
+        """An active order is paused until the link returns."""
         self.sender.link_closed()
 
     def ended(self, why: str = "monitoring ended") -> bool:
-        """The car is not monitored any more; whether the guard on it was told so just now."""
+        """End at the end of monitoring; return whether the guard was informed."""
         order = self._life.end("disconnected", self._now())
         if order is not None:
             self._order_log.write(order, "ended", f"The slow-down ended: {why}. Nothing holds the car.")
@@ -90,7 +92,7 @@ class SlowDownController:
         return has_released_guard
 
     def resume(self, order: Mapping[str, Any]) -> None:
-        """An order stood when the server ended, and the same car is dialled again: it stands until it is released."""
+        """Resume the order that was active when the server ended, because the same car is dialled again."""
         life = self._life
         life.armed_by = str(order.get("by") or "before the restart")
         tyre_rad = order.get("tyre_rad")  # held then, and until one is measured
@@ -104,7 +106,7 @@ class SlowDownController:
             pressed_s=None,
         )
         assert life.order is not None
-        text = "The car was being slowed when the server ended: the order stands again, under a new number."
+        text = "The car was being slowed when the server ended: the order is resumed under a new number."
         self.sender.begin()
         self._order_log.write(life.order, "resumed", text)
 
@@ -141,11 +143,11 @@ class SlowDownController:
             try:
                 self._guard.send_heartbeat(self._now())
             except Exception:
-                log.exception("a heartbeat for the guard failed")
+                log.exception("guard heartbeat failed")
 
     def watch_operators(self, heard_s: float | None) -> None:
-        """When a page of an operator was heard last; None: none is here. Armed ends with the last of them, but not an
-        order, and not where a rule is to slow the car because nobody is there."""
+        """`heard_s`: last contact of an operator's page; None: none. Arming ends with the last of them, unless an order
+        is active or a rule slows the car when nobody can hear alarms."""
         if self._life.is_deserted(heard_s, self._now(), keeps=bool(self.limits.on_reach)):
             self._disarm(f"the last operator's page has been gone for {DESERTED_S:.0f} s.")
             self.sender.publisher.unadvertise_all()
@@ -157,7 +159,7 @@ class SlowDownController:
         self._is_steering_old = order is not None and not is_measured
         if order is not None and self._is_steering_old and not was_old:
             held = "no angle is known" if order.last is None else f"the last known angle is held ({commanded(order)})"
-            self._order_log.write(order, "steering", f"The steering is not measured any more: {held}.")
+            self._order_log.write(order, "steering", f"The steering is no longer measured: {held}.")
 
     def _with_steering(self, target: CommandTarget) -> CommandTarget:
         """The same, or why nothing can be ordered: a command carries a tyre angle, and 0 would turn the wheels."""
@@ -168,11 +170,11 @@ class SlowDownController:
         return replace(target, problem=NO_STEERING) if self.car.tyre_rad is None else target
 
     def _watch_target(self, target: CommandTarget) -> None:
-        """A topic that is another, or has another type, disarms: it was not confirmed. An order goes on."""
+        """Disarm if topic or type changed, because they are not confirmed. An active order continues."""
         before = self.sender.target
         is_ordered = self._life.order is not None
         if is_ordered and target.problem is not None:
-            return  # the order goes on where it began, as soon as there is a link
+            return  # the order resumes on its former topic as soon as there is a link
         self.sender.target = target
         if self._life.armed_by is None or is_ordered:
             return
@@ -191,12 +193,12 @@ class SlowDownController:
     def _disarm(self, why: str) -> None:
         self._life.disarm()
         self._countdown.stop()
-        self._note("disarmed", f"Slow-down is not armed any more: {why}")
+        self._note("disarmed", f"Slow-down disarmed: {why}")
 
     # -- orders ------------------------------------------------------------------------------------------------------
 
     def obey(self, command: commands.SlowingCommand, *, by: str) -> None:
-        """Carries out what an operator orders. Raises Refused; the refusal of a slow-down stands in the log."""
+        """Execute an operator's command. Raises Refused; the refusal of a slow-down is logged."""
         match command:
             case commands.Arm():
                 if self._life.arm(self.sender.target, by):
@@ -209,7 +211,7 @@ class SlowDownController:
                 if self._life.disarm():
                     self._countdown.stop()
                     self.sender.publisher.unadvertise_all()
-                    self._note("disarmed", "Slow-down is not armed any more: nothing can be ordered.", by=by)
+                    self._note("disarmed", "Slow-down disarmed.", by=by)
             case commands.Decelerate():
                 self._order_by_hand(command, by)
             case commands.Release():
@@ -222,7 +224,7 @@ class SlowDownController:
         late_s = command.late_s(self._wall_ms())
         try:
             if late_s > LATE_S:
-                raise Refused(f"This was pressed {late_s:.1f} s ago: press again if it still counts.")
+                raise Refused(f"This was pressed {late_s:.1f} s ago: press again if still needed.")
             if self._life.order is None and not self.sender.is_linked:
                 raise Refused("Not ordered: there is no link to the car. Use the physical stop.")
             self._begin(by, BY_HAND, now_s, pressed_s=now_s - late_s)
@@ -241,7 +243,7 @@ class SlowDownController:
         )
         self._countdown.stop()
         if order is None:
-            return  # one stands already
+            return  # one is already active
         self._response.begin()
         self.sender.begin()
         self.sender.send_at_once()  # first to the car, then to the log
@@ -251,21 +253,25 @@ class SlowDownController:
             self._order_log.write(order, "sent", f"The first command is on the bridge: {commanded(order)}.")
 
     def _release(self, number: int, by: str) -> None:
-        """Ends the order; where none stands and the guard holds the car by itself, its hold."""
+        """End the order, or without one the hold of the guard."""
         if self._life.order is None and self._guard.holds:
             self._guard.release(number)
-            self._note("slow_down", "The guard on the car is told to release it.", by=by, step="released", hold=number)
+            self._note(
+                "slow_down", "The guard on the car was ordered to release it.", by=by, step="released", hold=number
+            )
             return
         order = self._life.release(number)
         self._guard.release()
-        self._order_log.write(order, "released", "The car is released: whoever drives it commands again.", by=by)
+        self._order_log.write(
+            order, "released", "The car is released: its driver or controller commands it again.", by=by
+        )
 
     # -- what others see ---------------------------------------------------------------------------------------------
 
     def _facts(self) -> SlowingFacts:
         return facts(self._life, self.sender.target, self.competing_publishers)
 
-    def frame(self) -> dict[str, Any]:
+    def frame(self) -> SlowDownState:
         """The `decelerate` of a state frame."""
         now_s = self._now()
         shown = slow_down_frame(
@@ -277,7 +283,7 @@ class SlowDownController:
             now_s=now_s,
             wall_ms=self._wall_ms(),
         )
-        return shown | {"countdown": self._countdown.frame(now_s), "guard": self._guard.frame(now_s)}
+        return {**shown, "countdown": self._countdown.frame(now_s), "guard": self._guard.frame(now_s)}
 
 
 def _competitors_text(names: tuple[str, ...] | None) -> str:

@@ -1,15 +1,14 @@
-"""The rules that slow the car by themselves: a count-down before each, in which any operator may say no."""
+"""The automatic slow-down rules: each has a countdown in which any operator can veto."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from monitor.alarm import Alarm, Refused
 from monitor.checks.slow_down import SlowDownLimits
 from monitor.triggers import COUNTDOWN_S, Due, Triggers
-from server.protocol import serialize
-from server.slowdown.note import Note
+from server.protocol.alarm_state import Note
+from server.protocol.slow_down_state import Countdown as CountdownState
 
 
 class Countdown:
@@ -23,7 +22,8 @@ class Countdown:
     def look(self, alarms: Mapping[str, Alarm], limits: SlowDownLimits, now_s: float, *, can_begin: bool) -> Due | None:
         """The rule whose count-down is over: the car is to be slowed now. `can_begin`: slow-down is armed, and nothing
         is ordered."""
-        due = self._triggers.look(alarms, limits, now_s)
+        counts = None if self._running is None else self._running[0].trigger.id
+        due = self._triggers.look(alarms, limits, now_s, counting=counts)
         if not can_begin:
             self._running = None
             return None
@@ -38,14 +38,14 @@ class Countdown:
         counting, began_s = self._running
         if due is None or due.trigger.id != counting.trigger.id:
             self._running = None
-            self._note("slow_down", f"Count-down ended: {counting.trigger.title} is over.", step="over")
+            self._note("slow_down", f"Countdown ended: {counting.trigger.title} is over.", step="over")
             return None
         return counting if now_s - began_s >= COUNTDOWN_S else None
 
     def veto(self, trigger: str, *, by: str) -> None:
         """Not this time: the rule is not due again before its fault has gone. Raises Refused."""
         if self._running is None or self._running[0].trigger.id != trigger:
-            raise Refused("No count-down runs for this any more.")
+            raise Refused("This countdown is no longer running.")
         due, _ = self._running
         self._running = None
         self._triggers.veto(trigger)
@@ -60,7 +60,7 @@ class Countdown:
         self._running = None
         self._triggers.forget()
 
-    def frame(self, now_s: float) -> dict[str, Any] | None:
+    def frame(self, now_s: float) -> CountdownState | None:
         """The `countdown` of `decelerate`."""
         if self._running is None:
             return None
@@ -69,5 +69,5 @@ class Countdown:
             "trigger": due.trigger.id,
             "title": due.trigger.title,
             "text": due.text,
-            "left_s": serialize.plain(max(0.0, COUNTDOWN_S - (now_s - began_s)), 1),
+            "left_s": round(max(0.0, COUNTDOWN_S - (now_s - began_s)), 1),
         }

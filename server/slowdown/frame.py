@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from monitor.checks.slow_down import SlowDownLimits
 from monitor.slowing import SlowingFacts
 from server.protocol import serialize
+from server.protocol.slow_down_state import SlowDownOrder, SlowDownSummary
 from server.slowdown.command_target import CommandTarget
 from server.slowdown.order import Order, SlowDown
 
@@ -20,7 +19,7 @@ def slow_down_frame(
     is_response_missing: bool,
     now_s: float,
     wall_ms: int,
-) -> dict[str, Any]:
+) -> SlowDownSummary:
     """Without the countdown and the guard. `wall_ms`: the time of day at `now_s`, a moment of the session's clock."""
     order = life.order
     return {
@@ -30,7 +29,7 @@ def slow_down_frame(
         "type": target.type,
         "rivals": None if competing_publishers is None else list(competing_publishers),
         "armed_by": life.armed_by,
-        "deceleration_mps2": serialize.plain(limits.deceleration_mps2, 2),
+        "deceleration_mps2": round(limits.deceleration_mps2, 2),
         "order": None
         if order is None
         else _order(order, now_s, wall_ms, is_response_missing=is_response_missing, longest_s=limits.longest_s),
@@ -52,7 +51,7 @@ def facts(life: SlowDown, target: CommandTarget, competing_publishers: tuple[str
     )
 
 
-def _order(order: Order, now_s: float, wall_ms: int, *, is_response_missing: bool, longest_s: float) -> dict[str, Any]:
+def _order(order: Order, now_s: float, wall_ms: int, *, is_response_missing: bool, longest_s: float) -> SlowDownOrder:
     def at_ms(moment_s: float | None) -> int | None:
         return None if moment_s is None else round(wall_ms - (now_s - moment_s) * 1000)
 
@@ -60,10 +59,10 @@ def _order(order: Order, now_s: float, wall_ms: int, *, is_response_missing: boo
         "number": order.number,
         "by": order.by,
         "why": order.why,
-        "for_s": serialize.plain(now_s - order.ordered_s, 1),
+        "for_s": round(now_s - order.ordered_s, 1),
         "from_mps": serialize.plain(order.from_mps, 2),
         "ordered_mps": serialize.plain(order.last.speed_mps, 2) if order.last else None,
-        "deceleration_mps2": serialize.plain(order.deceleration_mps2, 2),
+        "deceleration_mps2": round(order.deceleration_mps2, 2),
         "sending": order.sending_s is not None,
         "confirmed": False if is_response_missing else True if order.slows_s is not None else None,
         "stands": order.stands,
@@ -73,5 +72,5 @@ def _order(order: Order, now_s: float, wall_ms: int, *, is_response_missing: boo
             "bridge_ms": at_ms(order.first_sent_s),
             "slows_ms": at_ms(order.slows_s),
         },
-        "longest_s": serialize.plain(longest_s, 0),
+        "longest_s": round(longest_s, 0),
     }

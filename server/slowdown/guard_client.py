@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Any, get_args
 
-from server.protocol import serialize
+from server.protocol.slow_down_state import GuardPhase, GuardState
 from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.outgoing import NotAllowed
 from server.slowdown.command_target import GUARD_HEARTBEAT, GUARD_RELEASE, GUARD_STATE
@@ -15,7 +15,7 @@ UINT32 = "std_msgs/UInt32"
 END_OF_MONITORING = 0  # instead of a count
 SILENT_S = 1.0  # the guard publishes 5 times a second
 SICK_S = 0.25  # after a tick later than this no heartbeat is sent: it would vouch for a server that is not well
-STATES = ("unguarded", "guarded", "operator", "slowing", "holding")
+STATES: tuple[GuardPhase, ...] = get_args(GuardPhase)
 LONGEST_WHY = 120
 
 
@@ -29,7 +29,7 @@ class GuardClient:
         self._is_there = False
         self._count = 0
         self._ticked_s: float | None = None
-        self._state: str | None = None
+        self._state: GuardPhase | None = None
         self._why = ""
         self._hold = 0
         self._received_s: float | None = None
@@ -61,13 +61,13 @@ class GuardClient:
         self._has_sent = self._publish(GUARD_HEARTBEAT, self._count) or self._has_sent
 
     def end(self) -> bool:
-        """Monitoring ends on purpose: the guard is not to slow the car for it. Whether it was told."""
+        """Inform the guard of an intended end of monitoring, so that it does not slow the car. Return if sent."""
         is_told = self._has_sent and self._publish(GUARD_HEARTBEAT, END_OF_MONITORING)
         self._is_there, self._has_sent, self._state, self._received_s = False, False, None, None
         return is_told
 
     def release(self, hold: int | None = None) -> None:
-        """The operator lets the controllers drive again; None: of the hold that stands."""
+        """Release the car to its controllers; None: release the current hold."""
         if self._is_there:
             self._publish(GUARD_RELEASE, self._hold if hold is None else hold)
 
@@ -75,15 +75,15 @@ class GuardClient:
     def holds(self) -> bool:
         return self._state in ("operator", "slowing", "holding")
 
-    def frame(self, now_s: float) -> dict[str, Any] | None:
+    def frame(self, now_s: float) -> GuardState | None:
         """The `guard` of `decelerate`; None: there is none, or it is silent."""
-        if not self._is_there or self._received_s is None or now_s - self._received_s > SILENT_S:
+        if not self._is_there or self._state is None or self._received_s is None or now_s - self._received_s > SILENT_S:
             return None
         return {
             "state": self._state,
             "why": self._why,
             "hold": self._hold,
-            "age_s": serialize.plain(max(0.0, now_s - self._received_s), 2),
+            "age_s": round(max(0.0, now_s - self._received_s), 2),
         }
 
     def _publish(self, topic: str, number: int) -> bool:

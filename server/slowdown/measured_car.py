@@ -22,11 +22,11 @@ class MeasuredCar:
         self.tyre_rad: float | None = None  # the last known angle, in rad, positive to the left
 
     def now(self) -> Car:
-        """What is measured. Where that cannot be found out, nothing is, and an order goes on without it."""
+        """The measured motion; unknown after an error, and an order continues without it."""
         try:
             return self._measured()
         except Exception:
-            log.exception("the car's speed and steering cannot be read")
+            log.exception("speed and steering of the car cannot be read")
             return Car(speed_mps=None, tyre_rad=None)
 
     def update(self) -> bool:

@@ -1,34 +1,32 @@
-"""How what happens to a slow-down is told to the log."""
+"""Logging of slow-down events."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
+
+from typing_extensions import Unpack
+
+from server.protocol.alarm_state import EventDetails, Note
 
 log = logging.getLogger("catgraph.slowing")
 
 
-class Note(Protocol):
-    """Writes an event of no alarm into the log."""
-
-    def __call__(self, change: str, text: str, *, by: str | None = None, **more: Any) -> None: ...
-
-
 def never_raising(note: Note) -> Note:
-    """The same; where the log fails, the slow-down goes on."""
+    """Log without raising: the slow-down continues if the log fails."""
 
-    def note_safely(change: str, text: str, *, by: str | None = None, **more: Any) -> None:
+    def note_safely(change: str, text: str, *, by: str | None = None, **more: Unpack[EventDetails]) -> None:
         try:
             note(change, text, by=by, **more)
         except Exception:
-            log.exception("not in the event log: %s", text)
+            log.exception("event not logged: %s", text)
 
     return note_safely
 
 
 def recording_safely(record: Callable[[Any], None]) -> Callable[[Any], None]:
-    """The same; where the recording fails, the slow-down goes on. A failure is logged once until one succeeds."""
+    """Record without raising: the slow-down continues if recording fails. Failures are logged once until a success."""
     failed = False
 
     def record_safely(message: Any) -> None:

@@ -1,7 +1,7 @@
-"""The life of an order to slow the car: armed, ordered, held, released. Pure: time is an argument.
+"""The states of a slow-down order: armed, ordered, held, released. Pure: time is an argument.
 
-Between two commands the car may have done anything, so a ramp that was interrupted begins anew at the measured speed.
-What was never sent is never sent later: a command is made when it goes out.
+The car's motion is unknown during an interruption, so an interrupted ramp restarts at the measured speed. Nothing is
+sent later: a command is built when it is sent.
 """
 
 from __future__ import annotations
@@ -10,20 +10,20 @@ from dataclasses import dataclass
 from typing import Literal
 
 from monitor.alarm import Refused
+from server.protocol.slow_down_state import SlowDownPhase
 from server.slowdown.command_target import CommandTarget
 from server.slowdown.ramp import Ramp
 
 LATE_S = 0.3  # what was pressed longer ago is not obeyed any more
 DESERTED_S = 10.0  # after the last operator's page has gone, slow-down is not armed any more
 BY_HAND = "by hand"
-State = Literal["not_available", "safe", "armed", "ordered", "holding"]
 Ended = Literal["released", "longest", "disconnected"]
 Stands = Literal["before", "unproven"]  # it stood when it was ordered; what stopped it is not shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Command:
-    """What the car is told now: m/s along the car, tyre angle in rad."""
+    """A command to the car: speed [m/s, forward], tyre angle [rad]."""
 
     speed_mps: float
     tyre_rad: float
@@ -45,19 +45,19 @@ class Order:
     by: str
     why: str
     ordered_s: float
-    pressed_s: float | None  # when the finger let go, as near as can be told
+    pressed_s: float | None  # when the finger was lifted, as exactly as known
     deceleration_mps2: float
     ramp: Ramp | None = None  # None: no command has gone out since it began, or since the link came back
     from_mps: float | None = None  # where the first ramp began
     first_sent_s: float | None = None
     sending_s: float | None = None  # since when commands go out without a gap
     slows_s: float | None = None  # when the car's own speed showed it
-    stands: Stands | None = None  # the car stands, and its speed does not show that the order stopped it
+    stands: Stands | None = None  # the car stands, and its speed does not prove that the order stopped it
     last: Command | None = None
 
 
 class SlowDown:
-    """One vehicle's. Whoever calls has made sure that the caller may."""
+    """Of one vehicle. Callers are authorized already."""
 
     def __init__(self, number: int = 0) -> None:
         """`number`: no order up to this one is given again."""
@@ -65,9 +65,9 @@ class SlowDown:
         self.armed_by: str | None = None
         self.order: Order | None = None
         self.ended_at_longest_s: float | None = None
-        self._operators_s: float | None = None  # a page of an operator was last heard; None: none since it was armed
+        self._operators_s: float | None = None  # last contact of an operator's page; None: none since it was armed
 
-    def state(self, target: CommandTarget, now_s: float) -> State:
+    def state(self, target: CommandTarget, now_s: float) -> SlowDownPhase:
         if self.order is not None:
             at_zero = self.order.last is not None and self.order.last.speed_mps == 0.0
             return "holding" if at_zero and self.order.ramp is not None else "ordered"
@@ -84,9 +84,8 @@ class SlowDown:
         return was is None
 
     def is_deserted(self, heard_s: float | None, now_s: float, *, keeps: bool) -> bool:
-        """Whether it is armed without an order, and the last operator's page has gone. `heard_s`: when one was heard
-        last; None: none is here. `keeps`: it stays armed all the same. Armed by a program with no page about, it stays
-        armed."""
+        """Whether it is armed without an order after the last operator's page has gone. `heard_s`: last contact of such
+        a page; None: no page. `keeps`: stay armed all the same. Armed by a program without a page, it stays armed."""
         if self.armed_by is None:
             self._operators_s = None
             return False
@@ -112,7 +111,7 @@ class SlowDown:
         now_s: float,
         pressed_s: float | None,
     ) -> Order | None:
-        """A new order; None: one stands already, and goes on. Raises Refused."""
+        """Start an order; None: one is already active and continues. Raises Refused."""
         if self.order is not None:
             return None
         if self.armed_by is None:
@@ -132,9 +131,8 @@ class SlowDown:
         return self.order
 
     def next(self, car: Car, now_s: float) -> Command | None:
-        """What the car is to be told now; None: nothing is ordered, or no tyre angle is known that could be held: 0
-        would turn the tyres. Without a known speed the ramp begins at the last
-        command, or at zero: the car itself limits how hard it brakes."""
+        """The command to send now; None: no order, or no known tyre angle to hold (0 would turn the tyres). Without a
+        known speed the ramp starts at the last command, or at zero: the car itself limits its braking."""
         order = self.order
         if order is None:
             return None
@@ -189,12 +187,12 @@ class SlowDown:
         if order is None:
             raise Refused("The car is not being slowed.")
         if order.number != number:
-            raise Refused("The car was ordered to slow down anew meanwhile: look again.")
+            raise Refused("A newer slow-down order was given meanwhile: check again.")
         self.order = None
         return order
 
     def end(self, why: Ended, now_s: float) -> Order | None:
-        """Ends whatever stands; slow-down is not armed any more where the car is another."""
+        """End the active order; disarm if the car is another one."""
         order, self.order = self.order, None
         if why == "longest":
             self.ended_at_longest_s = now_s

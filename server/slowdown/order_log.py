@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from server.protocol import serialize
+from server.protocol.alarm_state import Note
 from server.slowdown.command_target import CommandTarget
-from server.slowdown.note import Note
 from server.slowdown.order import Order
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from server.rosbridge.link import RosLink
 from server.rosbridge.link_errors import LinkDown
+from server.rosbridge.live_source import CommandChannel
 
 ADVERTISE_ID = "catgraph:slow-down"
 
@@ -14,10 +14,10 @@ class CommandPublisher:
     """Advertises once an opening, publishes now or not at all, and remembers nothing for later."""
 
     def __init__(self) -> None:
-        self._link: RosLink | None = None
+        self._link: CommandChannel | None = None
         self._advertised: dict[str, str] = {}  # topic → type, on this opening
 
-    def attach(self, link: RosLink | None) -> None:
+    def attach(self, link: CommandChannel | None) -> None:
         """Another opening, or none: what was advertised on the last one is gone with it."""
         self._link = link
         self._advertised.clear()
@@ -44,7 +44,7 @@ class CommandPublisher:
         self.advertise(topic, type)
         self._link_now().send_now({"op": "publish", "topic": topic, "msg": message})
 
-    def _link_now(self) -> RosLink:
+    def _link_now(self) -> CommandChannel:
         if self._link is None or not self._link.is_open:
             raise LinkDown("not sent: no connection to the car")
         return self._link

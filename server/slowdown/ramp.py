@@ -19,9 +19,9 @@ class Ramp:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.from_mps) and math.isfinite(self.tyre_rad)):
-            raise ValueError("A ramp begins at a speed, with a tyre angle.")
+            raise ValueError("A ramp needs a start speed and a tyre angle.")
         if not 0.0 < self.deceleration_mps2 <= CAP_MPS2:
-            raise ValueError(f"A deceleration lies above 0 and is at most {CAP_MPS2} m/s².")
+            raise ValueError(f"A deceleration is above 0 and at most {CAP_MPS2} m/s².")
 
     def speed_mps(self, now_s: float) -> float:
         """What is ordered at a moment; zero for ever once it is reached."""

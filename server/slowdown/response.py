@@ -13,7 +13,7 @@ from server.slowdown.order_log import OrderLog
 
 
 class Response:
-    """Of the car to the order that stands."""
+    """The car's response to the active order."""
 
     def __init__(self, life: SlowDown, order_log: OrderLog) -> None:
         self._life = life
@@ -21,7 +21,7 @@ class Response:
         self.is_missing = False  # the car was found not to slow
 
     def begin(self) -> None:
-        """Another order stands."""
+        """Start for a new order."""
         self.is_missing = False
 
     def judge(
@@ -47,7 +47,7 @@ class Response:
             order.stands = None
 
     def _stands(self, order: Order, *, stood_before: bool) -> None:
-        """The car stands, and nothing shows that the order did it: no more is claimed."""
+        """The car stands without proof that the order stopped it: report standstill only."""
         stands: Stands = "before" if stood_before else "unproven"
         if order.stands != stands:
             order.stands = stands

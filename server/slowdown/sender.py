@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from server.rosbridge.link import RosLink
 from server.rosbridge.link_errors import LinkDown
+from server.rosbridge.live_source import CommandChannel
 from server.rosbridge.outgoing import NotAllowed
 from server.slowdown.command_target import CommandTarget
 from server.slowdown.measured_car import MeasuredCar
@@ -55,7 +55,7 @@ class Sender:
         self._now = now
         self._wall_ms = wall_ms
         self._record = record
-        self._link: RosLink | None = None
+        self._link: CommandChannel | None = None
         self._ordered = asyncio.Event()
         self._turned_s = 0.0
         self._due_s = 0.0  # the next command
@@ -69,8 +69,8 @@ class Sender:
         """Whether a command can be sent now."""
         return self._link is not None and self._link.is_open
 
-    def attach(self, link: RosLink) -> None:
-        """The link is open; an order that stands goes on at once."""
+    def attach(self, link: CommandChannel) -> None:
+        """The link is open: an active order resumes at once."""
         self._link = link
         self.publisher.attach(link)
         if self._life.order is not None:
@@ -97,9 +97,9 @@ class Sender:
         self._ordered.set()
 
     async def send_loop(self) -> None:
-        """Sends what is ordered, for ever: no page, no judge and no disk is waited for.
+        """Send commands forever, without waiting for pages, checks or the disk.
 
-        Started again while an order stands, it goes on with it.
+        Restarted while an order is active, it resumes the order.
         """
         while True:
             if self._life.order is None:
@@ -108,7 +108,7 @@ class Sender:
             await self._send_order()
 
     async def _send_order(self) -> None:
-        """As long as an order stands."""
+        """Send while an order is active."""
         while self._life.order is not None:
             left_s = self._due_s - self._now()
             if left_s > TIMER_S:
@@ -127,7 +127,7 @@ class Sender:
         try:
             self.send()
         except Exception:
-            log.exception("a command to the car failed")
+            log.exception("command to the car failed")
 
     def send(self) -> None:
         """Sends one command, now or not at all."""
@@ -137,7 +137,7 @@ class Sender:
         if self._life.order is None or not self._may_send(now_s, was_stalled=was_stalled) or link is None:
             return
         if self.target.kind is None or self.target.type is None:
-            self._cut("the command topic is not confirmed yet")  # after a restart the car is asked first
+            self._cut("the command topic is not confirmed yet")  # after a restart the car's speed is needed first
             return
         car = self._car_for_command(now_s)
         if car is not None:
@@ -167,7 +167,7 @@ class Sender:
             return None
         return car if car.tyre_rad is not None else replace(car, tyre_rad=self._car.tyre_rad)
 
-    def _publish(self, link: RosLink, car: Car, now_s: float) -> None:
+    def _publish(self, link: CommandChannel, car: Car, now_s: float) -> None:
         order, target = self._life.order, self.target
         if order is None or target.kind is None or target.type is None:
             return
@@ -202,5 +202,5 @@ class Sender:
     def _cut(self, why: str) -> None:
         order = self._life.order
         if self._life.cut() and order is not None:
-            text = f"No command goes out: {why}. It goes on when the link is back, if it still stands."
+            text = f"No command is sent: {why}. Sending resumes with the link, if the order is still active."
             self._order_log.write(order, "cut", text)

@@ -17,7 +17,7 @@ MAX_PARTS = 8  # of a dotted key or heading; ours have three
 MAX_NESTING = 8  # of arrays and inline tables in each other
 MAX_ENTRIES = 2000  # keys, headings and elements; all settings together are some hundreds
 
-# One token after the other; possessive, so that no text makes it look back. What none of them takes is one character.
+# Possessive tokens, so that no text causes backtracking. A character that fits none is a token of its own.
 # On what `tomllib` accepts it must agree with it about where a text ends, else a text could hide a name.
 _TOKEN = re.compile(
     r'(?P<text>"""(?:[^"\\]|\\[\s\S]|"(?!""))*+(?:"{3,5}+|\Z)'  # two more quotes at its end belong to it
@@ -37,7 +37,7 @@ def loads(text: str | bytes, *, max_bytes: int = MAX_BYTES, max_line: int = MAX_
         try:
             text = text[: max_bytes + 4].decode("utf-8", "strict" if len(text) <= max_bytes else "replace")
         except UnicodeDecodeError:
-            raise BadToml("This is not text in UTF-8.") from None
+            raise BadToml("This is not UTF-8 text.") from None
     if len(text) > max_bytes or len(text.encode(errors="replace")) > max_bytes:
         raise BadToml(f"A TOML file has at most {max_bytes // 1024} kB.")
     if any(len(line) > max_line for line in text.split("\n")):
@@ -52,7 +52,7 @@ def loads(text: str | bytes, *, max_bytes: int = MAX_BYTES, max_line: int = MAX_
 
 
 def _demand_flat(text: str) -> None:
-    """Counts the parts of dotted keys, what stands in each other, and entries. Raises BadToml."""
+    """Count parts of dotted keys, nesting and entries. Raises BadToml."""
     parts = 1
     nesting = entries = 0
     for token in _TOKEN.finditer(text):
@@ -68,7 +68,7 @@ def _demand_flat(text: str) -> None:
             case "[" | "{":
                 nesting += 1
                 if nesting > MAX_NESTING:
-                    raise BadToml(f"In TOML at most {MAX_NESTING} arrays or tables nest.")
+                    raise BadToml(f"TOML arrays and tables nest at most {MAX_NESTING} deep.")
                 entries += 1
             case "]" | "}":
                 nesting = max(0, nesting - 1)

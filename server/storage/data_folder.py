@@ -63,7 +63,7 @@ class DataFolder:
         except OSError as why:
             if why.errno not in _UNLOCKABLE:
                 raise
-            log.warning("the data folder %s cannot be locked (%s): start no second server on it", self._path, why)
+            log.warning("data folder not locked, start no second server on it: path=%s error=%s", self._path, why)
         with contextlib.suppress(OSError):  # a full disk; the number is only for the sentence above
             os.ftruncate(descriptor, 0)
             os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
@@ -77,7 +77,7 @@ class DataFolder:
         except FileNotFoundError:
             pass
         except (OSError, orjson.JSONDecodeError) as why:
-            log.warning("%s cannot be read (%s) and is written anew", file, why)
+            log.warning("format file unreadable, rewritten: path=%s error=%s", file, why)
             set_aside(file)
         number = kept.get("format") if isinstance(kept, dict) else None
         if isinstance(number, int) and number > FORMAT:
@@ -88,7 +88,7 @@ class DataFolder:
             if found > known:
                 raise self._newer(f"{name} has format {found}", known)
         if number != FORMAT:
-            with contextlib.suppress(OSError):  # a full disk keeps nobody from watching the car
+            with contextlib.suppress(OSError):  # a full disk must not prevent monitoring
                 content = orjson.dumps({"format": FORMAT, "catgraph": catgraph_version()})
                 durable_file.write(file, content)
 

@@ -23,7 +23,7 @@ _STANDARD = {"/dev/stdin": 0, "/dev/stdout": 1, "/dev/stderr": 2}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:
-    """Where a path leads: `file` is one to be made or replaced; else what is written goes into what is there."""
+    """The target of a path: `file` is created or replaced; otherwise data is written into the existing target."""
 
     path: Path  # as the person gave it
     file: Path | None = None  # behind all links
@@ -50,7 +50,7 @@ def output_of(path: Path) -> Output:
         file = Path(os.path.realpath(path))  # a link may lead to what is not there yet
         if not file.parent.is_dir():
             shown = file.parent if path.is_symlink() else path.parent
-            raise NotADirectoryError(errno.ENOTDIR, f"{shown} is no directory") from None
+            raise NotADirectoryError(errno.ENOTDIR, f"{shown} is not a directory") from None
         return Output(path=path, file=file)
     if stat.S_ISDIR(there.st_mode):
         raise IsADirectoryError(errno.EISDIR, "it is a directory")
@@ -89,7 +89,7 @@ def _pour(new: Path, output: Output) -> None:
     descriptor = os.dup(output.descriptor) if output.descriptor is not None else os.open(output.path, os.O_WRONLY)
     with open(descriptor, "wb") as target, new.open("rb") as source:
         if stat.S_ISREG(os.fstat(descriptor).st_mode) and output.descriptor is None:
-            raise OSError(errno.EBUSY, "it has become a file meanwhile")
+            raise OSError(errno.EBUSY, "it was replaced by a file meanwhile")
         shutil.copyfileobj(source, target, 1 << 20)
 
 

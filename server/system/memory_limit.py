@@ -1,4 +1,4 @@
-"""A bound on the memory of a command that reads what somebody sent: what is packed may say any size of itself."""
+"""A memory limit for commands that read foreign files: a packed file can declare any size."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PART = 0.8  # of what the machine has free
-TOO_LARGE = "a part of it, unpacked, is larger than this machine can hold."
+TOO_LARGE = "a part of it, unpacked, is larger than this machine's memory."
 
 
 @contextlib.contextmanager
-def bounded_memory() -> Iterator[None]:
-    """Within it, what would take nearly all free memory of the machine raises MemoryError."""
+def bounded_memory(part: float = 1.0) -> Iterator[None]:
+    """Within it, what would take nearly all free memory of the machine, or this part of it, raises MemoryError."""
     before = resource.getrlimit(resource.RLIMIT_DATA)
     free, used = free_bytes(), _bytes("/proc/self/status", "VmData")
     if free is None or used is None or before[0] != resource.RLIM_INFINITY:  # somebody has bounded it already
         yield
         return
-    resource.setrlimit(resource.RLIMIT_DATA, (used + int(free * PART), before[1]))
+    resource.setrlimit(resource.RLIMIT_DATA, (used + int(free * PART * part), before[1]))
     try:
         yield
     finally:
@@ -28,7 +28,7 @@ def bounded_memory() -> Iterator[None]:
 
 
 def free_bytes() -> int | None:
-    """What the machine can give without taking it from others; None: it does not say."""
+    """The available memory of the machine [B]; None: unknown."""
     return _bytes("/proc/meminfo", "MemAvailable")
 
 

@@ -10,7 +10,7 @@ KEPT_FREE = 32  # for the log, a recording, an export: below this it is said
 
 
 class FilesExhausted(OSError):
-    """Hardly any file can be opened; `str()` says how many."""
+    """Too few file descriptors are left; `str()` has the number."""
 
 
 def demand_free() -> None:

@@ -1,6 +1,6 @@
-"""Where the page's files lie, and whether the third-party ones among them are there and current.
+"""Paths of the page's files, and whether the third-party files exist and are current.
 
-The build hook loads this file by its path, so that one place says what the stamp holds: standard library only.
+The build hook loads this file by its path, so that the stamp is defined once: standard library only.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def write_stamp(vendor: Path, project: Path) -> None:
 
 
 def digest_of(project: Path) -> str:
-    """Hash of what decides the content of static/vendor; times of files say nothing after a clone or a copy."""
+    """Hash of the inputs of static/vendor; file times are useless after a clone or a copy."""
     digest = hashlib.sha256()
     for name in ("package.json", "package-lock.json"):
         digest.update((project / name).read_bytes())

@@ -112,7 +112,7 @@ class Supervisor:
         error = None if task.cancelled() else task.exception()
         if self._is_stopping or self._kept.get(name) is not kept:
             if error is not None:
-                log.error("%s %s failed while it was being stopped", self._owner, name, exc_info=error)
+                log.error("task failed while stopping: owner=%s task=%s", self._owner, name, exc_info=error)
             return
         if task.cancelled():
             kept.why = "it was cancelled"
@@ -123,7 +123,7 @@ class Supervisor:
             return
         else:
             kept.why = "it returned"
-        log.error("%s %s ended and is started again: %s", self._owner, name, kept.why, exc_info=error)
+        log.error("task ended, restarting: owner=%s task=%s why=%s", self._owner, name, kept.why, exc_info=error)
         loop = task.get_loop()
         if loop.time() - kept.started_s >= STEADY_S:
             kept.delay_s = FIRST_RESTART_S
@@ -137,4 +137,4 @@ class Supervisor:
         try:
             self._on_restart(name, kept.why)
         except Exception:  # the log of restarts may fail; the restart has happened
-            log.exception("the restart of %s %s could not be reported", self._owner, name)
+            log.exception("task restart not reported: owner=%s task=%s", self._owner, name)

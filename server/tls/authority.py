@@ -35,7 +35,7 @@ class TlsRefused(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Authority:
-    """A certificate that phones are told to trust, and the key that signs for it."""
+    """A certificate that phones trust, and its signing key."""
 
     cert: x509.Certificate
     key: ec.EllipticCurvePrivateKey
@@ -65,7 +65,7 @@ def fingerprint_of(cert: x509.Certificate) -> str:
 
 
 def clock(now: dt.datetime) -> dt.datetime:
-    """The time to date certificates by: a clock that stands before catgraph existed counts as wrong."""
+    """The time for certificates: a clock before catgraph existed counts as wrong."""
     return max(now, EARLIEST)
 
 
@@ -85,7 +85,7 @@ def load_or_make(folder: Path, *, host: str, now: dt.datetime) -> Authority:
 def make(*, host: str, now: dt.datetime) -> Authority:
     """A new authority, valid from well before `now` for ten years after it."""
     key = ec.generate_private_key(ec.SECP256R1())
-    # A phone may trust several servers: the last digits tell them apart where two machines have the same name.
+    # A phone may trust several servers: the last digits distinguish machines of the same name.
     common = f"catgraph {host[:40] or 'server'} {secrets.token_hex(2).upper()}"
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common)])
     start = clock(now).replace(microsecond=0)
@@ -135,7 +135,7 @@ def _load(path: Path) -> Authority:
 
 
 def _unusable(path: Path, why: str) -> TlsRefused:
-    # Never replaced in silence: every phone that trusts the old one would be turned away and nobody would know why.
+    # Never replaced silently: every phone that trusts the old one would fail without a visible reason.
     return TlsRefused(
         f"The server's own authority in {path} is damaged: {why}. Put back a copy, or delete the file for a new one; "
         "then every phone must be set up anew."

@@ -21,12 +21,12 @@ LOOK_EVERY_S = 5.0  # a phone that waits for the laptop to join its network wait
 
 
 class Certificate(Protocol):
-    """Something that shows a certificate and can look whether another is due."""
+    """A source of a certificate that can be renewed."""
 
     context: LiveContext
 
     def refresh(self, now: dt.datetime) -> str | None:
-        """Exchanges it where needed, and says so in words. Never raises for what is wrong with files."""
+        """Renew the certificate if needed and log it. Never raises because of files."""
 
 
 class OwnCertificate:
@@ -75,7 +75,7 @@ class OwnCertificate:
         return failing
 
 
-class GivenCertificate:
+class ProvidedCertificateRenewal:
     """The one of `--tls CERT KEY`."""
 
     def __init__(self, cert: Path, key: Path, *, now: dt.datetime) -> None:
@@ -134,16 +134,16 @@ async def keep(
     told: Callable[[], None] = lambda: None,
     every_s: float = LOOK_EVERY_S,
 ) -> None:
-    """Looks after it until cancelled; `told` is called after each exchange. A look that fails is no end of looking."""
+    """Renew the certificate when due, until cancelled; `told` is called after each renewal. Failures are retried."""
     last = ""
     while True:
         await asyncio.sleep(every_s)
         try:
-            said = certificate.refresh(now())
+            said = await asyncio.to_thread(certificate.refresh, now())
             if said is not None:
                 log.warning("%s", said)
                 told()
         except Exception as bug:
             if repr(bug) != last:
-                log.exception("the certificate could not be looked after, it goes on being tried")
+                log.exception("the certificate could not be checked; it is retried")
             last = repr(bug)

@@ -1,8 +1,8 @@
 """A TLS context whose certificate can be exchanged while it serves.
 
-A new certificate gets a context of its own, to which each new connection is led when it says hello (also one that
-names no host, as browsers do that were given an address). A context that was changed in place could keep the old
-certificate beside the new one, when their keys are of different kinds.
+A new certificate gets its own context, which each new handshake uses, with or without a server name (browsers send
+none for an address). A context changed in place could keep the old certificate beside the new one if their key types
+differ.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def _context(cert: Path, key: Path | None) -> ssl.SSLContext:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2  # every browser since 2014 has it
     context.set_alpn_protocols(["http/1.1"])
-    context.options |= ssl.OP_NO_TICKET  # a ticket goes on with the certificate that was shown when it was given
+    context.options |= ssl.OP_NO_TICKET  # a resumed session would keep the old certificate
     context.num_tickets = 0
     context.load_cert_chain(cert, key, password=_no_password)
     return context

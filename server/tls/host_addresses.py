@@ -1,7 +1,7 @@
-"""Addresses of the machine around a container, which nobody inside can look up: learnt as people type them.
+"""Addresses of a container's host machine, learned from requests, because they cannot be looked up inside.
 
-Whoever comes to the plain page names in `Host` what they typed. It is taken for an address of ours only where it is a
-private one: the certificate is worth nothing but to this server, so that a false one does no harm.
+A request to the plain page has the typed address in `Host`. Only private addresses are accepted; a false one does no
+harm, because the certificate serves this server only.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterable
 from server.tls.names import IpAddress
 from server.tls.ranges import may_vouch_for_address
 
-MOST = 12  # then the one not seen for longest goes
+MOST = 12  # then the one with the oldest use is dropped
 EVERY_S = 1.0  # each new one is a new certificate
 
 
-class Outside:
+class HostAddresses:
     """The addresses learnt, the newest first."""
 
     def __init__(self, known: Iterable[IpAddress], *, now: Callable[[], float]) -> None:

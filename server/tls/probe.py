@@ -1,7 +1,7 @@
-"""Answers that HTTPS succeeded, to the plain page that explains: outside of all else, for it says nothing of the car.
+"""Answers the instruction page that HTTPS works; outside the application, because it has no data of the car.
 
-That page is of another origin, which the server's own routes are right to refuse. It learns that it was answered, and a
-browser that does not trust the certificate never comes so far.
+That page has another origin, which the server's routes refuse. A browser that does not trust the certificate gets no
+answer.
 """
 
 from __future__ import annotations

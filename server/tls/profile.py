@@ -12,8 +12,8 @@ _OURS = uuid.UUID("5a1d3c5e-60a5-4f0c-9a44-4a0f9fb1f7a5")  # under it the ids of
 
 
 def mobileconfig(authority: Authority) -> bytes:
-    """The profile. It is not signed: nobody could know the signer before trusting it. One authority always has the same
-    ids, so that a second installation replaces the first."""
+    """The profile, unsigned, because the signer would not be trusted yet. An authority always has the same ids, so that
+    a second installation replaces the first."""
     id = authority.fingerprint.replace(":", "").lower()
     root = {
         "PayloadType": "com.apple.security.root",

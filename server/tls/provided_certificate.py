@@ -12,11 +12,11 @@ from cryptography.hazmat.primitives import serialization
 
 from server.tls.authority import TlsRefused
 
-SOON = dt.timedelta(days=14)  # before the end somebody is told
+SOON = dt.timedelta(days=14)  # warning before the expiry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Given:
+class ProvidedCertificate:
     """What a pair of files holds."""
 
     cert: x509.Certificate
@@ -24,8 +24,8 @@ class Given:
     warning: str | None  # it can be served, but somebody should see to it
 
 
-def look(cert: Path, key: Path, *, now: dt.datetime) -> Given:
-    """Reads both. Raises TlsRefused with what cannot be served: browsers would only say that something is wrong."""
+def look(cert: Path, key: Path, *, now: dt.datetime) -> ProvidedCertificate:
+    """Read certificate and key. Raises TlsRefused with the reason, which browsers would not show."""
     found = _certificate(cert)
     _check_pair(cert, key, found)
     if now > found.not_valid_after_utc:
@@ -38,7 +38,7 @@ def look(cert: Path, key: Path, *, now: dt.datetime) -> Given:
     names = _names(found)
     if not names:
         raise TlsRefused(f"The certificate {cert} names no host (subject alternative names): no browser takes it.")
-    return Given(cert=found, names=names, warning=warning)
+    return ProvidedCertificate(cert=found, names=names, warning=warning)
 
 
 def _certificate(path: Path) -> x509.Certificate:

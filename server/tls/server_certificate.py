@@ -20,7 +20,7 @@ from server.tls.names import IpAddress, Names
 
 FILE = "leaf.pem"
 VALID = dt.timedelta(days=397)  # from end to end; browsers refuse more than 398 (Apple, Chrome, since 2020-09-01)
-BACK = dt.timedelta(days=30)  # of these lie before now: for phones whose clock is behind, and servers whose is ahead
+BACK = dt.timedelta(days=30)  # of these are before now, for slow clocks of phones and fast clocks of servers
 RENEW = dt.timedelta(days=60)  # before the end: a server that is switched on once in two months never has an old one
 
 
@@ -38,7 +38,7 @@ class ServerCertificate:
 
 
 def make(authority: Authority, names: Names, *, now: dt.datetime) -> ServerCertificate:
-    """A new certificate for `names`, by a clock that says `now`."""
+    """Issue a certificate for `names` at the time `now`."""
     key = ec.generate_private_key(ec.SECP256R1())
     start = _clock(authority, now).replace(microsecond=0) - BACK
     # RFC 5280 4.1.2.5: both ends belong to it, so that a second less is 397 days.

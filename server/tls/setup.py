@@ -1,7 +1,7 @@
-"""The plain page that explains: how a device comes to trust this server. It hands out our authority and nothing else.
+"""The plain HTTP page with instructions for trusting this server. It serves our authority's certificate only.
 
-Whoever can change what comes over the network can change this page too. So it carries no secret, leads nowhere but to
-itself, and tells everybody to compare the fingerprint with the one on the server's terminal.
+An attacker on the network can change this page. It therefore has no secret, links only to itself, and asks the user to
+compare the fingerprint with the one on the server's terminal.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FONTS = ("catgraph-numerals-500.woff2", "catgraph-numerals-700.woff2")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Whereabouts:
+class SetupAddresses:
     """Where a server is found: hosts as people type them, IPv6 without brackets, the likeliest first."""
 
     hosts: tuple[str, ...]
@@ -49,9 +49,9 @@ class Whereabouts:
 
 
 def explaining(
-    authority: Authority, where: Callable[[], Whereabouts], typed: Callable[[str | None], None] = lambda host: None
+    authority: Authority, where: Callable[[], SetupAddresses], typed: Callable[[str | None], None] = lambda host: None
 ) -> ASGIApp:
-    """The application that explains `authority`; `typed` is told by which name somebody came to its page."""
+    """The application with the instructions for `authority`; `typed` is called with the host name of each request."""
     static = static_dir()
     templates = Environment(
         loader=FileSystemLoader(templates_dir()), autoescape=select_autoescape(), trim_blocks=True, lstrip_blocks=True
@@ -104,7 +104,7 @@ def explaining(
     return _only(routes, lambda _: "/")
 
 
-def leading(where: Callable[[], Whereabouts]) -> ASGIApp:
+def leading(where: Callable[[], SetupAddresses]) -> ASGIApp:
     """The application for a certificate that browsers trust already: it leads to the page."""
     return _only([], lambda request: where().secure(_host_of(request)))
 
@@ -132,7 +132,7 @@ def _host_of(request: Request) -> str | None:
 
 
 def _headers(secure: str = "") -> dict[str, str]:
-    # A host of IPv6 digits has no form in a policy: any https, then; the page asks for one address only.
+    # A policy cannot contain an IPv6 address, so any https is allowed; the page requests one address only.
     asks = "https:" if "[" in secure else secure or "'none'"
     policy = (
         "default-src 'none'; style-src 'self'; script-src 'self'; font-src 'self'; img-src 'self' data:; "

@@ -1,6 +1,6 @@
-"""How each kind of device is told to trust our authority, step by step, and what to draw beside each step.
+"""The steps for trusting our authority on each platform, with the picture of each step.
 
-As the makers' menus were called in 2026; where they differ, the words to search for in the settings are given.
+Menu names are those of 2026; where they differ, the steps give search terms for the settings.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Screen:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """What to do, and how it looks there."""
+    """One instruction and its picture."""
 
     title: str
     text: str
@@ -186,7 +186,7 @@ PLATFORMS = (
         steps=(
             Step(
                 title="Download the certificate",
-                text="It lies in Downloads as catgraph-ca.crt.",
+                text="It is in Downloads as catgraph-ca.crt.",
                 file="ca.crt",
             ),
             Step(
@@ -237,7 +237,7 @@ PLATFORMS = (
 
 
 def platform_of(agent: str) -> str:
-    """The id of the platform that a browser says it runs on (User-Agent); unknown ones count as Android."""
+    """The platform id for a User-Agent; an unknown one counts as Android."""
     agent = agent.lower()
     is_phone = "android" in agent
     if "firefox" in agent and not ("windows" in agent or "mac os" in agent):

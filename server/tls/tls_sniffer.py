@@ -1,9 +1,8 @@
-"""One port for who speaks TLS and for who forgot the s of https: the first byte of a connection tells them apart.
+"""One port for TLS and plain HTTP: the first byte of a connection tells which.
 
-`192.168.4.1:8000` typed into a phone is http, and a TLS port would answer with nothing at all. The byte is looked at
-and left where it is; what follows is served by TLS (a handshake begins with 22, RFC 8446 5.1) or by the page that
-explains.
-Where the loop cannot wait on a socket (Windows), such a connection ends as on any TLS port.
+`192.168.4.1:8000` typed into a phone is http, and a TLS port would not answer at all. The byte is peeked at; a
+connection that starts with 22 (RFC 8446 5.1) is served by TLS, any other by the instruction page.
+If the loop cannot wait on a socket (Windows), a plain connection ends as on any TLS port.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ log = logging.getLogger("catgraph.tls")
 
 _HANDSHAKE = 22
 UNDECIDED = 256  # connections that have said nothing yet or are in their handshake; the next one ends the eldest
-DECIDE_S = 10.0  # a browser opens spare connections and says nothing on them: they are not missed
+DECIDE_S = 10.0  # browsers open spare connections and send nothing on them
 
 Factory = Callable[[], asyncio.Protocol]
 
@@ -112,7 +111,7 @@ class TlsSniffer:
 
 
 async def _first_byte(sock: socket.socket) -> int | None:
-    """Waits for it and leaves it unread; None: closed without a word. Raises OSError."""
+    """Wait for the first byte without reading it; None: closed without data. Raises OSError."""
     loop = asyncio.get_running_loop()
     while True:
         readable = loop.create_future()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-CBOR_TRIES = 5  # unreadable binary frames before scans are asked for as JSON
+CBOR_TRIES = 5  # unreadable binary frames before scans are requested as JSON
 
 
 class CborUse:
@@ -22,7 +22,7 @@ class CborUse:
         self._json_only.add(topic)
 
     def bridge_complains(self, text: str) -> bool:
-        """An error the bridge states; whether it says that it has no CBOR, as an old one does."""
+        """Whether an error of the bridge means that it has no CBOR, as an old one."""
         if "cbor" in text.lower() and "compression" in text.lower() and not self._failed:
             self._failed = True
             return True

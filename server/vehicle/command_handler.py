@@ -5,15 +5,21 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Mapping
-from typing import Any
+from functools import partial
+from typing import Any, assert_never
 
 from monitor.alarm import Refused
+from server.control import display_name
 from server.control.authorization import Caller
+from server.judge.phone_report import phone_report
 from server.judge.settings import Settings
 from server.protocol import commands, serialize
+from server.protocol.messages import Answer
+from server.protocol.state import LiveState
 from server.rosbridge.address import BadAddress
 from server.storage.storage_thread import StorageThread
 from server.vehicle import phone, queries
+from server.vehicle.check_detail import check_answer
 from server.vehicle.session_parts import SessionActions, SessionParts
 
 log = logging.getLogger("catgraph.session")
@@ -22,7 +28,7 @@ log = logging.getLogger("catgraph.session")
 class CommandHandler:
     """Of one vehicle. `now` is a monotonic clock in seconds, `wall_ms` the time of day in ms since 1970.
 
-    A command is carried out first and logged then: the answer says what became of it, whatever the log does.
+    A command is executed first, then logged: its reply does not depend on the log.
     """
 
     def __init__(
@@ -30,7 +36,7 @@ class CommandHandler:
         vehicle: str,
         parts: SessionParts,
         actions: SessionActions,
-        frame: Callable[[], dict[str, Any]],
+        frame: Callable[[], LiveState],
         *,
         now: Callable[[], float],
         wall_ms: Callable[[], int],
@@ -46,11 +52,11 @@ class CommandHandler:
         self._now = now
         self._wall_ms = wall_ms
 
-    async def handle(self, message: Mapping[str, Any]) -> dict[str, Any]:
+    async def handle(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """The answer to a command or a query."""
-        answer = self._query(message)
-        if answer is not None:
-            return answer
+        found = self._query(message)
+        if found is not None:
+            return found
         parts = self._parts
         caller = Caller.of(message)
         by = caller.name
@@ -58,39 +64,53 @@ class CommandHandler:
             command = commands.read(dict(message))
             if isinstance(command, commands.PresentWord):
                 return self._present(command, caller)
+            self._check_car(command, by)
             parts.authorization.admit(command, caller, self._now())
-            if isinstance(command, commands.Import):  # a file may take a while to read, and control may pass meanwhile
-                read = await asyncio.to_thread(parts.settings.read, command.toml)
-                parts.authorization.admit(command, caller, self._now())
-                await self._change_settings(lambda: parts.settings.prepare_all(read), by)
-            elif isinstance(command, commands.Set):
-                values, topics = command.values, command.topics
-                await self._change_settings(
-                    lambda: parts.settings.prepare(
-                        values=values, topics=topics, profile=command.profile, version=command.version
-                    ),
-                    by,
-                )
-            else:
-                self._obey(command, caller)
-            if isinstance(command, commands.Record):
-                await parts.recording.demand_settled()
+            await self._apply(command, caller)
         except queries.REFUSALS as why:
             if isinstance(why, BadAddress) and parts.connection.refuse(why):
                 parts.publisher.put()
             refusal = queries.refusal(why)
-            self._record(message, by=by, reason=refusal["reason"])
+            self._record(message, by=by, reason=refusal.get("reason"))
             return refusal
         self._record(message, by=by)
-        version = {"version": parts.settings.settings.version} if commands.is_of_settings(command) else {}
-        fence = parts.authorization.fence_of(caller)
-        return {"ok": True} | version | ({} if fence is None else {"fence": fence})
+        answer: Answer = {"ok": True}
+        if isinstance(command, (commands.Set, commands.Import)):  # another version of the settings
+            answer["version"] = parts.settings.settings.version
+        if (fence := parts.authorization.fence_of(caller)) is not None:
+            answer["fence"] = fence
+        return answer
 
-    async def _change_settings(self, prepare: Callable[[], Settings], by: str) -> None:
+    def _check_car(self, command: commands.LoggedCommand, by: str) -> None:
+        """A command that acts on a car must be for this one. Raises Refused; a slow-down that is refused is logged."""
+        meant = command.vehicle if isinstance(command, commands.OfCar) else None
+        if meant is None or meant == self._vehicle:
+            return
+        why = (
+            f"This was meant for {display_name.clean(meant)}, and this is {self._vehicle}: nothing was sent to either."
+        )
+        if isinstance(command, commands.Decelerate):
+            self._parts.event_log.note("slow_down", f"Slow-down refused: {why}", by=by, step="refused")
+        raise Refused(why)
+
+    async def _change_settings(self, command: commands.Set | commands.Import, caller: Caller) -> None:
         """Stores settings and puts them in force; both happen though the caller waits no longer.
 
         Raises BadSetting, Conflict, OSError.
         """
+        parts, by = self._parts, caller.name
+        if isinstance(command, commands.Import):  # a file may take a while to read, and control may pass meanwhile
+            read = await asyncio.to_thread(parts.settings.read, command.toml)
+            parts.authorization.admit(command, caller, self._now())
+            prepare = partial(parts.settings.prepare_all, read)
+        else:
+            prepare = partial(
+                parts.settings.prepare,
+                values=command.values,
+                topics=command.topics,
+                profile=command.profile,
+                version=command.version,
+            )
         await asyncio.shield(asyncio.create_task(self._store_and_adopt(prepare, by), name="change settings"))
 
     async def _store_and_adopt(self, prepare: Callable[[], Settings], by: str) -> None:
@@ -104,7 +124,7 @@ class CommandHandler:
             self._actions.settings_changed(settings.adopt(new), by=by)
             self._parts.publisher.put()
 
-    def _query(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
+    def _query(self, message: Mapping[str, Any]) -> Mapping[str, Any] | None:
         """The answer to a query; None: it is a command."""
         parts, judgement = self._parts, self._parts.judgement
         match message.get("kind"):
@@ -113,13 +133,22 @@ class CommandHandler:
             case "refresh":
                 parts.publisher.put()
                 return {"ok": True}
+            case "announces":  # of a page that shows another car; no page can send it itself
+                word = commands.PresentWord.model_validate({**message, "kind": "present"})
+                parts.authorization.hear_elsewhere(word, Caller.of(message), self._now())
+                return {"ok": True}
             case "signals":
                 topics = parts.connection.subscriptions
                 return queries.signals(topics.signals.unmapped, judgement.reception, topics.offered)
             case "settings":
-                return parts.settings.as_json() | {"toml": parts.settings.as_toml()}
+                return {**parts.settings.as_json(), "toml": parts.settings.as_toml()}
+            case "check":
+                now_s = self._now()
+                return dict(check_answer(judgement.monitor, str(message.get("check")), now_s, judgement.minute))
             case "trends":
                 return serialize.trends(judgement.trends.piece(self._now(), after=message.get("after")))
+            case "drive_trends":
+                return queries.drive_trends(judgement, message, self._now(), self._wall_ms())
             case "track":
                 return queries.track(judgement.snapshot())
             case "track_points":
@@ -132,20 +161,24 @@ class CommandHandler:
         return None
 
     def _record(self, message: Mapping[str, Any], *, by: str, reason: str | None = None) -> None:
-        """The command is obeyed or refused by now: the answer says so, whether or not it can be recorded."""
+        """Record a command that was executed or refused; the reply does not depend on it."""
         try:
             self._parts.recording.asked(message, by=by, reason=reason)
         except Exception:
-            log.exception("a command to %s could not be recorded", self._vehicle)
+            log.exception("command not recorded: vehicle=%s", self._vehicle)
 
-    def _present(self, word: commands.PresentWord, caller: Caller) -> dict[str, Any]:
+    def _present(self, word: commands.PresentWord, caller: Caller) -> Answer:
         if self._parts.authorization.hear(word, caller, self._now()):
             self._parts.publisher.put_soon()
         return {"ok": True}
 
-    def _obey(self, command: commands.Command, caller: Caller) -> None:
+    async def _apply(self, command: commands.LoggedCommand, caller: Caller) -> None:
+        """Each command has exactly one case here. Raises one of queries.REFUSALS."""
         parts, now_s, by = self._parts, self._now(), caller.name
         match command:
+            case commands.Set() | commands.Import():
+                await self._change_settings(command, caller)
+                return
             case commands.Connect():
                 self._actions.connect(command.address, by=by)
             case commands.Retry():
@@ -164,7 +197,10 @@ class CommandHandler:
                 begins = "begins" if command.on else "ends"
                 parts.event_log.note("recording", f"Recording {begins}, by hand.", by=by)
                 self._actions.recording_ordered()
-            case commands.Acknowledge() | commands.Shelve() | commands.Unshelve():
+                parts.publisher.put()
+                await parts.recording.demand_settled()
+                return
+            case commands.Acknowledge() | commands.Silence() | commands.Shelve() | commands.Unshelve():
                 self._respond(command, now_s, by)
             case commands.TakeControl():
                 parts.authorization.obey(command, caller, now_s)
@@ -176,18 +212,25 @@ class CommandHandler:
             case commands.Position():
                 if parts.connection.phase == "idle":
                     raise Refused("No car is monitored: no position is needed.")
-                parts.judgement.state.hear_phone(phone.word(command, now_s, self._wall_ms(), by), now_s)
+                parts.judgement.state.receive_phone(phone_report(command, now_s, self._wall_ms(), by), now_s)
                 return  # many phones may report every second; the next tick judges and puts a state
+            case _:
+                assert_never(command)
         parts.publisher.put()
 
     def _respond(
-        self, command: commands.Acknowledge | commands.Shelve | commands.Unshelve, now_s: float, by: str
+        self,
+        command: commands.Acknowledge | commands.Silence | commands.Shelve | commands.Unshelve,
+        now_s: float,
+        by: str,
     ) -> None:
         """What an operator does about an alarm."""
         judgement = self._parts.judgement
         match command:
             case commands.Acknowledge():
                 found = judgement.monitor.acknowledge(command.alarm, command.occurrence, by=by, now_s=now_s)
+            case commands.Silence():
+                found = judgement.monitor.silence(command.alarm, command.occurrence, by=by, now_s=now_s)
             case commands.Shelve():
                 found = judgement.monitor.shelve(
                     command.alarm, command.occurrence, minutes=command.minutes, by=by, now_s=now_s
@@ -200,4 +243,4 @@ class CommandHandler:
         judgement = self._parts.judgement
         judgement.ride(phone_, now_s)
         judgement.judge(now_s)
-        self._parts.event_log.note("ride", phone.riding_words(judgement.snapshot(), phone_), by=by, phone=phone_)
+        self._parts.event_log.note("ride", phone.phone_in_car_text(judgement.snapshot(), phone_), by=by, phone=phone_)

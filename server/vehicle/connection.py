@@ -12,22 +12,22 @@ from monitor.state import Phase
 from server.rosbridge import connection_errors
 from server.rosbridge.address import Address, BadAddress
 from server.rosbridge.connection_errors import Problem
-from server.rosbridge.link import RosLink
 from server.rosbridge.link_listener import Marks
+from server.rosbridge.live_source import LiveSource, OpenSource
 from server.rosbridge.raw_frame import RawFrame
 from server.system.supervision import Supervisor
 from server.vehicle.subscriptions import Subscriptions
 
 log = logging.getLogger("catgraph.connection")
 
-PROOF_WITHIN_S = 4.0  # something that speaks WebSocket and no rosbridge is told apart by then
+PROOF_WITHIN_S = 4.0  # by then a WebSocket server without rosbridge is recognized
 BRIDGE_SILENT_S = 1.4  # the bridge answers a ping every 0.5 s
 
 
 class ConnectionObserver(Protocol):
     """What a connection reports; every method returns at once."""
 
-    def connection_opened(self, link: RosLink) -> None:
+    def connection_opened(self, link: LiveSource) -> None:
         """The car is monitored over this link, for the first time or again."""
 
     def connection_proved(self) -> None:
@@ -61,7 +61,8 @@ class Connection:
         name: str,
         observer: ConnectionObserver,
         messages: MessageHandler,
-        subscriptions: Callable[[RosLink | None], Subscriptions],
+        subscriptions: Callable[[LiveSource | None], Subscriptions],
+        open_source: OpenSource,
         supervisor: Supervisor,
         *,
         now: Callable[[], float],
@@ -71,6 +72,7 @@ class Connection:
         self._observer = observer
         self._messages = messages
         self._make_subscriptions = subscriptions
+        self._open_source = open_source
         self._supervisor = supervisor
         self._now = now
         self.phase: Phase = "idle"
@@ -80,7 +82,7 @@ class Connection:
         """Forgets one connection's facts before another begins."""
         self.phase = "idle"
         self.address: Address | None = None
-        self.link: RosLink | None = None
+        self.link: LiveSource | None = None
         self.problem: Problem | None = None
         self.since_s = self._now()  # since when the phase is what it is
         self.dialled_s = self._now()
@@ -90,7 +92,9 @@ class Connection:
     def dial(self, target: Address, marks: Marks) -> None:
         """Begins to dial; to be called after `reset`."""
         self.phase, self.address = "connecting", target
-        self.link = RosLink(target, self, now=self._now, take_unparsed=self._messages.frame_received, marks=marks)
+        self.link = self._open_source(
+            target, self, now=self._now, take_unparsed=self._messages.frame_received, marks=marks
+        )
         self.subscriptions = self._make_subscriptions(self.link)
         self.link.start()
 
@@ -102,7 +106,7 @@ class Connection:
             self.link = None
 
     def refuse(self, why: BadAddress) -> bool:
-        """An address that cannot be dialled; whether the phase tells so, which it does while no car is monitored."""
+        """Report an address that cannot be dialled; return whether the phase shows it: while no car is monitored."""
         if self.phase not in ("idle", "failed"):
             return False
         self.phase, self.problem = "failed", connection_errors.of_bad_address(why)
@@ -124,7 +128,7 @@ class Connection:
         if self.phase != "monitoring" and self.link is not None and self.link.is_open:
             self._reopened(self.link)
 
-    # -- what the link says (LinkListener) ---------------------------------------------------------------------------
+    # -- LinkListener ------------------------------------------------------------------------------------------------
 
     def link_opened(self) -> None:
         link = self.link
@@ -169,7 +173,7 @@ class Connection:
 
     def status_received(self, level: str, text: str) -> None:
         self.prove()
-        log.info("the bridge of %s says: %s: %s", self._name, level, text)
+        log.info("bridge status: vehicle=%s level=%s text=%s", self._name, level, text)
         if level == "error":
             self.subscriptions.bridge_complains(text)
 
@@ -182,8 +186,8 @@ class Connection:
     def message_received(self, topic: str, message: Any, note: str | None) -> None:
         self._messages.message_received(topic, message, note)
 
-    async def _demand_proof(self, link: RosLink) -> None:
-        """A WebSocket that says nothing of rosbridge's is not one."""
+    async def _demand_proof(self, link: LiveSource) -> None:
+        """Give up a WebSocket that sends no rosbridge operation."""
         await asyncio.sleep(PROOF_WITHIN_S)
         if link is self.link and link.is_open and not self.is_proved and self.address is not None:
             self.phase = "failed"
@@ -191,7 +195,7 @@ class Connection:
             link.abort()
             self._observer.connection_changed(self._now())
 
-    def _reopened(self, link: RosLink) -> None:
+    def _reopened(self, link: LiveSource) -> None:
         now_s = self._now()
         self.phase, self.since_s, self.problem = "monitoring", now_s, None
         self._observer.connection_opened(link)

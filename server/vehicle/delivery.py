@@ -1,8 +1,8 @@
-"""What of a car's topics arrives: which have no publisher, which are published and not received, which to renew.
+"""Delivery of a car's topics: which have no publisher, which are published and not received, which to renew.
 
-A bridge does not say that it cannot deliver a topic, and lists topics that are only subscribed to. So what arrives is
-compared with what rosapi says of publishers. It is asked only of topics from which nothing comes: each such call costs
-the bridge a walk through all nodes, and on ROS 2 may meet one that is just going.
+A bridge does not report that it cannot deliver a topic, and lists topics that have subscribers only. Arriving messages
+are therefore compared with rosapi's publishers. rosapi is called only for topics without messages: each call makes the
+bridge query all nodes, and on ROS 2 one of them may be shutting down.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
-JUDGED_AFTER_S = 1.0  # without a message: so long after subscribing the publishers of a signal's topic are asked
+JUDGED_AFTER_S = 1.0  # time without a message until the publishers of a signal's topic are fetched
 RECORDED_AFTER_S = 4.0  # the same for a topic that is only recorded
-RENEW_AFTER_S = 4.0  # published, and nothing since subscribing: subscribed anew, as JSON
+RENEW_AFTER_S = 4.0  # published, but nothing since subscribing: renewed as JSON
 STOPPED_AFTER_S = 4.0  # a topic that came and stopped is looked at after so long, and
 STOPPED_PERIODS = 10  # so many of its mean periods
-ABSENT_AGAIN_S = 3.0  # the publishers of a signal's topic without one are asked again so often
-SILENT_AGAIN_S = 10.0  # those of a signal's topic that is published and not received, and it is subscribed anew
-RECORDED_AGAIN_S = (10.0, 30.0, 60.0, 120.0, 300.0)  # the same of a recorded topic, which may be one that says little
+ABSENT_AGAIN_S = 3.0  # interval of fetching the publishers of a signal's topic without one
+SILENT_AGAIN_S = 10.0  # the same for a topic that is published and not received, and interval of renewal
+RECORDED_AGAIN_S = (10.0, 30.0, 60.0, 120.0, 300.0)  # the same for a recorded topic, which may have few messages
 FIRST_WITHIN_S = 5.0  # the first message of a publisher that came later
 FLOWS_S = 2.0  # anything within so long: the bridge delivers, so it is this topic and not all of them
-AT_ONCE = 8  # topics that are asked for in one look
+AT_ONCE = 8  # topics per round
 
 
 @dataclass(slots=True)
@@ -54,7 +54,7 @@ class _Row:
         return now_s - max(self.newest_s, self.since_s) >= max(STOPPED_AFTER_S, STOPPED_PERIODS * period_s)
 
     def again_s(self) -> float:
-        """How long its publishers are not asked again."""
+        """The time until its publishers are fetched again."""
         if self.is_judged:
             if self.publishers == ():
                 return ABSENT_AGAIN_S
@@ -66,7 +66,7 @@ class _Row:
 class Delivery:
     """One car's, over all openings of its link. Times are on the session's monotonic clock, in seconds."""
 
-    unpublished: set[str] = field(default_factory=set)  # topics without a publisher, of those that were asked for
+    unpublished: set[str] = field(default_factory=set)  # topics without a publisher
     delivered: set[str] = field(default_factory=set)  # topics of which anything ever came
     _rows: dict[str, _Row] = field(default_factory=dict)
     _came_s: dict[str, float] = field(default_factory=dict)  # when a publisher came to a topic that had none
@@ -74,7 +74,7 @@ class Delivery:
     _newest_s: float = -math.inf  # of any topic
 
     def opened(self, now_s: float) -> None:
-        """The link was opened: all is subscribed to anew."""
+        """The link was opened: all topics are subscribed again."""
         self._rows = {topic: _Row(now_s, row.is_judged) for topic, row in self._rows.items()}
 
     def follow(self, judged: Collection[str], recorded: Collection[str], now_s: float) -> None:
@@ -110,8 +110,8 @@ class Delivery:
         return silent[0] if len(silent) == 1 else None
 
     def to_ask(self, now_s: float, candidates: Collection[str] = ()) -> list[str]:
-        """Topics whose publishers are to be asked for now. Of `candidates`, topics that could carry a signal, those
-        known to have no publisher are asked for again."""
+        """Topics whose publishers to fetch now, including those of `candidates` (topics that could carry a signal)
+        without a known publisher."""
         due = [
             (row.asked_s, topic)
             for topic, row in self._rows.items()
@@ -125,8 +125,7 @@ class Delivery:
         return [topic for _, topic in sorted(due)[:AT_ONCE]]
 
     def answered(self, topic: str, publishers: tuple[str, ...] | None, now_s: float) -> bool:
-        """What rosapi says of a topic's publishers, None: it does not say. Answers whether the topic now has to be
-        subscribed to anew, as JSON."""
+        """Store a topic's publishers, None: unknown. Return whether its subscription must be renewed as JSON."""
         row = self._rows.get(topic)
         self._absent_asked_s[topic] = now_s
         if publishers == () and topic not in self.delivered:
@@ -163,13 +162,13 @@ class Delivery:
             if row.is_judged and row.publishers and row.newest_s is None and (row.renewed or row.is_silent(now_s))
         ]
 
-    def never_heard(self, topic: str) -> bool:
+    def never_received(self, topic: str) -> bool:
         """Whether nothing came of a topic on this connection."""
         row = self._rows.get(topic)
         return row is None or row.newest_s is None
 
     def not_received(self, now_s: float) -> Mapping[str, tuple[str, ...]]:
-        """Topic → its publishers, where nothing came although it was subscribed to anew, and other topics flow."""
+        """Topic → its publishers, for topics without messages after a renewal while other topics arrive."""
         return {
             topic: row.publishers
             for topic, row in sorted(self._rows.items())

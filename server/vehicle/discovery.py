@@ -1,5 +1,4 @@
-"""What a car offers, asked of its bridge through rosapi: topics and types, the version of ROS, whether ROS still
-lives."""
+"""Queries to rosapi: topics and types, the ROS version, whether ROS is alive."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from server.rosbridge.rosapi_client import Asks
 MAX_TOPICS = 5000
 MAX_PUBLISHERS = 100
 MAX_NAME = 120
-MAX_DETAILS = 100  # types that are asked for one by one
+MAX_DETAILS = 100  # types fetched one by one
 DEFINITIONS_WITHIN_S = 5.0  # rosapi reads a file for each type
 _FAILED = "# failed to get full definition text"  # a comment in place of a definition, by ROS 2: not an empty message
 STANDARD = frozenset(
@@ -28,13 +27,13 @@ STANDARD = frozenset(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Offer:
-    """What the bridge says there is."""
+    """The topics and types of the bridge."""
 
-    topics: Mapping[str, str]  # topic → type as the bridge spells it, "" where it does not say
+    topics: Mapping[str, str]  # topic → type as the bridge spells it, "" if unknown
     ros: RosVersion | None
 
 
-async def ask_topics(link: Asks) -> Offer | None:
+async def fetch_topics(link: Asks) -> Offer | None:
     """The topics of the car; None where the bridge has no rosapi or does not answer sensibly. Raises LinkDown."""
     try:
         answer = await link.call("/rosapi/topics", timeout_s=2.5)
@@ -45,21 +44,20 @@ async def ask_topics(link: Asks) -> Offer | None:
         return None
     found = dict(zip(names, types + [""] * (len(names) - len(types)), strict=False))
     for name in [name for name, kind in found.items() if not kind][:50]:
-        found[name] = await _ask_type(link, name)
+        found[name] = await _fetch_type(link, name)
     version = ros_version(found)
     return Offer(topics=found, ros=2 if version == 2 else 1 if version == 1 else None)
 
 
-async def ask_definitions(link: Asks, types: Collection[str], ros: RosVersion | None) -> dict[str, str]:
-    """The definitions of types, in .msg text, as far as the bridge knows them. Raises LinkDown, or CallFailed where it
-    did not answer.
+async def fetch_definitions(link: Asks, types: Collection[str], ros: RosVersion | None) -> dict[str, str]:
+    """The type definitions known to the bridge, as .msg text. Raises LinkDown, or CallFailed without an answer.
 
-    `message_details` is asked of ROS 1 only: on ROS 2 a type with a bounded array or a wstring ends rosapi.
+    `message_details` is called on ROS 1 only: on ROS 2 a type with a bounded array or a wstring crashes rosapi.
     """
     answer = await link.call("/rosapi/topics_and_raw_types", timeout_s=DEFINITIONS_WITHIN_S)
     found = {type: text for type, text in _texts(answer, ros).items() if type in types}
     for type in sorted(set(types) - found.keys())[:MAX_DETAILS] if ros == 1 else ():
-        if plain_package(type) not in STANDARD:  # of those the distribution knows more than rosapi tells
+        if plain_package(type) not in STANDARD:  # for these the distribution has more than rosapi returns
             try:
                 text = text_of_details(await link.call("/rosapi/message_details", {"type": type}, timeout_s=1.5))
             except CallFailed:
@@ -69,9 +67,9 @@ async def ask_definitions(link: Asks, types: Collection[str], ros: RosVersion | 
     return found
 
 
-async def ask_alive(link: Asks, *, timed: Callable[[float], None] = lambda _: None) -> bool | None:
-    """Does ROS behind the bridge still answer? None: it never could say (no rosapi). Raises LinkDown. `timed` gets the
-    time of ROS, in seconds."""
+async def fetch_alive(link: Asks, *, timed: Callable[[float], None] = lambda _: None) -> bool | None:
+    """Whether ROS behind the bridge answers; None: unknown, no rosapi. Raises LinkDown. `timed` gets the time of ROS
+    [s]."""
     try:
         answer = await link.call("/rosapi/get_time", timeout_s=1.5)
     except CallFailed:
@@ -82,9 +80,8 @@ async def ask_alive(link: Asks, *, timed: Callable[[float], None] = lambda _: No
     return isinstance(answer, Mapping)
 
 
-async def ask_publishers(link: Asks, topic: str, *, and_bridge: bool = False) -> tuple[str, ...] | None:
-    """The nodes that publish on a topic, `and_bridge`: with the bridge, which is also we; None where it does not say.
-    Raises LinkDown."""
+async def fetch_publishers(link: Asks, topic: str, *, and_bridge: bool = False) -> tuple[str, ...] | None:
+    """The nodes that publish on a topic; `and_bridge`: with the bridge, thus us; None: unknown. Raises LinkDown."""
     try:
         answer = await link.call("/rosapi/publishers", {"topic": topic}, timeout_s=1.0)
     except CallFailed:
@@ -96,8 +93,8 @@ async def ask_publishers(link: Asks, topic: str, *, and_bridge: bool = False) ->
     return tuple(sorted(name[:MAX_NAME] for name in found if and_bridge or "rosbridge" not in name))
 
 
-async def ask_subscribers(link: Asks, topic: str) -> tuple[str, ...] | None:
-    """The nodes that subscribe to a topic, the bridge among them; None where rosapi does not say. Raises LinkDown."""
+async def fetch_subscribers(link: Asks, topic: str) -> tuple[str, ...] | None:
+    """The nodes that subscribe to a topic, including the bridge; None: unknown. Raises LinkDown."""
     try:
         answer = await link.call("/rosapi/subscribers", {"topic": topic}, timeout_s=1.0)
     except CallFailed:
@@ -108,7 +105,7 @@ async def ask_subscribers(link: Asks, topic: str) -> tuple[str, ...] | None:
     return tuple(sorted({name[:MAX_NAME] for name in names[:MAX_PUBLISHERS] if isinstance(name, str)}))
 
 
-async def _ask_type(link: Asks, topic: str) -> str:
+async def _fetch_type(link: Asks, topic: str) -> str:
     try:
         answer = await link.call("/rosapi/topic_type", {"topic": topic}, timeout_s=1.5)
     except (CallFailed, LinkDown):

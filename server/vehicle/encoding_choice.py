@@ -50,7 +50,7 @@ def _is_fit(type: str, text: str | None, version: RosVersion) -> bool:
         try:
             known |= get_types_from_msg(bounded(text), long_type(type))
             demand_few_fields(long_type(type), known)
-        except Exception:  # the parser says what is wrong in many ways
+        except Exception:  # the parser raises many exception types
             return False
     return _is_message_fit(long_type(type), known, version, 0)
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
+from typing_extensions import Unpack
+
 from monitor.alarm import Alarm, Transition
-from server.bus.bus import LocalBus
+from server.bus.bus import SessionBus
 from server.judge.active_settings import ActiveSettings
 from server.protocol import serialize
+from server.protocol.alarm_state import EventDetails, NotedEvent
 from server.system.clean_text import cleaned
 
 log = logging.getLogger("catgraph.logbook")
@@ -22,14 +25,14 @@ class EventLog:
     """Every event carries the version of the settings in force. `wall_ms` is the time of day in ms since 1970;
     `also` is called with each event and its number.
 
-    No method raises for what the log does: what an event reports has happened already. Events that cannot be appended
-    wait for `retry`, in order, and `trouble` says so.
+    No method raises if the log fails, because the reported event has already happened. Events that cannot be appended
+    wait for `retry`, in order, and `trouble` reports them.
     """
 
     def __init__(
         self,
         vehicle: str,
-        bus: LocalBus,
+        bus: SessionBus,
         tuning: ActiveSettings,
         *,
         wall_ms: Callable[[], int],
@@ -40,7 +43,7 @@ class EventLog:
         self._tuning = tuning
         self._wall_ms = wall_ms
         self._also = also
-        self._waiting: deque[dict[str, Any]] = deque()
+        self._waiting: deque[NotedEvent] = deque()
         self._lost = 0
         self._why: str | None = None
 
@@ -67,27 +70,35 @@ class EventLog:
             ]
         )
 
-    def note(self, change: str, text: str, *, by: str | None = None, **more: Any) -> None:
+    def note(self, change: str, text: str, *, by: str | None = None, **more: Unpack[EventDetails]) -> None:
         """Something of no alarm."""
-        event = {"at_ms": self._wall_ms(), "alarm": None, "change": change, "text": text, "by": by}
-        self._write([event | {"settings_version": self._version} | more])
+        event: NotedEvent = {
+            "at_ms": self._wall_ms(),
+            "alarm": None,
+            "change": change,
+            "text": text,
+            "by": by,
+            "settings_version": self._version,
+            **more,
+        }
+        self._write([event])
 
     def started(self, address: str, shown: str, *, by: str | None) -> None:
-        """Monitoring of a car begins; with all settings in force, so that the log alone says what was judged by."""
+        """Log the start of monitoring with all settings in force, so that the log is complete by itself."""
         self.note("started", f"Monitoring of {shown} begins.", by=by, address=address, settings=self._tuning.in_force())
-        self._tuning.changes()  # told herewith
+        self._tuning.changes()  # logged by this event
 
     def settings(self, text: str, *, by: str | None) -> None:
-        """Settings changed: `text` for people, each value from → to for whoever reconstructs them."""
+        """Log changed settings: `text` for people, each value from → to for tools."""
         self.note("settings", text, by=by, changes=self._tuning.changes())
 
-    def _write(self, events: list[dict[str, Any]]) -> None:
+    def _write(self, events: Sequence[NotedEvent]) -> None:
         due = [*self._waiting, *(events := [cleaned(event) for event in events])]
         try:
             numbered = self._bus.append(self._vehicle, due)
         except Exception as error:
             self._why = f"{type(error).__name__}: {error}"[:200]
-            log.exception("%d events of %s could not be logged", len(due), self._vehicle)
+            log.exception("events not logged: count=%d vehicle=%s", len(due), self._vehicle)
             self._waiting.extend(events)
             while len(self._waiting) > MAX_WAITING:
                 self._waiting.popleft()
@@ -100,7 +111,7 @@ class EventLog:
                 self._also(numbered)
         except Exception as error:  # the recording of events; the log has them
             self._why = f"{type(error).__name__}: {error}"[:200]
-            log.exception("%d events of %s could not be recorded", len(numbered), self._vehicle)
+            log.exception("events not recorded: count=%d vehicle=%s", len(numbered), self._vehicle)
 
     @property
     def _version(self) -> int:

@@ -1,9 +1,6 @@
-"""What the monitor and the pages are told of a session: gathered from its parts."""
+"""Facts about a session for the monitor and the pages, collected from its parts."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import Any
 
 from monitor.state import LinkFacts
 from server.rosbridge.connection_errors import Problem
@@ -24,7 +21,7 @@ def behind(parts: SessionParts, now_s: float) -> Problem | None:
 
 
 def link_facts(parts: SessionParts, now_s: float, *, wall_ms: int, log_trouble: str | None) -> LinkFacts:
-    """What the checks of the connection look at."""
+    """The input of the connection checks."""
     connection, judgement = parts.connection, parts.judgement
     link, topics, problem = connection.link, connection.subscriptions, connection.problem
     failed = behind(parts, now_s)
@@ -57,7 +54,6 @@ def frame_facts(
     now_s: float,
     *,
     wall_ms: int,
-    server: Mapping[str, Any],
     configured: str | None,
     held: RestoredState | None,
     log_trouble: str | None,
@@ -67,7 +63,6 @@ def frame_facts(
     connection, judgement, topics = parts.connection, parts.judgement, parts.connection.subscriptions
     return Facts(
         vehicle=vehicle,
-        server=server,
         now_s=now_s,
         wall_ms=wall_ms,
         phase=connection.phase,

@@ -1,4 +1,4 @@
-"""What is known of one car, and what the checks say of it: messages and time go in, transitions of alarms come out."""
+"""State and checks of one car: input are messages and time, output are alarm transitions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from monitor.alarm import Transition
+from monitor.alarm_marks import AlarmMarks
 from monitor.catalog import AnyCheck
+from monitor.check_minute import CheckMinute
+from monitor.drive_trends import DriveTrends
 from monitor.load import AlarmLoad, RecentLoad
 from monitor.runner import Monitor
 from monitor.signal_limits import expected_rates
@@ -43,7 +46,7 @@ class Judgement:
         self._crashes_logged: set[str] = set()
         self._load = RecentLoad()
         self.monitor = Monitor(checks, tuning.limits)
-        self.rides: str | None = None  # the phone that rides in the car, as the operator in control says
+        self.rides: str | None = None  # the phone in the car, chosen by the operator in control
         self.track_number = 0  # of this run of the server; another number is another track
         self.reset()
 
@@ -54,6 +57,10 @@ class Judgement:
         self.state = State(expected_rates(self._tuning.limits))
         self.state.ride(self.rides, self._now())
         self.trends = Trends(self._now())
+        self.drive_trends = DriveTrends(self._now())
+        self.drive_trends.set_limits(self._tuning.limits, self._now())
+        self.marks = AlarmMarks()
+        self.minute = CheckMinute()
         self.track_number += 1  # with the state begins another track
         self.topics: set[str] = set()  # that came and carry signals
         self.last_message_s: float | None = None
@@ -89,7 +96,8 @@ class Judgement:
         )
         if changed:
             self.judge(now_s, changed)
-            self.trends.hear(changed, self.state, now_s)
+            self.trends.receive(changed, self.state, now_s)
+            self.drive_trends.receive(changed, self.state, now_s)
         return changed
 
     def judge(self, now_s: float, changed: tuple[str, ...] | None = None) -> None:
@@ -98,11 +106,15 @@ class Judgement:
         if self.monitor.crashes:
             self._log_crashes()
         self.report(transitions)
+        if changed is None:
+            self.minute.note(self.monitor.findings, now_s)
 
     def report(self, transitions: Collection[Transition]) -> None:
         """Transitions that an operator or the end of monitoring brought about are counted and reported likewise."""
         if transitions:
             self._load.add(transitions)
+            for one in transitions:
+                self.marks.add(one, one.at_s)
             self._on_transitions(transitions)
 
     def ride(self, phone: str | None, now_s: float) -> None:
@@ -114,10 +126,11 @@ class Judgement:
         """The limits in force are those of the settings from this moment on."""
         self.monitor.limits = self._tuning.limits
         self.state.expect(expected_rates(self._tuning.limits))
+        self.drive_trends.set_limits(self._tuning.limits, self._now())
 
     def _log_crashes(self) -> None:
-        """Each failing check once; the page says "monitoring impaired" as long as it fails."""
+        """Log each failing check once; the alarm "monitoring impaired" lasts as long as it fails."""
         for crash in self.monitor.crashes.values():
             if crash.check_id not in self._crashes_logged:
                 self._crashes_logged.add(crash.check_id)
-                log.error("check %s failed: %s\n%s", crash.check_id, crash.error, crash.where)
+                log.error("check failed: check=%s error=%s\n%s", crash.check_id, crash.error, crash.where)

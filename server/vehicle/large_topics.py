@@ -30,8 +30,8 @@ class LargeTopics:
         return {topic: max(sizes) for topic, sizes in self._sizes.items() if len(sizes) >= LARGE_TRIES}
 
     def sentence(self, topic: str) -> str:
-        """What the log says of a topic that was left."""
+        """The log text for a topic that was unsubscribed."""
         return (
-            f"{topic} is not received any more: its messages have {max(self._sizes[topic]) / 2**20:.0f} MB, and "
-            f"{MAX_MESSAGE_BYTES // 2**20} MB are the most."
+            f"{topic} is no longer received: its messages have {max(self._sizes[topic]) / 2**20:.0f} MB, and "
+            f"{MAX_MESSAGE_BYTES // 2**20} MB is the limit."
         )

@@ -1,4 +1,4 @@
-"""How much is asked of the bridge while the link is slow: the less the slower, what is judged last. Pure."""
+"""Throttling on a slow link: the slower the link, the fewer messages; judged signals are reduced last. Pure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from monitor.signals import SIGNALS
 
-STEP_ABOVE_S = 0.5  # later than this, beyond the link's own round trip, less is asked for
+STEP_ABOVE_S = 0.5  # a delay above this, beyond the link's round trip, starts throttling
 LASTING_S = 0.4  # a burst after a hiccup of the radio is over by then
 STEEP_ABOVE_S = 1.5  # later than this, the least at once
 STEP_EVERY_S = 1.0  # what was taken away needs so long to show
@@ -23,7 +23,7 @@ TRENDS = frozenset(name for name, signal in SIGNALS.items() if signal.optional)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Level:
-    """What is asked for at one step."""
+    """The throttling of one step."""
 
     words: str  # what is not received in full, as a sentence
     records_others: bool = False
@@ -34,18 +34,20 @@ class Level:
 
 LEVELS = (
     Level(words="Everything is received", records_others=True),
-    Level(words="Topics that are only recorded are left out"),
+    Level(words="Topics that are only recorded are not subscribed"),
     Level(
-        words="Topics that are only recorded are left out, scans and trends come less often", scan_ms=200, trends_ms=500
+        words="Topics that are only recorded are not subscribed, scans and trends are throttled",
+        scan_ms=200,
+        trends_ms=500,
     ),
     Level(
-        words="Topics that are only recorded are left out, all signals come less often",
+        words="Topics that are only recorded are not subscribed, all signals are throttled",
         scan_ms=500,
         trends_ms=500,
         judged_ms=100,
     ),
     Level(
-        words="Topics that are only recorded are left out, all signals come at 5 Hz at most",
+        words="Topics that are only recorded are not subscribed, all signals are limited to 5 Hz",
         scan_ms=500,
         trends_ms=500,
         judged_ms=200,
@@ -96,7 +98,7 @@ class LinkLoad:
             is_falling = self._looked_s is not None and late_s < self._late_before_s - FALLING_S
             self._looked_s, self._late_before_s = now_s, late_s
         else:
-            is_falling = True  # too early to tell
+            is_falling = True  # too early
         if self.step < top and (late_s > STEEP_ABOVE_S or not is_falling):
             if self._restored_s is not None and now_s - self._restored_s <= RELAPSE_WITHIN_S:
                 self._patience_s = min(2.0 * self._patience_s, PATIENCE_AT_MOST_S)
@@ -115,7 +117,7 @@ class LinkLoad:
         return level.trends_ms if signal in TRENDS else level.judged_ms
 
     def throttled(self, now_s: float) -> frozenset[str]:
-        """The signals whose rate is ours and not the car's, also until it has been measured anew."""
+        """The signals whose rate is set by our throttle, and until it is measured again."""
         if self.step:
             # Also where nothing is throttled: the bridge keeps one message of each, and loses the others of a burst.
             self._judged_since_s.update(dict.fromkeys(SIGNALS, now_s))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from server.bus.bus import LocalBus
+from server.bus.bus import SessionBus
 from server.recording.controller import SessionRecording
 from server.rosbridge.raw_frame import RawFrame
 from server.slowdown.command_target import GUARD_STATE
@@ -25,7 +25,7 @@ class MessageIntake:
     def __init__(
         self,
         vehicle: str,
-        bus: LocalBus,
+        bus: SessionBus,
         judgement: Judgement,
         recording: SessionRecording,
         slow_down: SlowDownController,
@@ -64,7 +64,7 @@ class MessageIntake:
             self._connection.subscriptions.unreadable(topic, why)
 
     def frame_received(self, frame: RawFrame) -> bool:
-        """A message that is only recorded goes to the recorder as it came: parsing it is no work for the loop."""
+        """Pass a message that is only recorded to the recorder unparsed, to keep the work off the loop."""
         connection = self._connection
         if connection is None or frame.topic in (GUARD_STATE, CLIENT_COUNT):
             return False

@@ -1,4 +1,4 @@
-"""Asks rosapi about the topics from which nothing comes: who publishes them, and whether the bridge passes them on."""
+"""Queries rosapi about topics without messages: publishers, and whether the bridge subscribes to them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ MOST_NAMED = 20
 class MissingWatch:
     """Of one car's connection. `now` is a monotonic clock in seconds.
 
-    `renew(topic)` subscribes anew, `remap()` follows a change of what is published, `resubscribe()` one of what the
-    watch itself needs, `noted(text)` logs.
+    `renew(topic)` renews a subscription, `remap()` follows a change of publishers, `resubscribe()` one of the watch's
+    own topics, `noted(text)` logs.
     """
 
     def __init__(
@@ -70,12 +70,12 @@ class MissingWatch:
         commanded: Collection[str | None],
         is_current: Callable[[], bool],
     ) -> None:
-        """Asks who publishes what does not come; where somebody does, subscribes anew. `candidates`: topics that could
-        carry a signal. `commanded`: where the car is commanded; there the bridge is a publisher once the slow-down is
-        armed, and nothing need come. Nothing is done once `is_current()` is false. Raises LinkDown."""
+        """Fetch the publishers of missing topics and renew those that have one. `candidates`: topics that could carry a
+        signal. `commanded`: the command topic, where the armed bridge is a publisher itself and no message is expected.
+        Stops once `is_current()` is false. Raises LinkDown."""
         topics = self.delivery.to_ask(self._now(), candidates)
         answers = await asyncio.gather(
-            *(discovery.ask_publishers(asks, topic, and_bridge=topic not in commanded) for topic in topics),
+            *(discovery.fetch_publishers(asks, topic, and_bridge=topic not in commanded) for topic in topics),
             return_exceptions=True,
         )
         if not is_current():
@@ -97,19 +97,19 @@ class MissingWatch:
         self.not_received = missing
         if news:
             self._named |= set(missing)
-            self._noted(f"No message comes from topics that have a publisher: {', '.join(news[:MOST_NAMED])}.")
+            self._noted(f"Topics with a publisher but no messages: {', '.join(news[:MOST_NAMED])}.")
 
     async def look_behind(self, asks: Asks) -> None:
-        """Asks whether the bridge subscribed to the signals' topics that have a publisher and do not arrive; subscribes
-        anew to those that another client stopped blocking. Raises LinkDown."""
+        """Fetch whether the bridge subscribed to published signal topics that do not arrive; renew those that another
+        client no longer blocks. Raises LinkDown."""
         needed = self._undelivered.needs_clients
         self._undelivered.follow(self.delivery.never_came(self._now()), self._now())
         if self._undelivered.needs_clients != needed:
             self._resubscribe()
         if self._undelivered.needs_clients and not self._undelivered.bridges:
-            nodes = await discovery.ask_publishers(asks, CLIENT_COUNT, and_bridge=True)
+            nodes = await discovery.fetch_publishers(asks, CLIENT_COUNT, and_bridge=True)
             self._undelivered.bridges = frozenset(nodes or ())
         for topic in self._undelivered.to_ask(self._now()):
-            self._undelivered.answered(topic, await discovery.ask_subscribers(asks, topic), self._now())
+            self._undelivered.answered(topic, await discovery.fetch_subscribers(asks, topic), self._now())
         for topic in self._undelivered.to_renew(self._now()):
             self._renew(topic)

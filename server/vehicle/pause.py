@@ -1,4 +1,4 @@
-"""The pause of a vehicle's monitoring: since when, ordered by whom, and what the log says of it."""
+"""The pause of a vehicle's monitoring: start, operator and log texts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Pause:
         if self.since_s is None:
             self.since_s, self.by = now_s, by
             state.set_paused(True)
-            self._logbook.note("paused", "Monitoring is paused: no alarm will come.", by=by)
+            self._logbook.note("paused", "Monitoring is paused: no alarm is raised.", by=by)
 
     def end(self, state: State, *, by: str) -> bool:
         """Whether there was one."""
@@ -27,7 +27,7 @@ class Pause:
             return False
         self.forget()
         state.set_paused(False)
-        self._logbook.note("resumed", "Monitoring goes on.", by=by)
+        self._logbook.note("resumed", "Monitoring continues.", by=by)
         return True
 
     def forget(self) -> None:
@@ -35,13 +35,13 @@ class Pause:
         self.since_s = self.by = None
 
     def go_on(self, state: State, before: RestoredState, now_s: float, wall_ms: int) -> None:
-        """A pause outlasts a restart: who ordered it counts on silence. It is said anew, and shown as ever."""
+        """Restore a pause after a restart, because its operator relies on it. It is logged again and shown."""
         if before.paused_s is not None:
             self.since_s, self.by = before.paused_s, before.paused_by
             state.set_paused(True, before.paused_s)
             self._logbook.note(
                 "paused",
-                "The server was restarted and monitoring is still paused: no alarm will come.",
+                "The server was restarted and monitoring is still paused: no alarm is raised.",
                 by=before.paused_by,
                 since_ms=round(wall_ms - (now_s - before.paused_s) * 1000),
             )

@@ -1,57 +1,26 @@
-"""The operator's phone between the page and the judge: its word on the server's clock, and its part of the state."""
+"""The operator's phone between the page and the judge: its part of the state."""
 
 from __future__ import annotations
 
-import math
-from typing import Any
+from typing import Literal
 
 from monitor.agreement import phone_sigma_m
 from monitor.phone_words import why_words
-from monitor.phones import PhoneView, PhoneWord
+from monitor.phones import PhoneView
 from monitor.state import Snapshot
-from monitor.values import PhoneFix
-from server.protocol import commands, serialize
+from server.protocol import serialize
+from server.protocol.operator_state import PhoneCompared, PhoneListed, PhonePlace
 
 MOST_SHOWN = 12
-AHEAD_S = 0.25  # by so much the server's time of day may be set back between two frames; more, and nothing is known
 
 
-def word(command: commands.Position, now_s: float, wall_ms: float, label: str = "") -> PhoneWord:
-    """What the phone said, its moment on the clock of `now_s`.
-
-    Three durations, each between two readings of one clock: how old the fix was when the page sent it (the page's), how
-    long ago the server told the time that the page echoes (the server's), and how long the page held that (the page's).
-    The last two leave the way there and back; the fix was measured within it, so in the middle give or take half.
-    """
-    fix = command.fix
-    if fix is None:
-        return PhoneWord(phone=command.phone, is_handheld=command.handheld, label=label, why=command.why)
-    way_s = (wall_ms - fix.heard_ms) / 1000 - fix.held_s
-    half_s = max(0.0, way_s) / 2 if way_s >= -AHEAD_S else math.inf
-    return PhoneWord(
-        phone=command.phone,
-        is_handheld=command.handheld,
-        label=label,
-        fix=PhoneFix(
-            lat_deg=fix.lat_deg,
-            lon_deg=fix.lon_deg,
-            accuracy_m=fix.accuracy_m,
-            alt_m=fix.alt_m,
-            speed_mps=fix.speed_mps,
-            heading_deg=fix.heading_deg,
-            at_ms=fix.at_ms,
-        ),
-        measured_s=now_s - fix.age_s - (half_s if math.isfinite(half_s) else 0.0),
-        uncertain_s=half_s,
-    )
-
-
-def as_json(view: PhoneView, now_s: float) -> dict[str, Any] | None:
-    """The `phone` of a state; None while no phone tells anything."""
+def as_json(view: PhoneView, now_s: float) -> PhoneCompared | None:
+    """The `phone` of a state; None while no phone reports."""
     if not view.is_there(now_s):
         return None
     newest = view.comparisons[-1] if view.comparisons else None
-    return _place(view, now_s, "the phone") | {
+    return {
+        **_place(view, now_s, "the phone"),
         "count": view.count,
         "choice": _choice(view, now_s),
         "choice_text": _choice_words(view, now_s),
@@ -63,17 +32,17 @@ def as_json(view: PhoneView, now_s: float) -> dict[str, Any] | None:
     }
 
 
-def all_as_json(views: tuple[PhoneView, ...], compared: PhoneView, now_s: float) -> list[dict[str, Any]]:
+def all_as_json(views: tuple[PhoneView, ...], compared: PhoneView, now_s: float) -> list[PhoneListed]:
     """The `phones` of a state: every one that is there; the one that is compared is never left out."""
     there = [view for view in views if view.is_there(now_s)]
     there.sort(key=lambda view: view.phone != compared.phone)
-    return [_place(view, now_s) | {"compared": view.phone == compared.phone} for view in there[:MOST_SHOWN]]
+    return [{**_place(view, now_s), "compared": view.phone == compared.phone} for view in there[:MOST_SHOWN]]
 
 
-def riding_words(snapshot: Snapshot, phone: str | None) -> str:
-    """What the log says when a phone was chosen."""
+def phone_in_car_text(snapshot: Snapshot, phone: str | None) -> str:
+    """The log text for the choice of a phone."""
     if phone is None:
-        return "No phone is chosen as the one in the car: the first with a usable position is used."
+        return "No phone is chosen as the phone in the car: the first with a usable position is used."
     label = (
         next((view.label for view in snapshot.phones if view.phone == phone), "")
         or "A phone that has not connected yet"
@@ -81,7 +50,7 @@ def riding_words(snapshot: Snapshot, phone: str | None) -> str:
     return f"{label} is in the car: it is compared with the car's position."
 
 
-def _choice(view: PhoneView, now_s: float) -> str:
+def _choice(view: PhoneView, now_s: float) -> Literal["operator", "only", "first", "none"]:
     if view.is_chosen:
         return "operator"
     if view.count == 1:
@@ -92,21 +61,22 @@ def _choice(view: PhoneView, now_s: float) -> str:
 def _choice_words(view: PhoneView, now_s: float) -> str:
     match _choice(view, now_s):
         case "operator":
-            return "This phone was chosen as the one in the car."
+            return "This phone was chosen as the phone in the car."
         case "only":
-            return "No phone was chosen as the one in the car. The only phone is used."
+            return "No phone was chosen as the phone in the car. The only phone is used."
         case "first":
             return (
-                f"No phone was chosen as the one in the car. Of {view.count}, the first with a usable position is used."
+                "No phone was chosen as the phone in the car. "
+                f"Of {view.count}, the first with a usable position is used."
             )
-    return f"No phone was chosen as the one in the car. None of {view.count} has a usable position."
+    return f"No phone was chosen as the phone in the car. None of {view.count} has a usable position."
 
 
-def _place(view: PhoneView, now_s: float, name: str = "this phone") -> dict[str, Any]:
-    """Where one phone is, or why it cannot tell."""
+def _place(view: PhoneView, now_s: float, name: str = "this phone") -> PhonePlace:
+    """The position of one phone, or the reason for none."""
     why, fix = view.why_not(now_s), view.fix
     return {
-        "id": view.phone,
+        "id": view.phone or "",
         "label": view.label or None,
         "handheld": view.is_handheld,
         "chosen": view.is_chosen,

@@ -1,4 +1,4 @@
-"""What a session answers beyond its state: where the car went, what it publishes besides, why a wish was refused."""
+"""A session's answers beyond its state: track, further topics, reasons of refusals."""
 
 from __future__ import annotations
 
@@ -13,21 +13,25 @@ from server.judge.reception_stats import Reception
 from server.judge.settings import BadSetting, Conflict
 from server.judge.topics import candidates
 from server.protocol import commands, serialize
+from server.protocol import drive_trends as drive
+from server.protocol.answers import SignalsAnswer, TrackPoints
+from server.protocol.messages import Answer
 from server.rosbridge import connection_errors
 from server.rosbridge.address import BadAddress
+from server.vehicle.judgement import Judgement
 
 REFUSALS = (commands.NotUnderstood, BadAddress, Refused, BadSetting, Conflict, OSError)  # what `refusal` has words for
 
 
-def refusal(why: Exception) -> dict[str, Any]:
-    """The answer to a wish that cannot be met, one of REFUSALS."""
+def refusal(why: Exception) -> Answer:
+    """The reply to a refused command, one of REFUSALS."""
     match why:
         case BadAddress():
             problem = connection_errors.of_bad_address(why)
             return {
                 "ok": False,
                 "reason": f"{problem.title} {problem.hint}".strip(),
-                "problem": problem.as_json() | {"suggestion": why.suggestion},
+                "problem": {**problem.as_json(), "suggestion": why.suggestion},
             }
         case NotInControl():
             return {"ok": False, "reason": why.reason, "held_by": why.holder.name if why.holder else None}
@@ -60,14 +64,30 @@ def track(snapshot: Snapshot) -> dict[str, Any]:
     }
 
 
-def track_points(snapshot: Snapshot, *, number: int, after: int) -> dict[str, Any]:
+def track_points(snapshot: Snapshot, *, number: int, after: int) -> TrackPoints:
     """The points of track `number` beyond point `after`, oldest first, as docs/protocol.md has them."""
     rows = [
-        [p.number, round(p.lat_deg, 7), round(p.lon_deg, 7), round(p.at_s, 1), _joins(p)]
+        (p.number, round(p.lat_deg, 7), round(p.lon_deg, 7), round(p.at_s, 1), _joins(p))
         for p in snapshot.track
         if p.number > after
     ]
     return {"number": number, "points": rows}
+
+
+def drive_trends(
+    judgement: Judgement, message: Mapping[str, Any], now_s: float, wall_ms: int
+) -> drive.DriveTrendsAnswer:
+    """A part of the drive since this car was dialled."""
+    trends = judgement.drive_trends
+    length_s = max(0.0, now_s - trends.since_s)
+    facts = drive.DriveFacts(
+        now_s=now_s,
+        start_ms=round(wall_ms - length_s * 1000),
+        length_s=length_s,
+        marks=judgement.marks,
+        marks_left_out=judgement.marks.left_out,
+    )
+    return drive.answer(trends, drive.Wanted.of(message), facts)
 
 
 def _joins(point: TrackPoint) -> int:
@@ -77,9 +97,9 @@ def _joins(point: TrackPoint) -> int:
 
 def signals(
     unmapped: Mapping[str, str], reception: Reception, offered: Mapping[str, str] | None = None
-) -> dict[str, Any]:
-    """Topics beyond the signals, what came that was no message, and which topics could carry each signal; `offered`
-    None: the bridge does not say what there is."""
+) -> SignalsAnswer:
+    """Topics beyond the signals, unreadable frames, and the possible topics of each signal; `offered` None: the topics
+    are unknown."""
     return {
         "candidates": None if offered is None else candidates(offered),
         "topics": [{"topic": name, "type": kind} for name, kind in sorted(unmapped.items())],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from server.bus.bus import LocalBus
+from server.bus.bus import SessionBus
 from server.vehicle import restore
 from server.vehicle.restore import RestoredState
 from server.vehicle.session_parts import SessionParts
@@ -16,7 +16,7 @@ class Restoration:
     def __init__(
         self,
         vehicle: str,
-        bus: LocalBus,
+        bus: SessionBus,
         parts: SessionParts,
         *,
         now: Callable[[], float],
@@ -40,7 +40,7 @@ class Restoration:
             if sentence:
                 event_log.note("restarted", sentence)
         if parts.settings.number_on(before.settings_version):
-            event_log.settings("The settings are not those that were last in force: they were lost.", by=None)
+            event_log.settings("The settings differ from the last ones in force, which were lost.", by=None)
         if before.address is not None or before.standing:
             self.held = before
             event_log.note("restarted", before.words(judgement.monitor.alarms))

@@ -1,4 +1,4 @@
-"""Asks whether ROS behind the bridge lives, and who else publishes commands."""
+"""Checks whether ROS behind the bridge is alive, and which other nodes publish commands."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from server.rosbridge.diagnosis import Diagnosis
-from server.rosbridge.link import RosLink
+from server.rosbridge.live_source import LiveSource
 from server.rosbridge.rosapi_client import Questions
 from server.vehicle import discovery
 
@@ -17,11 +17,11 @@ DOUBT_S = 0.5  # after a first failure: is it one?
 class RosWatch:
     """Of one car, over any number of openings. `now` is a monotonic clock in seconds.
 
-    `timed(asked_s, ros_s)`: when the time of ROS was asked for, and what it was.
+    `timed(asked_s, ros_s)`: the time of the call and the time of ROS.
     """
 
     def __init__(
-        self, link: RosLink | None, *, now: Callable[[], float], timed: Callable[[float, float], None]
+        self, link: LiveSource | None, *, now: Callable[[], float], timed: Callable[[float, float], None]
     ) -> None:
         """`link` None: no car is dialled."""
         self._now = now
@@ -34,15 +34,15 @@ class RosWatch:
         self.publishers: tuple[str, ...] | None = None  # who publishes there; None: not known
 
     def watch_commands(self, topic: str | None) -> None:
-        """From now on rosapi is asked who publishes there; None: nobody commands the car."""
+        """Set the command topic whose publishers are fetched; None: there is none."""
         if topic != self.commanded_on:
             self.commanded_on, self.publishers = topic, None
 
     async def ask(self, asks: Questions) -> bool | None:
-        """Asks; whether ROS answered. Raises LinkDown."""
-        alive = await discovery.ask_alive(asks, timed=partial(self._timed, self._now()))
+        """Call rosapi; return whether ROS answered. Raises LinkDown."""
+        alive = await discovery.fetch_alive(asks, timed=partial(self._timed, self._now()))
         if self.commanded_on is not None:
-            self.publishers = await discovery.ask_publishers(asks, self.commanded_on)
+            self.publishers = await discovery.fetch_publishers(asks, self.commanded_on)
         return alive
 
     def answered(self, alive: bool | None) -> None:

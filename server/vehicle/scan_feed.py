@@ -8,7 +8,7 @@ from monitor.instruments import ObstacleLimits, stopping_m
 from monitor.obstacle_view import corridor_ahead, is_blind, look_ahead
 from monitor.state import Snapshot
 from monitor.values import LaserScan, Twist
-from server.bus.bus import LocalBus
+from server.bus.bus import SessionBus
 from server.protocol import serialize
 
 SCAN_FRAME_S = 0.05  # pages are offered at most 20 scans a second
@@ -17,7 +17,7 @@ SCAN_FRAME_S = 0.05  # pages are offered at most 20 scans a second
 class ScanFeed:
     """The scans of one car since it was dialled."""
 
-    def __init__(self, vehicle: str, bus: LocalBus) -> None:
+    def __init__(self, vehicle: str, bus: SessionBus) -> None:
         self._vehicle = vehicle
         self._bus = bus
         self._number = 0
@@ -35,8 +35,8 @@ class ScanFeed:
         return now_s >= self._due_s and self._bus.wanted(self._vehicle, "scan")
 
     def put(self, snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bool, kinds_kept: bool) -> None:
-        """Offers the newest scan, and how it is judged. `was_active`: an obstacle is alarmed; `kinds_kept`: the
-        transport told NaN and ±Inf apart."""
+        """Publish the newest scan and its judgement. `was_active`: an obstacle alarm is active; `kinds_kept`: the
+        transport distinguishes NaN and ±Inf."""
         reading = snapshot.get("scan")
         if reading is not None and isinstance(reading.value, LaserScan):
             # Counted from when it was due: scans that come at just this rate come a little early as often as late.

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import Any
 
 from monitor.alarm import Transition
 from monitor.catalog import AnyCheck
 from monitor.load import AlarmLoad
-from server.bus.bus import LocalBus
+from server.bus.bus import SessionBus
 from server.judge.active_settings import ActiveSettings
 from server.judge.reception_stats import Tally
 from server.judge.settings import SettingsFile
+from server.protocol.state import LiveState, ServerState
 from server.recording.folder import RecordingsFolder
 from server.recording.recover import Recovered
 from server.rosbridge import address
 from server.rosbridge.address import BadAddress
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.link import RosLink
+from server.rosbridge.live_source import LiveSource, OpenSource
 from server.storage.storage_thread import StorageThread
+from server.system import log_context
 from server.system.supervision import Supervisor
 from server.vehicle import facts
 from server.vehicle.command_handler import CommandHandler
@@ -33,7 +35,7 @@ from server.vehicle.vitals import Vitals
 
 
 class Session:
-    """Shared by every page that looks at the vehicle. Runs on the loop it is started on.
+    """Shared by all pages of the vehicle. Runs on the loop that it is started on.
 
     `now` is a monotonic clock in seconds, `wall_ms` the time of day in ms since 1970.
     """
@@ -41,21 +43,22 @@ class Session:
     def __init__(
         self,
         vehicle: Vehicle,
-        bus: LocalBus,
+        bus: SessionBus,
         *,
         now: Callable[[], float],
         wall_ms: Callable[[], int],
-        server: Callable[[], dict[str, Any]],
+        server: Callable[[], ServerState],
         allowed_hosts: Collection[str] = (),
         checks: Sequence[AnyCheck] | None = None,
         settings: SettingsFile | None = None,
         recordings: RecordingsFolder | None = None,
         on_finished: Callable[[Path], None] = lambda _: None,
         storage: StorageThread | None = None,
+        open_source: OpenSource = RosLink,
     ) -> None:
         """`recordings` None: nothing is recorded. `on_finished` is called with each part that is.
 
-        `storage`: the thread that writes settings; None: the session does.
+        `storage`: the thread that writes settings; None: the session does. `open_source`: where messages come from.
         """
         self.vehicle = vehicle
         self._bus = bus
@@ -76,6 +79,7 @@ class Session:
             recordings=recordings,
             on_finished=on_finished,
             frame=self.frame,
+            open_source=open_source,
             now=now,
             wall_ms=wall_ms,
         )
@@ -89,7 +93,7 @@ class Session:
 
     async def start(self) -> None:
         """Begins to tick, and dials where the vehicle's address is known."""
-        self._bus.serve(self.vehicle.name, self._commands.handle)
+        self._bus.serve(self.vehicle.name, log_context.keeping(self._commands.handle))
         self._tick.restart()
         self._parts.publisher.restart()
         self._supervisor.keep("judge", self._tick.loop)
@@ -118,7 +122,7 @@ class Session:
 
     @property
     def phase(self) -> str:
-        """idle, connecting, failed, monitoring or lost; docs/protocol.md says what they mean."""
+        """idle, connecting, failed, monitoring or lost; see docs/protocol.md."""
         return self._parts.connection.phase
 
     @property
@@ -161,7 +165,7 @@ class Session:
         return self._parts.judgement.reception.by_signal
 
     def vitals(self) -> Vitals:
-        """The ages that say whether this session does its work."""
+        """The ages for the health check of this session."""
         now_s = self._now()
         return Vitals(
             tick_age_s=self._tick.age_s(now_s),
@@ -171,7 +175,7 @@ class Session:
             task_problems=(*self._supervisor.problems(), *self._attempts.problems()),
         )
 
-    def frame(self) -> dict[str, Any]:
+    def frame(self) -> LiveState:
         """The whole state, as `/api/state` answers it."""
         now_s = self._now()
         self._tick.watch_link(now_s)
@@ -180,16 +184,17 @@ class Session:
             self._parts,
             now_s,
             wall_ms=self._wall_ms(),
-            server=self._server() | {"loop_lag_ms": round(self._tick.lag_s * 1000, 1)},
             configured=self.configured,
             held=self._restoration.held,
             log_trouble=self.log_trouble,
         )
-        return state_frame(found, self._parts.judgement.state.snapshot(now_s), self._parts.judgement.monitor)
+        shown = state_frame(found, self._parts.judgement.state.snapshot(now_s), self._parts.judgement.monitor)
+        return {**shown, "server": {**self._server(), "loop_lag_ms": round(self._tick.lag_s * 1000, 1)}}
 
     def alarms_changed(self, transitions: Collection[Transition]) -> None:
         self._parts.event_log.tell(transitions, self._parts.judgement.monitor.alarms, self._now())
         self._parts.publisher.put_soon()
+        self._tick.summary.put()
 
     # -- orders (SessionActions) -------------------------------------------------------------------------------------
 
@@ -198,7 +203,7 @@ class Session:
         target = address.parse(typed if typed.strip() else self.vehicle.address or "")
         if self._allowed_hosts and target.host not in self._allowed_hosts and target.shown not in self._allowed_hosts:
             raise BadAddress(
-                f"{target.shown} is not among the vehicles this server may dial.",
+                f"{target.shown} is not among the vehicles that this server may connect to.",
                 "Ask whoever started the server.",
                 code="not_allowed",
             )
@@ -255,7 +260,7 @@ class Session:
 
     # -- what the connection reports (ConnectionObserver) ------------------------------------------------------------
 
-    def connection_opened(self, link: RosLink) -> None:
+    def connection_opened(self, link: LiveSource) -> None:
         self._parts.recording.link_opened(self.address_url)
         self._parts.recording.link(phase="monitoring", problem=None)
         self._parts.slow_down.link_opened(link)

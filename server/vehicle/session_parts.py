@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from monitor.alarm import Transition
 from monitor.catalog import AnyCheck
-from server.bus.bus import LocalBus
+from server.bus.bus import SessionBus
 from server.control.authorization import Authorization
 from server.judge.active_settings import ActiveSettings
+from server.protocol.state import LiveState
 from server.recording.controller import SessionRecording
 from server.recording.folder import RecordingsFolder
-from server.rosbridge.link import RosLink
+from server.rosbridge.live_source import LiveSource, OpenSource
 from server.slowdown.controller import SlowDownController
 from server.system.supervision import Supervisor
 from server.vehicle.connection import Connection, ConnectionObserver
@@ -71,7 +72,7 @@ class SessionObserver(ConnectionObserver, Protocol):
 
 def session_parts(
     vehicle: str,
-    bus: LocalBus,
+    bus: SessionBus,
     *,
     observer: SessionObserver,
     supervisor: Supervisor,
@@ -80,7 +81,8 @@ def session_parts(
     settings: ActiveSettings,
     recordings: RecordingsFolder | None,
     on_finished: Callable[[Path], None],
-    frame: Callable[[], dict[str, Any]],
+    frame: Callable[[], LiveState],
+    open_source: OpenSource,
     now: Callable[[], float],
     wall_ms: Callable[[], int],
 ) -> SessionParts:
@@ -92,7 +94,7 @@ def session_parts(
         settings,
         now=now,
         wall_ms=wall_ms,
-        told=on_finished,
+        on_finished=on_finished,
         unreadable=lambda topic, why: intake.recorded_unreadable(topic, why),
     )
     event_log = EventLog(vehicle, bus, settings, wall_ms=wall_ms, also=recording.events)
@@ -102,19 +104,19 @@ def session_parts(
     )  # fmt: skip
     intake = MessageIntake(vehicle, bus, judgement, recording, slow_down, attempts, now=now)
 
-    def subscriptions(link: RosLink | None) -> Subscriptions:
+    def subscriptions(link: LiveSource | None) -> Subscriptions:
         return Subscriptions(
             link,
             settings,
             now=now,
             proved=lambda: connection.prove(),
-            recognised=lambda title: observer.settings_changed([f"Taken for: {title}"], by=None),
+            recognised=lambda title: observer.settings_changed([f"Vehicle profile: {title}"], by=None),
             learned=recording.learn,
             noted=lambda text: event_log.note("not_received", text),
             timed=lambda asked_s, ros_s: judgement.transport.clock.answered(asked_s, now(), ros_s),
         )
 
-    connection = Connection(vehicle, observer, intake, subscriptions, supervisor, now=now)
+    connection = Connection(vehicle, observer, intake, subscriptions, open_source, supervisor, now=now)
     intake.follow(connection)
     return SessionParts(
         settings=settings,

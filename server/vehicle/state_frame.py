@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from monitor import catalog, values
 from monitor.instruments import stopping_m, time_gap_s
+from monitor.link import Phase
 from monitor.load import AlarmLoad
 from monitor.runner import Monitor
 from monitor.signals import SIGNALS, Signal
@@ -16,6 +17,11 @@ from monitor.trends import Piece
 from server.judge.reception_stats import Reception, Tally
 from server.judge.topics import Source
 from server.protocol import serialize
+from server.protocol.operator_state import OperatorsState
+from server.protocol.recording_state import RecordingState
+from server.protocol.signal_state import SignalFreshness, SignalState, SignalValue
+from server.protocol.slow_down_state import SlowDownState
+from server.protocol.state import Cut, HeldState, LinkState, NearestState, RecordedState, SessionState
 from server.rosbridge import connection_errors
 from server.rosbridge.address import Address
 from server.rosbridge.connection_errors import Problem
@@ -23,7 +29,7 @@ from server.vehicle import phone
 from server.vehicle.restore import RestoredState
 
 if TYPE_CHECKING:  # a replay shows states too, and has no use for all that dials
-    from server.rosbridge.link import RosLink
+    from server.rosbridge.live_source import LiveSource
 
 CAR_SILENT_S = 1.4  # said before 2 s are over
 OVERDUE_PERIODS = 3
@@ -38,10 +44,9 @@ class Facts:
     """What only the session knows; `…_s` without `for` are moments of its monotonic clock."""
 
     vehicle: str
-    server: Mapping[str, Any]
     now_s: float
     wall_ms: int
-    phase: str
+    phase: Phase
     address: Address | None
     ros_version: int | None
     connected_s: float | None
@@ -55,7 +60,7 @@ class Facts:
     since_s: float
     dialled_s: float
     problem: Problem | None
-    link: RosLink | None
+    link: LiveSource | None
     last_message_s: float | None
     ros_answered_s: float | None
     ros_alive: bool | None
@@ -69,20 +74,16 @@ class Facts:
     track_number: int  # of this run of the server; another number is another track
     configured: str | None = None  # the address of the car the session was started for
     topics_judged: int = 0  # subscribed to for their signals
-    recording: Mapping[str, Any] = field(default_factory=lambda: {"state": "off", "for_s": None})
-    decelerate: Mapping[str, Any] = field(
-        default_factory=lambda: {"state": "not_available", "why": "Nothing is ordered of a recording."}
-    )
-    # Who is in control and whom an alarm reaches: of a recording, nobody.
-    operators: Mapping[str, Any] = field(default_factory=lambda: {"control": {"holder": None}, "reach": None})
+    recording: RecordingState
+    decelerate: SlowDownState
+    operators: OperatorsState
 
 
-def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str, Any]:
-    """The object of `GET /api/state`, without its `seq`."""
+def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> RecordedState:
+    """A state without its `server`."""
     return {
         "kind": "state",
         "vehicle": facts.vehicle,
-        "server": dict(facts.server),
         "session": _session(facts, snapshot),
         "link": _link(facts, snapshot),
         "signals": {name: _signal(signal, facts, snapshot) for name, signal in SIGNALS.items()},
@@ -97,15 +98,15 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> dict[str,
         "log_trouble": facts.log_trouble,
         "trends": serialize.trends(facts.trends),
         "limits": catalog.flat(monitor.limits),
-        "recording": dict(facts.recording),
-        "decelerate": dict(facts.decelerate),
+        "recording": facts.recording,
+        "decelerate": facts.decelerate,
         **facts.operators,
         "phone": phone.as_json(snapshot.phone, facts.now_s),
         "phones": phone.all_as_json(snapshot.phones, snapshot.phone, facts.now_s),
     }
 
 
-def _session(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
+def _session(facts: Facts, snapshot: Snapshot) -> SessionState:
     connected_for = facts.now_s - facts.connected_s if facts.connected_s is not None else None
     return {
         "phase": facts.phase,
@@ -127,13 +128,13 @@ def _session(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
     }
 
 
-def _held(before: RestoredState | None) -> dict[str, Any] | None:
+def _held(before: RestoredState | None) -> HeldState | None:
     if before is None:
         return None
     return {"address": before.address, "alarms": len(before.standing), "paused": before.paused_s is not None}
 
 
-def _link(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
+def _link(facts: Facts, snapshot: Snapshot) -> LinkState:
     cut, problem, heard_s = where_cut(facts, snapshot)
     link = facts.link
     bridge_heard_s = link.heard_s if link is not None else None
@@ -158,9 +159,9 @@ def _link(facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
     }
 
 
-def where_cut(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Problem | None, float | None]:
-    """Which wire of the chain is broken, why, and when what lies beyond it was last heard. A part behind the bridge may
-    have failed while messages still come: then no wire is broken, and the problem is named all the same."""
+def where_cut(facts: Facts, snapshot: Snapshot) -> tuple[Cut | None, Problem | None, float | None]:
+    """The broken connection of the chain, its cause, and the last contact beyond it. If a part behind the bridge fails
+    while messages still arrive, no connection is broken, but the problem is still reported."""
     if facts.phase == "idle":
         return None, None, None
     heard_s = facts.link.heard_s if facts.link is not None else None
@@ -173,7 +174,7 @@ def where_cut(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Problem | N
     return _behind_the_bridge(facts, snapshot)
 
 
-def _behind_the_bridge(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Problem | None, float | None]:
+def _behind_the_bridge(facts: Facts, snapshot: Snapshot) -> tuple[Cut | None, Problem | None, float | None]:
     last_s = facts.last_message_s
     opened_s = max(facts.since_s, facts.connected_s or facts.since_s)
     answered_s = facts.ros_answered_s
@@ -193,18 +194,18 @@ def _behind_the_bridge(facts: Facts, snapshot: Snapshot) -> tuple[str | None, Pr
 
 
 def _shortest_period_s(snapshot: Snapshot) -> float:
-    """Of the signals heard; 0 where none has a known period. A car whose fastest signal comes each second gets 3 s."""
+    """Of the received signals; 0 if none has a known period. A car whose fastest signal has 1 Hz gets 3 s."""
     return min((r.period_s for r in snapshot.readings.values() if r.period_s and r.count), default=0.0)
 
 
-def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> dict[str, Any]:
+def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[SignalValue]:
     source = facts.sources.get(signal.name)
     reading: Reading[Any] | None = snapshot.readings.get(signal.name)
     tally = facts.reception.by_signal.get(signal.name) or Tally()
     rate = snapshot.rates.get(signal.name)
     extent = snapshot.extents.get(signal.name)
     unusable = snapshot.unusable.get(signal.name)
-    freshness: str
+    freshness: SignalFreshness
     if reading is not None:
         freshness = reading.freshness(facts.now_s)
     elif source is not None and source.decode is not None:
@@ -250,7 +251,7 @@ def _unknown_part(value: Any) -> str | None:
     return None
 
 
-def _nearest(snapshot: Snapshot, monitor: Monitor) -> dict[str, float | None]:
+def _nearest(snapshot: Snapshot, monitor: Monitor) -> NearestState:
     """Time gap and stopping distance, from speed and nearest object while both are fresh."""
     speed: values.Twist | None = _fresh(snapshot, "speed")
     distance: values.Distance | None = _fresh(snapshot, "distance")

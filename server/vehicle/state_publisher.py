@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import Any
 
 import orjson
 
-from server.bus.bus import LocalBus
+from server.bus.bus import SessionBus
+from server.protocol.state import LiveState
 
 log = logging.getLogger("catgraph.session")
 
@@ -20,7 +20,7 @@ class StatePublisher:
     """The states of one vehicle. `make` makes the frame; `now` is a monotonic clock in seconds."""
 
     def __init__(
-        self, vehicle: str, bus: LocalBus, make: Callable[[], dict[str, Any]], *, now: Callable[[], float]
+        self, vehicle: str, bus: SessionBus, make: Callable[[], LiveState], *, now: Callable[[], float]
     ) -> None:
         self._vehicle = vehicle
         self._bus = bus
@@ -55,7 +55,7 @@ class StatePublisher:
         except Exception as error:
             if self._failure != (failure := f"{type(error).__name__}: {error}"):
                 self._failure = failure
-                log.exception("no state of %s can be made", self._vehicle)
+                log.exception("state failed: vehicle=%s", self._vehicle)
         else:
             self._failure, self._put_s = "", self._now()
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 
 from server.judge.topics import Source
 from server.recording.recorded_topics import Also
-from server.rosbridge.link import RosLink
+from server.rosbridge.live_source import LiveSource
 from server.rosbridge.subscription import Subscription
 from server.vehicle import wanted_topics
 from server.vehicle.cbor_use import CborUse
@@ -25,7 +25,7 @@ class SubscriptionTable:
 
     def __init__(
         self,
-        link: RosLink | None,
+        link: LiveSource | None,
         definitions: TypeDefinitions,
         delivery: Delivery,
         *,
@@ -66,7 +66,7 @@ class SubscriptionTable:
         *,
         needs_client_count: bool,
     ) -> None:
-        """Brings the link's rows to what is wanted now. `offered` None: the bridge does not say what there is."""
+        """Update the link's subscriptions to the wanted ones. `offered` None: the topics are unknown."""
         known, too_large, compression = self._definitions, self.large.left, self.cbor.compression
         wanted = wanted_topics.judged(
             by_topic, self.load, without=too_large, asked=known.asked, fit=known.fit, compression=compression
@@ -93,13 +93,13 @@ class SubscriptionTable:
         return by_topic
 
     def renew_by_name(self) -> None:
-        """A bridge forgets a subscription without a type where nobody publishes the topic yet."""
+        """A bridge drops a subscription without a type if the topic has no publisher yet."""
         now_s = self._now()
         if self._by_name_s is None or now_s - self._by_name_s < self._by_name_pause_s:
             return
         self._by_name_s, self._by_name_pause_s = now_s, min(self._by_name_pause_s * 2, BY_NAME_LAST_S)
         for row in self.rows:
-            if row.type is None and self._delivery.never_heard(row.topic):
+            if row.type is None and self._delivery.never_received(row.topic):
                 self._renew(row.topic)
 
     def is_cbor(self, topic: str) -> bool:

@@ -10,8 +10,8 @@ from server.judge.active_settings import ActiveSettings
 from server.judge.topics import Source, could_carry
 from server.recording.recorded_topics import Also, Missing
 from server.rosbridge.connection_errors import Problem
-from server.rosbridge.link import RosLink
 from server.rosbridge.link_errors import LinkDown
+from server.rosbridge.live_source import LiveSource
 from server.rosbridge.rosapi_client import Asks
 from server.vehicle import discovery
 from server.vehicle.missing_watch import MissingWatch
@@ -33,7 +33,7 @@ class Subscriptions:
 
     def __init__(
         self,
-        link: RosLink | None,
+        link: LiveSource | None,
         tuning: ActiveSettings,
         *,
         now: Callable[[], float],
@@ -43,8 +43,7 @@ class Subscriptions:
         noted: Callable[[str], None] = lambda _: None,
         timed: Callable[[float, float], None] = lambda *_: None,
     ) -> None:
-        """`link` None: no car is dialled, and nothing is known of any. `timed`: when the time of ROS was asked for, and
-        what it was."""
+        """`link` None: no car is dialled. `timed`: the time of the call and the time of ROS."""
         self._link = link
         self._tuning = tuning
         self._now = now
@@ -70,7 +69,7 @@ class Subscriptions:
         self.ros_version: int | None = None
 
     async def run(self) -> None:
-        """While this opening lasts: looks at what the car offers, and asks whether ROS behind the bridge lives."""
+        """While this connection is open: fetch the car's topics, and check whether ROS is alive."""
         link, ros, asks = self._link, self.ros, self.ros.asks
         looked_s = -LOOK_AGAIN_S
         self._missing.opened()
@@ -97,7 +96,7 @@ class Subscriptions:
                 return
             if ros.diagnosis.is_rosbridge:
                 self._proved()
-            if ros.diagnosis.master_came_back():
+            if ros.diagnosis.master_restarted():
                 self.table.renew_all()
             ros.answered(alive)
             await asyncio.sleep(ros.pause_s)
@@ -113,7 +112,7 @@ class Subscriptions:
 
     @property
     def offered(self) -> Mapping[str, str] | None:
-        """Topic → type of all the car has, as its bridge spells them; None while the bridge does not say."""
+        """Topic → type of all topics, as the bridge spells them; None while unknown."""
         return self._offer.topics if self._offer is not None else None
 
     @property
@@ -147,7 +146,7 @@ class Subscriptions:
     # -- what others want --------------------------------------------------------------------------------------------
 
     def watch_commands(self, topic: str | None, *, guard: str | None) -> None:
-        """From now on rosapi is asked who publishes there; None: nobody commands the car. `guard`: a topic besides."""
+        """Set the command topic whose publishers are fetched; None: there is none. `guard`: a further topic."""
         self.ros.watch_commands(topic)
         if guard != self.table.guard:
             self.table.guard = guard
@@ -163,7 +162,7 @@ class Subscriptions:
         return changed
 
     def record(self, also: Also) -> None:
-        """Which topics are to be recorded beyond those that carry signals; nobody judges them."""
+        """The topics that are recorded only."""
         if also != self.table.also:
             self.table.also, self._look_soon = also, True
             if self._offer is not None:
@@ -206,7 +205,7 @@ class Subscriptions:
         """A message of a recorded topic could not be read: as JSON its text is recorded, whatever it holds."""
         if self._offer is not None and self.table.is_cbor(topic):
             self._subscribe_anew(topic)
-            self._noted(f"{topic} is received as JSON from now on: {why} could not be read, and is not recorded.")
+            self._noted(f"{topic} is now received as JSON: {why} could not be read, and is not recorded.")
 
     def fell_silent(self) -> None:
         """The link was given up because the bridge did not answer."""
@@ -217,7 +216,7 @@ class Subscriptions:
 
     def _note_left(self, topics: list[str]) -> None:
         for topic in topics:
-            self._noted(f"{topic} is not received any more: while it is asked for, the bridge does not answer in time.")
+            self._noted(f"{topic} is no longer received: while it is subscribed, the bridge does not answer in time.")
 
     def bridge_complains(self, text: str) -> None:
         """An error the bridge states."""
@@ -231,8 +230,8 @@ class Subscriptions:
 
     # -- subscribing -------------------------------------------------------------------------------------------------
 
-    async def _look(self, link: RosLink, asks: Asks) -> None:
-        offer = await discovery.ask_topics(asks)
+    async def _look(self, link: LiveSource, asks: Asks) -> None:
+        offer = await discovery.fetch_topics(asks)
         if link is not self._link:
             return
         if offer is None:

@@ -8,11 +8,12 @@ from collections.abc import Callable
 from functools import partial
 
 from monitor.state import LinkFacts
-from server.bus.bus import LocalBus
+from server.bus.bus import SessionBus
 from server.judge.pipeline import TICK_S
 from server.recording.delay import LinkDelay
 from server.slowdown.command_target import GUARD_STATE, target_of
 from server.vehicle import facts
+from server.vehicle.car_summary import SummaryPublisher
 from server.vehicle.link_load import RESTORE_BELOW_S
 from server.vehicle.session_parts import SessionParts
 from server.vehicle.tick_parts import LogKeeper, OpenFilesWatch, TickParts
@@ -21,8 +22,8 @@ log = logging.getLogger("catgraph.session")
 
 FRAME_TICKS = 2  # a state is put on the bus with every second tick, ten a second
 READ_UP_S = 0.1  # to read what waits after the loop stood still
-TELL_STALL_S = 2.0  # a page that was covered for so long is told why
-SICK_LOOP_S = 0.25  # a loop later than this lets one heartbeat fall: a sign of life from a sick server is a lie
+TELL_STALL_S = 2.0  # a stall this long is logged, because pages were covered
+SICK_LOOP_S = 0.25  # a loop later than this skips one heartbeat, which would otherwise hide the stall
 
 
 class Tick:
@@ -33,7 +34,7 @@ class Tick:
         vehicle: str,
         parts: SessionParts,
         attempts: TickParts,
-        bus: LocalBus,
+        bus: SessionBus,
         *,
         now: Callable[[], float],
         wall_ms: Callable[[], int],
@@ -48,6 +49,7 @@ class Tick:
         self._wall_ms = wall_ms
         self._log_keeper = LogKeeper(parts.event_log, bus)
         self._open_files = OpenFilesWatch()
+        self.summary = SummaryPublisher(vehicle, parts, bus, now=now, wall_ms=wall_ms)
 
     @property
     def log_trouble(self) -> str | None:
@@ -75,14 +77,14 @@ class Tick:
                 self.run(self._now(), put=self.lag_s <= SICK_LOOP_S and self._count % FRAME_TICKS == 0)
                 self._ended_s = self._now()
             except Exception:  # the one net: a fault in a tick must not end the ticking
-                log.exception("a tick of %s failed", self._vehicle)
+                log.exception("tick failed: vehicle=%s", self._vehicle)
             due_s = max(due_s + TICK_S, loop.time())
             await asyncio.sleep(due_s - loop.time())
 
     async def _catch_up(self) -> None:
         """After the loop stood still: what the car sent meanwhile waits to be read, and its silence was ours."""
         if self.lag_s > TELL_STALL_S:
-            text = f"The server stood still for {self.lag_s:.1f} s: nothing was judged meanwhile."
+            text = f"The server stalled for {self.lag_s:.1f} s: nothing was evaluated meanwhile."
             self._parts.event_log.note("stalled", text)
         await asyncio.sleep(READ_UP_S)
 
@@ -101,8 +103,10 @@ class Tick:
         judgement, publisher = self._parts.judgement, self._parts.publisher
         judgement.monitor.failed_parts = self._attempts.failed
         judgement.judge(now_s)
-        if put and not publisher.is_due:
-            publisher.put()
+        if put:
+            if not publisher.is_due:
+                publisher.put()
+            self.summary.tick(now_s)
 
     def slow_down_ordered(self, now_s: float) -> None:
         """The slow-down and the checks act on an order at once."""
@@ -120,7 +124,7 @@ class Tick:
         topics, transport = self._parts.connection.subscriptions, self._parts.judgement.transport
         if self._parts.connection.phase == "monitoring" and topics.watch_load(transport.queued_s(now_s)):
             late_s = transport.late_s(now_s)
-            why = f"The link is slow, {late_s:.1f} s late" if late_s > RESTORE_BELOW_S else "The link is in time"
+            why = f"The link is slow, {late_s:.1f} s late" if late_s > RESTORE_BELOW_S else "The link is fast enough"
             self._parts.event_log.note(
                 "reduced", f"{why}. {topics.table.load.level.words}.", step=topics.table.load.step
             )

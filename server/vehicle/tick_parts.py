@@ -5,13 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
-from server.bus.bus import LocalBus
+from server.bus.bus import SessionBus
 from server.system import open_files
 from server.vehicle.event_log import EventLog
 
 log = logging.getLogger("catgraph.session")
 
-EVERY_S = 1.0  # how often the log is asked whether it is kept, and open files are counted
+EVERY_S = 1.0  # interval of checking the log and counting open files
 
 
 class TickParts:
@@ -27,7 +27,7 @@ class TickParts:
             work()
         except Exception as error:
             if part not in self._failed:
-                log.exception("the part %s of %s fails", part, self._vehicle)
+                log.exception("part failed: part=%s vehicle=%s", part, self._vehicle)
             self._failed[part] = f"{type(error).__name__}: {error}"[:200]
         else:
             self._failed.pop(part, None)
@@ -42,9 +42,9 @@ class TickParts:
 
 
 class LogKeeper:
-    """Asks now and then whether the event log is kept."""
+    """Checks periodically whether the event log is stored."""
 
-    def __init__(self, event_log: EventLog, bus: LocalBus) -> None:
+    def __init__(self, event_log: EventLog, bus: SessionBus) -> None:
         self._event_log = event_log
         self._bus = bus
         self._looked_s = -EVERY_S
@@ -58,7 +58,7 @@ class LogKeeper:
 
 
 class OpenFilesWatch:
-    """Looks now and then whether files and connections can still be opened."""
+    """Checks periodically whether files and connections can be opened."""
 
     def __init__(self) -> None:
         self._looked_s = -EVERY_S

@@ -26,16 +26,16 @@ class TypeDefinitions:
     def __init__(self, learned: Callable[[Mapping[str, str]], None], changed: Callable[[], None]) -> None:
         self._learned = learned
         self._changed = changed
-        self._unanswered: set[str] = set()  # asked for, and rosapi said nothing
+        self._unanswered: set[str] = set()  # fetched without an answer of rosapi
         self._tries = 0
         self._task: asyncio.Task[None] | None = None
         self._ended = False
-        self.asked: set[str] = set()  # types whose definitions the bridge was asked for
+        self.asked: set[str] = set()  # types whose definitions were requested
         self.fit: set[str] = set()  # of those, the ones that arrive as CBOR
         self.may_be_large: set[str] = set()  # types that have arrays without a bound
 
     def learn(self, asks: Asks, topics: Mapping[str, str], ros_version: int | None) -> None:
-        """Begins to ask for what is not known yet of the types of these topics; does nothing while it asks."""
+        """Start to fetch unknown type definitions of these topics; does nothing while a fetch runs."""
         if self._task is None:
             self._task = asyncio.create_task(self._ask(asks, topics, ros_version), name="definitions")
             self._task.add_done_callback(self._done)
@@ -56,13 +56,13 @@ class TypeDefinitions:
         ros: RosVersion | None = 1 if ros_version == 1 else 2 if ros_version == 2 else None
         found: dict[str, str] = {}
         try:
-            found = await discovery.ask_definitions(asks, types, ros)
+            found = await discovery.fetch_definitions(asks, types, ros)
         except LinkDown:
             return
         except CallFailed as why:
             self._tries += 1
-            self._unanswered |= types  # recorded as far as they are known without it, and asked for again
-            log.warning("rosapi does not give the definitions of %d types: %s", len(types), why)
+            self._unanswered |= types  # recorded with what is known, and fetched again
+            log.warning("type definitions missing: count=%d types=%s", len(types), why)
         else:
             self._tries = 0
             self._unanswered.clear()
@@ -78,4 +78,4 @@ class TypeDefinitions:
     def _done(self, task: asyncio.Task[None]) -> None:
         self._task = None
         if not task.cancelled() and task.exception() is not None:
-            log.error("the definitions of types could not be learned", exc_info=task.exception())
+            log.error("type definitions not learned", exc_info=task.exception())

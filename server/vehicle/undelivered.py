@@ -1,7 +1,7 @@
-"""Which topics a bridge does not pass on although they have a publisher, and why: by what rosapi says of subscribers.
+"""Published topics that a bridge does not deliver, and the cause, by rosapi's list of subscribers.
 
-A topics_glob keeps the bridge from subscribing at all. A client that subscribed with cbor-raw before us leaves the
-bridge subscribed, and us without messages. Neither is ever reported. Pure: time is an argument.
+A topics_glob prevents the bridge from subscribing. After another client's cbor-raw subscription the bridge is
+subscribed, and we get no messages. The bridge reports neither. Pure: time is an argument.
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ class Passing:
             self._since_s.setdefault(topic, now_s)
 
     def to_ask(self, now_s: float) -> list[str]:
-        """Topics whose subscribers are to be asked for now; none while it is not known which node is the bridge."""
+        """Topics whose subscribers to fetch now; none while the bridge's node is unknown."""
         if not self.bridges:
             return []
         due = [topic for topic in self._since_s if now_s - self._asked_s.get(topic, -math.inf) >= AGAIN_S]
         return sorted(due, key=lambda topic: self._asked_s.get(topic, -math.inf))[:AT_ONCE]
 
     def answered(self, topic: str, subscribers: tuple[str, ...] | None, now_s: float) -> None:
-        """Which nodes subscribe to a topic; None: rosapi does not say."""
+        """The nodes that subscribe to a topic; None: unknown."""
         self._asked_s[topic] = now_s
         before = self._is_subscribed.pop(topic, None)
         if subscribers is None:

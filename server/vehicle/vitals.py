@@ -13,7 +13,7 @@ LATE_RECORDER_S = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vitals:
-    """What health looks at. Ages in seconds."""
+    """The input of the health check. Ages in seconds."""
 
     tick_age_s: float  # since every check was last judged
     state_age_s: float | None  # since a state was made for the pages; None: no page is connected
@@ -26,9 +26,9 @@ def problems(vitals: Vitals) -> list[str]:
     """What is wrong, a sentence each, worst first; empty: well."""
     found = []
     if vitals.tick_age_s > LATE_TICK_S:
-        found.append(f"No check was judged for {vitals.tick_age_s:.1f} s.")
+        found.append(f"No check was evaluated for {vitals.tick_age_s:.1f} s.")
     if vitals.state_age_s is not None and vitals.state_age_s > LATE_STATE_S:
-        found.append(f"The pages got no state for {vitals.state_age_s:.1f} s.")
+        found.append(f"No state was sent to pages for {vitals.state_age_s:.1f} s.")
     found += vitals.task_problems
     if vitals.log_trouble is not None:
         found.append(vitals.log_trouble)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
-from server.judge.topics import BY_SIGNAL, TOPICS, Source
+from server.judge.signals import TOPICS
+from server.judge.topics import BY_SIGNAL, Source
 from server.recording import recorded_topics
 from server.recording.recorded_topics import Also
 from server.rosbridge.subscription import Subscription
@@ -31,7 +32,7 @@ def judged(
     fit: Collection[str],
     compression: Compression,
 ) -> dict[str, Subscription]:
-    """The subscriptions that signals need. `asked`: types whose definitions are known; `fit`: those fit for CBOR."""
+    """The subscriptions of the signals. `asked`: types whose definitions are known; `fit`: those fit for CBOR."""
     wanted: dict[str, Subscription] = {}
     for topic, sources in by_topic.items():
         rows = [BY_SIGNAL[source.signal] for source in sources if source.decode is not None]

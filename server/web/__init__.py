@@ -1,1 +1,1 @@
-"""What a browser asks for: routes, files and the two sockets."""
+"""The HTTP side: routes, files and the page's socket."""

@@ -6,13 +6,13 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from server.bus.bus import LocalBus
+from server.bus.bus import PageBus
 
 
 class EventFeed:
     """Of one page and vehicle. `on_read` is called when events that were not in memory have been read."""
 
-    def __init__(self, bus: LocalBus, vehicle: str, on_read: Callable[[], None]) -> None:
+    def __init__(self, bus: PageBus, vehicle: str, on_read: Callable[[], None]) -> None:
         self._bus = bus
         self._vehicle = vehicle
         self._on_read = on_read

@@ -20,7 +20,7 @@ class FairWakeup:
         return len(self._urgent) + len(self._line)
 
     def queue(self, event: asyncio.Event, *, is_urgent: bool = False) -> None:
-        """At the end of the line; what is urgent goes before all that is not."""
+        """Append to the queue; urgent entries precede all others."""
         if is_urgent:
             self._line.pop(event, None)
             self._urgent[event] = None

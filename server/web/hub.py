@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 from starlette.websockets import WebSocket
 
 from server.access.identity import LOCAL, Principal
-from server.bus.bus import LocalBus
+from server.bus.bus import PageBus
+from server.protocol import replay_commands
+from server.protocol.messages import Hello
 from server.protocol.rate_limit import Limits
-from server.replay import commands as replay_commands
+from server.protocol.state import ServerState
 from server.replay.manager import ReplayManager
+from server.web.cars_board import CarsBoard
 from server.web.fair_wakeup import FairWakeup
 from server.web.page_socket import Page
 
@@ -24,14 +26,15 @@ class Hub:
 
     def __init__(
         self,
-        bus: LocalBus,
+        bus: PageBus,
         *,
         replays: ReplayManager,
-        server: Callable[[], Mapping[str, Any]],
+        server: Callable[[], ServerState],
         limits: Limits,
         now: Callable[[], float],
+        wall_ms: Callable[[], int],
     ) -> None:
-        """`server`: what a state tells of the server; `now` is a monotonic clock in seconds."""
+        """`server`: the server's part of a state; `now` is a monotonic clock [s], `wall_ms` the time of day."""
         self._bus = bus
         self._limits = limits
         self._now = now
@@ -39,6 +42,7 @@ class Hub:
         self._server = server
         self._pages: set[Page] = set()
         self._wakeup = FairWakeup()
+        self._cars = CarsBoard(bus, now=now, wall_ms=wall_ms)
         self._by_device: Counter[str] = Counter()
 
     @property
@@ -55,10 +59,10 @@ class Hub:
         self,
         socket: WebSocket,
         vehicle: str,
-        hello: Mapping[str, Any],
+        hello: Hello,
         *,
         principal: Principal,
-        replay: replay_commands.Open | None = None,
+        replay: replay_commands.OpenReplay | None = None,
     ) -> None:
         """Serves one page until it leaves; `replay`: the recording it begins with."""
         await socket.accept()
@@ -76,6 +80,7 @@ class Hub:
             limits=self._limits,
             now=self._now,
             wakeup=self._wakeup,
+            cars=self._cars,
             replay=replay,
         )
         self._pages.add(page)

@@ -3,41 +3,39 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import re
 import secrets
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from server.access.identity import LOCAL, Principal
-from server.bus.bus import LocalBus, NotServed
+from server.bus.bus import NotServed, PageBus
 from server.control import display_name
-from server.protocol import commands, replies
-from server.protocol.rate_limit import SLOW_DOWN, Allowance, Limits
-from server.replay import commands as replay_commands
+from server.protocol import command_base, commands, messages, replay_commands
+from server.protocol.rate_limit import Allowance, Limits
 from server.replay.manager import NoReplay
 from server.replay.view_source import ViewSource
 
-# Where the phone is, the live monitor must know whatever its page shows; and a page that is asked for control answers.
-FROM_A_REPLAY = ("position", "control", "veto")
 LEAVES = {"kind": "present", "visible": False, "sound": "asks", "awake": "asks", "leaves": True}
-TOO_MANY = "Too many orders at once from this page: wait a second."
-NOT_A_VIEWERS = "This device is paired as a viewer: it looks, and changes nothing."
-NOT_FROM_A_REPLAY = "This page replays a recording: nothing is ordered from it. Go back to live first."
+TOO_MANY = "Too many commands at once from this page: wait a second."
+NOT_A_VIEWERS = "This device is paired as a viewer and cannot make changes."
+NOT_FROM_A_REPLAY = "This page shows a replay and cannot send commands. Return to live first."
 
 
 class PageCommands:
-    """Of one page. `send` queues a reply; `complain` counts a message that makes no sense, and answers why."""
+    """Of one page. `send` queues a reply; `complain` counts a message that is invalid, and answers why."""
 
     def __init__(
         self,
-        bus: LocalBus,
+        bus: PageBus,
         vehicle: str,
         view: ViewSource,
         principal: Principal,
         limits: Limits,
         *,
         now: Callable[[], float],
-        send: Callable[[replies.ToPage], None],
+        send: Callable[[messages.ToPage], None],
         complain: Callable[[str], None],
     ) -> None:
         self._bus = bus
@@ -52,102 +50,128 @@ class PageCommands:
         self._opening: asyncio.Task[None] | None = None
         self._has_begun = False
         self._is_counted = False  # as a page that may show and sound alarms
+        self._announced: set[str] = set()  # other cars whose alarms it announces
         self._name = display_name.NAMELESS  # which the page gave itself: who gave its orders, in the log
         self._page = secrets.token_hex(8)  # by which the page keeps control over a reload
 
     async def begin(self, message: Mapping[str, Any]) -> None:
         """The page's hello: its name, and the id that it keeps over a reload, of which only the first counts."""
         page = message.get("page")
-        if isinstance(page, str) and re.fullmatch(commands.PAGE, page) and not self._has_begun:
+        if isinstance(page, str) and re.fullmatch(command_base.PAGE, page) and not self._has_begun:
             if self._is_counted:
-                await self.leave()  # it was counted under the id of before, which nobody uses any more
+                await self.leave()  # it was counted under the former id, which is no longer used
             self._page = page
         self._name = display_name.clean(message.get("name")) or self._name
         self._has_begun = True
 
     async def command(self, message: dict[str, Any]) -> None:
-        """Has the session carry out a command, and replies."""
+        """Has the session carry out a command, and messages."""
         id = self._id_of(message)
         if id is None:
             return
         kind = message.get("kind")
         reason = self._refusal(kind)
         if reason is not None:
-            self._send(replies.refusal(id, reason))
+            self._send(messages.refusal(id, reason))
             return
         try:
-            answer = await self._bus.request(self._vehicle, message | self._sender)
+            answer: Mapping[str, Any] = await self._bus.request(self._vehicle, message | self._sender)
         except NotServed as why:
             answer = {"ok": False, "reason": f"{str(why).capitalize()}."}
-        self._send(replies.reply(id, answer))
+        self._send(messages.reply(id, answer))
 
     def _refusal(self, kind: object) -> str | None:
         """Why a command does not reach the session; None: it does."""
         if not self._principal.is_operator:  # whatever it is: no command of the union needs less than an operator
             return NOT_A_VIEWERS
-        if not isinstance(kind, str) or kind not in commands.KINDS:  # what the server asks of a session is not a page's
+        command = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
+        if command is None:  # commands of the server to a session are not allowed for a page
             return commands.NO_SUCH
-        allowance = self._slow_downs if kind in SLOW_DOWN else self._orders
+        allowance = self._slow_downs if kind in commands.SLOW_DOWN else self._orders
         if not allowance.takes(self._now()):
             return TOO_MANY
-        if self._view.is_replaying and kind not in FROM_A_REPLAY:
+        if self._view.is_replaying and not command.passes_replay:
             return NOT_FROM_A_REPLAY
         return None
 
     async def present(self, message: Mapping[str, Any]) -> None:
-        """Passes on, once a second, whether the page is seen and heard: without a reply, and not of a viewer's page."""
+        """Pass on the page's status, once a second: without a reply, and not of a viewer's page."""
         if not self._principal.is_operator:
             return
         self._is_counted = True
         try:
-            answer = await self._bus.request(self._vehicle, {**message, **self._sender})
+            answer: Mapping[str, Any] = await self._bus.request(self._vehicle, {**message, **self._sender})
         except NotServed:
             return
         if answer.get("ok") is not True:
             self._complain(str(answer.get("reason")))
+            return
+        await self._announce(message)
+
+    async def _announce(self, message: Mapping[str, Any]) -> None:
+        """Pass a page's status on to the other cars whose alarms it announces, and once to those that it did."""
+        named = () if message.get("leaves") else message.get("announces", ())
+        now = set(self._bus.vehicles).intersection(named) - {self._vehicle}
+        before, self._announced = self._announced, now
+        for vehicle in now | before:
+            word = {**message, "kind": "announces", "leaves": vehicle not in now, **self._sender}
+            with contextlib.suppress(NotServed):
+                await self._bus.request(vehicle, word)
 
     async def leave(self) -> None:
         """The page is closed: it is not counted on to show alarms any more."""
         await self.present(LEAVES)
 
     async def replay(self, message: Mapping[str, Any]) -> None:
-        """Has the page's own replay carry out an order, and replies."""
+        """Has the page's own replay carry out an order, and messages."""
         id = self._id_of(message)
         if id is None:
             return
         if not self._orders.takes(self._now()):
-            self._send(replies.refusal(id, TOO_MANY))
+            self._send(messages.refusal(id, TOO_MANY))
             return
         try:
-            order = replay_commands.read({name: value for name, value in message.items() if name not in ("id", "kind")})
+            order = replay_commands.read(message)
         except replay_commands.NotUnderstood as why:
-            self._send(replies.refusal(id, str(why)))
+            self._send(messages.refusal(id, str(why)))
             return
         match order:
-            case replay_commands.Open() if self._opening is not None and not self._opening.done():
-                self._send(replies.refusal(id, "A recording is being opened already."))
-            case replay_commands.Open():
+            case replay_commands.OpenReplay() | replay_commands.OpenBeside() if self._is_opening:
+                self._send(messages.refusal(id, "A recording is already being opened."))
+            case replay_commands.OpenReplay() | replay_commands.OpenBeside():
                 self.open_replay(order, id)
-            case replay_commands.Leave():
+            case replay_commands.CloseBeside():
+                await self._view.close_beside()
+                self._send(messages.reply(id, {"ok": True}))
+            case replay_commands.LeaveReplay():
                 await self._view.leave()
-                self._send(replies.reply(id, {"ok": True}))
+                self._send(messages.reply(id, {"ok": True}))
             case _:
-                self._send(replies.reply(id, await self._view.ask(order)))
+                self._send(messages.reply(id, await self._view.ask(order)))
 
-    def open_replay(self, order: replay_commands.Open, id: str | None = None) -> None:
-        """Opens a recording, which takes a second; meanwhile the page goes on taking what is live.
+    @property
+    def _is_opening(self) -> bool:
+        return self._opening is not None and not self._opening.done()
 
-        `id` None: the page's address names the recording, and only a refusal is sent.
+    def open_replay(
+        self, order: replay_commands.OpenReplay | replay_commands.OpenBeside, id: str | None = None
+    ) -> None:
+        """Open a recording, which takes a second; meanwhile the page continues with live data.
+
+        `id` None: the recording is from the page's address, and only an error is sent.
         """
         self._opening = asyncio.create_task(self._open(id, order), name="open a replay")
 
-    async def _open(self, id: str | None, order: replay_commands.Open) -> None:
+    async def _open(self, id: str | None, order: replay_commands.OpenReplay | replay_commands.OpenBeside) -> None:
         try:
-            await self._view.open(order)
+            if isinstance(order, replay_commands.OpenBeside):
+                await self._view.open_beside(order)
+            else:
+                await self._view.open(order)
             if id is not None:
-                self._send(replies.reply(id, {"ok": True}))
+                self._send(messages.reply(id, {"ok": True}))
         except NoReplay as why:
-            self._send(replies.replay_ended(str(why)) if id is None else replies.refusal(id, str(why)))
+            self._send(messages.replay_ended(str(why)) if id is None else messages.refusal(id, str(why)))
 
     async def close(self) -> None:
         """Ends what is being opened."""
@@ -170,5 +194,5 @@ class PageCommands:
         id = message.get("id")
         if isinstance(id, str) and len(id) <= 80:
             return id
-        self._complain("A command carries an id of at most 80 letters.")
+        self._complain("A command needs an id of at most 80 characters.")
         return None

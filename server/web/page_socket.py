@@ -5,19 +5,21 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import orjson
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from server.access.identity import Principal
-from server.bus.bus import LocalBus
-from server.protocol import commands, replies
+from server.bus.bus import PageBus
+from server.protocol import commands, messages, replay_commands
+from server.protocol.messages import Hello
 from server.protocol.rate_limit import MAX_DEPTH, Allowance, Limits, nests_deeper
-from server.replay import commands as replay_commands
+from server.protocol.state import ServerState
 from server.replay.manager import ReplayManager
 from server.replay.view_source import ViewSource
+from server.web.cars_board import CarsBoard
 from server.web.fair_wakeup import FairWakeup
 from server.web.page_commands import PageCommands
 from server.web.page_writer import PageWriter
@@ -35,17 +37,18 @@ class Page:
     def __init__(
         self,
         socket: WebSocket,
-        bus: LocalBus,
+        bus: PageBus,
         vehicle: str,
         *,
-        hello: Mapping[str, Any],
+        hello: Hello,
         principal: Principal,
         replays: ReplayManager,
-        server: Callable[[], Mapping[str, Any]],
+        server: Callable[[], ServerState],
         limits: Limits,
         now: Callable[[], float],
         wakeup: FairWakeup,
-        replay: replay_commands.Open | None = None,
+        cars: CarsBoard,
+        replay: replay_commands.OpenReplay | None = None,
     ):
         """`wakeup`: of all pages, for what is new to all. `replay`: the recording with which the page begins."""
         self._socket = socket
@@ -54,6 +57,7 @@ class Page:
         self._hello = hello
         self._replay = replay
         self._now = now
+        self._cars = cars
         self._view = view = ViewSource(
             bus,
             vehicle,
@@ -78,6 +82,7 @@ class Page:
     async def serve(self) -> None:
         """Runs until the page leaves."""
         unwatch = self._bus.watch(self._vehicle, self._writer.on_new)
+        leave_cars = self._cars.watch(self._writer.on_new)
         writer = asyncio.create_task(self._writer.run(self._hello), name="page writer")
         reader = asyncio.create_task(self._read(), name="page reader")
         writer.add_done_callback(lambda task: self._writer_ended(task, reader))
@@ -96,6 +101,7 @@ class Page:
             self._is_leaving = True
             reader.cancel()
             unwatch()
+            leave_cars()
             await self._commands.close()
             writer.cancel()
             with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError, OSError):
@@ -122,7 +128,7 @@ class Page:
             message = self._understood(received.get("text"))
             if message is not None:
                 await self._obey(message)
-        await self._socket.close(code=1008, reason="too many messages that make no sense")
+        await self._socket.close(code=1008, reason="too many invalid messages")
 
     def _understood(self, text: str | None) -> dict[str, Any] | None:
         """A message of the page; None: it is none, and the page was sent why."""
@@ -155,21 +161,21 @@ class Page:
 
     def _complain(self, reason: str) -> None:
         self._complaints += 1
-        self._writer.queue(replies.problem(reason))
+        self._writer.queue(messages.problem(reason))
 
 
 def _parsed(text: str | None) -> dict[str, Any]:
     """The message in a frame of the page. Raises ValueError with a sentence for the page."""
     if text is None or len(text) > commands.MAX_COMMAND_BYTES:
-        raise ValueError("A page's message is text of at most 16 kB.")
+        raise ValueError("A message must be text of at most 16 kB.")
     try:
         message = orjson.loads(text)
     except orjson.JSONDecodeError:
-        raise ValueError("That was not JSON.") from None
+        raise ValueError("The message is not JSON.") from None
     if not isinstance(message, dict):
-        raise ValueError("A message is an object with a kind.")
+        raise ValueError("A message must be an object with a kind.")
     if nests_deeper(message, MAX_DEPTH):
-        raise ValueError("A message does not nest so deep.")
+        raise ValueError("The message is nested too deeply.")
     return message
 
 

@@ -1,21 +1,23 @@
-"""Sends one page what is new: offers of frames and events, at most one of each unanswered, and replies to its commands.
+"""The writer of one page: offers of frames and events, at most one of each unanswered, and replies to commands.
 
-Nothing else is pushed (docs/protocol.md says why), so a page that stops reading costs nothing, delays nobody, and finds
-nothing old when it comes back.
+Nothing else is pushed (see docs/protocol.md), so a page that stops reading costs nothing, delays nobody, and gets
+nothing outdated when it resumes.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
+from typing import cast
 
 import orjson
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from server.bus.bus import LocalBus, NotServed
-from server.protocol import replies
+from server.bus.bus import NotServed, PageBus
+from server.protocol import messages
+from server.protocol.alarm_state import LogEvent
+from server.protocol.messages import FrameKind, Hello
 from server.replay.view_source import ViewSource
 from server.web.event_feed import EventFeed
 from server.web.fair_wakeup import FairWakeup
@@ -31,7 +33,7 @@ class PageWriter:
     def __init__(
         self,
         socket: WebSocket,
-        bus: LocalBus,
+        bus: PageBus,
         vehicle: str,
         view: ViewSource,
         wakeup: FairWakeup,
@@ -46,12 +48,12 @@ class PageWriter:
         self._now = now
         self._since_s = now()
         self._wake = asyncio.Event()
-        self._sent = dict.fromkeys(view.kinds, 0)  # number of the newest frame of a kind that was sent
+        self._sent: dict[FrameKind, int] = dict.fromkeys(view.kinds, 0)  # the newest frame of each kind
         self._watches_scan = False
         self._seq = 0
         self._is_offered = False  # an offer is unanswered
-        self._is_taking = False  # the page asked for the newest
-        self._replies: list[replies.ToPage] = []
+        self._is_taking = False  # the page requested the newest
+        self._replies: list[messages.ToPage] = []
         self._event = bus.last_event(vehicle)  # the last number sent
         self._feed = EventFeed(bus, vehicle, on_read=lambda: self.on_new("events"))
         self._are_events_due = False
@@ -80,7 +82,7 @@ class PageWriter:
             self._wake.set()
 
     def on_turned(self) -> None:
-        """The page looks at something else from now on: none of its frames was sent."""
+        """Switch the source of the page's frames: none of them was sent yet."""
         self._sent = dict.fromkeys(self._view.kinds, 0)
         self._wake.set()
 
@@ -112,24 +114,24 @@ class PageWriter:
             self._watches_scan = wanted
             self._view.watch_scan(wanted)
 
-    def queue(self, message: replies.ToPage) -> None:
+    def queue(self, message: messages.ToPage) -> None:
         """To be sent before any frame."""
         self._replies.append(message)
         self._wake.set()
 
     @property
     def is_full(self) -> bool:
-        """Whether the page asks and does not read."""
+        """Whether the page sends requests without reading replies."""
         return len(self._replies) >= MAX_REPLIES
 
     # -- the loop ----------------------------------------------------------------------------------------------------
 
-    async def run(self, hello: Mapping[str, Any]) -> None:
+    async def run(self, hello: Hello) -> None:
         """Sends until the socket fails, whose end the reader notices as well."""
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):
             await self._send(hello)
             with contextlib.suppress(NotServed):
-                await self._bus.request(self._vehicle, {"kind": "refresh"})  # nobody may have looked for a while
+                await self._bus.request(self._vehicle, {"kind": "refresh"})  # there may have been no viewer for a while
             await self._send_newest("state", unasked=True)
             while True:
                 await self._wake.wait()
@@ -144,8 +146,11 @@ class PageWriter:
 
     async def _send_round(self) -> None:
         if self._view.ended is not None:
-            self._replies.append(replies.replay_ended(self._view.ended))
+            self._replies.append(messages.replay_ended(self._view.ended))
             await self._view.leave()
+        if self._view.beside_ended is not None:
+            self._replies.append(messages.beside_ended(self._view.beside_ended))
+            await self._view.close_beside()
         waiting, self._replies = self._replies, []
         for message in waiting:
             await self._send(message)
@@ -166,7 +171,8 @@ class PageWriter:
         if events:
             self._are_events_unanswered = True
             self._event = events[-1]["n"]
-            await self._send({"kind": "events", "events": events, "last": self._bus.last_event(self._vehicle)})
+            last = self._bus.last_event(self._vehicle)
+            await self._send({"kind": "events", "events": cast(list[LogEvent], events), "last": last})
 
     async def _offer(self) -> None:
         fresh = [kind for kind in self._view.kinds if self._is_new(kind)]
@@ -175,12 +181,12 @@ class PageWriter:
             self._is_offered = True
             await self._send({"kind": "offer", "seq": self._seq, "of": fresh})
 
-    def _is_new(self, kind: str) -> bool:
+    def _is_new(self, kind: FrameKind) -> bool:
         if kind == "scan" and not self._watches_scan:
             return False
         return self._view.number(kind) > self._sent[kind]
 
-    async def _send_newest(self, kind: str, *, unasked: bool = False) -> None:
+    async def _send_newest(self, kind: FrameKind, *, unasked: bool = False) -> None:
         frame = self._view.newest(kind)
         if frame is None or (frame.number <= self._sent[kind] and not unasked):
             return
@@ -190,5 +196,5 @@ class PageWriter:
         else:
             await self._socket.send_text(frame.payload)
 
-    async def _send(self, message: Mapping[str, Any]) -> None:
+    async def _send(self, message: messages.ToPage | Hello | messages.Offer | messages.Events) -> None:
         await self._socket.send_text(orjson.dumps(message).decode())

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from starlette.requests import HTTPConnection
 
 from server.access.access import Access
-from server.bus.bus import LocalBus
+from server.bus.bus import PageBus
 from server.mail.mailer import Mailer
+from server.protocol.messages import ServerHello
+from server.protocol.state import ServerState
 from server.recording.catalog.catalog import Catalog
 from server.recording.export.jobs import Exports
 from server.replay.manager import ReplayManager
 from server.storage.data_folder import DataFolder
-from server.system.page_files import static_dir
+from server.storage.storage_thread import StorageThread
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
 from server.vehicle.vitals import problems
-from server.web.assets.bundle import find
-from server.web.assets.service_worker import build_of
 from server.web.hub import Hub
-from server.web.maps.layers import Ground
+from server.web.maps.layers import MapLayers
 
 
 @dataclass(slots=True)
@@ -33,7 +32,9 @@ class Services:
     keeps_shell: bool  # phones keep the page's shell
     found: tuple[Vehicle, ...]  # offered on the connect screen
     folder: DataFolder | None  # held until the app ends; None: nothing is kept
-    bus: LocalBus
+    storage: StorageThread
+    bus: PageBus
+    unwritten_events: Callable[[], int]  # in memory only
     hub: Hub
     access: Access
     sessions: dict[str, Session]
@@ -41,14 +42,15 @@ class Services:
     wall_ms: Callable[[], int]
     boot: str
     version: str
+    build: str  # of the page as it was served last
     started_s: float
-    ground: Ground
+    ground: MapLayers
     mailer: Mailer | None  # None: nothing is kept, so nothing is mailed
     recordings: Catalog | None  # None: nothing is kept, so nothing is recorded
     replays: ReplayManager
     exports: Exports | None = None  # None: nothing is kept, so nothing is exported
 
-    def server_facts(self) -> dict[str, Any]:
+    def server_facts(self) -> ServerState:
         """The `server` part of a state."""
         return {
             "time_ms": self.wall_ms(),
@@ -67,14 +69,14 @@ class Services:
             found += self.mailer.problems()
         return found
 
-    def hello(self, vehicle: str) -> dict[str, Any]:
+    def hello(self, vehicle: str) -> ServerHello:
         return {
             "kind": "hello",
             "version": self.version,
             "boot": self.boot,
             "vehicle": vehicle,
             "vehicles": list(self.sessions),
-            "build": build_of(find(static_dir())),
+            "build": self.build,
             "time_ms": self.wall_ms(),
             "last_event": self.bus.last_event(vehicle),
             "veil_after_s": 2.0,

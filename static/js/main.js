@@ -20,6 +20,8 @@ import { Router } from './shell/router.js';
 import { Phone } from './phone/phone.js';
 import { Presence } from './control/presence.js';
 import { Screens } from './shell/screens.js';
+import { Cars, mountChip } from './shell/cars.js';
+import { CarsAlarms } from './shell/cars-alarms.js';
 import { closeSheet, mountSheets } from './shell/sheet.js';
 import { Store } from './core/store.js';
 import { tabContents } from './shell/tab-contents.js';
@@ -32,8 +34,11 @@ import { mount as mountChecks } from './alarms/checks.js';
 import { mount as mountConnect } from './shell/connect.js';
 import { Control, mount as mountControl } from './control/control.js';
 import { mount as mountGauge } from './home/gauge.js';
+import { mount as mountHelp } from './home/help.js';
 import { mount as mountInstall } from './shell/install.js';
+import { mount as mountKeys } from './shell/keys.js';
 import { mount as mountNearest } from './home/nearest.js';
+import { mount as mountPanes } from './shell/panes.js';
 import { mount as mountPedals } from './home/pedals.js';
 import { mount as mountPosition } from './home/position.js';
 import { mount as mountPreferences } from './shell/preferences.js';
@@ -88,7 +93,7 @@ async function begin() {
   page.store.sync.greet();
   mountAlarms(page);
   await breath();
-  mountControl(page.monitor, field(document, 'snacks'), page.store, page.control);
+  mountControl(field(document, 'snacks'), page.store, page.control);
   await breath();
   const arming = page.mountPhone();
   await breath();
@@ -97,8 +102,10 @@ async function begin() {
   mountReach(need(page.monitor, '[data-part="reach"]'), page.store, () => page.openPhone());
   mountChecks(need(page.monitor, '[data-part="checks"]'), page.store);
   await breath();
-  mountTrends(need(page.monitor, '[data-part="trends"]'), page.store);
+  mountTrends(need(page.monitor, '[data-part="trends"]'), page.store, page.say);
   await breath();
+  mountPanes(page.monitor, page.store);
+  mountKeys(page.monitor, page.store, page.tabs, page.say);
   mountBadge(page.store);
   page.router.onShown = () => {
     page.shown();
@@ -126,6 +133,8 @@ class Page {
   monitor = need(document, '#monitor');
   /** Called when another tab or screen came in front; the contents of the tabs come later. */
   front = () => {};
+  /** The alarms of the other cars. @type {CarsAlarms | null} */
+  others = null;
   #name = ''; // one, also where nothing can be stored
   /** @type {{arming: Arming, status: DeviceStatus} | null} */
   #phone = null;
@@ -133,10 +142,12 @@ class Page {
 
   constructor() {
     const { access, vehicle } = document.documentElement.dataset;
-    const address = `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${vehicle ? `?vehicle=${encodeURIComponent(vehicle)}` : ''}`;
+    /** @returns {string} */
+    const address = () => `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws${store.vehicle ? `?vehicle=${encodeURIComponent(store.vehicle)}` : ''}`;
     /** Where devices are paired, each socket needs a ticket. */
     this.admission = access === 'paired' ? new Admission(address, (why) => this.#shut(why)) : null;
-    const store = this.store = new Store(() => takeEarly() ?? this.admission?.dial() ?? new WebSocket(address), () => (this.#name ||= deviceName(navigator.userAgent, keptHere())), ownName);
+    const store = /** @type {Store} */ (this.store = new Store(() => takeEarly() ?? this.admission?.dial() ?? new WebSocket(address()), () => (this.#name ||= deviceName(navigator.userAgent, keptHere())), ownName));
+    store.vehicle = vehicle ?? '';
     store.painter.undrawn = undrawn = new Undrawn(() => store.frame, () => this.alarmSound.say('high'));
     stop = () => {
       store.stop();
@@ -146,6 +157,8 @@ class Page {
     this.control = new Control(store, tell, () => this.openPhone());
     /** A refusal because another page is in control is shown with a key that helps. @type {typeof tell} */
     this.say = (sentence, title, way) => tell(sentence, title, way ?? this.control.wayOf(sentence));
+    this.cars = new Cars(store, this.say);
+    this.cars.openControl = () => this.control.openSheet();
     this.router = new Router(store, this.say);
     this.tabs = new Tabs(this.monitor, () => this.front());
     this.router.onShown = () => this.shown();
@@ -168,14 +181,15 @@ class Page {
     const { alarmSound, router, store } = this;
     if (store.painter.drawing.isFailed) return; // then undrawn.js sounds
     const isServerLost = store.isSilent && store.isMonitoring && store.silence_s > 4;
-    alarmSound.say(soundOf(router.unclosed(store.heeded), { isServerLost, isLossAcknowledged: router.answered === lossKey(store.frame, store.isSilent) }));
+    const own = soundOf(router.unclosed(store.heeded), { isServerLost, isLossAcknowledged: router.answered === lossKey(store.frame, store.isSilent) });
+    alarmSound.say(this.others ? this.others.sound(own) : own);
   }
 
   /** Mounts what this phone can do: its sound, screen and position, and its report to the server. */
   mountPhone() {
     const arming = new Arming(this.alarmSound, new Phone(this.store));
     const status = new DeviceStatus();
-    new Presence(this.store, arming, status);
+    new Presence(this.store, arming, status, () => this.others?.announced ?? []);
     this.#phone = { arming, status };
     return arming;
   }
@@ -184,7 +198,7 @@ class Page {
   openPhone() {
     import('./phone/this-phone.js').then(({ openThisPhone }) => {
       if (this.#phone) openThisPhone(this.store, this.#phone.arming, this.#phone.status);
-    }).catch(() => this.say('What shows this phone could not be fetched.', 'Not opened'));
+    }).catch(() => this.say('The details of this phone could not be loaded.', 'Not opened'));
   }
 
   /** Greys what a viewer may not do, once the page is a viewer's. */
@@ -216,16 +230,18 @@ class Page {
         setShut(false);
         this.admission?.admit();
       },
-    })).catch(() => say('The screen for pairing could not be fetched from the server. Load the page again.', 'Not paired'));
+    })).catch(() => say('The pairing screen could not be loaded from the server. Reload the page.', 'Not paired'));
   }
 }
 
 /** Mounts what is seen at a glance. @param {Page} page */
-function mountGlance({ alarmSound, monitor, router, say, store }) {
+function mountGlance({ alarmSound, cars, monitor, router, say, store }) {
+  mountChip(monitor, cars);
   mountTopbar(monitor, store, say);
   mountStrip(monitor, store);
   mountVeil(monitor, store);
   mountGauge(need(monitor, '[data-part="gauge"]'), store);
+  mountHelp(need(monitor, '[data-part="help"]'), store);
   mountNearest(need(monitor, '[data-part="nearest"]'), store);
   mountPedals(need(monitor, '[data-part="pedals"]'), store);
   mountPosition(need(monitor, '[data-part="position"]'), store);
@@ -239,14 +255,16 @@ function mountAlarms(page) {
   const { control, monitor, router, say, store } = page;
   store.on('beat', () => page.sound());
   store.on('tick', () => page.sound());
+  page.others = new CarsAlarms(monitor, field(document, 'snacks'), page.cars);
   mountDialogs(store, router);
   mountSnackbar(field(document, 'snacks'), store, say);
-  mountSlowing(monitor, store, control, say); // after the dialogs: its count-down covers them
+  mountSlowing(monitor, store, control, say, (name) => page.cars.shortOf(name)); // after the dialogs: its count-down covers them
 }
 
 /** Mounts the screens and sheets; returns the tabs, whose contents come later. @param {Page} page @param {Arming} arming */
 function mountScreens(page, arming) {
-  const { monitor, router, say, store, tabs } = page;
+  const { cars, monitor, router, say, store, tabs } = page;
+  mountChip(need(document, '#connect'), cars);
   mountStart(need(document, '#start'), store);
   mountConnect(need(document, '#connect'), store, router, arming);
   const contents = tabContents(monitor, store, say, (name) => router.isMonitorShown && tabs.shows(name) && screens.open === null);
@@ -284,13 +302,13 @@ function listenEverywhere(page, arming) {
   listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
   listen(field(monitor, 'sound-off'), 'click', () => arming.ask());
   listen(field(need(document, '#connect'), 'saved'), 'click', () => {
-    import('./files/files-board.js').then(({ openSaved }) => openSaved(store, say, router)).catch(() => say('The recordings could not be fetched from the server. Try again.', 'Not opened'));
+    import('./files/files-board.js').then(({ openSaved }) => openSaved(store, say, router)).catch(() => say('The recordings could not be loaded from the server. Try again.', 'Not opened'));
   });
 }
 
 /** Fetches the screens that an operator may want when the server is gone. */
 function prefetch() {
-  for (const load of [() => import('./slowdown/slow-sheet.js'), () => import('./alarms/log.js'), () => import('./home/signals.js'), () => import('./scan/scan.js'), () => import('./home/chart.js')]) load().catch(() => {});
+  for (const load of [() => import('./slowdown/slow-sheet.js'), () => import('./alarms/log.js'), () => import('./home/signals.js'), () => import('./scan/scan.js'), () => import('./home/drive-screen.js')]) load().catch(() => {});
 }
 
 /**

@@ -17,7 +17,7 @@ import psutil
 from tests.bench import yardstick
 from tests.bench.child import Failed
 from tests.bench.rig import FULL, QUICK, Rig
-from tests.bench.rows import bridge, cpu, gap, latency, memory, recording, rehearsal, size, slow_down
+from tests.bench.rows import bridge, cpu, gap, latency, memory, recording, rehearsal, size, slow_down, stall
 from tests.bench.table import Group, printed
 
 GROUPS: dict[str, Callable[[Rig], Group]] = {
@@ -29,6 +29,7 @@ GROUPS: dict[str, Callable[[Rig], Group]] = {
     "cpu": cpu.measure,
     "memory": memory.measure,
     "recording": recording.measure,
+    "stall": stall.measure,
     "slow-down": slow_down.measure,
     "rehearsal": rehearsal.measure,
 }

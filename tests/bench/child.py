@@ -58,7 +58,7 @@ class Child:
             self._process.stdin.write(orjson.dumps({"do": do} | arguments) + b"\n")
             self._process.stdin.flush()
         except OSError:
-            raise Failed(f"{self._module} has ended: {self._last_words()}") from None
+            raise Failed(f"{self._module} has ended: {self._last_output()}") from None
 
     def answer(self, within_s: float = ANSWERS_WITHIN_S) -> Any:
         """The next answer. Raises Failed."""
@@ -66,10 +66,10 @@ class Child:
         ends_s = time.monotonic() + within_s
         while b"\n" not in self._unread:
             if not select.select([self._process.stdout], [], [], max(0.0, ends_s - time.monotonic()))[0]:
-                raise Failed(f"{self._module} did not answer within {within_s:g} s: {self._last_words()}")
+                raise Failed(f"{self._module} did not answer within {within_s:g} s: {self._last_output()}")
             read = os.read(self._process.stdout.fileno(), 2**20)
             if not read:
-                raise Failed(f"{self._module} has ended: {self._last_words()}")
+                raise Failed(f"{self._module} has ended: {self._last_output()}")
             self._unread += read
         line, _, self._unread = self._unread.partition(b"\n")
         said = orjson.loads(line)
@@ -106,6 +106,6 @@ class Child:
             process.wait()
         self._errors.close()
 
-    def _last_words(self) -> str:
+    def _last_output(self) -> str:
         self._errors.seek(0)
         return self._errors.read().decode(errors="replace")[-2000:].strip() or "it said nothing"

@@ -27,6 +27,8 @@ class Pace:
     most: int  # pages on the server
     warm_s: float  # until the server's rings and caches are full, before its memory is looked at
     memory_s: float  # how long memory is looked at
+    stall_s: float  # how long the event loop is watched
+    events: int  # in the journal of a server that has run for long
 
 
 FULL = Pace(
@@ -41,6 +43,8 @@ FULL = Pace(
     most=100,
     warm_s=180.0,
     memory_s=420.0,
+    stall_s=60.0,
+    events=200_000,
 )
 QUICK = Pace(
     probes=20,
@@ -54,6 +58,8 @@ QUICK = Pace(
     most=100,
     warm_s=0.5,
     memory_s=1.5,
+    stall_s=3.0,
+    events=2_000,
 )
 
 
@@ -112,15 +118,21 @@ class Rig:
     @contextlib.contextmanager
     def apart(self) -> Iterator[None]:
         """Until the block ends the server has a processor of its own, as where phones and the car have theirs."""
+        with self.apart_from(self.server):
+            yield
+
+    @contextlib.contextmanager
+    def apart_from(self, server: Child) -> Iterator[None]:
+        """As `apart`, for any server."""
         cores = sorted(os.sched_getaffinity(0))
-        others = [child for name, child in self._children.items() if name != "server"]
-        self.server.keep_to(cores[-1:])
+        others = [child for child in self._children.values() if child is not server]
+        server.keep_to(cores[-1:])
         for child in others:
             child.keep_to(cores[:-1] or cores)
         try:
             yield
         finally:
-            for child in (self.server, *others):
+            for child in (server, *others):
                 child.keep_to(cores)
 
     @contextlib.contextmanager

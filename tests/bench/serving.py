@@ -20,10 +20,12 @@ from monitor import catalog
 from monitor.runner import Monitor
 from server.app import app, process
 from server.app.config import Config
+from server.bus.journal import Journal
 from server.rosbridge import codec
 from server.vehicle.message_intake import MessageIntake
 from server.vehicle.session import Session
 from server.vehicle.tick import Tick
+from tests.bench import slow_disk
 from tests.bench.orders import obey, options
 
 VEHICLE = "car"
@@ -57,7 +59,53 @@ class Timed:
         setattr(owner, name, outer)
 
 
-async def main() -> None:
+class LoopLag:
+    """How late the event loop wakes up who sleeps [s], and its thread's processor time meanwhile [s]."""
+
+    EVERY_S = 0.005
+
+    def __init__(self) -> None:
+        self._lags_s: list[tuple[float, float]] = []
+        self._task: asyncio.Task[None] | None = None
+
+    async def begin(self) -> None:
+        self._lags_s = []
+        self._task = asyncio.create_task(self._watch())
+
+    async def end(self) -> list[tuple[float, float]]:
+        assert self._task is not None
+        self._task.cancel()
+        return self._lags_s
+
+    async def _watch(self) -> None:
+        while True:
+            due_s, worked_s = time.monotonic() + self.EVERY_S, time.thread_time()
+            await asyncio.sleep(self.EVERY_S)
+            self._lags_s.append((max(0.0, time.monotonic() - due_s), time.thread_time() - worked_s))
+
+
+def fill(journal: Path, events: int) -> None:
+    """An alarm log as of weeks."""
+    kept = Journal(journal)
+    for first in range(0, events, 1000):
+        kept.append(VEHICLE, [_event(n) for n in range(first, min(events, first + 1000))])
+    kept.close()
+
+
+def _event(n: int) -> dict[str, Any]:
+    is_raised = n // 40 % 2 == 0
+    return {
+        "at_ms": 1_790_000_000_000 + 1000 * n,
+        "alarm": f"alarm_{n % 40}",
+        "change": "raised" if is_raised else "cleared",
+        "state": "unacknowledged" if is_raised else "normal",
+        "occurrence": n // 80 + 1,
+        "text": "12.0 m/s, limit 11.0 m/s",
+    }
+
+
+async def main(events: int = 0, disk_s: float = 0.0) -> None:
+    """`events`: in the alarm log when it starts. `disk_s`: what each access to the disk takes longer, once it runs."""
     timed = {
         "parse": Timed(codec, "decode"),
         "message": Timed(MessageIntake, "message_received"),
@@ -74,6 +122,8 @@ async def main() -> None:
     process.create_app = create_app  # so that uvicorn is set up as the product sets it up
     announced = io.StringIO()
     kept = tempfile.TemporaryDirectory()  # the alarm log is on a disk, as in earnest
+    fill(Path(kept.name) / "events.sqlite", events)
+    lag = LoopLag()
     with contextlib.redirect_stdout(announced):
         running = asyncio.create_task(process.serve(Config(port=0, data=Path(kept.name))))
         while "listens on" not in announced.getvalue() or not made[-1].state.services.bus.vehicles:
@@ -92,7 +142,10 @@ async def main() -> None:
         return {"at_ns": time.monotonic_ns(), "spent": spent}
 
     try:
-        await obey({"command": command, "timings": timings}, {"url": f"{url}ws"})
+        if disk_s:
+            slow_disk.begin(Path(kept.name), disk_s)
+        orders = {"command": command, "timings": timings, "begin_stalls": lag.begin, "stalls": lag.end}
+        await obey(orders, {"url": f"{url}ws"})
     finally:
         running.cancel()
         await asyncio.gather(running, return_exceptions=True)

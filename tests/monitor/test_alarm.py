@@ -366,9 +366,9 @@ def test_nothing_is_announced_from_the_shelf() -> None:
 
 def test_a_late_tap_does_not_hide_a_newer_occurrence() -> None:
     alarm, _ = play([(0.0, A, NORMAL), (1.0, A, UNACKED), (1.5, A_AND_B, UNACKED)])
-    with pytest.raises(Refused, match="announced anew"):
+    with pytest.raises(Refused, match="raised again"):
         acknowledge(alarm, 1, "Ann", 2.0)
-    with pytest.raises(Refused, match="announced anew"):
+    with pytest.raises(Refused, match="raised again"):
         acknowledge(alarm, 3, "Ann", 2.0)
     assert acknowledge(alarm, 2, "Ann", 2.0)[0].state is ACKED
 
@@ -393,7 +393,7 @@ STANDING, _ = play([(0.0, BAD, NORMAL), (1.0, BAD, UNACKED)])
         pytest.param(STANDING, 1, float("nan"), "Ann", False, "at most 15 minutes", id="NaN"),
         pytest.param(STANDING, 1, float("inf"), "Ann", False, "at most 15 minutes", id="for ever"),
         pytest.param(STANDING, 1, 5.0, "  ", False, "name", id="nobody"),
-        pytest.param(STANDING, 2, 5.0, "Ann", False, "announced anew", id="another occurrence"),
+        pytest.param(STANDING, 2, 5.0, "Ann", False, "raised again", id="another occurrence"),
         pytest.param(STANDING, 1, 5.0, "Ann", True, "explains other alarms", id="inhibitor"),
         pytest.param(Alarm(id="hot", spec=SPEC), 0, 5.0, "Ann", False, "nothing to shelve", id="normal"),
         pytest.param(

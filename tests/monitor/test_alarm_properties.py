@@ -11,7 +11,7 @@ from monitor.alarm import Alarm, AlarmState, Refused, Transition
 from monitor.alarm_life import advance
 from monitor.alarm_spec import AlarmSpec, Place, Priority, Sound
 from monitor.check import OK, Finding, Verdict, fault, unknown
-from monitor.response import acknowledge, shelve, unshelve
+from monitor.response import acknowledge, shelve, silence, unshelve
 
 SPECS = st.builds(
     AlarmSpec,
@@ -50,7 +50,9 @@ class Tap:
 EVENTS = st.one_of(
     st.builds(Judge, FINDINGS, st.sampled_from([False, False, False, True])),
     st.builds(Judge, FINDINGS, st.just(False)),
-    st.builds(Tap, st.sampled_from(["acknowledge", "shelve", "unshelve"]), st.sampled_from([0, 0, 0, -1, 1])),
+    st.builds(
+        Tap, st.sampled_from(["acknowledge", "silence", "shelve", "unshelve"]), st.sampled_from([0, 0, 0, -1, 1])
+    ),
 )
 DAY = st.lists(st.tuples(st.sampled_from([0.0, 0.1, 0.5, 1.0, 2.0, 90.0]), EVENTS), max_size=40)
 
@@ -61,6 +63,8 @@ def happen(alarm: Alarm, event: Judge | Tap, now_s: float) -> tuple[Alarm, tuple
             return advance(alarm, event.finding, now_s, ("link_lost",) if event.inhibited else ())
         case Tap(kind="acknowledge"):
             return acknowledge(alarm, alarm.occurrence + event.off_by, "Ann", now_s)
+        case Tap(kind="silence"):
+            return silence(alarm, alarm.occurrence + event.off_by, "Ann", now_s)
         case Tap(kind="shelve"):
             return shelve(alarm, alarm.occurrence + event.off_by, 1.0, "Ann", now_s, is_inhibitor=False)
         case _:
@@ -147,7 +151,12 @@ def test_unknown_decides_nothing(spec: AlarmSpec, day: list[tuple[float, Judge |
             continue
         if isinstance(event, Judge) and event.finding.verdict is Verdict.UNKNOWN:
             assert alarm.active == before.active
-            assert {transition.change for transition in transitions} <= {"unshelved", "suppressed", "unsuppressed"}
+            assert {transition.change for transition in transitions} <= {
+                "unshelved",
+                "unsilenced",
+                "suppressed",
+                "unsuppressed",
+            }
 
 
 @given(SPECS, DAY)
@@ -185,7 +194,7 @@ def test_nothing_is_raised_or_cleared_while_explained_away(
         except Refused:
             continue
         if isinstance(event, Judge) and event.inhibited:
-            assert {t.change for t in transitions} <= {"suppressed", "unshelved"}
+            assert {t.change for t in transitions} <= {"suppressed", "unshelved", "unsilenced"}
             assert not any(t.announces for t in transitions)
 
 

@@ -31,6 +31,12 @@ def test_each_signal_has_its_own_alarms() -> None:
     assert {"speed_limit", "connect_failed", "no_message", "link_lost", "car_silent"} <= ids
 
 
+def test_each_check_says_what_makes_it_checked() -> None:
+    for check in CHECKS:
+        assert check.checked_when.endswith("."), check.id
+        assert check.checked_when.startswith(("Checked ", "Always checked")), check.id
+
+
 @pytest.mark.parametrize(("alarm_id", "spec"), SPECS.items(), ids=SPECS.keys())
 def test_what_an_alarm_must_have(alarm_id: str, spec) -> None:  # type: ignore[no-untyped-def]
     assert 0 < len(spec.title) <= LETTERS[spec.place]
@@ -102,8 +108,9 @@ def test_a_threshold_has_all_that_settings_need(name: str, field: dict[str, obje
 
 def test_settings_begin_with_the_first_tile_and_headings_stand_together() -> None:
     headings = [field["heading"] for field in catalog.schema().values()]
-    assert headings[:2] == ["Speed", "Speed"]
-    assert headings[-1] == "Gauge"
+    assert headings[0] == "Speed"
+    assert headings[-1] == "Expert", "what is seldom changed is the last"
+    assert list(dict.fromkeys(headings))[-2] == "Gauge"
     assert {name for name, field in catalog.schema().items() if field["heading"] == "Vehicle"} == {
         "obstacle.half_width_m", "obstacle.wheelbase_m", "obstacle.laser_ahead_m", "steering.tyre_rad_per_unit",
     }  # fmt: skip
@@ -165,7 +172,7 @@ class OtherLimits(Limits):
 
 def test_two_families_cannot_share_a_name() -> None:
     first = Check(id="a", label="A", alarm=SPEC, limits=OtherLimits, find=lambda *_: OK, group="gauge")
-    with pytest.raises(ValueError, match="two classes of limits are called gauge"):
+    with pytest.raises(ValueError, match="two classes of limits are named gauge"):
         catalog.compose((first,))
 
 

@@ -17,7 +17,7 @@ from monitor import catalog
 from monitor.catalog import CHECKS, AllLimits
 from monitor.checks.slow_down import SlowDownLimits
 from monitor.link import LinkFacts
-from monitor.phones import PhoneWord
+from monitor.phones import PhoneReport
 from monitor.recorder import RecorderFacts
 from monitor.runner import Monitor
 from monitor.signals import SIGNALS
@@ -456,11 +456,13 @@ def ride(car: Drive, phone: Callable[[float, GpsFix], PhoneFix | None], seconds:
         reading = car.state.get("position")
         fix = None if reading is None else phone(car.now_s, reading.value)
         if fix is not None:
-            car.state.hear_phone(PhoneWord(phone="one", is_handheld=True, fix=fix, measured_s=car.now_s), car.now_s)
+            car.state.receive_phone(
+                PhoneReport(phone="one", is_handheld=True, fix=fix, measured_s=car.now_s), car.now_s
+            )
         elif (
-            car.now_s - (car.state.snapshot(car.now_s).phone.heard_s) >= 4.0
+            car.now_s - (car.state.snapshot(car.now_s).phone.received_s) >= 4.0
         ):  # a page speaks more often than every 5 s
-            car.state.hear_phone(PhoneWord(phone="one", is_handheld=True, why="unavailable"), car.now_s)
+            car.state.receive_phone(PhoneReport(phone="one", is_handheld=True, why="unavailable"), car.now_s)
     return car
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from monitor.catalog import CHECKS
 from monitor.check import Finding
-from monitor.phones import PhoneWord
+from monitor.phones import PhoneReport
 from monitor.state import LinkFacts, NotFresh, Snapshot, State
 from monitor.values import (
     Acceleration,
@@ -171,8 +171,8 @@ def test_no_check_fails_and_nobody_reads_nan(happening: list[Any], published: bo
     for later_s, (name, value), stamp_s in happening:
         now_s += later_s
         if name == "phone":
-            word = PhoneWord(phone="one", is_handheld=True, fix=value, measured_s=now_s)
-            state.hear_phone(word, now_s)
+            word = PhoneReport(phone="one", is_handheld=True, fix=value, measured_s=now_s)
+            state.receive_phone(word, now_s)
         else:
             state.receive(name, value, now_s, stamp_s)
         look_at(state.snapshot(now_s))

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from monitor import phones
-from monitor.phones import NO_PHONE, Phones, PhoneWord, Why
+from monitor.phones import NO_PHONE, PhoneReport, Phones, Why
 from monitor.state import State
 from monitor.values import GpsFix, PhoneFix
 
@@ -51,14 +51,14 @@ class Road:
         """`aside_m` north of where the car was at the moment of the fix."""
         north_m = self.speed_mps * (self.now_s - age_s - 100.0) + aside_m
         accuracy_m, handheld = more.pop("accuracy_m", 5.0), more.pop("is_handheld", True)
-        word = PhoneWord(
+        word = PhoneReport(
             phone=phone, is_handheld=handheld, fix=at(north_m, accuracy_m), measured_s=self.now_s - age_s, **more
         )
-        self.phones.hear(word, self.now_s)
+        self.phones.receive(word, self.now_s)
         return self
 
     def excuse(self, why: Why, phone: str = "one", *, is_handheld: bool = True) -> Road:
-        self.phones.hear(PhoneWord(phone=phone, is_handheld=is_handheld, why=why), self.now_s)
+        self.phones.receive(PhoneReport(phone=phone, is_handheld=is_handheld, why=why), self.now_s)
         return self
 
 
@@ -258,7 +258,7 @@ def test_a_snapshot_holds_what_was_known_then() -> None:
     for i in range(20):
         state.receive("position", GpsFix(lat_deg=LAT, lon_deg=LON), 100.0 + i / 10)
     before = state.snapshot(101.9)
-    state.hear_phone(PhoneWord(phone="one", is_handheld=True, fix=at(40.0), measured_s=101.5), 101.95)
+    state.receive_phone(PhoneReport(phone="one", is_handheld=True, fix=at(40.0), measured_s=101.5), 101.95)
     assert before.phone is NO_PHONE
     assert state.snapshot(102.0).phone.comparisons[0].distance_m == pytest.approx(40.0, abs=0.05)
 
@@ -266,17 +266,17 @@ def test_a_snapshot_holds_what_was_known_then() -> None:
 def test_a_clock_that_goes_back_forgets_the_phones_which_speak_again() -> None:
     state = State()
     state.receive("position", GpsFix(lat_deg=LAT, lon_deg=LON), 100.0)
-    state.hear_phone(PhoneWord(phone="one", is_handheld=True, fix=at(), measured_s=100.0), 100.0)
+    state.receive_phone(PhoneReport(phone="one", is_handheld=True, fix=at(), measured_s=100.0), 100.0)
     assert state.snapshot(50.0).phone is NO_PHONE
     for i in range(5):
         state.receive("position", GpsFix(lat_deg=LAT, lon_deg=LON), 50.0 + i / 10)
-    state.hear_phone(PhoneWord(phone="one", is_handheld=True, fix=at(), measured_s=50.2), 50.5)
+    state.receive_phone(PhoneReport(phone="one", is_handheld=True, fix=at(), measured_s=50.2), 50.5)
     assert len(state.snapshot(50.5).phone.comparisons) == 1
 
 
 def test_another_connection_begins_without_phones() -> None:
     state = State()
-    state.hear_phone(PhoneWord(phone="one", is_handheld=True, why="denied"), 100.0)
+    state.receive_phone(PhoneReport(phone="one", is_handheld=True, why="denied"), 100.0)
     state.reset()
     assert state.snapshot(100.1).phone is NO_PHONE
 
@@ -336,6 +336,6 @@ def test_every_phone_is_seen_each_with_its_own_reason() -> None:
 def test_a_clock_that_goes_back_forgets_the_phones_and_not_the_choice() -> None:
     state = State()
     state.ride("two", 100.0)
-    state.hear_phone(PhoneWord(phone="two", is_handheld=True, fix=at(), measured_s=100.0), 100.0)
+    state.receive_phone(PhoneReport(phone="two", is_handheld=True, fix=at(), measured_s=100.0), 100.0)
     snapshot = state.snapshot(50.0)
     assert (snapshot.phone.phone, snapshot.phone.is_chosen, snapshot.phone.fix) == ("two", True, None)

@@ -16,6 +16,7 @@ FILES = sorted(Path(monitor.__file__).parent.rglob("*.py"))
 MAY_KNOW = {
     "__future__",
     "abc",
+    "array",
     "bisect",
     "collections",
     "dataclasses",

@@ -92,8 +92,8 @@ def test_a_restart_leaves_acknowledged_what_came_back_acknowledged() -> None:
 
 def test_a_phone_that_never_had_a_position_and_leaves_is_no_loss() -> None:
     (check,) = PHONE_MISSING
-    phone = PhoneView(phone="one", count=1, is_handheld=True, heard_s=50.0, usable_s=40.0, why="denied")
+    phone = PhoneView(phone="one", count=1, is_handheld=True, received_s=50.0, usable_s=40.0, why="denied")
     snapshot = known(100.0, position=GpsFix(lat_deg=32.23, lon_deg=-110.95, sigma_m=1.0))
-    assert ask(check.id, replace(snapshot, phone=replace(phone, heard_s=99.0))).verdict == "fault"
+    assert ask(check.id, replace(snapshot, phone=replace(phone, received_s=99.0))).verdict == "fault"
     assert ask(check.id, replace(snapshot, phone=phone)).text == "No phone is sharing its position"
     assert ask(check.id, replace(snapshot, phone=replace(phone, was_usable=True))).verdict == "fault"

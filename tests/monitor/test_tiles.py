@@ -23,7 +23,7 @@ NONE = absent("c is not published")
     ("findings", "verdict", "brief", "text"),
     [
         pytest.param([OK, OK, OK], "ok", "OK", "OK", id="all the same"),
-        pytest.param([ok("1 m"), ok("2 m"), NONE], "ok", "OK", "All 2 in order", id="what is absent does not count"),
+        pytest.param([ok("1 m"), ok("2 m"), NONE], "ok", "OK", "All 2 OK", id="what is absent does not count"),
         pytest.param([NONE, NONE, NONE], "unknown", "not published", "c is not published", id="nothing but absent"),
         pytest.param([OK, FAULT_1, HUH], "fault", "FAULT a 3 s", "a is bad", id="one fault says its own"),
         pytest.param([FAULT_1, FAULT_2, OK], "fault", "FAULT 2 of 3", "a is bad; b is bad", id="two are counted"),

@@ -73,8 +73,8 @@ def test_the_state_says_which_number_stands_for_a_signal() -> None:
     assert all(SIGNALS[name].headline for name in TRENDS)
     state, trends = State(), Trends(0.0)
     for at_s, speed in ((0.05, 3.0), (0.1, 2.5)):
-        trends.hear(state.receive("speed", Twist(speed_mps=speed, yaw_rate_radps=None), at_s), state, at_s)
-    trends.hear(state.receive("distance", Distance(distance_m=None, none_in_range=True), 0.1), state, 0.1)
+        trends.receive(state.receive("speed", Twist(speed_mps=speed, yaw_rate_radps=None), at_s), state, at_s)
+    trends.receive(state.receive("distance", Distance(distance_m=None, none_in_range=True), 0.1), state, 0.1)
     rows = trends.piece(0.3).rows
     assert rows["speed"] == ((2.5, 3.0),)
     assert rows["distance"] == (NO_NUMBER,)

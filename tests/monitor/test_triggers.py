@@ -93,6 +93,11 @@ def test_another_drive_knows_no_veto() -> None:
 def test_of_several_the_first_in_order_is_told() -> None:
     first, second = TRIGGERS[0], TRIGGERS[1]
     limits = SlowDownLimits(**{first.switch: 1.0, first.after: 0.0, second.switch: 1.0, second.after: 0.0})
-    due = Triggers().look(at_fault(first.checks[0], second.checks[0]), limits, 5.0)
+    faulty = at_fault(first.checks[0], second.checks[0])
+    for counting, expected in [(None, first), (first.id, first), (second.id, second), ("another", first)]:
+        due = Triggers().look(faulty, limits, 5.0, counting=counting)
+        assert due is not None
+        assert due.trigger is expected
+    due = Triggers().look(at_fault(first.checks[0]), limits, 5.0, counting=second.id)
     assert due is not None
     assert due.trigger is first

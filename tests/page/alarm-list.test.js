@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { countWords, noneWords, rowsOf } from '../../static/js/alarms/alarms-layout.js';
+import { countWords, noneWords, pagesOf, rowsOf, silentWords, together } from '../../static/js/alarms/alarms-layout.js';
 
 /** @param {string} id @param {any} [more] @returns {any} */
 const alarm = (id, more) => ({
@@ -18,13 +18,50 @@ test('what waits comes first, of it what still stands; then danger, then the new
   assert.equal(rows.at(-1)?.words, 'cause: worst');
 });
 
-test('whatever is unacknowledged can be acknowledged, also once it has returned', () => {
+test('whatever is unacknowledged can be acknowledged, also once it has returned; what sounds can be silenced', () => {
   const keys = (/** @type {any} */ more) => shown([alarm('a', { actions: ['shelve', 'acknowledge'], ...more })])[0]?.keys;
-  assert.deepEqual(keys({}), ['shelve', 'acknowledge']);
+  assert.deepEqual(keys({ sound: 'high' }), ['silence', 'acknowledge']);
+  assert.deepEqual(keys({ sound: 'high', silenced_until_ms: 1 }), ['acknowledge']);
+  assert.deepEqual(keys({ sound: 'none' }), ['acknowledge']);
   assert.deepEqual(keys({ actions: ['reconnect'], state: 'RTN_UNACKED', active: false }), ['acknowledge']);
   assert.deepEqual(keys({ state: 'ACKED' }), ['shelve']);
   assert.deepEqual(keys({ state: 'SHELVED' }), ['unshelve']);
   assert.deepEqual(shown([alarm('a')], [], false)[0]?.keys, []);
+});
+
+test('one tap answers together what waits on this page, stands, is not critical, and was in sight for a second', () => {
+  const rows = shown([alarm('worst', { priority: 'critical' }), alarm('a'), alarm('b', { priority: 'advisory' }), alarm('ended', { state: 'RTN_UNACKED', active: false }), alarm('known', { state: 'ACKED' })]);
+  const since = new Map(rows.map(({ key }) => [key, 0]));
+  const answered = (/** @type {any[]} */ page, /** @type {number} */ now_ms, seen = since) => {
+    const { alarms, isReady } = together(page, seen, now_ms);
+    return [alarms.map(({ id }) => id), isReady];
+  };
+  assert.deepEqual(answered(rows, 1000), [['a', 'b'], true]);
+  assert.deepEqual(answered(rows, 999), [['a', 'b'], false]);
+  assert.deepEqual(answered(rows.slice(2), 1000), [['b'], true]);
+  assert.deepEqual(answered(rows, 5000, new Map([...since, [rows[2]?.key ?? '', 4500]])), [['a', 'b'], false], 'one has just come');
+  assert.deepEqual(answered(rows, 5000, new Map()), [['a', 'b'], false], 'never seen');
+});
+
+test('no row of a page is sliced, and each is on one page', () => {
+  assert.deepEqual(pagesOf([124, 124, 124, 77, 77], 372), [0, 3]);
+  assert.deepEqual(pagesOf([124, 124, 124], 371), [0, 2]);
+  assert.deepEqual(pagesOf([900, 80], 400), [0, 1], 'one that is higher than the room has a page of its own');
+  assert.deepEqual(pagesOf([], 400), [0]);
+});
+
+test('who took the sound is said, and until when', () => {
+  assert.match(silentWords(alarm('a', { silenced_until_ms: 1000, silenced_by: 'Ann' })), /^silent until \d\d:\d\d:\d\d by Ann$/);
+  assert.equal(silentWords(alarm('a')), '');
+});
+
+test('a row says what is measured of what is allowed, where both are known', () => {
+  const quantity = (/** @type {number} */ value, unit = 'm/s') => ({ label: '', value, unit });
+  const words = (/** @type {any} */ more) => shown([alarm('a', { verdict: 'fault', measured: quantity(12.6), limit: quantity(11), ...more })])[0]?.words;
+  assert.equal(words({}), '12.6 of 11.0 m/s');
+  assert.equal(words({ limit: quantity(3, 's') }), 'now');
+  assert.match(words({ verdict: 'unknown', text: 'Speed is 4.2 s old' }) ?? '', /^Not checked now: Speed is 4.2 s old/);
+  assert.equal(words({ state: 'RTN_UNACKED', active: false }), 'then');
 });
 
 test('states are said in the words of ISA-18.2', () => {

@@ -27,6 +27,7 @@ test('the loudest unacknowledged alarm is heard', () => {
   assert.equal(soundOf(state({ session: { paused: true } }), page), null);
   assert.equal(soundOf(state({ alarms: [warning()], session: { paused: true } }), page), 'medium', 'what the server tells although paused');
   assert.equal(soundOf(state({ alarms: [alarm({ sound: 'none' })] }), page), null);
+  assert.equal(soundOf(state({ alarms: [alarm({ silenced_until_ms: 1 }), warning()] }), page), 'medium', 'silenced alone');
 });
 
 test('a server that fell silent is the loudest of all, until it is acknowledged', () => {
@@ -88,9 +89,11 @@ const strip = (frame, more = {}) => stripOf(frame, { isSilent: false, paused_s: 
 test('the strip says the worst that stands', () => {
   const checks = /** @type {any} */ ([{ id: 'a', label: 'A', verdict: 'ok' }, { id: 'b', label: 'B', verdict: 'unknown' }]);
   assert.deepEqual([strip(state({ checks })).text, strip(state({ checks })).end], ['No alarms', '1 OK · 1 not checked']);
-  assert.deepEqual(strip(state({ alarms: [alarm()] })), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: '2.3 s', hasReturned: false, opens: 'alarms' });
-  assert.deepEqual([strip(state({ alarms: [warning(), warning({ id: 'b' })] })).kind, strip(state({ alarms: [warning(), warning({ id: 'b' })] })).end], ['warn', '2 alarms']);
-  assert.equal(strip(state({ session: { paused: true } })).text, 'Paused 0:42: no alarm will come');
+  assert.deepEqual(strip(state({ alarms: [alarm()] })), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: '2.3 s', hasReturned: false, isKnown: false, opens: 'alarms' });
+  assert.equal(strip(state({ alarms: [alarm({ state: 'ACKED' })] })).isKnown, true, 'outlined');
+  assert.equal(strip(state({ alarms: [alarm()], suppressed: [{}] })).end, '1 of 2', 'of all in the list');
+  assert.deepEqual([strip(state({ alarms: [warning(), warning({ id: 'b' })] })).kind, strip(state({ alarms: [warning(), warning({ id: 'b' })] })).end], ['warn', '1 of 2']);
+  assert.equal(strip(state({ session: { paused: true } })).text, 'Paused 0:42: no alarm is raised');
   assert.equal(strip(state({ session: { phase: 'lost' } })).kind, 'crit');
   assert.equal(strip(state({ link: { cut: 'bridge-car' } })).text, 'Values are not live');
   assert.equal(strip(null).text, 'Nothing received yet');
@@ -100,7 +103,7 @@ test('the strip says the worst that stands', () => {
 test('what still stands comes before what has returned, and the strip says which it is', () => {
   const returned = alarm({ state: 'RTN_UNACKED', active: false });
   const both = strip(state({ alarms: [returned, warning({ active: true })] }));
-  assert.deepEqual([both.kind, both.text, both.hasReturned, both.end], ['warn', warning().title, false, '2 alarms']);
+  assert.deepEqual([both.kind, both.text, both.hasReturned, both.end], ['warn', warning().title, false, '1 of 2']);
   const only = strip(state({ alarms: [returned] }));
   assert.deepEqual([only.kind, only.text, only.hasReturned, only.end], ['crit', 'Speed above limit: ended', true, '1 alarm']);
 });
@@ -108,8 +111,8 @@ test('what still stands comes before what has returned, and the strip says which
 test('an advisory hides neither a warning that waits to be acknowledged nor how many alarms there are', () => {
   const advisory = warning({ id: 'moving', priority: 'advisory', title: 'Component warns' });
   const returned = strip(state({ alarms: [advisory, warning({ state: 'RTN_UNACKED', active: false })] }));
-  assert.deepEqual([returned.kind, returned.text, returned.hasReturned, returned.end], ['warn', `${warning().title}: ended`, true, '2 alarms']);
-  assert.equal(strip(state({ alarms: [advisory, { ...advisory, id: 'b' }] })).end, '2 alarms');
+  assert.deepEqual([returned.kind, returned.text, returned.hasReturned, returned.end], ['warn', `${warning().title}: ended`, true, '1 of 2']);
+  assert.equal(strip(state({ alarms: [advisory, { ...advisory, id: 'b' }] })).end, '1 of 2');
   const checks = /** @type {any} */ ([{ id: 'a', label: 'A', verdict: 'ok' }, { id: 'b', label: 'B', verdict: 'unknown' }]);
   assert.equal(strip(state({ checks, alarms: [advisory] })).end, '1 not checked');
   assert.equal(strip(state({ checks: checks.slice(0, 1), alarms: [advisory] })).end, '1 OK');

@@ -1,6 +1,5 @@
-"""A server of pictures: serves the real page and speaks docs/protocol.md with frames that are set by hand.
-
-For screenshots only, so that every state of the page can be looked at; the tests drive the real server.
+"""Serves the real page and speaks docs/protocol.md with frames that are set by hand: any state, at once, for as long
+as a test looks at it. Screenshots are made of it, and what depends on the page alone is tested with it.
 """
 
 from __future__ import annotations
@@ -16,8 +15,6 @@ from typing import Any
 
 import uvicorn
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
-from fastapi.responses import HTMLResponse
-from fastapi.staticfiles import StaticFiles
 from fastapi.templating import Jinja2Templates
 
 from monitor.tracks import TrackPoint
@@ -26,8 +23,12 @@ from server.judge.settings import SettingsFile
 from server.judge.topics import candidates
 from server.recording.catalog.sketch import sketch
 from server.system.page_files import static_dir, templates_dir
+from server.web.assets.bundle import find
+from server.web.assets.static_files import StaticText
 from server.web.compression import PageSocket
-from server.web.routes.pages import parts_of
+from server.web.routes.pages import PageFiles
+from server.web.routes.recordings import listed_formats
+from tests.page.canned_drive import CannedDrive
 
 Json = dict[str, Any]
 TILES = (
@@ -42,10 +43,12 @@ def signal(label: str, kind: str | None, value: Json | None, **more: Any) -> Jso
     hz = more.pop("hz", 20.0)
     known = value is not None
     return {
-        "label": label, "freshness": "fresh" if known else "not_published", "age_s": 0.02 if known else None,
+        "label": label, "unit": "", "freshness": "fresh" if known else "not_published",
+        "age_s": 0.02 if known else None, "delay_s": 0.0 if known else None, "unusable": None,
         "horizon_s": max(1.0, 10 / hz), "period_s": 1 / hz, "expected_hz": hz, "rate_hz": hz,
         "topic": f"/catvehicle/{label.lower()}" if known else None, "type": kind, "note": None,
-        "count": 1118 if known else 0, "rejected": 0, "rejected_why": None, "dropped": 0, "value": value,
+        "count": 1118 if known else 0, "rejected": 0, "rejected_why": None, "repaired": 0,
+        "repaired_why": None, "value": value,
         "lowest": None, "highest": None, **more,
     }  # fmt: skip
 
@@ -55,35 +58,43 @@ def live() -> Json:
     diagnostics = "diagnostic_msgs/DiagnosticArray"
     twist, wrench, number = "geometry_msgs/Twist", "geometry_msgs/Wrench", "std_msgs/Float64"
     return {
-        "kind": "state", "seq": 1, "vehicle": "car",
-        "server": {"boot": "9f00", "version": "0.1.0", "pages": 1, "frames_skipped": 0, "loop_lag_ms": 0.4},
+        "kind": "state", "vehicle": "car",
+        "server": {
+            "time_ms": 0, "boot": "9f00", "version": "0.1.0", "pages": 1, "frames_skipped": 0, "loop_lag_ms": 0.4,
+        },
         "session": {
             "phase": "monitoring", "address": "ws://192.168.4.1:9090", "name": "192.168.4.1:9090", "ros_version": 1,
             "connected_for_s": 252.3, "paused": False, "paused_for_s": 0.0, "track_m": 76.1, "received": 14228,
-            "rejected": 0, "track": {"number": 1, "last": 7},
+            "rejected": 0, "track": {"number": 1, "last": 7}, "configured": None, "profile": "CATVehicle",
+            "settings_version": 0, "paused_by": None, "held": None,
         },
         "link": {
             "cut": None, "since_ms": None, "bridge_age_s": 0.05, "car_age_s": 0.05, "problem": None, "attempts": 0,
-            "trying_for_s": 0.0, "topics_subscribed": 14, "topics_heard": 12,
+            "trying_for_s": 0.0, "topics_subscribed": 14, "topics_heard": 12, "late_s": None, "reduced": None,
+            "unreadable_frames": 0, "unreadable_why": None,
         },
         "signals": {
-            "speed": signal("Speed", twist, {"speed_mps": 4.2}, age_s=0.04),
+            "speed": signal("Speed", twist, {"speed_mps": 4.2, "yaw_rate_radps": None}, age_s=0.04),
             "acceleration": signal("Acceleration", twist, {"acceleration_mps2": 0.3, "source": "speed"}),
             "brake": signal("Brake", wrench, {"percent": 0.0}, age_s=0.04),
             "accelerator": signal("Accelerator", wrench, {"percent": 14.1}, age_s=0.05),
-            "steering": signal("Steering", wrench, {"percent": -4.0}, age_s=0.04),
+            "steering": signal("Steering", wrench, {"percent": -4.0, "tyre_rad": None}, age_s=0.04),
             "distance": signal("Nearest distance", number, {"distance_m": 12.4, "none_in_range": False}, hz=74.8),
             "bearing": signal("Nearest angle", number, {"bearing_rad": -0.052}, hz=74.8, age_s=0.01),
-            "odometry": signal("Odometry", "nav_msgs/Odometry", {"speed_mps": 4.19}),
+            "odometry": signal(
+                "Odometry", "nav_msgs/Odometry", {"x_m": 0.0, "y_m": 0.0, "yaw_rad": 0.0, "speed_mps": 4.19}
+            ),
             "position": signal(
                 "Position", "sensor_msgs/NavSatFix",
-                {"lat_deg": 32.231904, "lon_deg": -110.950116, "alt_m": 748.3, "status": 0, "sigma_m": 5.0},
+                {"lat_deg": 32.231904, "lon_deg": -110.950116, "alt_m": 748.3, "status": 0, "sigma_m": 5.0,
+                 "covariance_m2": None},
                 hz=10.0,
             ),
             "heading": signal("Heading", "nav_msgs/Odometry", {"heading_deg": 87.0, "source": "odometry"}),
             "scan": signal(
                 "Laser", "sensor_msgs/LaserScan",
-                {"beams": 181, "usable": 164, "nearest_m": 3.2, "nearest_bearing_rad": 1.5, "frame_id": "laser"},
+                {"beams": 181, "usable": 164, "nearest_m": 3.2, "nearest_bearing_rad": 1.5, "frame_id": "laser",
+                 "angle_min_rad": -1.571, "angle_increment_rad": 0.017453, "range_min_m": 0.1, "range_max_m": 81.0},
                 hz=75.0,
             ),
             "diagnostics": signal("Diagnostics", diagnostics, {"worst": 0, "components": []}, hz=1.0),
@@ -93,10 +104,14 @@ def live() -> Json:
         "nearest": {"time_gap_s": 3.0, "stopping_m": 7.1},
         "checks": [
             {"id": tile, "label": tile, "verdict": "unknown" if tile in UNKNOWN else "ok", "text": "",
-             "brief": UNKNOWN.get(tile, "OK")}
+             "brief": UNKNOWN.get(tile, "OK"), "checks": [tile]}
             for tile in TILES
         ],
         "alarms": [],
+        "suppressed": [],
+        "alarm_load": {"in_10_min": 0, "flood": False, "bearable": True, "chattering": []},
+        "log_trouble": None,
+        "trends": trends(1500.4, 1200, 4),
         "limits": {
             "speed_limit.max_mps": 11.0, "gauge.speed_max_mps": 15.0, "gauge.acceleration_max_mps2": 3.0,
             "obstacle.standoff_m": 5.0, "obstacle.half_width_m": 1.2, "obstacle.wheelbase_m": 2.62,
@@ -105,9 +120,13 @@ def live() -> Json:
         "recording": {"state": "recording", "for_s": 252.0},
         "decelerate": slow("not_available", why="/catvehicle/cmd_vel is not on the car."),
         "control": {"holder": "You"},
+        "reach": None,
+        "phones": [],
         "phone": {
-            "id": "9c0f", "label": "Pixel 7", "count": 1, "handheld": True, "lat_deg": 32.231828, "lon_deg": -110.95005,
-            "accuracy_m": 5.0, "sigma_m": 3.3, "alt_m": None, "speed_mps": None, "heading_deg": None, "at_ms": 0,
+            "id": "9c0f", "label": "Pixel 7", "count": 1, "handheld": True, "chosen": False, "choice": "only",
+            "choice_text": "No phone was chosen as the one in the car. The only phone is used.",
+            "lat_deg": 32.231828, "lon_deg": -110.95005, "accuracy_m": 5.0,
+            "sigma_m": 3.3, "alt_m": None, "speed_mps": None, "heading_deg": None, "at_ms": 0,
             "age_s": 0.8, "used": True, "why": None, "why_text": None, "apart_m": 10.4, "bearing_deg": 323.6,
             "compared_age_s": 0.8, "explained_m": 14.0, "correlation": None,
         },
@@ -152,9 +171,22 @@ def alarm(name: str, title: str, **more: Any) -> Json:
     """A standing alarm."""
     return {
         "id": name, "occurrence": 1, "title": title, "priority": "warning", "place": "snackbar", "sound": "medium",
-        "state": "UNACKED", "active": True, "needs_ack": False, "raised_ms": 0, "for_s": 2.3, "text": "",
-        "trip_text": "", "measured": None, "limit": None, "causes": [], "actions": ["shelve", "acknowledge"],
-        "advice": "", "shelved_until_ms": None, **more,
+        "state": "UNACKED", "active": True, "needs_ack": False, "raised_ms": 0, "for_s": 2.3, "verdict": "fault",
+        "text": "", "trip_text": "", "measured": None, "limit": None, "worst": None, "causes": [],
+        "actions": ["shelve", "acknowledge"], "advice": "", "acknowledged_by": None, "shelved_until_ms": None,
+        "shelved_by": None, "silenced_until_ms": None, "silenced_by": None, **more,
+    }  # fmt: skip
+
+
+def check(name: str, label: str, **more: Any) -> Json:
+    """The answer to a request for one check: OK, and nothing measured."""
+    return {
+        "id": name, "label": label, "tile": label,
+        "checks": [{"id": name, "label": label, "verdict": "ok", "text": ""}],
+        "verdict": "ok", "text": "OK", "for_s": 41.0, "measured": None, "limit": None,
+        "checked_when": "Always checked.", "settings": [], "title": label, "priority": "warning",
+        "delays": {"on_s": 0.3, "off_s": 2.0}, "ends": None, "advice": "",
+        "suppressed_by": [], "signal": None, "minute": {"step_s": 0.2, "values": [], "limits": []}, **more,
     }  # fmt: skip
 
 
@@ -277,32 +309,19 @@ class Canned:
     """The server: `state` is what every page gets from now on, `silent` makes it hold its tongue."""
 
     def __init__(self) -> None:
-        self.state = live()
-        self.silent = False
-        self.heard: list[Json] = []
-        self.refuses: dict[str, str] = {}  # why, by the kind of command
-        self.role = "operator"
+        self.reset()
         self.address = ""
-        self.found: list[Json] = [
-            {"name": "CATVehicle", "address": "ws://192.168.4.1:9090"},
-            {"name": "Simulated car", "address": "ws://127.0.0.1:9091"},
-        ]
-        self.ground: Json = {"layers": [], "image": None}
-        self.log: list[Json] = []  # newest first
-        self.timeline: Json | None = None  # of the recording that a page asks to replay
-        self.mails: list[Json] = []
-        self.tile: Callable[[int, int, int], bytes] = lambda z, x, y: b""
         self.app = FastAPI()
         self._watching = False
         self._page: str | None = None
-        templates = Jinja2Templates(directory=templates_dir())
-        asset = templates.env.globals["asset"] = lambda name: f"/static/{name}"
-        self.app.mount("/static", StaticFiles(directory=static_dir()))
+        files = PageFiles(static_dir(), Jinja2Templates(directory=templates_dir()))
+        self.app.mount("/static", StaticText(directory=files.static))
 
-        @self.app.get("/", response_class=HTMLResponse)
-        async def page(request: Request) -> HTMLResponse:
-            parts = parts_of(None, asset)
-            return templates.TemplateResponse(request, "page.html", parts | {"version": "0.1.0", "vehicle": "car"})
+        @self.app.get("/")
+        def page(request: Request) -> Response:
+            built = find(files.static)
+            context = {"version": "0.1.0", "vehicle": "car", "access": "open"}
+            return files.response(files.render("page.html", request, built, **context), request, built)
 
         @self.app.get("/api/vehicles")
         async def vehicles() -> Json:
@@ -316,6 +335,13 @@ class Canned:
         async def signals() -> Json:
             offered = {one["topic"]: one["type"] for one in self.state["signals"].values() if one["topic"]}
             return {"candidates": candidates(offered), "topics": [{"topic": "/rosout", "type": "rosgraph_msgs/Log"}]}
+
+        @self.app.get("/api/checks/{name}")
+        async def one_check(name: str, response: Response) -> Json:
+            if name not in self.checks:
+                response.status_code = 409
+                return {"detail": "There is no such check."}
+            return self.checks[name]
 
         @self.app.get("/api/log")
         async def log() -> Json:
@@ -333,19 +359,32 @@ class Canned:
         async def points(after: int = 0) -> Json:
             return {"number": 1, "points": [row for row in track() if row[0] > after]}
 
-        begin = int(time.monotonic() * 5)
-        self._trends = lambda steps: trends(time.monotonic() * 5, begin, steps)
-
         @self.app.get("/api/recordings")
         async def recordings() -> Json:
             kept = {"count": 27, "bytes": 1_900_000_000}
             more = {"trash": {"count": 2, "bytes": 81_000_000}, "free_bytes": 41_000_000_000, "waiting": 0}
-            names = {"vehicles": ["car"], "tags": ["wet"]}
+            names = {"vehicles": ["car"], "tags": ["wet"], "formats": listed_formats()}
             return {"recordings": drives(), "next": None, "found": kept, "all": kept} | more | names
 
         @self.app.get("/api/recordings/{name}")
         async def recording(name: str) -> Json:
-            return next(one for one in drives() if one["id"] == name)
+            row = next(one for one in drives() if one["id"] == name)
+            raised = (
+                (102, "warning", "GPS drift at standstill", "6.3 m, 2.0 m are allowed"),
+                (256, "critical", "Speed above limit", "12.1 m/s, limit 11.0 m/s"),
+                (378, "warning", "Phone position missing", "none for 16 s"),
+            )
+            return row | {
+                "raised": [
+                    {"at_ms": row["started_ms"] + 1000 * at_s, "alarm": title, "title": title, "priority": priority,
+                     "text": text, "occurrence": 1}
+                    for at_s, priority, title, text in raised
+                ]
+            }  # fmt: skip
+
+        @self.app.get("/api/devices")
+        async def devices() -> Json:
+            return {"you": "local", "open": True, "devices": []}
 
         @self.app.get("/api/mail/settings")
         async def mail_settings() -> Json:
@@ -359,16 +398,42 @@ class Canned:
         async def minute() -> Json:
             return self._trends(299)
 
+        @self.app.get("/api/trends/drive")
+        async def drive(request: Request) -> Any:
+            return self.drive.answer(dict(request.query_params))
+
         @self.app.websocket("/ws")
         async def socket(socket: WebSocket) -> None:
             await socket.accept()
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await self._serve(socket)
 
+    def reset(self) -> None:
+        """As it is at first: a calm drive."""
+        self.state = live()
+        self.silent = False
+        self.heard: list[Json] = []
+        self.refuses: dict[str, str] = {}  # why, by the kind of command
+        self.role = "operator"
+        self.found: list[Json] = [
+            {"name": "CATVehicle", "address": "ws://192.168.4.1:9090"},
+            {"name": "Simulated car", "address": "ws://127.0.0.1:9091"},
+        ]
+        self.ground: Json = {"layers": [], "image": None}
+        self.log: list[Json] = []  # newest first
+        self.checks: dict[str, Json] = {}  # the answer for each check that is requested by its id
+        self.timeline: Json | None = None  # of the recording that a page asks to replay
+        self.mails: list[Json] = []
+        self.tile: Callable[[int, int, int], bytes] = lambda z, x, y: b""
+        self.drive = CannedDrive()
+        begin = int(time.monotonic() * 5)
+        self._trends = lambda steps: trends(time.monotonic() * 5, begin, steps)
+
     async def _serve(self, socket: WebSocket) -> None:
         hello = {"kind": "hello", "version": "0.1.0", "boot": "9f00", "vehicle": "car", "vehicles": ["car"]}
         who = {"id": "local", "name": "Pixel 7", "role": self.role}
-        await socket.send_json(hello | {"time_ms": _now_ms(), "last_event": 117, "veil_after_s": 2.0, "who": who})
+        more = {"build": "", "time_ms": _now_ms(), "last_event": 117, "veil_after_s": 2.0, "who": who}
+        await socket.send_json(hello | more)
         beat = asyncio.create_task(self._beat(socket))
         try:
             while True:

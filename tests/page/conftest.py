@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import json
 import re
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Generator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser, Page, async_playwright, expect
+from playwright.async_api import Browser, BrowserContext, Locator, Page, async_playwright, expect
+from playwright.async_api import Error as PlaywrightError
 
+from monitor.checks import link_late
 from tests.chromium import FLAGS
+from tests.page.canned import Canned
 
 PHONE: dict[str, Any] = {
     "viewport": {"width": 412, "height": 915},
@@ -27,17 +33,15 @@ expect.set_options(timeout=8000)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Every test here but those of the plain functions drives a browser, on one event loop a module."""
+    """Every test here drives a browser, one for all of them, and so on one event loop."""
     here = Path(__file__).parent
     for item in items:
         if here in item.path.parents:
             item.add_marker(pytest.mark.browser)
-            item.add_marker(pytest.mark.asyncio(loop_scope="module"), append=False)
-            # A browser, a car and a server on two busy cores: what fails is tried again, and the summary says so.
-            item.add_marker(pytest.mark.flaky(reruns=2, reruns_delay=2))
+            item.add_marker(pytest.mark.asyncio(loop_scope="session"), append=False)
 
 
-@pytest_asyncio.fixture(loop_scope="module", scope="module")
+@pytest_asyncio.fixture(loop_scope="session", scope="session")
 async def browser(chromium: str) -> AsyncIterator[Browser]:
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(executable_path=chromium, args=list(FLAGS))
@@ -45,9 +49,31 @@ async def browser(chromium: str) -> AsyncIterator[Browser]:
         await browser.close()
 
 
+@pytest_asyncio.fixture(loop_scope="session", scope="session")
+async def canned_server() -> AsyncIterator[Canned]:
+    served = Canned()
+    async with served.running():
+        yield served
+
+
+@pytest.fixture
+def canned(canned_server: Canned) -> Canned:
+    """The server of set states, as it is at first."""
+    canned_server.reset()
+    return canned_server
+
+
 def is_complaint(kind: str, text: str) -> bool:
     """Whether the page says on its console that something is wrong; that these tests keep its worker away is not."""
     return kind in ("error", "warning") and "blocked by Playwright" not in text
+
+
+async def press(keys: Locator) -> None:
+    """Presses them all; any may go meanwhile."""
+    await keys.evaluate_all("keys => keys.forEach((key) => key.click())")
+
+
+LATE_TITLE = link_late.CHECKS[0].alarm.title
 
 
 class Phone:
@@ -57,6 +83,8 @@ class Phone:
         self.page = page
         self.complaints: list[str] = []
         self.stutter_s = 0.0
+        self.machine_was_late = 0
+        self._handled: list[Locator] = []
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on(
             "console", lambda said: self.complaints.append(said.text) if is_complaint(said.type, said.text) else None
@@ -73,6 +101,22 @@ class Phone:
             due_s = time.monotonic() + 0.05
             await asyncio.sleep(0.05)
             self.stutter_s = max(self.stutter_s, time.monotonic() - due_s)
+
+    async def clear(self) -> None:
+        """Makes it as a new phone: nothing shown and nothing kept."""
+        while self._handled:
+            await self.page.remove_locator_handler(self._handled.pop())
+        site = urlsplit(self.page.url)
+        if site.netloc:
+            kept = {"origin": f"{site.scheme}://{site.netloc}", "storageTypes": "all"}
+            cdp = await self.page.context.new_cdp_session(self.page)
+            await cdp.send("Storage.clearDataForOrigin", kept)
+            await cdp.detach()
+        await self.page.goto("about:blank")
+        await self.page.set_viewport_size(PHONE["viewport"])
+        await self.page.emulate_media(color_scheme=PHONE["color_scheme"], reduced_motion="null")
+        self.complaints.clear()
+        self.stutter_s = 0.0
 
     async def open(self, address: str) -> None:
         await self.page.goto(address)
@@ -92,21 +136,123 @@ class Phone:
             await self.f("acknowledge", "#sheet-alarm").tap()
             await self.page.wait_for_timeout(300)
 
+    async def acknowledge_meanwhile(self) -> None:
+        """From now on acknowledges the snackbar that would cover what a test presses: a busy machine is late."""
+        acknowledge = self.page.locator('.snack[data-f="warning"]:not([hidden]) .key.solid')
+        await self.page.add_locator_handler(acknowledge, press, no_wait_after=True)
+        self._handled.append(acknowledge)
+
+    async def acknowledge_late(self) -> None:
+        """Acknowledges the alarm of a late link, as an operator does: a machine that halts raises it, rightly.
+
+        Its dialog covers the page. Tests of that alarm itself are in tests/world and do not use this phone.
+        """
+
+        async def press_late(keys: Locator) -> None:
+            self.machine_was_late += 1
+            await press(keys)
+
+        shown = self.page.locator('#sheet-alarm[open], .snack[data-f="warning"]:not([hidden])').filter(
+            has_text=LATE_TITLE
+        )
+        key = shown.locator('[data-f="acknowledge"], .key.solid').first
+        await self.page.add_locator_handler(key, press_late, no_wait_after=True)
+
     async def speed(self) -> str:
         return str(await self.page.locator(".gauge .speed").text_content())
 
 
-@pytest_asyncio.fixture(loop_scope="module")
-async def phone(browser: Browser, request: pytest.FixtureRequest) -> AsyncIterator[Phone]:
-    """A fresh phone; at the end its console must be clean but for the lost connections a test made."""
-    context = await browser.new_context(**{**PHONE, **getattr(request, "param", {})})
+LOST = re.compile(
+    r"Service Worker registration blocked|WebSocket connection to"
+    r"|Failed to load resource: net::ERR_(CONNECTION|EMPTY|CONTENT_LENGTH|SOCKET_NOT_CONNECTED)|ERR_CONNECTION"
+    r"|The page now draws the scan itself"  # on a machine that lets its thread wait; test_scan.py asks for it
+)
+
+
+async def new_phone(browser: Browser, **more: Any) -> Phone:
+    """A phone of its own; `more` are options of its browser. Whoever asks for it closes its context."""
+    return await phone_in(await browser.new_context(**PHONE | more))
+
+
+async def phone_in(context: BrowserContext) -> Phone:
+    """A new page of this context, at which a late link is acknowledged."""
     phone = Phone(await context.new_page())
+    await phone.acknowledge_late()
+    return phone
+
+
+@pytest_asyncio.fixture(loop_scope="session", scope="session")
+async def kept_phones(browser: Browser) -> AsyncIterator[list[Phone]]:
+    """The phone that one test hands on to the next, once there is one."""
+    phones: list[Phone] = []
+    yield phones
+    for phone in phones:
+        await phone.page.context.close()
+
+
+def refuse_what_stays(phone: Phone) -> None:
+    """What the next test would find in its browser needs the mark `own_phone`."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise AssertionError("This stays in the browser: mark the test with own_phone.")
+
+    page, context = phone.page, phone.page.context
+    for owner, name in (
+        *((page, "add_init_script"), (page, "route")),
+        *((context, "add_init_script"), (context, "grant_permissions"), (context, "set_geolocation")),
+    ):
+        setattr(owner, name, refused)
+
+
+FAILED = pytest.StashKey[bool]()
+SEEN = """() => ({
+    at: location.href,
+    dialogs: [...document.querySelectorAll('dialog[open], .sheet[open]')].map((it) => it.innerText),
+    snackbars: [...document.querySelectorAll('.snack:not([hidden])')].map((it) => it.innerText),
+    tabs: [...document.querySelectorAll('[role=tab]')].map((it) => `${it.id} ${it.ariaSelected}`),
+    header: document.querySelector('header')?.innerText,
+})"""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    if report.when == "call":
+        item.stash[FAILED] = report.failed
+    return report
+
+
+async def picture(phone: Phone, name: str) -> None:
+    """What a failed test saw: as text with its report, and as a picture."""
+    with contextlib.suppress(PlaywrightError):  # the page may be what failed
+        print(json.dumps(await phone.page.evaluate(SEEN), indent=1))
+        print(f"stutter {phone.stutter_s:.2f} s, late link acknowledged {phone.machine_was_late} ×")
+        path = Path("out/tests/failed") / f"{re.sub(r'[^A-Za-z0-9]+', '-', name)[:120]}.png"
+        await phone.page.screenshot(path=path, timeout=5000)
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def phone(browser: Browser, kept_phones: list[Phone], request: pytest.FixtureRequest) -> AsyncIterator[Phone]:
+    """A phone; at the end its console must be clean but for the lost connections a test made.
+
+    It is the one of the test before, cleared, for a browser's process for a new one takes seconds.
+    """
+    is_own = request.node.get_closest_marker("own_phone") is not None or hasattr(request, "param")
+    if is_own or not kept_phones:
+        phone = await new_phone(browser, **getattr(request, "param", {}))
+    else:
+        phone = kept_phones.pop()
+    if not is_own:
+        refuse_what_stays(phone)
     machine = asyncio.create_task(phone.watch_machine())
     yield phone
     machine.cancel()
-    await context.close()
-    lost = re.compile(
-        r"Service Worker registration blocked|WebSocket connection to"
-        r"|Failed to load resource: net::ERR_(CONNECTION|EMPTY)|ERR_CONNECTION"
-    )
-    assert [said for said in phone.complaints if not lost.search(said)] == []
+    if request.node.stash.get(FAILED, False):
+        await picture(phone, request.node.name)
+    complaints = [said for said in phone.complaints if not LOST.search(said)]
+    if is_own or complaints:
+        await phone.page.context.close()
+    else:
+        await phone.clear()
+        kept_phones.append(phone)
+    assert complaints == []

@@ -53,7 +53,7 @@ test('the sheet offers what can be done from here', () => {
   assert.deepEqual(mine.handTo.map((one) => one.name), ['Ben']); // Cem sleeps
   assert.equal(sheetOf(ANNS, reach, 'page-b').state, 'other');
   const asking = sheetOf({ ...ANNS, requests: [{ page: 'page-b', name: 'Ben', left_s: 6.2 }] }, reach, 'page-b');
-  assert.deepEqual([asking.state, asking.text], ['asking', 'You asked for control. It is granted in 7 s unless it is refused.']);
+  assert.deepEqual([asking.state, asking.text], ['asking', 'You requested control. It is granted in 7 s unless it is refused.']);
   const lapsed = sheetOf({ ...FREE, former: { name: 'Ann', page: 'page-a', may_return_s: 12 } }, reach, 'page-b');
   assert.match(lapsed.text, /Ann can reclaim it for 12 s\.$/);
   assert.equal(sheetOf({ holder: null }, null, 'page-a').state, 'free');
@@ -78,9 +78,9 @@ test('a phone that is armed says so', () => {
 
 test('each thing that keeps a phone from alarming has its own words', () => {
   const why = (more) => verdictOf({ ...PHONE, ...more }).text;
-  assert.match(why({ sound: 'interrupted' }), /a call or another app took its sound/);
-  assert.match(why({ sound: 'asks' }), /it was not touched yet/);
-  assert.match(why({ sound: 'refused' }), /not allowed to sound/);
+  assert.match(why({ sound: 'interrupted' }), /a call or another app uses the sound/);
+  assert.match(why({ sound: 'asks' }), /the page was not touched yet/);
+  assert.match(why({ sound: 'refused' }), /sound was not allowed/);
   assert.match(why({ sound: 'missing' }), /no sound/);
   assert.match(why({ isOnline: false }), /offline/);
   assert.match(why({ lag_s: 2.1 }), /No data from the server/);

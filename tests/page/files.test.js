@@ -61,13 +61,13 @@ test('what a recording is called, and what stands beneath', () => {
 test('the facts in one sentence, and what is unknown as unknown', () => {
   assert.equal(factWords(row()), '08:32 min, 38.0 MB, 1.3 km, up to 12.6 m/s, 2 critical alarms, 1 warning.');
   assert.equal(factWords(row({ distance_m: null, top_speed_mps: null, alarms: null })), '08:32 min, 38.0 MB, no position, alarms not recorded.');
-  assert.equal(factWords(row({ state: 'waiting', length_s: null })), '38.0 MB, being read now.');
+  assert.equal(factWords(row({ state: 'waiting', length_s: null })), '38.0 MB, being read.');
   assert.equal(factWords(row({ state: 'unreadable', problem: 'x.mcap is empty.' })), '38.0 MB. x.mcap is empty.');
   assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'the server was killed.', damage: ['A part is lost.'] })), ['Recovered: the server was killed.', 'A part is lost.']);
   assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'car_1 was recovered.', left_out: ['/camera', '/points'] })), ['car_1 was recovered.', 'Not recorded: /camera, /points.']);
-  assert.deepEqual(warningWords(row({ not_received: ['/imu'] })), ['No message came from: /imu.']);
+  assert.deepEqual(warningWords(row({ not_received: ['/imu'] })), ['No messages from: /imu.']);
   assert.deepEqual(warningWords(row({ left_out: ['/camera', '/points'], left_out_count: 9 })), ['Not recorded: /camera, /points and 7 more.']);
-  assert.deepEqual(warningWords(row({ ended: 'recovered' })), ['Recovered: the server ended while it was recorded.']);
+  assert.deepEqual(warningWords(row({ ended: 'recovered' })), ['Recovered: the server stopped during the recording.']);
   assert.deepEqual(warningWords(row()), []);
 });
 
@@ -98,15 +98,15 @@ test('what is recorded now, and why nothing is', () => {
   const stopped = liveOf({ ...on, state: 'stopped', reason: 'The disk is full.' }, now);
   assert.deepEqual([stopped?.name, stopped?.mark, stopped?.isBad, stopped?.order], ['Recording stopped', 'The disk is full.', true, true]);
   assert.equal(liveOf({ ...on, state: 'saving' }, now)?.order, null);
-  const off = { state: 'off', for_s: null, reason: 'Recording begins by hand: a setting.' };
+  const off = { state: 'off', for_s: null, reason: 'Recording starts manually (a setting).' };
   assert.deepEqual([liveOf(off, now)?.name, liveOf(off, now)?.order, liveOf(off, now)?.facts], ['Not recording', true, '']);
   assert.equal(liveOf(off, { ...now, isMonitoring: false }), null);
   assert.equal(liveOf(undefined, now), null);
   assert.equal(liveOf(on, { ...now, isSilent: true })?.isOn, false, 'nobody knows');
   const missing = { left_out: ['/points', '/camera'], too_large: [{ topic: '/camera', mb: 40.2 }], not_received: ['/imu', '/names'], as_json: 3 };
-  assert.equal(liveOf({ ...on, ...missing }, now)?.missing, 'Not recorded: /points. Too large to record: /camera (40 MB a message). No message comes from: /imu, /names. '
-    + '3 messages kept as JSON: not of their type, or its definition is not known.');
+  assert.equal(liveOf({ ...on, ...missing }, now)?.missing, 'Not recorded: /points. Too large to record: /camera (40 MB a message). No messages from: /imu, /names. '
+    + '3 messages stored as JSON: their type definition is unknown or does not match.');
   assert.equal(liveOf({ ...off, ...missing }, now)?.missing, '');
   const many = { left_out: ['/points', '/camera'], left_out_count: 9, too_large: [{ topic: '/camera', mb: 40.2 }], too_large_count: 1, not_received: ['/imu'], not_received_count: 2 };
-  assert.equal(liveOf({ ...on, ...many }, now)?.missing, 'Not recorded: /points and 7 more. Too large to record: /camera (40 MB a message). No message comes from: /imu and 1 more.');
+  assert.equal(liveOf({ ...on, ...many }, now)?.missing, 'Not recorded: /points and 7 more. Too large to record: /camera (40 MB a message). No messages from: /imu and 1 more.');
 });

@@ -16,6 +16,6 @@ export function alarm(more = {}) {
   return {
     id: 'speed_limit', occurrence: 1, title: 'Speed above limit', priority: 'critical', place: 'dialog', sound: 'high', state: 'UNACKED', active: true,
     needs_ack: true, raised_ms: 0, for_s: 2.3, text: '', trip_text: '', measured: null, limit: null, causes: [], actions: ['acknowledge'], advice: '',
-    shelved_until_ms: null, ...more,
+    shelved_until_ms: null, silenced_until_ms: null, silenced_by: null, ...more,
   };
 }

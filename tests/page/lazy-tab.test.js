@@ -75,7 +75,7 @@ test('a tab that cannot be fetched says so, and is fetched again when it is open
   seen.isShown = true;
   tab.look();
   await settled();
-  assert.equal(fields['none-words'].textContent, 'The scan could not be fetched: the server does not answer. Open this tab again.');
+  assert.equal(fields['none-words'].textContent, 'The scan could not be loaded: the server does not answer. Open this tab again.');
   assert.equal(fields.none.hasAttribute('hidden'), false);
   tab.look();
   await settled();

@@ -42,8 +42,8 @@ test('too many alarms are told in one line; what can be borne is a number only',
 
 test('what stood when the server ended is said where a car is chosen', () => {
   const held = { address: 'ws://192.168.4.1:9090', alarms: 2, paused: false };
-  assert.equal(heldWords(held), 'The server was restarted while it watched 192.168.4.1:9090: 2 alarms stood. Connect to it to go on.');
-  assert.match(heldWords({ ...held, alarms: 1, paused: true }), /1 alarm stood and monitoring was paused/);
+  assert.equal(heldWords(held), 'The server was restarted while it monitored 192.168.4.1:9090: 2 alarms were active. Connect to it to continue.');
+  assert.match(heldWords({ ...held, alarms: 1, paused: true }), /1 alarm was active and monitoring was paused/);
   for (const none of [null, undefined, { ...held, alarms: 0 }, { ...held, address: null }]) assert.equal(heldWords(none), '');
 });
 
@@ -91,18 +91,18 @@ test('an acknowledgement tells how long the alarm waited for it', () => {
 
 test('a dialog tells with what it began, and never speaks in the present of what is over or not checked', () => {
   const near = { ...ALARM, active: true, verdict: 'fault', text: '4.1 m', trip_text: '4.8 m', raised_ms: noon_ms, for_s: 3.5, advice: 'Brake.', measured: null, limit: null };
-  assert.equal(dialogWords(near), '4.1 m. Stands for 3.5 s, since 12:00:00 with 4.8 m. Brake.');
-  assert.equal(dialogWords({ ...near, measured: {}, limit: {}, trip_text: '4.1 m' }), 'Stands for 3.5 s, since 12:00:00. Brake.');
+  assert.equal(dialogWords(near), '4.1 m. Active for 3.5 s, since 12:00:00 with 4.8 m. Brake.');
+  assert.equal(dialogWords({ ...near, measured: {}, limit: {}, trip_text: '4.1 m' }), 'Active for 3.5 s, since 12:00:00. Brake.');
   const lost = { ...near, verdict: 'unknown', text: 'No link to the car.' };
-  assert.equal(dialogWords(lost), 'Not checked now: No link to the car. Stands for 3.5 s, since 12:00:00 with 4.8 m. Brake.');
+  assert.equal(dialogWords(lost), 'Not checked now: No link to the car. Active for 3.5 s, since 12:00:00 with 4.8 m. Brake.');
   assert.equal(dialogWords({ ...lost, active: false }), 'It has returned to normal; it began at 12:00:00 with 4.8 m. Brake.');
 });
 
 test('a dialog tells how bad it was, where that is not what is measured now', () => {
   const speed = (/** @type {number} */ value) => ({ label: 'Speed', value, unit: 'm/s' });
   const fast = { ...ALARM, active: true, verdict: 'fault', trip_text: ALARM.text, raised_ms: noon_ms, for_s: 3.5, advice: 'Brake.', measured: speed(12.6), limit: speed(11), worst: { ...speed(12.84), side: 'above' } };
-  assert.equal(dialogWords(fast), 'Stands for 3.5 s, since 12:00:00. Highest 12.8 m/s. Brake.');
-  assert.equal(dialogWords({ ...fast, measured: speed(12.81) }), 'Stands for 3.5 s, since 12:00:00. Brake.', 'what reads the same is not said twice');
+  assert.equal(dialogWords(fast), 'Active for 3.5 s, since 12:00:00. Highest 12.8 m/s. Brake.');
+  assert.equal(dialogWords({ ...fast, measured: speed(12.81) }), 'Active for 3.5 s, since 12:00:00. Brake.', 'what reads the same is not said twice');
   assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It has returned to normal; it began at 12:00:00. Highest 12.8 m/s. Brake.');
   assert.match(dialogWords({ ...fast, worst: { ...speed(3.9), side: 'below' } }), /Lowest 3\.9 m\/s\./);
 });

@@ -25,7 +25,7 @@ test('addresses are taken apart at commas, semicolons, blanks and lines, each on
 });
 
 for (const [addresses, problem] of /** @type {[string[], RegExp | null][]} */ ([
-  [[], /Type whom/], [['a@b'], null], [['a'], /“a” is not an address/], [['a@b', 'a@b@c'], /a@b@c/], [Array.from({ length: 21 }, (_, i) => `a${i}@b`), /20 at most/], [['x'.repeat(99)], /^“x{60}”/],
+  [[], /Enter a recipient/], [['a@b'], null], [['a'], /“a” is not an address/], [['a@b', 'a@b@c'], /a@b@c/], [Array.from({ length: 21 }, (_, i) => `a${i}@b`), /at most 20/], [['x'.repeat(99)], /^“x{60}”/],
 ])) {
   test(`what is plainly wrong with ${addresses.length} addresses`, () => {
     const found = recipientProblem(addresses);
@@ -36,9 +36,9 @@ for (const [addresses, problem] of /** @type {[string[], RegExp | null][]} */ ([
 
 test('the size says what becomes of it', () => {
   assert.equal(sizeNote(4_200_000, 18, 'split'), '4.2 MB as recorded, compressed: one mail.');
-  assert.match(sizeNote(18_000_001, 18, 'split'), /More than 18.0 MB goes as several mails, with a sentence on how to join them\.$/);
+  assert.match(sizeNote(18_000_001, 18, 'split'), /Above 18.0 MB it is sent as several mails, with a sentence on how to join them\.$/);
   assert.match(sizeNote(60_000_000, 18, 'link'), /^60.0 MB as recorded.*a link to this server\.$/);
-  assert.match(sizeNote(null, 18, 'link'), /^It is compressed\. More than 18.0 MB goes as a link/);
+  assert.match(sizeNote(null, 18, 'link'), /^It is compressed\. Above 18.0 MB it is sent as a link/);
 });
 
 for (const [name, given, word, says] of /** @type {[string, object, string, string | RegExp][]} */ ([

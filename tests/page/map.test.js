@@ -205,8 +205,8 @@ test('a car of now, with its ellipse', () => {
 
 test('a car that is not known to be there is never shown as live, and why is said', () => {
   for (const [value, ink, words] of /** @type {[any, string, RegExp][]} */ ([
-    [FIX, 'stale', /^The car’s position is 3\.4 s old: it may be elsewhere by now\.$/],
-    [null, 'never', /^No position has come/],
+    [FIX, 'stale', /^The car’s position is 3\.4 s old: the car may be elsewhere\.$/],
+    [null, 'never', /^No position received/],
     [null, 'not_published', /^The car publishes no position/],
     [{ ...FIX, status: -1 }, 'fresh', /^The car’s receiver has no fix/],
     [{ ...FIX, lat_deg: null, status: -1 }, 'fresh', /^The car’s receiver has no fix/],
@@ -239,7 +239,7 @@ test('every reason of a phone is said; a coarse fix is still one of now', () => 
   assert.deepEqual([coarse.isLive, coarse.label, coarse.says], [true, 'Phone ±80 m', 'To 80 m only.']);
   assert.equal(phoneOf(frameOf(FIX, { ...PHONE, lat_deg: null, lon_deg: null, age_s: null, used: false, why: 'denied', why_text: 'No' }), 0).place, null);
   assert.equal(phoneOf(frameOf(FIX, PHONE), 4.5).isLive, false); // the page itself has heard nothing for so long
-  assert.match(phoneOf(frameOf(FIX, { ...PHONE, count: 3 }), 0).says, /^It is of Pixel 7 · a3f2, one of 3 phones\.$/);
+  assert.match(phoneOf(frameOf(FIX, { ...PHONE, count: 3 }), 0).says, /^It is the position of Pixel 7 · a3f2, one of 3 phones\.$/);
 });
 
 test('apart is as the server compared them at one moment; where it did not, as the two fixes have it', () => {
@@ -264,7 +264,7 @@ test('distances, bearings and the picture in words', () => {
   const [car, phone] = [carOf(frame, inked('fresh')), phoneOf(frame, 0)];
   assert.equal(pictureWords(car, phone, apartOf(frame, 0, car, phone)), 'Map: the car is 10.4 m from the phone, at 323° NW of it');
   assert.equal(pictureWords(car, { ...phone, isLive: false }, null), 'Map: the car');
-  assert.equal(pictureWords({ ...car, isLive: false }, { ...phone, isLive: false }, null), 'Map: nothing that is of now');
+  assert.equal(pictureWords({ ...car, isLive: false }, { ...phone, isLive: false }, null), 'Map: no current position');
   assert.equal(pictureWords({ ...car, place: null, isLive: false }, { ...phone, place: null, isLive: false }, null), 'Map: no position');
 });
 

@@ -12,6 +12,8 @@ import sys
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+import httpx
+
 
 class Process:
     """One `python -m server …`, of the project in `folder` where one is given; `address` is what it printed."""
@@ -66,8 +68,9 @@ class Process:
         self._send(signal.SIGCONT)
 
     async def kill(self) -> None:
-        """At once, without a farewell."""
-        assert self._process is not None
+        """At once; nothing happens where it never began."""
+        if self._process is None:
+            return
         with contextlib.suppress(ProcessLookupError):
             self._process.kill()
         await self._process.wait()
@@ -87,9 +90,9 @@ class Process:
 @contextlib.asynccontextmanager
 async def running(*arguments: str, folder: Path | None = None) -> AsyncIterator[Process]:
     """A process for the length of the block."""
-    process = await Process(*arguments, folder=folder).start()
+    process = Process(*arguments, folder=folder)
     try:
-        yield process
+        yield await process.start()
     finally:
         await process.kill()
 
@@ -102,6 +105,24 @@ def server(data: Path, vehicle: str | None = None, port: int = 0) -> tuple[str, 
 
 def simulate(*options: str, port: int = 0) -> tuple[str, ...]:
     return ("simulate", "--port", str(port), *options)
+
+
+Drive = tuple[Process, Process]  # a car and a server that watches it
+
+
+@contextlib.asynccontextmanager
+async def driving(data: Path) -> AsyncIterator[Drive]:
+    """A simulated car and a server that watches it."""
+    async with running(*simulate()) as car, running(*server(data, car.address)) as watch:
+        yield car, watch
+
+
+async def watching(watch: Process, address: str) -> Process:
+    """The server, newly connected to a car: nothing is acknowledged."""
+    async with httpx.AsyncClient(base_url=watch.address) as client:
+        await client.post("/api/disconnect")
+        await client.post("/api/connect", json={"address": address})
+    return watch
 
 
 def replay(path: Path, *options: str, port: int = 0) -> tuple[str, ...]:

@@ -6,12 +6,13 @@ import { dialogOf } from '../../static/js/shell/dialogs.js';
 import { chainOf } from '../../static/js/core/link.js';
 import { Track } from '../../static/js/map/map-track.js';
 import { readMessage } from '../../static/js/core/protocol.js';
-import { asideOf, atByKey, atOf, BASE, clockOf, gapBands, markBeside, markPath, placed, rateWords, speedPath, spoken, toldOf, xOf } from '../../static/js/replay/replay-layout.js';
+import { asideOf, atByKey, atOf, BASE, clockOf, countWords, gapBands, liveWords, markBeside, markPath, momentOf, placed, rateWords, sketchOf, speedPath, spoken, summaryOf, xOf } from '../../static/js/replay/replay-layout.js';
+import { LEAD_S, jumpAt, jumpsOf, lengthOfJump, nearestJump } from '../../static/js/replay/replay-jumps-layout.js';
 import { alarm, state } from './frames.js';
 
-const mark = (at_s, more = {}) => ({ at_s, alarm: 'speed_limit', title: 'Speed above limit', priority: /** @type {const} */ ('critical'), text: '', ...more });
+const mark = (at_s, more = {}) => ({ at_s, alarm: 'speed_limit', title: 'Speed above limit', priority: /** @type {const} */ ('critical'), text: '', duration_s: null, ...more });
 const replay = (more = {}) => ({
-  id: 'r', token: 't', at_s: 246, at_ms: 1_790_000_000_000, start_ms: 0, end_ms: 0, length_s: 512, is_playing: false, rate: 1, reached_rate: null,
+  id: 'r', vehicle: 'car', title: '', token: 't', at_s: 246, at_ms: 1_790_000_000_000, start_ms: 0, end_ms: 0, length_s: 512, is_playing: false, rate: 1, reached_rate: null,
   is_seeking: false, is_settled: true, silent_s: 0, seek: 1, alarms_from: /** @type {const} */ ('judged'), settings_from: /** @type {const} */ ('now'), hangs_s: null, ...more,
 });
 const live = (more = {}) => ({ phase: /** @type {const} */ ('monitoring'), name: 'car', paused: false, cut: null, problem: null, recording: { state: 'off', for_s: null }, alarms: [], alarms_in_all: 0, ...more });
@@ -83,7 +84,7 @@ test('times as a person reads and hears them', () => {
 
 test('the line says first what is wrong with the replay, then what was not recorded, then the alarms', () => {
   const fast = alarm({ title: 'Speed above limit' });
-  const told = (more, rest = {}) => toldOf(playing({ replay: replay(more), ...rest }));
+  const told = (more, rest = {}) => momentOf(playing({ replay: replay(more), ...rest }));
   assert.deepEqual(told({}, { alarms: [fast] }), { kind: 'crit', icon: 'crit', text: 'Speed above limit', end: 're-evaluated' });
   assert.equal(told({ alarms_from: 'recording' }, { alarms: [fast] }).end, 'original alarms');
   assert.equal(told({}, { alarms: [fast, alarm({ id: 'b', priority: 'warning' })] }).end, '2 alarms, re-evaluated');
@@ -93,12 +94,12 @@ test('the line says first what is wrong with the replay, then what was not recor
   assert.equal(told({ is_seeking: true, silent_s: 9 }).text, 'Seeking to 04:06');
   assert.equal(told({ hangs_s: 3.2, is_seeking: true }).text, 'The replay has not answered for 3 s');
   assert.equal(told({ is_settled: false }).text, 'Checks still warming up');
-  assert.equal(toldOf(playing({ session: { paused: true } })).text, 'Monitoring was paused');
+  assert.equal(momentOf(playing({ session: { paused: true } })).text, 'Monitoring was paused');
 });
 
 test('what is live is told beside a recording: alarms, a lost link, a pause, and that it is not known', () => {
   assert.equal(asideOf(live()), null);
-  assert.equal(asideOf(null)?.text, 'Live: not known');
+  assert.equal(asideOf(null)?.text, 'Live: unknown');
   assert.equal(asideOf(live({ phase: 'idle' })), null);
   assert.equal(asideOf(live({ phase: 'lost' }))?.text, 'Live: connection lost');
   assert.equal(asideOf(live({ cut: 'bridge-car' }))?.text, 'Live: the car fell silent');
@@ -110,6 +111,48 @@ test('what is live is told beside a recording: alarms, a lost link, a pause, and
   assert.equal(asideOf(live({ alarms: [gps] }))?.asking, null);
   assert.equal(asideOf(live({ alarms: [alarm({ state: 'ACKED' })] }))?.asking, null, 'somebody has seen it');
   assert.equal(asideOf(live({ alarms: [alarm({ state: 'SHELVED' }), alarm({ priority: 'advisory' })] })), null);
+});
+
+test('the list of jumps has alarms of every priority and gaps, in the order of time, and leads to what came before each', () => {
+  const marks = [mark(20, { duration_s: 8.04 }), mark(33, { priority: 'advisory', title: 'Fuel low' }), mark(3, { priority: 'warning', duration_s: 71 })];
+  const jumps = jumpsOf({ marks, gaps: [[40, 46]] });
+  assert.deepEqual(jumps.map(({ at_s, kind, title }) => [at_s, kind, title]), [[3, 'warning', 'Speed above limit'], [20, 'critical', 'Speed above limit'], [33, 'advisory', 'Fuel low'], [40, 'gap', 'Nothing recorded']]);
+  assert.deepEqual(jumps.map(jumpAt), [0, 20 - LEAD_S, 33 - LEAD_S, 40 - LEAD_S], 'never before the beginning');
+  assert.deepEqual(jumps.map((jump) => lengthOfJump(jump, true)), ['1:11 min', '8.0 s', 'to the end', '6.0 s']);
+  assert.equal(lengthOfJump({ length_s: null }, false), 'end not read yet', 'what was not read is not called endless');
+  assert.equal(lengthOfJump({ length_s: 12.3 }, true), '12 s');
+  assert.equal(nearestJump([3, 20, 33, 40], 15), 1, 'where its own jump leads, it is the one');
+  assert.equal(nearestJump([3, 20], 0), 0);
+  assert.equal(nearestJump([8, 20], 0), 0, 'before the first');
+  assert.equal(nearestJump([], 9), -1);
+});
+
+test('the number of alarms is no promise while the recording is still read', () => {
+  const line = { marks: [mark(1), mark(2)], marks_left_out: 3, is_done: true };
+  assert.equal(countWords(line), '5 alarms');
+  assert.equal(countWords({ ...line, is_done: false }), '5 so far');
+  assert.equal(countWords({ ...line, marks: [], marks_left_out: 0, is_done: false }), 'Alarms', 'not: none');
+  assert.equal(countWords(null), 'Alarms');
+});
+
+test('the catalog\'s sketch is a time line that nobody has read yet', () => {
+  const row = /** @type {any} */ ({ length_s: 100, speed_mps: [1, null, 3, 4], started_ms: 5000, raised: [{ at_ms: 15_000, alarm: 'a', title: 'A', priority: 'warning', text: 't' }] });
+  const line = sketchOf(row) ?? assert.fail();
+  assert.deepEqual([line.bucket_s, line.done_s, line.is_done], [25, 0, false]);
+  assert.deepEqual(line.marks.map(({ at_s, duration_s }) => [at_s, duration_s]), [[10, null]]);
+  assert.equal(sketchOf({ ...row, length_s: null }), null, 'not read yet');
+  assert.equal(speedPath(sketchOf({ ...row, speed_mps: undefined }) ?? assert.fail(), 100), '');
+});
+
+test('what is live is said in a line: the recording, and alarms that are not urgent are not called none', () => {
+  const recorded = { recording: { state: 'recording', for_s: 252, reason: null } };
+  assert.deepEqual(liveWords(live(recorded)), { recording: 'recording 04:12', text: 'no alarms' });
+  assert.equal(liveWords(live({ alarms_in_all: 1 })).text, 'no urgent alarm, 1 other');
+  assert.equal(liveWords(live()).recording, 'not recording');
+  assert.equal(liveWords(live({ recording: { state: 'stopped', for_s: null, reason: 'Disk full.' } })).recording, 'recording stopped: Disk full.');
+  assert.equal(liveWords(live({ phase: 'idle' })).text, 'no car is monitored');
+  assert.deepEqual(liveWords(null), { text: 'alarms unknown', recording: 'recording unknown' });
+  assert.equal(asideOf(summaryOf(state({ alarms: [alarm()] })))?.text, 'Live: Speed above limit', 'while it is being opened');
 });
 
 test('a recording rings nobody: no dialog, and the title says REPLAY', () => {

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, readScan } from '../../static/js/scan/scan-frame.js';
-import { NOT_IN_VIEW, beamWords, behind, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
+import { NOT_IN_VIEW, beamWords, behind, clearOf, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
 import { edgesOf, endOf } from '../../static/js/scan/scan-corridor.js';
 import { beside, follow, nearestShown, nearestTo } from '../../static/js/scan/scan-pick.js';
 import { ScanMark } from '../../static/js/scan/scan-mark.js';
@@ -209,4 +209,13 @@ test('a mark stays through a gap of a second, then it is let go; touched again i
   assert.equal(mark.at === null ? null : mark.words, '8.3 m, straight ahead');
   mark.step(ROOM, -1, 20, 0);
   assert.equal(mark.words, '12.4 m, 14° right');
+});
+
+test('words give way to words: half a line, a line, or they are left out', () => {
+  const box = { left: 0, top: 100, width: 40, height: 20 };
+  assert.deepEqual(clearOf([], box), box);
+  assert.equal(clearOf([{ left: 30, top: 110, width: 40, height: 20 }], box)?.top, 90);
+  assert.equal(clearOf([{ left: 30, top: 82, width: 40, height: 20 }], box)?.top, 110);
+  assert.equal(clearOf([{ left: 41, top: 100, width: 40, height: 20 }], box)?.top, 100, 'beside it');
+  assert.equal(clearOf([{ left: 0, top: 70, width: 40, height: 80 }], box), null);
 });

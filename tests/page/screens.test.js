@@ -10,9 +10,9 @@ import { thenWords } from '../../static/js/shell/veil.js';
 import { state } from './frames.js';
 
 test('tabs by key and by link', () => {
-  assert.deepEqual(['ArrowRight', 'ArrowLeft', 'Home', 'End', 'x'].map((key) => tabByKey(key, 0)), [1, 0, 0, 4, null]);
-  assert.equal(tabByKey('ArrowRight', 4), 4);
-  assert.deepEqual(['#map', '#SCAN', '', '#nothing'].map(tabByHash), [1, 2, -1, -1]);
+  assert.deepEqual(['ArrowRight', 'ArrowLeft', 'Home', 'End', 'x'].map((key) => tabByKey(key, 0, 4)), [1, 0, 0, 4, null]);
+  assert.equal(tabByKey('ArrowRight', 4, 4), 4);
+  assert.deepEqual(['#map', '#SCAN', '', '#nothing'].map((hash) => tabByHash(hash, ['home', 'map', 'scan'])), [1, 2, -1, -1]);
 });
 
 test('which screen is in front', () => {
@@ -23,8 +23,8 @@ test('which screen is in front', () => {
 });
 
 test('what the phone refused is said, with what it costs', () => {
-  assert.deepEqual(armWords('position', 'refused'), { tag: 'Refused', kind: 'warn', cost: 'Refused: phone–car will not be checked' });
-  assert.equal(armWords('screen', 'missing').cost, 'Needs HTTPS: the phone may go dark and hide alarms');
+  assert.deepEqual(armWords('position', 'refused'), { tag: 'Refused', kind: 'warn', cost: 'Refused: phone and car are not compared' });
+  assert.equal(armWords('screen', 'missing').cost, 'Needs HTTPS: the screen may turn off and hide alarms');
   assert.equal(armWords('sound', 'ready').tag, 'Ready');
   assert.equal(armWords('sound', 'asks').kind, 'unk');
 });
@@ -51,6 +51,7 @@ test('the headline of each signal; unknown is a dash and never 0', () => {
   assert.deepEqual(headline('position', { status: -1, alt_m: 1 }), ['no', 'fix']);
   assert.deepEqual(headline('diagnostics', { worst: 2 }), ['ERROR', '']);
   assert.deepEqual(headline('fuel', { value: 62.5, unit: '%' }), ['62.5', '%']);
+  assert.deepEqual(headline('oil', { value: 92.04 }, '°C'), ['92.0', '°C']);
   assert.deepEqual(headline('command', { speed_mps: null }), ['–', 'm/s']);
   assert.deepEqual(headline('speed', null), ['–', '']);
   assert.deepEqual(headline('something_new', { percent: 7 }), ['7.0', '%']);

@@ -15,7 +15,7 @@ from typing import Any
 from playwright.async_api import Browser, Page, async_playwright
 
 from tests.chromium import FLAGS, find_chromium
-from tests.page.canned import Canned, alarm, idle, live, slow, slowed
+from tests.page.canned import Canned, alarm, check, idle, live, slow, slowed
 from tests.server.web.map_files import png
 
 OUT = Path(__file__).resolve().parents[2] / "out" / "screenshots"
@@ -27,6 +27,34 @@ PHONE: dict[str, Any] = {
     "reduced_motion": "reduce",  # so that nothing stands half-way
 }
 SIZES = ((320, 640), (915, 412), (1180, 820))
+# The pictures of the drawing: which scene, in a window of which size, in which theme.
+WATCH: dict[str, tuple[str, int, int, str]] = {
+    "watch-desk": ("home", 1440, 900, "dark"),
+    "watch-desk-light": ("home", 1440, 900, "light"),
+    "watch-desk-critical": ("home-fault", 1440, 900, "dark"),
+    "watch-desk-lost": ("link-lost", 1440, 900, "dark"),
+    "watch-desk-replay": ("replay", 1440, 900, "dark"),
+    "watch-desk-settings": ("settings", 1440, 900, "dark"),
+    "watch-desk-files": ("files", 1440, 900, "dark"),
+    "watch-wide": ("home-people", 1920, 1080, "dark"),
+    "watch-wide-critical": ("home-fault", 1920, 1080, "dark"),
+    "watch-tablet": ("home", 820, 1180, "dark"),
+    "watch-tablet-alarms": ("alarms", 820, 1180, "dark"),
+    "watch-tablet-critical": ("home-fault", 820, 1180, "light"),
+    "watch-tablet-stale": ("home-stale", 820, 1180, "dark"),
+    "watch-tablet-replay": ("replay", 820, 1180, "dark"),
+    "watch-land": ("home", 915, 412, "dark"),
+    "watch-crit-land": ("home-fault", 915, 412, "dark"),
+    "watch-crit-412": ("home-fault", 412, 915, "dark"),
+    "watch-crit-320": ("home-fault", 320, 568, "light"),
+    "watch-phone-home": ("home", 412, 915, "dark"),
+    "watch-phone-home-360": ("home", 360, 800, "dark"),
+    "watch-phone-home-320": ("home", 320, 568, "dark"),
+    "watch-phone-alarms": ("alarms", 412, 915, "dark"),
+    "watch-phone-chart": ("chart", 412, 915, "dark"),
+    "watch-phone-check": ("check", 412, 915, "dark"),
+    "watch-phone-check-unknown": ("check-unknown", 412, 915, "dark"),
+}
 Scene = Callable[[Canned, Page], Awaitable[None]]
 SCENES: dict[str, Scene] = {}
 # Roboto as on a phone: words take the room they take there.
@@ -58,6 +86,20 @@ async def home(server: Canned, page: Page) -> None:
     server.state = live()
 
 
+@scene("home-people")
+async def home_people(server: Canned, page: Page) -> None:
+    state = live()
+    told = (("a", "Desk 1", True, None), ("b", "Desk 2", True, None), ("c", "Field 2", False, "its sound is off"))
+    people = [
+        {"page": name, "name": label, "can": can, "why": None if can else "sound", "why_text": why, "here": True,
+         "awake": "ready", "vibrates": False, "battery": None, "charging": None, "heard_s": 0.1 + 0.1 * n}
+        for n, (name, label, can, why) in enumerate(told)
+    ]  # fmt: skip
+    state["reach"] = {"can": 2, "of": 3, "why": "Field 2: its sound is off", "pages": people, "left_out": 0}
+    state["control"] |= {"page": "a", "holder": "Desk 1"}
+    server.state = state
+
+
 @scene("home-lower")
 async def home_lower(server: Canned, page: Page) -> None:
     server.state = live()
@@ -69,9 +111,10 @@ async def home_lower(server: Canned, page: Page) -> None:
 async def chart(server: Canned, page: Page) -> None:
     await home_lower(server, page)
     await page.tap("[data-trend=distance]")
-    box = await page.locator("#sheet-chart .u-over").bounding_box()
+    await page.wait_for_selector(".trends-strip .line[d]")
+    box = await page.locator(".trends-panes .u-over").first.bounding_box()
     assert box is not None
-    await page.touchscreen.tap(box["x"] + 0.7 * box["width"], box["y"] + 80)
+    await page.touchscreen.tap(box["x"] + 0.6 * box["width"], box["y"] + 40)
 
 
 @scene("home-fault")
@@ -150,7 +193,7 @@ def _slowing(confirmed: bool | None, **more: Any) -> dict[str, Any]:
         ("accelerator", {"percent": 0.0}),
         ("distance", {"distance_m": 9.6, "none_in_range": False}),
     ):
-        state["signals"][name]["value"] = value
+        state["signals"][name]["value"] |= value
     state["nearest"] = {"time_gap_s": 3.3, "stopping_m": 4.3}
     return state
 
@@ -169,7 +212,7 @@ async def slow_down_release(server: Canned, page: Page) -> None:
 @scene("slow-down-not-confirmed")
 async def slow_down_not_confirmed(server: Canned, page: Page) -> None:
     server.state = _slowing(False)
-    server.state["signals"]["speed"]["value"] = {"speed_mps": 4.2}
+    server.state["signals"]["speed"]["value"]["speed_mps"] = 4.2
     server.state["alarms"] = [
         alarm(
             "slow_down_unconfirmed", "Slow-down NOT CONFIRMED", priority="critical", place="dialog", sound="high",
@@ -304,6 +347,115 @@ async def alarm_log(server: Canned, page: Page) -> None:
     await page.tap("[data-screen=log]")
     await page.tap("text=Older")
     await page.evaluate("document.querySelector('.screen').scrollTo(0, 9999)")
+
+
+def several() -> dict[str, Any]:
+    """A state with an alarm of every kind."""
+    gone: dict[str, Any] = {"state": "RTN_UNACKED", "active": False, "place": "list"}
+    speed, limit = (
+        {"label": name, "value": value, "unit": "m/s"} for name, value in (("Speed", 12.6), ("Limit", 11.0))
+    )
+    state = live()
+    state["signals"]["speed"]["value"]["speed_mps"] = 12.6
+    state["checks"][0] |= {"verdict": "fault", "brief": "FAULT 12.6 m/s"}
+    state["alarms"] = [
+        alarm(
+            "Speed",
+            "Speed above limit",
+            priority="critical",
+            place="list",
+            sound="high",
+            measured=speed,
+            limit=limit,
+            text="12.6 m/s, limit 11.0 m/s",
+            raised_ms=at("14:07:31"),
+            advice="The safety driver must slow the car.",
+        ),
+        alarm("phone_missing", "Phone position missing", place="list", text="none for 16 s", raised_ms=at("14:07:12")),
+        alarm(
+            "drift",
+            "GPS drift at standstill",
+            place="list",
+            text="6.3 m from where it stopped",
+            raised_ms=at("14:07:02"),
+            silenced_until_ms=at("14:08:01"),
+            silenced_by="Desk 1",
+        ),
+        alarm(
+            "link_lost",
+            "Connection lost",
+            priority="critical",
+            trip_text="The bridge, for 6.2 s",
+            raised_ms=at("14:06:02"),
+            **gone,
+        ),
+        alarm(
+            "quality",
+            "GPS quality unknown",
+            state="ACKED",
+            acknowledged_by="Desk 1",
+            place="list",
+            text="no covariance",
+            raised_ms=at("14:03:50"),
+        ),
+        alarm(
+            "slow",
+            "Laser slower than expected",
+            state="SHELVED",
+            shelved_by="Ann",
+            place="list",
+            shelved_until_ms=at("14:14:00"),
+            text="61 of 75 Hz",
+            raised_ms=at("14:04:51"),
+        ),
+    ]
+    state["suppressed"] = [
+        {
+            "id": "near",
+            "title": "Nearest object slow",
+            "priority": "warning",
+            "by": ["Laser slower than expected"],
+            "raised_ms": at("14:04:51"),
+        }
+    ]
+    return state
+
+
+@scene("alarms")
+async def alarms(server: Canned, page: Page) -> None:
+    server.state = several()
+    await page.tap("[data-f=strip]")
+    await page.wait_for_selector("ul[data-f=alarms] li")
+    await page.wait_for_timeout(1200)  # until what is in sight can be acknowledged together
+
+
+@scene("check")
+async def one_check(server: Canned, page: Page) -> None:
+    server.state = several()
+    speed, limit = server.state["alarms"][0]["measured"], server.state["alarms"][0]["limit"]
+    values = [6.0 + 1.2 * math.sin(n / 40) for n in range(280)] + [6.0 + 0.34 * n for n in range(20)]
+    server.checks["Speed"] = check(
+        "Speed", "Speed", verdict="fault", text="12.6 m/s, limit 11.0 m/s", for_s=2.3, measured=speed, limit=limit,
+        settings=["speed_limit.max_mps", "speed_limit.deadband_mps"], priority="critical", signal="speed",
+        minute={"step_s": 0.2, "values": values, "limits": [11.0] * 300},
+    )  # fmt: skip
+    await page.tap("[data-f=tiles] li button")
+    await page.wait_for_selector(".check-view canvas:not([hidden])")
+    await page.tap("[data-f=check-change]")
+
+
+@scene("check-unknown")
+async def unknown_check(server: Canned, page: Page) -> None:
+    server.state = live()
+    server.checks["GPS drift"] = check(
+        "GPS drift", "GPS drift", verdict="unknown", text="The car moves", for_s=32.0,
+        checked_when="Checked at standstill with a fix, once three positions have come since the car stopped.",
+        checks=[{"id": "GPS drift", "label": "GPS drift", "verdict": "unknown", "text": "The car moves"},
+                {"id": "gps_jump", "label": "GPS jump", "verdict": "ok", "text": "OK"}],
+    )  # fmt: skip
+    await page.wait_for_selector("[data-f=tiles] li")
+    await page.tap("[data-f=tiles] li:nth-child(5) button")
+    await page.wait_for_selector(".check-view[data-verdict=unknown] .others button")
 
 
 @scene("tablet")
@@ -448,7 +600,7 @@ async def replay(server: Canned, page: Page) -> None:
         ("bearing", {"bearing_rad": -0.0175}),
         ("distance", {"distance_m": 18.7, "none_in_range": False}),
     ):
-        state["signals"][name]["value"] = value
+        state["signals"][name]["value"] |= value
     state["nearest"] = {"time_gap_s": 1.5, "stopping_m": 17.9}
     state["checks"][0] |= {"verdict": "fault", "brief": "FAULT 12.1 m/s"}
     state["live"] = {
@@ -457,7 +609,8 @@ async def replay(server: Canned, page: Page) -> None:
         "reach": None, "decelerate": state["decelerate"],
     }  # fmt: skip
     state["replay"] = {
-        "id": "car_0", "token": "0", "at_s": at_s, "at_ms": start_ms + round(at_s * 1000), "start_ms": start_ms,
+        "id": "car_0", "vehicle": "car", "title": "", "token": "0",
+        "at_s": at_s, "at_ms": start_ms + round(at_s * 1000), "start_ms": start_ms,
         "end_ms": start_ms + round(length_s * 1000), "length_s": length_s, "is_playing": False, "rate": 1.0,
         "reached_rate": None, "is_seeking": False, "is_settled": True, "silent_s": 0.0, "seek": 1,
         "alarms_from": "recording", "settings_from": "recording", "hangs_s": None,
@@ -468,7 +621,7 @@ async def replay(server: Canned, page: Page) -> None:
         "kind": "timeline", "length_s": length_s, "done_s": length_s, "is_done": True, "bucket_s": 4.0,
         "speed_mps": speeds, "gaps": [], "marks_left_out": 0, "notes": [],
         "marks": [
-            {"at_s": at_s, "alarm": title, "title": title, "priority": priority, "text": ""}
+            {"at_s": at_s, "alarm": title, "title": title, "priority": priority, "text": "", "duration_s": 12.4}
             for at_s, priority, title in marks
         ],
     }  # fmt: skip
@@ -476,7 +629,7 @@ async def replay(server: Canned, page: Page) -> None:
         alarm("Speed", "Speed above limit", priority="critical", state="ACKED", text="12.1 m/s, limit 11.0 m/s")
     ]
     server.state = state
-    await page.goto(f"{server.rosbridge.address}/?replay=car_0&t={at_s:.0f}")
+    await page.goto(f"{server.address}/?replay=car_0&t={at_s:.0f}#home")
     await page.wait_for_selector("#monitor:not([hidden])")
     await page.tap(".gauge")  # any touch lets the page sound
 
@@ -540,27 +693,41 @@ async def preferences(server: Canned, page: Page) -> None:
     await page.tap("[data-screen=preferences]")
 
 
+async def show(server: Canned, page: Page, name: str) -> None:
+    """Brings the page into a state, from anew."""
+    server.reset()
+    await page.goto("about:blank")
+    await page.goto(f"{server.address}/#home")
+    await page.wait_for_selector("#monitor:not([hidden])")
+    if "connect" not in name:
+        await page.tap("#monitor .top .rec")  # any touch lets the page sound
+    await SCENES[name](server, page)
+
+
 async def take(browser: Browser, name: str, theme: str, size: dict[str, int] | None = None) -> Path:
     """One picture."""
     server = Canned()
     options = PHONE | ({"viewport": size} if size else {})
-    async with server.running() as address:
+    async with server.running():
         context = await browser.new_context(
             **options, color_scheme="dark" if theme == "dark" else "light", permissions=[]
         )
         page = await context.new_page()
         page.on("console", lambda message: print(name, "console:", message.text) if message.type != "log" else None)
         page.on("pageerror", lambda error: print(name, "error:", error))
-        await page.goto(address)
-        await page.wait_for_selector("#monitor:not([hidden])")
-        if "connect" not in name:
-            await page.tap("#monitor .top .rec")  # any touch lets the page sound
-        await SCENES[name](server, page)
+        await show(server, page, name)
         await page.wait_for_timeout(700)
         path = OUT / (f"{name}-{theme}.png" if size is None else f"{name}-{theme}-{size['width']}.png")
         await page.screenshot(path=path)
         await context.close()
     return path
+
+
+async def take_watch(browser: Browser, name: str) -> Path:
+    """One picture of the drawing, from the running page."""
+    what, width, height, theme = WATCH[name]
+    taken = await take(browser, what, theme, {"width": width, "height": height})
+    return taken.rename(OUT / f"{name}.png")
 
 
 async def take_all(names: list[str], fonts: Path) -> None:
@@ -570,7 +737,11 @@ async def take_all(names: list[str], fonts: Path) -> None:
             executable_path=find_chromium(), args=[*FLAGS], env={**os.environ, "FONTCONFIG_FILE": str(fonts)}
         )
         sizes = [{"width": width, "height": height} for width, height in SIZES] if names[:1] == ["--sizes"] else [None]
-        for name in [one for one in names if one != "--sizes"] or SCENES:
+        for name in [one for one in names if one in WATCH] if names else WATCH:
+            print(await take_watch(browser, name))
+        for name in [one for one in names if one not in ("--sizes", *WATCH)] or (
+            [] if names and names != ["--sizes"] else SCENES
+        ):
             for theme in ("dark", "light"):
                 for size in sizes:
                     print(await take(browser, name, theme, size))

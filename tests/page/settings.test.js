@@ -96,14 +96,14 @@ test('a typed number: comma or point, with or without its unit', () => {
 
 test('what cannot be set is refused in words', () => {
   const why = (/** @type {string} */ typed) => /** @type {any} */ (readNumber(typed, speed)).refused;
-  assert.equal(why(''), 'Speed limit: a number is needed.');
-  assert.equal(why('  '), 'Speed limit: a number is needed.');
+  assert.equal(why(''), 'Speed limit: a number is required.');
+  assert.equal(why('  '), 'Speed limit: a number is required.');
   for (const typed of ['abc', '1,000.5', '1.2.3', '1e3', 'NaN', 'Infinity', '--1', '0x10', '5 m', '<b>']) {
-    assert.equal(why(typed), `Speed limit: “${typed}” is no number.`);
+    assert.equal(why(typed), `Speed limit: “${typed}” is not a number.`);
   }
-  for (const typed of ['0.4', '40.1', '-3', '99999999999999999999999']) assert.equal(why(typed), 'Speed limit: 0.5 to 40 m/s is possible.', typed);
+  for (const typed of ['0.4', '40.1', '-3', '99999999999999999999999']) assert.equal(why(typed), 'Speed limit: 0.5 to 40 m/s is allowed.', typed);
   chooseSpeedUnit('km/h');
-  assert.equal(why('150'), 'Speed limit: 1.8 to 144 km/h is possible.');
+  assert.equal(why('150'), 'Speed limit: 1.8 to 144 km/h is allowed.');
 });
 
 test('headings in the order of the server, each once', () => {
@@ -133,7 +133,7 @@ test('a change in words', () => {
   assert.deepEqual(changeLines(now, { values: { 'gone.x': 1 } }, () => ''), []);
 });
 
-/** @returns {import('../../static/js/core/protocol.js').Signal} */
+/** @returns {import('../../static/js/core/protocol-types.js').SignalState<any>} */
 const signal = (more = {}) => ({
   label: 'Speed', freshness: 'fresh', age_s: 0.1, horizon_s: 1, period_s: 0.05, expected_hz: 20, rate_hz: 20, topic: '/vel', type: 'geometry_msgs/Twist', note: null,
   count: 9, rejected: 0, rejected_why: null, value: { speed_mps: 1 }, lowest: null, highest: null, ...more,
@@ -141,16 +141,16 @@ const signal = (more = {}) => ({
 
 test('a topic says what it carries, how fast, and what is wrong with it', () => {
   assert.deepEqual(topicWords(signal(), undefined, true), { topic: '/vel', says: 'speed · Twist', icon: 'ok', rate: '20.0' });
-  assert.deepEqual(topicWords(signal(), '/vel', true).says, 'speed · Twist · picked by you');
+  assert.deepEqual(topicWords(signal(), '/vel', true).says, 'speed · Twist · chosen by you');
   assert.deepEqual(topicWords(signal({ note: 'Float64, expected Float32' }), undefined, true), { topic: '/vel', says: 'speed · Twist\nFloat64, expected Float32', icon: 'warn', rate: '20.0' });
   assert.match(topicWords(signal({ rejected: 3, rejected_why: 'x is NaN' }), undefined, true).says, /3 rejected: x is NaN/);
   assert.match(topicWords(signal({ freshness: 'stale', age_s: 7.4 }), undefined, true).says, /silent for 7.4 s/);
   assert.match(topicWords(signal({ freshness: 'never' }), undefined, true).says, /no message yet/);
   const ghost = { freshness: /** @type {const} */ ('not_published'), note: 'no node publishes it', value: null };
   assert.deepEqual(topicWords(signal(ghost), undefined, true), { topic: '/vel', says: 'speed · no node publishes it', icon: 'unknown', rate: '–' });
-  assert.deepEqual(topicWords(signal(ghost), '/vel', true), { topic: '/vel', says: 'speed · picked by you, no node publishes it', icon: 'warn', rate: '–' });
+  assert.deepEqual(topicWords(signal(ghost), '/vel', true), { topic: '/vel', says: 'speed · chosen by you, no node publishes it', icon: 'warn', rate: '–' });
   assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null, freshness: 'not_published' }), undefined, true), { topic: 'Speed', says: 'not published', icon: 'unknown', rate: '–' });
-  assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null }), '/gone', true), { topic: '/gone', says: 'speed · picked by you, and the car does not have it', icon: 'warn', rate: '–' });
+  assert.deepEqual(topicWords(signal({ topic: null, type: null, value: null }), '/gone', true), { topic: '/gone', says: 'speed · chosen by you, but not published', icon: 'warn', rate: '–' });
   assert.deepEqual([topicWords(signal(), undefined, false).icon, topicWords(signal(), undefined, false).rate], ['unknown', '–']);
 });
 
@@ -159,7 +159,7 @@ test('what can be picked: the own choice of the server, what is gone, what fits'
   assert.deepEqual(optionsOf(fits, '/vel', undefined).map(({ topic, says, isChosen }) => [topic, says, isChosen]), [[null, 'now /vel', true], ['/vel', 'T · now', false], ['/odom', 'O', false]]);
   assert.deepEqual(optionsOf(fits, null, '/gone').map(({ topic, isChosen }) => [topic, isChosen]), [[null, false], ['/gone', true], ['/vel', false], ['/odom', false]]);
   assert.deepEqual(optionsOf(null, null, '/x').map(({ topic, says }) => [topic, says]), [[null, 'by name, then by type'], ['/x', 'picked']]);
-  assert.deepEqual(optionsOf([], null, undefined).map(({ says }) => says), ['now none fits']);
+  assert.deepEqual(optionsOf([], null, undefined).map(({ says }) => says), ['no match now']);
 });
 
 test('a file that cannot hold settings is not sent', () => {
@@ -169,8 +169,8 @@ test('a file that cannot hold settings is not sent', () => {
 });
 
 test('a trial of a sound says plainly where this phone cannot sound', () => {
-  assert.match(trialWords('missing', 'high'), /cannot sound: no alarm will be heard/);
-  assert.match(trialWords('blocked', 'high'), /no alarm will be heard/);
+  assert.match(trialWords('missing', 'high'), /has no sound: this phone sounds no alarms/);
+  assert.match(trialWords('blocked', 'high'), /no alarm can be heard/);
   assert.match(trialWords('busy', 'low'), /An alarm sounds now/);
   assert.match(trialWords('sounding', 'medium'), /three rising pulses/);
 });

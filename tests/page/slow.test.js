@@ -31,9 +31,10 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
   assert.equal(words(slow('not_available', { why: 'The steering of this kind of car is not known, and a command would turn its wheels.' })), 'off: Slow-down off press for the reason');
   assert.equal(words(slow('safe')), 'off: Slow-down off press to arm');
   assert.equal(words(slow('safe'), { isViewer: true }), 'off: Slow-down off not for viewers');
-  assert.equal(words(slow('armed')), 'armed: Slide to slow down');
+  assert.equal(words(slow('armed'), { car: 'Ocelot', vehicle: 'Ocelot' }), 'armed: Slide to slow Ocelot');
+  assert.equal(words(slow('armed')), 'armed: Slide to slow the car');
   assert.equal(words(slow('armed'), { isViewer: true }), 'off: Slow-down armed not for viewers');
-  assert.equal(words(slow('armed'), { mayControl: false, holder: 'Ben' }), 'armed: Slide to slow down', 'any operator stops the car');
+  assert.equal(words(slow('armed'), { mayControl: false, holder: 'Ben' }), 'armed: Slide to slow the car', 'any operator stops the car');
   assert.equal(words(slow('armed'), { isSilent: true }), 'off: Slow-down off the server does not answer');
   assert.equal(words(null), 'off: Slow-down off the server does not answer');
   assert.equal(words(ordered()), 'go: Slowing to 0.0 m/s');
@@ -95,7 +96,7 @@ test('the line beneath the steps: who, why and since when; or what is wrong', ()
   assert.equal(orderWords(order({ why: 'Speed above limit', from_mps: null }), 0).text, 'By itself: Speed above limit, 2.1 s ago');
   assert.deepEqual(orderWords(order({ confirmed: false, sending: false }), 0), { text: NOT_CONFIRMED, kind: 'crit' });
   assert.equal(orderWords(order({ sending: false }), 0).kind, 'crit');
-  assert.match(orderWords(order({ confirmed: null, stands: 'before' }), 0).text, /stood already: there is nothing to slow/);
+  assert.match(orderWords(order({ confirmed: null, stands: 'before' }), 0).text, /already standing: nothing to slow/);
 });
 
 test('the count-down ends at 0 and is none once the order stands; its sound is of its own', () => {
@@ -117,7 +118,7 @@ test('the guard: only one that is heard and guards is said to', () => {
     assert.equal(told, isSafe, name);
     assert.match(text, isSafe ? /^GUARDED/ : /^UNGUARDED.*will NOT slow the car$/);
   }
-  assert.match(says({ state: 'guarded', age_s: 3.2 }).text, /^Guard not heard for 3\.2 s: link loss may NOT slow the car$/);
+  assert.match(says({ state: 'guarded', age_s: 3.2 }).text, /^No message from the guard for 3\.2 s: link loss may NOT slow the car$/);
   assert.equal(says({ state: 'guarded' }, 2).isSafe, false, 'the page’s own silence counts');
   assert.equal(says({ state: 'guarded', age_s: null }).isSafe, false);
 });
@@ -144,13 +145,13 @@ test('the sheet: what would be commanded, who competes, and the one thing this p
   assert.deepEqual([safe.title, safe.act], ['Arm the slow-down?', 'arm']);
   assert.deepEqual(safe.facts[0], ['Commanded on', '/catvehicle/cmd_vel', false]);
   assert.deepEqual(safe.facts[2], ['Slows at', '1.5 m/s²', false]);
-  assert.deepEqual(safe.facts[3], ['Others publish there', '/lap_driver, /joy: the last message wins, so the car may not slow', true]);
+  assert.deepEqual(safe.facts[3], ['Other publishers', '/lap_driver, /joy: the last message wins, so the car may not slow', true]);
   assert.match(safe.aid, /^An aid, not an emergency stop/);
   assert.equal(safe.isGuarded, false);
   assert.equal(sheet(slow('safe', { rivals: null })).facts[3]?.[2], true, 'not known is no "none"');
   assert.equal(sheet(slow('safe')).facts[3]?.[1], 'none');
   const other = sheet(slow('safe'), { mayControl: false, holder: 'Ben' });
-  assert.deepEqual([other.act, other.says], ['ask', 'Ben is in control, and arms it.']);
+  assert.deepEqual([other.act, other.says], ['ask', 'Ben is in control and can arm it.']);
   assert.equal(sheet(slow('armed')).act, 'disarm');
   assert.match(sheet(slow('armed')).text, /^Armed by Ann\./);
   assert.deepEqual([sheet(slow('armed'), { isViewer: true }).act, sheet(slow('safe'), { isReplay: true }).act, sheet(slow('safe'), { isSilent: true }).act, sheet(ordered()).act], [null, null, null, null]);

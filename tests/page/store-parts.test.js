@@ -38,8 +38,8 @@ test('what is asked is answered once, refused where it cannot be sent, and refus
   assert.equal((await second).reason, 'The connection to the server broke.');
   const third = requests.ask('pause', {}, 100);
   t.mock.timers.tick(100);
-  assert.equal((await third).reason, 'The server gave no answer in time.');
-  assert.deepEqual(refused, ['Not now.', 'The connection to the server broke.', 'The server gave no answer in time.']);
+  assert.equal((await third).reason, 'The server did not answer in time.');
+  assert.deepEqual(refused, ['Not now.', 'The connection to the server broke.', 'The server did not answer in time.']);
 });
 
 test('a scan is asked for while anybody wants it, and again of a server that begins anew', () => {

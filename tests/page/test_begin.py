@@ -27,12 +27,13 @@ FIRST = """() => new MutationObserver((_, observer) => {
 }).observe(document, {attributeFilter: ['data-screen'], subtree: true})"""
 
 
-@pytest_asyncio.fixture(loop_scope="module", scope="module")
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Process]:
     async with running(*simulate()) as car, running(*server(tmp_path_factory.mktemp("data"), car.address)) as process:
         yield process
 
 
+@pytest.mark.own_phone
 async def test_the_first_picture_of_the_car_is_whole_and_what_lies_under_the_fold_comes_after(
     phone: Phone, watch: Process
 ) -> None:
@@ -60,7 +61,7 @@ PRESS = """(selector) => new MutationObserver((_, observer) => {
 }).observe(document, {attributeFilter: ['data-screen'], subtree: true})"""
 
 
-@pytest_asyncio.fixture(loop_scope="module", scope="module")
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def alarmed(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Process]:
     """Watches a car that drives too fast for as long as it is watched."""
     async with (
@@ -74,6 +75,7 @@ async def alarmed(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Pro
         yield process
 
 
+@pytest.mark.own_phone
 @pytest.mark.parametrize(
     ("pressed", "opened"),
     [("[data-f=menu] svg", "#sheet-menu[open]"), ("[data-f=word-age] .n", "#monitor .screen:not([hidden])")],
@@ -88,6 +90,7 @@ async def test_what_is_pressed_before_the_page_listens_is_pressed_once_it_does(
     assert await phone.page.evaluate("window.openAtOnce") == 0
 
 
+@pytest.mark.own_phone
 async def test_what_is_pressed_too_early_is_not_pressed_through_an_alarm(phone: Phone, alarmed: Process) -> None:
     await phone.page.add_init_script(f"({PRESS})('#monitor [data-f=menu]')")
     await phone.open(alarmed.address)
@@ -106,6 +109,7 @@ FAILS = {
 }
 
 
+@pytest.mark.own_phone
 @pytest.mark.parametrize("fails", FAILS)
 async def test_a_page_that_cannot_begin_in_whole_shows_nothing_of_the_car(
     phone: Phone, alarmed: Process, fails: str

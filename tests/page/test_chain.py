@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+import pytest
+import pytest_asyncio
 from playwright.async_api import expect
 
 from tests.page.conftest import Phone
 from tests.page.drives import number, steady, twist, write
-from tests.page.processes import Process, free_port, replay, running, server, simulate
+from tests.page.processes import Drive, driving, free_port, replay, running, server, simulate
 from tests.page.radio import Radio
 
 CAR_S = 2.0  # what the design allows; to each is added what the looking and a busy machine cost: phone.slack_s
@@ -24,13 +26,18 @@ VEIL_S = 2.25
 BACK_S = 4.0
 
 
-@contextlib.asynccontextmanager
-async def driving(phone: Phone, data: Path) -> AsyncIterator[tuple[Process, Process]]:
-    """A simulated car, a server that watches it, and the page live on it."""
-    async with running(*simulate()) as car, running(*server(data, car.address)) as watch:
-        await phone.open(watch.address)
-        await phone.live()
-        yield car, watch
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def driven(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Drive]:
+    async with driving(tmp_path_factory.mktemp("data")) as drive:
+        yield drive
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def drive(driven: Drive, phone: Phone) -> Drive:
+    """A simulated car, a server that watches it, and the page live on it. What is frozen is thawed by the test."""
+    await phone.open(driven[1].address)
+    await phone.live()
+    return driven
 
 
 async def covered(phone: Phone, kind: str, sentence: str, within_s: float, began_s: float) -> None:
@@ -49,46 +56,46 @@ async def cut_between(phone: Phone, root: str, a: str, b: str) -> None:
     )
 
 
-async def test_a_silent_car(phone: Phone, tmp_path: Path) -> None:
-    async with driving(phone, tmp_path) as (car, _):
-        await car.type("all-silent 60")
-        began_s = time.monotonic()
-        await covered(phone, "values", "The car fell silent.", CAR_S, began_s)
-        sheet = phone.page.locator("#sheet-lost")
-        await expect(sheet).to_contain_text("The car may still be moving: watch the car.")
-        await phone.page.keyboard.press("Escape")  # seen: the sheet goes, the veil stays
-        await expect(sheet).to_be_hidden()
-        await cut_between(phone, "#monitor .veil", "Bridge", "Car")
-        await expect(phone.f("word")).to_have_text("Silent")
-        await expect(phone.f("strip")).to_contain_text("The car fell silent")
-        await expect(phone.f("veil-then")).to_have_text(re.compile(r"\d+\.\d m/s"))
-        await expect(phone.page.locator(".checks li.ok")).to_have_count(0)
-        await car.type("stop")
-        await phone.live()
-        await expect(phone.page.locator("dialog[open]")).to_have_count(0)
+async def test_a_silent_car(phone: Phone, drive: Drive) -> None:
+    car, _ = drive
+    await car.type("all-silent 60")
+    began_s = time.monotonic()
+    await covered(phone, "values", "The car fell silent.", CAR_S, began_s)
+    sheet = phone.page.locator("#sheet-lost")
+    await expect(sheet).to_contain_text("The car may still be moving: watch the car.")
+    await phone.page.keyboard.press("Escape")  # seen: the sheet goes, the veil stays
+    await expect(sheet).to_be_hidden()
+    await cut_between(phone, "#monitor .veil", "Bridge", "Car")
+    await expect(phone.f("word")).to_have_text("Silent")
+    await expect(phone.f("strip")).to_contain_text("The car fell silent")
+    await expect(phone.f("veil-then")).to_have_text(re.compile(r"\d+\.\d m/s"))
+    await expect(phone.page.locator(".checks li.ok")).to_have_count(0)
+    await car.type("stop")
+    await phone.live()
+    await expect(phone.page.locator("dialog[open]")).to_have_count(0)
 
 
 async def test_case_12_and_13_a_frozen_bridge_is_said_on_every_tab_and_its_return_leads_back(
-    phone: Phone, tmp_path: Path
+    phone: Phone, drive: Drive
 ) -> None:
-    async with driving(phone, tmp_path) as (car, _):
-        for tab in ("home", "map", "scan", "files", "settings"):
-            await phone.page.locator(f"[data-tab={tab}]").tap()
-            car.freeze()
-            began_s = time.monotonic()
-            sheet = phone.page.locator("#sheet-lost")
-            await expect(sheet).to_be_visible()
-            assert time.monotonic() - began_s <= FROZEN_S + phone.slack_s
-            await expect(sheet).to_contain_text("The bridge does not answer.")
-            await expect(sheet).to_contain_text("The car may still be moving")
-            await cut_between(phone, "#sheet-lost", "Server", "Bridge")
-            await expect(phone.f("veil")).to_have_attribute("data-on", "values")
-            car.thaw()
-            back_s = time.monotonic()
-            await phone.live()
-            assert time.monotonic() - back_s <= BACK_S + phone.slack_s
-            await expect(sheet).to_be_hidden()
-            await expect(phone.page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
+    car, _ = drive
+    for tab in ("home", "map", "scan", "files", "settings"):
+        await phone.page.locator(f"[data-tab={tab}]").tap()
+        car.freeze()
+        began_s = time.monotonic()
+        sheet = phone.page.locator("#sheet-lost")
+        await expect(sheet).to_be_visible()
+        assert time.monotonic() - began_s <= FROZEN_S + phone.slack_s
+        await expect(sheet).to_contain_text("The bridge does not answer.")
+        await expect(sheet).to_contain_text("The car may still be moving")
+        await cut_between(phone, "#sheet-lost", "Server", "Bridge")
+        await expect(phone.f("veil")).to_have_attribute("data-on", "values")
+        car.thaw()
+        back_s = time.monotonic()
+        await phone.live()
+        assert time.monotonic() - back_s <= BACK_S + phone.slack_s
+        await expect(sheet).to_be_hidden()
+        await expect(phone.page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
 
 
 async def test_a_killed_bridge_and_its_return_on_the_same_port(phone: Phone, tmp_path: Path) -> None:
@@ -111,30 +118,32 @@ async def test_a_killed_bridge_and_its_return_on_the_same_port(phone: Phone, tmp
 
 
 async def test_case_14_exit_from_a_lost_connection_leads_to_the_connect_screen(phone: Phone, tmp_path: Path) -> None:
-    async with driving(phone, tmp_path) as (car, _):
+    async with driving(tmp_path) as (car, watch):
+        await phone.open(watch.address)
+        await phone.live()
         await car.kill()
         await phone.page.locator("#sheet-lost [data-f=exit]").tap()
         await expect(phone.page.locator("#connect")).to_be_visible()
         await expect(phone.page.locator("dialog[open]")).to_have_count(0)
 
 
-async def test_a_frozen_server_is_said_by_the_page_alone(phone: Phone, tmp_path: Path) -> None:
-    async with driving(phone, tmp_path) as (_, watch):
-        watch.freeze()
-        began_s = time.monotonic()
-        await covered(phone, "all", "The server fell silent.", VEIL_S, began_s)
-        await cut_between(phone, "#monitor .veil", "Phone", "Server")
-        await expect(phone.f("word")).to_have_text("Lost")
-        await expect(phone.page.locator(".gauge")).to_have_attribute("data-speed", "stale")
-        await expect(phone.f("latitude")).to_have_attribute("data-ink", "stale")
-        await expect(phone.f("distance")).to_have_attribute("data-ink", "stale")
-        await expect(phone.page.locator("#sheet-lost")).to_be_visible(timeout=4000)
-        await cut_between(phone, "#sheet-lost", "Phone", "Server")
-        watch.thaw()
-        back_s = time.monotonic()
-        await phone.live()
-        assert time.monotonic() - back_s <= BACK_S + 1 + phone.slack_s
-        await expect(phone.page.locator("#sheet-lost")).to_be_hidden()
+async def test_a_frozen_server_is_said_by_the_page_alone(phone: Phone, drive: Drive) -> None:
+    _, watch = drive
+    watch.freeze()
+    began_s = time.monotonic()
+    await covered(phone, "all", "The server fell silent.", VEIL_S, began_s)
+    await cut_between(phone, "#monitor .veil", "Phone", "Server")
+    await expect(phone.f("word")).to_have_text("Lost")
+    await expect(phone.page.locator(".gauge")).to_have_attribute("data-speed", "stale")
+    await expect(phone.f("latitude")).to_have_attribute("data-ink", "stale")
+    await expect(phone.f("distance")).to_have_attribute("data-ink", "stale")
+    await expect(phone.page.locator("#sheet-lost")).to_be_visible(timeout=4000)
+    await cut_between(phone, "#sheet-lost", "Phone", "Server")
+    watch.thaw()
+    back_s = time.monotonic()
+    await phone.live()
+    assert time.monotonic() - back_s <= BACK_S + 1 + phone.slack_s
+    await expect(phone.page.locator("#sheet-lost")).to_be_hidden()
 
 
 async def test_a_server_that_is_killed_and_started_again_is_survived(phone: Phone, tmp_path: Path) -> None:
@@ -149,22 +158,22 @@ async def test_a_server_that_is_killed_and_started_again_is_survived(phone: Phon
             await expect(phone.page.locator("dialog[open]")).to_have_count(0)
 
 
-async def test_one_silent_signal_loses_its_ink_and_no_other(phone: Phone, tmp_path: Path) -> None:
-    async with driving(phone, tmp_path) as (car, _):
-        await car.type("stale-gps 60")
-        await expect(phone.f("latitude")).to_have_attribute("data-ink", "stale")
-        await expect(phone.page.locator(".gauge")).to_have_attribute("data-speed", "fresh")
-        await expect(phone.f("veil")).not_to_have_attribute("data-on", re.compile("."))
-        await expect(phone.f("fuel-line")).to_be_hidden()
+async def test_one_silent_signal_loses_its_ink_and_no_other(phone: Phone, drive: Drive) -> None:
+    car, _ = drive
+    await car.type("stale-gps 60")
+    await expect(phone.f("latitude")).to_have_attribute("data-ink", "stale")
+    await expect(phone.page.locator(".gauge")).to_have_attribute("data-speed", "fresh")
+    await expect(phone.f("veil")).not_to_have_attribute("data-on", re.compile("."))
+    await expect(phone.f("fuel-line")).to_be_hidden()
+    await car.type("stop")
 
 
-async def test_the_veil_comes_though_the_page_hangs(phone: Phone, tmp_path: Path) -> None:
+async def test_the_veil_comes_though_the_page_hangs(phone: Phone, drive: Drive) -> None:
     """The picture on the glass, taken by the browser while the page's script stands still."""
-    async with driving(phone, tmp_path):
-        before, hung = await hanging(phone, 3.5)
-        assert before < 0.03, "the instruments were hatched before"
-        assert hung > 0.1, "the veil did not come"
-        await phone.live()
+    before, hung = await hanging(phone, 3.5)
+    assert before < 0.03, "the instruments were hatched before"
+    assert hung > 0.1, "the veil did not come"
+    await phone.live()
 
 
 async def hanging(phone: Phone, seconds: float) -> tuple[float, float]:
@@ -219,45 +228,53 @@ async def hatched(phone: Phone, picture: str) -> float:
     return float(share)
 
 
-async def test_a_page_that_slept_shows_the_veil_first(phone: Phone, tmp_path: Path) -> None:
+async def test_a_page_that_slept_shows_the_veil_first(phone: Phone, drive: Drive) -> None:
     """Hidden and seen again: covered before anything is drawn. A browser under test never hides, so it is told to."""
-    async with driving(phone, tmp_path):
-        seen = await phone.page.evaluate(
-            """() => {
-              const veil = document.querySelector('#monitor .veil');
-              const turn = (hidden) => {
-                Object.defineProperty(document, 'hidden', { value: hidden, configurable: true });
-                document.dispatchEvent(new Event('visibilitychange'));
-                return veil.dataset.on;
-              };
-              return [turn(true), turn(false)];
-            }"""
-        )
-        assert seen == ["all", "all"]
-        await phone.live()
+    seen = await phone.page.evaluate(
+        """() => {
+          const veil = document.querySelector('#monitor .veil');
+          const turn = (hidden) => {
+            Object.defineProperty(document, 'hidden', { value: hidden, configurable: true });
+            document.dispatchEvent(new Event('visibilitychange'));
+            return veil.dataset.on;
+          };
+          return [turn(true), turn(false)];
+        }"""
+    )
+    assert seen == ["all", "all"]
+    await phone.live()
 
 
-async def test_a_page_that_is_stopped_wakes_under_the_veil(phone: Phone, tmp_path: Path) -> None:
+def running_renderers() -> list[psutil.Process]:
+    """The processes of the browser's pages; one of a closed page may end meanwhile."""
+    found = []
+    for one in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):  # also one that has ended and is not yet waited for
+            if "--type=renderer" in one.cmdline():
+                found.append(one)
+    return found
+
+
+async def test_a_page_that_is_stopped_wakes_under_the_veil(phone: Phone, drive: Drive) -> None:
     """The browser's own process is stopped, as a phone's are in its sleep; old frames wait for it in its sockets."""
-    async with driving(phone, tmp_path):
-        await phone.page.evaluate(
-            """() => {
-              window.seen = [];
-              const veil = document.querySelector('#monitor .veil');
-              const note = () => window.seen.push(veil.dataset.on ?? 'lifted');
-              new MutationObserver(note).observe(veil, { attributeFilter: ['data-on'] });
-            }"""
-        )
-        renderers = [one for one in psutil.Process().children(recursive=True) if "--type=renderer" in one.cmdline()]
+    await phone.page.evaluate(
+        """() => {
+          window.seen = [];
+          const veil = document.querySelector('#monitor .veil');
+          const note = () => window.seen.push(veil.dataset.on ?? 'lifted');
+          new MutationObserver(note).observe(veil, { attributeFilter: ['data-on'] });
+        }"""
+    )
+    renderers = running_renderers()
+    for one in renderers:
+        one.suspend()
+    try:
+        await asyncio.sleep(5)
+    finally:
         for one in renderers:
-            one.suspend()
-        try:
-            await asyncio.sleep(5)
-        finally:
-            for one in renderers:
-                one.resume()
-        await phone.live()
-        assert (await phone.page.evaluate("window.seen"))[0] == "all"
+            one.resume()
+    await phone.live()
+    assert (await phone.page.evaluate("window.seen"))[0] == "all"
 
 
 async def test_a_radio_gap_hides_old_values_and_its_events_come_exactly_once(phone: Phone, tmp_path: Path) -> None:

@@ -11,9 +11,10 @@ from typing import Any
 
 import httpx
 import pytest
+import pytest_asyncio
 from playwright.async_api import Browser, BrowserContext, CDPSession, expect
 
-from tests.page.conftest import PHONE, Phone
+from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
 
 NAMES = ("Ann", "Ben", "Cem")
@@ -51,6 +52,7 @@ class Crew:
     async def sheet(self, name: str) -> Any:
         """Opens who is in control, behind the chip."""
         await self[name].f("who").tap()
+        await self[name].page.locator('#sheet-cars [data-f="cars-control"]').tap()
         sheet = self[name].page.locator("#sheet-control")
         await expect(sheet).to_be_visible()
         return sheet
@@ -93,10 +95,16 @@ async def hide(phone: Phone, hidden: bool) -> None:
 async def opened(browser: Browser, name: str, address: str) -> tuple[BrowserContext, Phone]:
     context = await browser.new_context(**PHONE)
     await context.add_init_script(f"localStorage.setItem('catgraph.device', '{name}')")
-    phone = Phone(await context.new_page())
+    phone = await phone_in(context)
     await phone.open(address)
     await phone.live()
     return context, phone
+
+
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def car() -> AsyncIterator[Process]:
+    async with running(*simulate()) as process:
+        yield process
 
 
 @contextlib.asynccontextmanager
@@ -121,8 +129,10 @@ async def holds(one: Crew, name: str) -> None:
 
 
 @pytest.mark.timeout(120)
-async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(browser: Browser, tmp_path: Path) -> None:
-    async with running(*simulate()) as car, crew(browser, tmp_path, car) as one:
+async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(
+    browser: Browser, car: Process, tmp_path: Path
+) -> None:
+    async with crew(browser, tmp_path, car) as one:
         await expect(one.chip("Ann")).to_have_text("No one")
         await one["Ann"].f("pause").tap()  # the first order takes it
         await holds(one, "Ann")
@@ -132,14 +142,16 @@ async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(browse
         refused = one["Ben"].page.locator(".snack.note")
         await expect(refused).to_contain_text("Not resumed")
         await expect(refused).to_contain_text("Ann is in control.")
-        await refused.get_by_role("button", name="Ask for control").tap()
+        await refused.get_by_role("button", name="Request control").tap()
         asks = one["Ann"].page.locator(".snack.asks")
         await expect(asks).to_contain_text(re.compile(r"Ben gets it in (\d+) s unless you keep it\."))
         await asks.get_by_role("button", name="Keep").tap()
-        await expect(one["Ben"].page.locator(".snack.note")).to_contain_text("Ann keeps control: Ben had asked for it.")
+        await expect(one["Ben"].page.locator(".snack.note")).to_contain_text(
+            "Ann keeps control; the request of Ben was declined."
+        )
         await holds(one, "Ann")
 
-        await one.press("Cem", "Ask for control")
+        await one.press("Cem", "Request control")
         await expect(one["Cem"].page.locator("#sheet-control")).to_contain_text("It is granted in")
         await asks.get_by_role("button", name="Hand over").tap()
         await holds(one, "Cem")
@@ -166,8 +178,8 @@ async def test_control_is_taken_asked_for_kept_handed_over_and_taken_over(browse
 
 
 @pytest.mark.timeout(120)
-async def test_lost_by_sleep_back_again_and_lost_for_good(browser: Browser, tmp_path: Path) -> None:
-    async with running(*simulate()) as car, crew(browser, tmp_path, car) as one:
+async def test_lost_by_sleep_back_again_and_lost_for_good(browser: Browser, car: Process, tmp_path: Path) -> None:
+    async with crew(browser, tmp_path, car) as one:
         await one.press("Ann", "Take control")
         await holds(one, "Ann")
         sleep = Sleep(one["Ann"])
@@ -191,11 +203,13 @@ async def test_lost_by_sleep_back_again_and_lost_for_good(browser: Browser, tmp_
 
 
 @pytest.mark.timeout(120)
-async def test_silence_grants_what_is_asked_for_and_a_reload_keeps_it(browser: Browser, tmp_path: Path) -> None:
-    async with running(*simulate()) as car, crew(browser, tmp_path, car) as one:
+async def test_silence_grants_what_is_asked_for_and_a_reload_keeps_it(
+    browser: Browser, car: Process, tmp_path: Path
+) -> None:
+    async with crew(browser, tmp_path, car) as one:
         await one.press("Ann", "Take control")
         await holds(one, "Ann")
-        await one.press("Ben", "Ask for control")
+        await one.press("Ben", "Request control")
         await expect(one["Ann"].page.locator(".snack.asks")).to_be_visible()
         await expect(one.chip("Ben")).to_have_text("You", timeout=14_000)
         await expect(one["Ann"].page.locator(".snack.asks")).to_be_hidden()
@@ -211,8 +225,8 @@ def reach(state: dict[str, Any]) -> tuple[int, int]:
 
 
 @pytest.mark.timeout(120)
-async def test_two_of_three_operators_can_hear_alarms(browser: Browser, tmp_path: Path) -> None:
-    async with running(*simulate()) as car, crew(browser, tmp_path, car) as one:
+async def test_two_of_three_operators_can_hear_alarms(browser: Browser, car: Process, tmp_path: Path) -> None:
+    async with crew(browser, tmp_path, car) as one:
         line = one["Ann"].page.locator('[data-part="reach"]')
         await expect(line).to_contain_text("Nobody can hear alarms (3 operators)")
         await expect(line).to_contain_text("3 × sound off")
@@ -240,9 +254,9 @@ async def test_two_of_three_operators_can_hear_alarms(browser: Browser, tmp_path
 
 @pytest.mark.timeout(120)
 async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
-    browser: Browser, tmp_path: Path
+    browser: Browser, car: Process, tmp_path: Path
 ) -> None:
-    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
+    async with running(*server(tmp_path, car.address)) as watch:
         context, phone = await opened(browser, "Ann", watch.address)
         try:
             await expect(phone.page.locator(".strip")).to_contain_text("Nobody can hear alarms", timeout=40_000)
@@ -257,7 +271,7 @@ async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
             sheet = phone.page.locator("#sheet-this-phone")
             await expect(sheet).to_be_visible()
             await sheet.locator('[data-f="arm"]').tap()
-            await expect(sheet).to_contain_text("This phone sounds alarms while this page is in front.")
+            await expect(sheet).to_contain_text("This phone sounds alarms while this page is in the foreground.")
             async with httpx.AsyncClient() as client:
                 async with asyncio.timeout(10):
                     while True:
@@ -270,9 +284,11 @@ async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
 
 
 @pytest.mark.timeout(120)
-async def test_each_phone_has_its_marker_and_the_one_in_the_car_is_compared(browser: Browser, tmp_path: Path) -> None:
+async def test_each_phone_has_its_marker_and_the_one_in_the_car_is_compared(
+    browser: Browser, car: Process, tmp_path: Path
+) -> None:
     """Ann tells a position, Ben was not allowed to; Ann, in control, says that Ben's is in the car."""
-    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
+    async with running(*server(tmp_path, car.address)) as watch:
         one = Crew({}, watch)
         contexts = []
         try:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import re
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,6 +24,8 @@ NOTE = """() => {
   }, 100);
 }"""
 
+MESSAGES = 14228
+ENDED_S = 10.0  # without another message the drive is over
 RECEIVED = "fetch('/api/state').then((answer) => answer.json()).then((state) => state.session.received)"
 
 
@@ -31,22 +34,34 @@ def number(text: str) -> float | None:
     return float(found.group().replace("−", "-")) if found else None
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(180)
-async def test_the_real_drive_as_the_operator_sees_it(phone: Phone, tmp_path: Path, recordings: Path) -> None:
-    bag = recordings / "catvehicle_2016-06-01.bag"
+async def watched(phone: Phone, folder: Path, bag: Path) -> tuple[list[dict[str, str]], dict[str, Any], bool]:
+    """What the page showed of the whole drive, the state at its end, and whether a late link was throttled."""
     async with (
         running("replay", str(bag), "--port", "0", "--wait", "--stay") as car,
-        running(*server(tmp_path, car.address)) as watch,
+        running(*server(folder, car.address)) as watch,
     ):
-        await phone.page.add_init_script(f"({NOTE})()")
         await phone.open(watch.address)
-        async with asyncio.timeout(110):
-            while await phone.page.evaluate(RECEIVED) < 14228:
-                await phone.page.wait_for_timeout(500)
+        received, since_s = 0, time.monotonic()
+        while received < MESSAGES and time.monotonic() - since_s < ENDED_S:
+            await phone.page.wait_for_timeout(500)
+            before, received = received, await phone.page.evaluate(RECEIVED)
+            since_s = time.monotonic() if received > before else since_s
         await phone.page.wait_for_timeout(500)
         rows = await phone.page.evaluate("window.seen")
         state = await phone.page.evaluate("fetch('/api/state').then((r) => r.json())")
+        events = await phone.page.evaluate("fetch('/api/log?change=reduced').then((r) => r.json())")
+    return rows, state, bool(events["events"])
+
+
+@pytest.mark.own_phone
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+async def test_the_real_drive_as_the_operator_sees_it(phone: Phone, tmp_path: Path, recordings: Path) -> None:
+    bag = recordings / "catvehicle_2016-06-01.bag"
+    await phone.page.add_init_script(f"({NOTE})()")
+    rows, state, was_throttled = await watched(phone, tmp_path / "first", bag)
+    if was_throttled:  # rightly: a machine that was busy with something else made the link late, so not all was sent
+        rows, state, _ = await watched(phone, tmp_path / "second", bag)
     read = {name: [n for row in rows if (n := number(row[name])) is not None] for name in rows[0] if name != "side"}
     # The fastest moment lasts a quarter of a second: a machine that stood still for longer did not draw it.
     assert max(read["speed"]) == pytest.approx(4.2, abs=0.051 if phone.stutter_s < 0.2 else 0.151)
@@ -59,5 +74,5 @@ async def test_the_real_drive_as_the_operator_sees_it(phone: Phone, tmp_path: Pa
     assert max(right) == pytest.approx(2, abs=0.5)
     assert min(read["distance"]) == pytest.approx(4.1, abs=0.051)
     assert max(read["distance"]) == pytest.approx(14.5, abs=0.11)
-    assert (state["session"]["received"], state["session"]["rejected"]) == (14228, 0)
+    assert (state["session"]["received"], state["session"]["rejected"]) == (MESSAGES, 0)
     assert state["session"]["track_m"] == pytest.approx(76, abs=1)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 from playwright.async_api import expect
 
 from server.app.config import Config
@@ -69,6 +70,7 @@ async def harmless(phone: Phone) -> None:
     assert await phone.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
+@pytest.mark.own_phone
 async def test_a_car_that_means_harm_is_only_told(phone: Phone, tmp_path: Path) -> None:
     await phone.page.add_init_script(NOTE_VIOLATIONS)
     async with roaming() as car:
@@ -100,6 +102,7 @@ async def test_a_car_that_means_harm_is_only_told(phone: Phone, tmp_path: Path) 
         talking.cancel()
 
 
+@pytest.mark.own_phone
 async def test_a_recording_that_means_harm_is_only_listed(phone: Phone, tmp_path: Path) -> None:
     """Its title, note and tags, and the subject of a mail, which somebody else wrote."""
     await phone.page.add_init_script(NOTE_VIOLATIONS)

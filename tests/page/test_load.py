@@ -31,7 +31,7 @@ WATCH = """() => {
 }"""
 
 
-@pytest_asyncio.fixture(loop_scope="module", scope="module")
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Process]:
     async with running(*simulate()) as car, running(*server(tmp_path_factory.mktemp("data"), car.address)) as process:
         yield process

@@ -11,14 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import expect
 
 from server.app.config import Config
 from server.vehicle.vehicle import Vehicle
+from tests.page.barriers import SIZES
+from tests.page.canned import Canned
 from tests.page.conftest import Phone
 from tests.page.radio import Radio
 from tests.page.roamer import Roamer, roaming
+from tests.page.touch import stroke
 from tests.server.conftest import serving
 from tests.server.web import map_files as maps
 from tests.server.web.map_files import png
@@ -40,6 +42,20 @@ class Map:
 
     def svg(self, name: str) -> Any:
         return self.page.locator(f"#panel-map .mapv {name}").first
+
+    async def press(self, name: str) -> None:
+        """Presses a key that can be on or off, where it lies now.
+
+        A test's own tap that meets another element scrolls on to find the key, and so leaves the tab: it is not asked
+        to. What pushes the key away under the finger is a banner that comes or goes.
+        """
+        key = self.f(name)
+        other = {"true": "false", "false": "true"}[await key.get_attribute("aria-pressed")]
+        async with asyncio.timeout(15):
+            while await key.get_attribute("aria-pressed") != other:
+                await key.tap(force=True)
+                with contextlib.suppress(AssertionError):
+                    await expect(key).to_have_attribute("aria-pressed", other, timeout=1500)
 
     async def numbers(self, name: str, attribute: str = "transform") -> list[float]:
         text = await self.svg(name).get_attribute(attribute) or ""
@@ -105,6 +121,7 @@ async def lying(
 # -- where they are ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.own_phone
 async def test_car_and_phone_with_distance_bearing_and_their_errors(phone: Phone) -> None:
     """The phone lies 6 m east and 8 m south of the car: 10 m, and the car is at 323° of it."""
     async with roaming() as car, lying(phone, car, 6.0, -8.0), looking(phone, car) as it:
@@ -167,7 +184,7 @@ async def test_a_page_that_comes_late_and_one_after_a_radio_gap_have_the_whole_t
                 await phone.open(f"{heard}/#home")
                 await phone.live()
                 await asyncio.sleep(3.0)
-                await phone.page.locator("[data-tab=map]").tap()
+                await phone.page.evaluate("location.hash = '#map'")  # whatever alarm a busy machine raises
                 await phone.page.wait_for_function(f"() => ({count}) >= 8", timeout=12_000)
                 radio.cut()
                 await asyncio.sleep(3.5)
@@ -191,13 +208,14 @@ async def test_a_page_that_comes_late_and_one_after_a_radio_gap_have_the_whole_t
 # -- what is not known -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.own_phone
 async def test_a_stale_car_loses_its_ink_and_its_line(phone: Phone) -> None:
     async with roaming() as car, lying(phone, car, 6.0, -8.0), looking(phone, car) as it:
         await expect(it.svg(".dl")).to_be_visible(timeout=12_000)
         car.tells_position, car.heading_deg = False, None
         await expect(it.svg(".car-mark")).to_have_attribute("data-ink", "stale")
         await expect(it.svg(".name")).to_have_text(re.compile(r"^Car STALE \d"))
-        await expect(it.f("car-says")).to_have_text(re.compile(r"^The car’s position is \d+\.\d s old: it may be"))
+        await expect(it.f("car-says")).to_have_text(re.compile(r"^The car’s position is \d+\.\d s old: the car may be"))
         await expect(it.f("car-age")).to_have_text(re.compile(r"^STALE \d+\.\d s$"))
         spoken = await it.f("spoken").text_content()
         assert spoken.startswith("The car’s position is ")
@@ -240,6 +258,7 @@ async def test_a_heading_that_is_not_known_points_nowhere(phone: Phone) -> None:
         await expect(it.svg(".car-mark")).to_have_attribute("data-ink", "fresh")
 
 
+@pytest.mark.own_phone
 async def test_every_reason_of_the_phone_is_said_in_words(phone: Phone) -> None:
     async with roaming() as car, looking(phone, car) as it:
         await expect(it.f("phone-says")).to_have_text("No phone is sharing its position.")
@@ -266,54 +285,42 @@ async def test_before_any_position_nothing_is_drawn_and_that_is_said(phone: Phon
             await phone.live()
             it = Map(phone)
             await expect(it.f("none-words")).to_have_text("no position yet")
-            await expect(it.f("car-says")).to_have_text("No position has come from the car yet.")
+            await expect(it.f("car-says")).to_have_text("No position received from the car yet.")
             await expect(it.f("car-lat")).to_have_text("no message yet")
             for mark in (".car-mark", ".phone-mark", ".dl", ".acc", ".phacc"):
                 await expect(it.svg(mark)).to_be_hidden()
             assert (await it.svg(".g").get_attribute("d")).count("M") > 5  # the grid is there
 
 
-@pytest.mark.parametrize(
-    ("lat_deg", "lon_deg"), [(-17.0, 179.99999), (89.99995, 10.0), (90.0, 0.0), (-89.9999, -180.0), (0.0, 0.0)]
-)
-async def test_no_place_on_earth_is_special(phone: Phone, lat_deg: float, lon_deg: float) -> None:
-    async with roaming(lat_deg, lon_deg, speed_mps=4.0) as car:
-        async with lying(phone, car, -6.0, 8.0) if abs(lat_deg) < 89 else contextlib.nullcontext():
-            async with looking(phone, car) as it:
-                if abs(lat_deg) < 89:
-                    await expect(it.f("apart")).to_have_text(re.compile(r"^(9|1\d)\.\d$"), timeout=15_000)
-                for key in ("fit", "north"):
-                    await it.f(key).evaluate("key => key.click()")  # an alarm of the judge's may stand before it
-                await asyncio.sleep(1.0)
-                html = await it.page.locator("#panel-map .mapbox").inner_html()
-                assert not re.search(r"NaN|Infinity|undefined", html)
-                x, y = await it.from_middle(".car-mark")
-                assert abs(x) < 210
-                assert abs(y) < 240
-                assert len(await it.f("car-lat").text_content()) > 5
+@pytest.mark.own_phone
+async def test_no_place_on_earth_is_special(phone: Phone) -> None:
+    for lat_deg, lon_deg in ((-17.0, 179.99999), (89.99995, 10.0), (90.0, 0.0), (-89.9999, -180.0), (0.0, 0.0)):
+        async with roaming(lat_deg, lon_deg, speed_mps=4.0) as car:
+            async with lying(phone, car, -6.0, 8.0) if abs(lat_deg) < 89 else contextlib.nullcontext():
+                async with looking(phone, car) as it:
+                    if abs(lat_deg) < 89:
+                        await expect(it.f("apart")).to_have_text(re.compile(r"^(9|1\d)\.\d$"), timeout=15_000)
+                    for key in ("fit", "north"):
+                        await it.f(key).evaluate("key => key.click()")  # an alarm of the judge's may stand before it
+                    await asyncio.sleep(0.5)
+                    html = await it.page.locator("#panel-map .mapbox").inner_html()
+                    assert not re.search(r"NaN|Infinity|undefined", html), (lat_deg, lon_deg)
+                    x, y = await it.from_middle(".car-mark")
+                    assert abs(x) < 210, (lat_deg, lon_deg)
+                    assert abs(y) < 240, (lat_deg, lon_deg)
+                    assert len(await it.f("car-lat").text_content()) > 5
+                    await phone.open("about:blank")
 
 
 # -- hands -------------------------------------------------------------------------------------------------------------
 
 
 async def drag(it: Map, dx: int, dy: int, fingers: int = 1, spread: int = 0) -> None:
-    """Fingers over the map; with two, they part by `spread` pixels."""
-    cdp = await it.page.context.new_cdp_session(it.page)
+    """Fingers over the map; with two, 60 px apart, they part by `spread` pixels."""
     box = await it.f("box").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-    def points(share: float) -> list[dict[str, float]]:
-        part = (60 + spread * share) / 2 if fingers == 2 else 0
-        return [
-            {"x": x + dx * share + side * part, "y": y + dy * share} for side in ((-1, 1) if fingers == 2 else (0,))
-        ]
-
-    await cdp.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": points(0)})
-    for step in range(1, 11):
-        await cdp.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": points(step / 10)})
-        await asyncio.sleep(0.016)
-    await cdp.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    await cdp.detach()
+    sides, apart = ((-0.5, 0.5), 60) if fingers == 2 else ((0.0,), 0)
+    await stroke(it.page, *((x + side * apart, y, x + dx + side * (apart + spread), y + dy) for side in sides))
 
 
 async def test_following_leaves_the_swipe_to_the_tabs_and_free_takes_it(phone: Phone) -> None:
@@ -348,10 +355,12 @@ async def test_two_fingers_and_keys_change_the_scale_and_the_car_stays_in_the_mi
         await it.reaches(".acc", "ry", pinched, 0.2)
 
 
+@pytest.mark.own_phone
 async def test_both_are_brought_into_sight_and_the_heading_up(phone: Phone) -> None:
     async with roaming() as car, lying(phone, car, 300.0, 400.0, 60.0), looking(phone, car) as it:
         await expect(it.f("apart")).to_have_text(re.compile("^500$|^49|^50"), timeout=15_000)
-        await it.f("fit").tap()
+        await expect(phone.f("strip")).to_contain_text("Phone position", timeout=25_000)  # its fix is too coarse
+        await it.press("fit")
         await expect(it.f("fit")).to_have_attribute("aria-pressed", "true")
         await expect(it.f("follow")).to_have_attribute("aria-pressed", "false")
         across, down = await it.page.evaluate(MIDDLE)
@@ -364,7 +373,7 @@ async def test_both_are_brought_into_sight_and_the_heading_up(phone: Phone) -> N
         (cx, cy), (px, py) = await it.from_middle(".car-mark"), await it.from_middle(".phone-mark")
         assert px > cx
         assert py < cy
-        await it.f("north").tap()  # the car looks east: east is up, and north is at the left
+        await it.press("north")  # the car looks east: east is up, and north is at the left
         await expect(it.f("north")).to_have_attribute("aria-pressed", "true")
         await expect(it.svg(".car-mark .car")).to_have_attribute("transform", "rotate(0)")
         await expect(it.f("needle")).to_have_attribute("transform", "rotate(-90.0 12 12)")
@@ -380,7 +389,7 @@ async def test_both_are_brought_into_sight_and_the_heading_up(phone: Phone) -> N
         car.heading_deg = None
         await expect(it.svg(".nose")).to_be_visible(timeout=20_000)
         await expect(it.f("needle")).to_have_attribute("transform", "rotate(-90.0 12 12)")  # nobody turned
-        await it.f("north").tap()
+        await it.press("north")
         await expect(it.f("needle")).to_have_attribute("transform", re.compile(r"rotate\(-?0\.0 12 12\)"))
 
 
@@ -406,53 +415,29 @@ async def test_keys_are_large_named_and_worked_by_a_keyboard(phone: Phone) -> No
         await it.stands(".car-mark", 80.0, -80.0)
         await it.page.keyboard.press("+")
         await it.stands(".car-mark", 120.0, -120.0)
+        await it.f("follow").tap()  # its keys stay within reach while the map has the focus
+        await expect(it.f("follow")).to_have_attribute("aria-pressed", "true")
 
 
-async def test_no_barrier_that_a_machine_can_find(phone: Phone) -> None:
-    async with roaming() as car, lying(phone, car, 6.0, -8.0), looking(phone, car) as it:
-        await expect(it.svg(".dl")).to_be_visible(timeout=12_000)
-        for state in ("live", "stale"):
-            if state == "stale":
-                car.tells_position = False
-                await expect(it.f("car-says")).to_be_visible()
-            for theme in ("dark", "light"):
-                await phone.page.emulate_media(color_scheme=theme)
-                found = (await Axe().run(phone.page)).response["violations"]
-                assert [(one["id"], one["nodes"][0]["html"]) for one in found] == [], f"{state}, {theme}"
-
-
-@pytest.mark.parametrize("size", [(320, 640), (412, 915), (915, 412), (1180, 820)])
-async def test_no_width_breaks_the_map(phone: Phone, size: tuple[int, int], tmp_path: Path) -> None:
-    await phone.page.set_viewport_size({"width": size[0], "height": size[1]})
-    # On a wide screen Files is in sight too, and asks for what a server without a folder has not.
-    async with roaming() as car, looking(phone, car, data=tmp_path) as it:
-        over = await phone.page.evaluate(
-            """() => { const { left, right } = document.querySelector('#panel-map').getBoundingClientRect();
-              return [...document.querySelectorAll('#panel-map *')]
-                .filter((one) => one.getClientRects().length && !one.closest('svg') && !one.closest('.ground'))
-                .filter((one) => one.getBoundingClientRect().right > right + 1
-                  || one.getBoundingClientRect().left < left - 1)
-                .map((one) => one.className + ' ' + one.textContent.trim().slice(0, 30)); }"""
-        )
-        assert over == []
+async def test_no_width_breaks_the_map(phone: Phone, canned: Canned) -> None:
+    await phone.open(f"{canned.address}/#map")
+    await phone.live()
+    it = Map(phone)
+    await expect(it.svg(".car-mark")).to_be_visible(timeout=12_000)
+    for width, height in SIZES:
+        await phone.page.set_viewport_size({"width": width, "height": height})
+        await it.stands(".car-mark", 0.0, 0.0)
         place = await it.page.locator("#panel-map .map").bounding_box()
         for key in await it.page.locator("#panel-map .map button").all():
             box = await key.bounding_box()
-            assert box["y"] >= place["y"]
-            assert box["y"] + box["height"] <= place["y"] + place["height"]
-        await it.stands(".car-mark", 0.0, 0.0)
-        await phone.page.set_viewport_size({"width": size[0] - 40, "height": size[1] - 30})
-        await it.until(
-            """() => { const { width, height } = document.querySelector('.mapbox').getBoundingClientRect();
-              const mark = document.querySelector('.car-mark').getAttribute('transform');
-              const [x, y] = mark.match(/[\\d.]+/g).map(Number);
-              return Math.abs(x - width / 2) < 0.6 && Math.abs(y - height / 2) < 0.6; }"""
-        )
+            assert box["y"] >= place["y"], (width, height)
+            assert box["y"] + box["height"] <= place["y"] + place["height"], (width, height)
 
 
 # -- the ground --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.own_phone
 async def test_the_map_is_fetched_when_it_comes_near_and_leaflet_only_for_tiles(phone: Phone) -> None:
     asked: list[str] = []
     phone.page.on("request", lambda request: asked.append(request.url))
@@ -480,6 +465,7 @@ def plan(path: Path, lat_deg: float, lon_deg: float) -> Path:
     return maps.write(path / "plan.mbtiles", tiles, format="png", attribution=said, minzoom="19", maxzoom="19")
 
 
+@pytest.mark.own_phone
 async def test_tiles_and_the_site_s_picture_lie_where_they_should(phone: Phone, tmp_path: Path) -> None:
     asked: list[str] = []
     phone.page.on("request", lambda request: asked.append(request.url))

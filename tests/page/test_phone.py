@@ -71,6 +71,7 @@ def uses_it(state: dict[str, Any]) -> bool:
     return state["phone"] is not None and state["phone"]["used"] and state["phone"]["apart_m"] is not None
 
 
+@pytest.mark.own_phone
 @pytest.mark.timeout(90)
 async def test_a_phone_in_the_car_agrees_and_one_500_m_away_is_told(phone: Phone, tmp_path: Path) -> None:
     await phone.page.context.grant_permissions(["geolocation"])
@@ -88,11 +89,12 @@ async def test_a_phone_in_the_car_agrees_and_one_500_m_away_is_told(phone: Phone
         sheet = phone.page.locator("#sheet-alarm")
         await expect(sheet).to_be_visible(timeout=15_000)
         await expect(phone.f("title", "#sheet-alarm")).to_have_text("Phone and car disagree")
-        await expect(sheet).to_contain_text("Where phone and car are together, do not trust the car's position.")
+        await expect(sheet).to_contain_text("If the phone is in the car, do not trust the car's position.")
         await phone.f("acknowledge", "#sheet-alarm").tap()
         await expect(tile(phone, "Phone–car")).to_contain_text("FAULT")
 
 
+@pytest.mark.own_phone
 @pytest.mark.timeout(90)
 async def test_case_07_a_permission_taken_away_is_told_with_its_name_and_given_back_is_enough(
     phone: Phone, tmp_path: Path
@@ -115,6 +117,7 @@ async def test_case_07_a_permission_taken_away_is_told_with_its_name_and_given_b
         await expect(tile(phone, "Phone–car")).to_contain_text("OK")
 
 
+@pytest.mark.own_phone
 async def test_a_reload_is_the_same_phone_and_needs_no_tap(phone: Phone, tmp_path: Path) -> None:
     await phone.page.context.grant_permissions(["geolocation"])
     async with running(*simulate()) as car, running(*server(tmp_path)) as watch, riding(phone, watch) as ride:
@@ -127,6 +130,7 @@ async def test_a_reload_is_the_same_phone_and_needs_no_tap(phone: Phone, tmp_pat
         assert (state["phone"]["id"], state["phone"]["count"]) == (name, 1)
 
 
+@pytest.mark.own_phone
 async def test_without_a_tap_and_a_permission_nothing_is_asked_and_nothing_sent(phone: Phone, tmp_path: Path) -> None:
     async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
         await phone.page.add_init_script(

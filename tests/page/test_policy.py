@@ -28,6 +28,7 @@ async def violations(phone: Phone) -> list[str]:
     return found
 
 
+@pytest.mark.own_phone
 async def test_nothing_the_page_does_is_against_its_policy(phone: Phone, tmp_path: Path) -> None:
     """Every tab with all it can draw: tiles by Leaflet, sparklines by uPlot, a replay, every screen of the menu."""
     await phone.page.add_init_script(NOTE_VIOLATIONS)
@@ -87,6 +88,7 @@ def forbidden_at_once() -> str:
     }}"""
 
 
+@pytest.mark.own_phone
 @pytest.mark.parametrize("phone", [{"service_workers": "allow"}], indirect=True, ids=["workers allowed"])
 async def test_what_the_page_never_does_is_refused(phone: Phone, forbidden_at_once: str) -> None:
     await phone.page.add_init_script(NOTE_VIOLATIONS)
@@ -100,6 +102,7 @@ async def test_what_the_page_never_does_is_refused(phone: Phone, forbidden_at_on
     phone.complaints.clear()
 
 
+@pytest.mark.own_phone
 async def test_the_description_of_the_interface_is_within_the_policy(phone: Phone) -> None:
     await phone.page.add_init_script(NOTE_VIOLATIONS)
     async with serving(Config()) as address:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
 from playwright.async_api import expect
 
 from server.cli.main import main
@@ -26,6 +27,7 @@ def hostile(path: Path) -> Path:
     return write_ros1(path, Drive(messages=sorted(rows, key=lambda row: row[0])))
 
 
+@pytest.mark.own_phone
 async def test_alarms_plots_and_nothing_from_the_network(phone: Phone, tmp_path: Path) -> None:
     out = tmp_path / "drive.html"
     assert main(["check", str(hostile(tmp_path / "a.bag")), "--html", str(out)]) == 1

@@ -12,14 +12,21 @@ from typing import Any
 import httpx
 import pytest
 import pytest_asyncio
-from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import Browser, Page, expect
 
 from tests.page import drives
-from tests.page.conftest import PHONE, Phone
+from tests.page.barriers import no_barrier
+from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
+from tests.page.touch import DRAWN
 
 OPENS_MS = 40_000
+PLACES = """() => ['.replay-top', '.top .menu', '.replay-date', '.replay-line', '#monitor .view',
+  '.time-line', '.tape-keys .clock', ...[1, 2, 3, 4, 5].map((n) => `.keysrow > :nth-child(${n})`)]
+  .map((selector) => {
+    const {left, right, top, bottom} = document.querySelector(selector).getBoundingClientRect();
+    return [selector, left, right, top, bottom];
+  })"""
 
 
 def speed(t: float) -> Any:
@@ -34,7 +41,7 @@ class Watch:
     car: Process
 
 
-@pytest_asyncio.fixture(loop_scope="module", scope="module")
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Watch]:
     data = tmp_path_factory.mktemp("data")
     folder = data / "recordings" / "car"
@@ -109,7 +116,7 @@ async def test_it_plays_pauses_and_changes_its_pace(phone: Phone, watch: Watch) 
 
 async def test_the_finger_and_the_keys_lead_to_any_moment(phone: Phone, watch: Watch) -> None:
     page = await replayed(phone, watch, 5.0)
-    slider = page.get_by_role("slider", name="Moment of the recording")
+    slider = page.get_by_role("slider", name="Position in the recording")
     box = await slider.bounding_box()
     assert box is not None
     assert box["height"] >= 56
@@ -135,7 +142,7 @@ async def test_marks_stand_at_the_alarms_and_keys_lead_there(phone: Phone, watch
     await page.get_by_role("button", name="Next alarm").tap()
     await expect(page.locator(".replay-line")).to_contain_text(re.compile("Speed above limit|Obstacle ahead"))
     await expect(clock(page)).to_have_text("00:20")
-    await page.get_by_role("slider", name="Moment of the recording").press("End")
+    await page.get_by_role("slider", name="Position in the recording").press("End")
     await expect(clock(page)).to_have_text("01:09")
     await page.get_by_role("button", name="Previous alarm").tap()
     await expect(clock(page)).not_to_have_text("01:09")
@@ -153,7 +160,7 @@ async def test_two_pages_look_at_different_moments_and_a_third_at_live(
 ) -> None:
     page = await replayed(phone, watch, 24.0)
     others = [await browser.new_context(**PHONE) for _ in range(2)]
-    second, live = [Phone(await context.new_page()) for context in others]
+    second, live = [await phone_in(context) for context in others]
     await replayed(second, watch, 60.0)
     await live.open(f"{watch.address}/#home")
     await live.live()
@@ -182,10 +189,26 @@ async def test_nothing_is_ordered_from_a_replay(phone: Phone, watch: Watch) -> N
     await expect(number).to_be_visible(timeout=10_000)
     await number.fill("9")
     await number.press("Enter")
-    await expect(page.locator("body")).to_contain_text("replays a recording", timeout=10_000)
+    await expect(page.locator("body")).to_contain_text("shows a replay", timeout=10_000)
     async with httpx.AsyncClient() as client:
         after = (await client.get(f"{watch.address}/api/settings")).json()["values"]["speed_limit.max_mps"]
     assert before == after
+
+
+async def test_a_check_opens_with_the_minute_and_the_alarms_of_the_recording(phone: Phone, watch: Watch) -> None:
+    page = await replayed(phone, watch, 24.0)
+    await page.locator("[data-f=tiles] li button").first.press("Enter")
+    await expect(phone.f("check-tag")).to_have_text("FAULT")
+    await expect(page.locator("canvas.minute")).to_have_attribute("aria-label", re.compile(r"highest 12\.4 m/s"))
+    history = phone.f("check-history").locator("li")
+    await expect(history).to_have_count(1)
+    await expect(history).to_contain_text("active, highest 12.4 m/s")
+    await expect(phone.f("check-change")).to_be_hidden()
+    await no_barrier(page, "a check of a replay")
+    await page.evaluate("document.querySelector('.check-view [data-f=close]').click()")
+    await page.evaluate("document.querySelector('[data-f=strip]').click()")
+    await expect(phone.f("alarms-note")).to_contain_text("nothing can be acknowledged in it")
+    await expect(phone.f("alarms-ended")).to_be_hidden()
 
 
 async def test_a_live_alarm_reaches_who_looks_at_a_recording(phone: Phone, watch: Watch) -> None:
@@ -195,7 +218,7 @@ async def test_a_live_alarm_reaches_who_looks_at_a_recording(phone: Phone, watch
     await expect(sheet).to_contain_text(
         "Live: Speed above limit", timeout=45_000
     )  # it takes the bends of its way slowly
-    await expect(sheet).to_contain_text("happening now")
+    await expect(sheet).to_contain_text("This is live")
     await expect(page).to_have_title(re.compile("LIVE Speed above limit"))
     await page.get_by_role("button", name="Stay in the replay").tap()
     await expect(page.locator(".replay-live")).to_contain_text("Live: Speed above limit")
@@ -207,6 +230,93 @@ async def test_a_live_alarm_reaches_who_looks_at_a_recording(phone: Phone, watch
     await phone.f("acknowledge", "#sheet-alarm").tap()
 
 
+WHEN = """() => {
+  const keys = [...document.querySelectorAll('#sheet-file .menu-list button')];
+  const key = keys.find((one) => one.textContent === 'Open replay');
+  key.addEventListener('click', () => {
+    const began_ms = performance.now();
+    const timer = setInterval(() => {
+      if (!/L/.test(document.querySelector('.scrub .all')?.getAttribute('d') ?? '')) return;
+      clearInterval(timer);
+      document.body.dataset.traceMs = performance.now() - began_ms;
+    }, 5);
+  }, {capture: true});
+}"""
+
+
+async def test_from_files_it_opens_on_home_with_its_speed_within_a_second(phone: Phone, watch: Watch) -> None:
+    page = phone.page
+    await phone.open(f"{watch.address}/#files")
+    await phone.live()
+    row = page.locator(f'#panel-files [data-id="{watch.recording}"]')
+    await expect(row).to_have_attribute("data-state", "read", timeout=20_000)
+    await phone.acknowledge_all()
+    await page.evaluate("() => import('/static/js/replay/replay.js').catch(() => {})")
+    await row.locator(".t").tap()
+    await expect(page.locator("#sheet-file")).to_be_visible()
+    await page.evaluate(WHEN)
+    await page.get_by_role("button", name="Open replay").tap()
+    await page.wait_for_selector("body[data-trace-ms]", timeout=20_000)
+    assert float(await page.evaluate("() => document.body.dataset.traceMs")) < 1000 + 1000 * phone.slack_s
+    await shown(page)
+    await expect(page.locator('[data-tab="home"]')).to_have_attribute("aria-selected", "true")
+    await expect(page.locator(".replay-date")).to_contain_text("Recorded 1 Jun 2016, car")
+    assert await page.locator(".replay-band").count() == 1
+    await expect(page.locator(".replay-calm, .replay-live:not([hidden])").first).to_contain_text("recording")
+    await page.locator(".scrub .leave").tap()
+    await phone.live()
+
+
+async def test_its_alarms_are_a_list_to_jump_to(phone: Phone, watch: Watch) -> None:
+    """By a tap, and by keys alone; nothing in it can be acknowledged."""
+    page = await replayed(phone, watch, 60.0)
+    await expect(page.locator(".unread")).to_have_count(0, timeout=OPENS_MS)
+    await expect(page.locator(".replay-line .count")).to_have_text(re.compile(r"^\d+ alarms?$"))
+    await page.locator(".replay-line").tap()
+    jumps = page.locator("#sheet-jumps[open]")
+    await expect(jumps).to_contain_text("Each opens 5 s before it begins.")
+    fast = jumps.get_by_role("button").filter(has_text="Speed above limit").first
+    await expect(fast).to_contain_text(re.compile(r"00:20.*(9|10)(\.\d)? s", re.DOTALL))
+    await expect(jumps.get_by_role("button").filter(has_text="Nothing recorded")).to_contain_text("6.")
+    await fast.tap()
+    await expect(page.locator("#sheet-jumps")).to_be_hidden()
+    await expect(clock(page)).to_have_text("00:15")
+    await page.locator(".replay-line").press("Enter")
+    await expect(jumps.get_by_role("button").first).to_be_visible()
+    await page.keyboard.press("End")
+    await page.keyboard.press("Home")
+    await page.keyboard.press("ArrowDown")
+    await expect(jumps.get_by_role("button").nth(1)).to_be_focused()
+    at_s = await jumps.get_by_role("button").nth(1).get_attribute("data-at")
+    await page.keyboard.press("Enter")
+    await expect(page.locator(".time-line")).to_have_attribute("aria-valuenow", f"{float(at_s or 'nan'):.1f}")
+    assert (
+        not await page.get_by_role("button", name=re.compile("acknowledge", re.IGNORECASE))
+        .locator("visible=true")
+        .count()
+    )
+
+
+async def test_a_tap_on_the_chart_leads_to_the_moment(phone: Phone, watch: Watch) -> None:
+    page = await replayed(phone, watch, 24.0)
+    await page.locator("[data-trend=speed]").tap()
+    await expect(page.locator(".trends-strip .line")).to_have_attribute("d", re.compile("M"))
+    await page.locator(".trends-tools button").nth(2).tap()
+    await expect(page.locator(".trends-state")).to_be_hidden(timeout=OPENS_MS)  # all is read, and nothing is live
+    stage = page.locator(".trends-stage")
+    await expect(stage).to_have_attribute("aria-valuemax", re.compile(r"^(69|70)\."))  # the recording's end
+    await expect(stage).to_have_attribute("aria-valuenow", "24.0")
+    await expect(stage).to_have_attribute("aria-valuetext", re.compile(r"Speed 12\.4 m/s"))
+    over = await page.locator(".trends-panes .u-over").first.bounding_box()
+    assert over is not None
+    await page.touchscreen.tap(over["x"] + over["width"] * 43.5 / 70, over["y"] + 20)
+    await expect(clock(page)).to_have_text(re.compile("00:4[34]"))
+    await expect(stage).to_have_attribute("aria-valuetext", re.compile("Speed no data"))
+    await expect(page.locator(".trends-marks .critical").first).to_be_attached()
+    await page.keyboard.press("Escape")
+    await expect(stage).to_be_hidden()
+
+
 async def test_a_recording_that_is_not_there_is_refused_and_live_goes_on(phone: Phone, watch: Watch) -> None:
     await phone.open(f"{watch.address}/?replay=../../etc/passwd#home")
     await expect(phone.page.locator(".snack.note")).to_contain_text(
@@ -215,41 +325,25 @@ async def test_a_recording_that_is_not_there_is_refused_and_live_goes_on(phone: 
     await phone.live()
 
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-async def test_no_barrier(browser: Browser, watch: Watch, scheme: Any) -> None:
-    context = await browser.new_context(**PHONE | {"color_scheme": scheme, "bypass_csp": True})
-    phone = Phone(await context.new_page())
+async def test_nothing_overlaps_or_overflows_or_is_too_small(phone: Phone, watch: Watch) -> None:
     page = await replayed(phone, watch, 24.0)
-    found = await Axe().run(page)
-    assert [(rule["id"], rule["nodes"][0]["html"]) for rule in found.response["violations"]] == []
+    await no_barrier(page, "replay")
     small = await page.evaluate(
         """() => [...document.querySelectorAll('.scrub button, .scrub label, .leave, .time-line')]
         .map((key) => [key.textContent, key.getBoundingClientRect()])
         .filter(([, box]) => box.width < 56 || box.height < 56).map(([text]) => text)"""
     )
     assert small == []
-    await context.close()
-
-
-@pytest.mark.parametrize(("width", "height"), [(320, 640), (915, 412), (1280, 800)])
-async def test_nothing_overlaps_or_overflows(browser: Browser, watch: Watch, width: int, height: int) -> None:
-    context = await browser.new_context(**PHONE | {"viewport": {"width": width, "height": height}})
-    page = await replayed(Phone(await context.new_page()), watch, 24.0)
-    boxes = await page.evaluate(
-        """() => ['.replay-top .leave', '.top .menu', '.replay-date', '.replay-line', '#monitor .view',
-        '.time-line', ...[1, 2, 3, 4, 5].map((n) => `.keysrow > :nth-child(${n})`)]
-        .map((selector) => {
-          const {left, right, top, bottom} = document.querySelector(selector).getBoundingClientRect();
-          return [selector, left, right, top, bottom];
-        })"""
-    )
-    for selector, left, right, top, bottom in boxes:
-        assert -0.5 <= left, selector
-        assert right <= width + 0.5, selector
-        assert -0.5 <= top, selector
-        assert bottom <= height + 0.5, selector
-    for i, (a, *one) in enumerate(boxes):
-        for b, *two in boxes[i + 1 :]:
-            apart = one[1] <= two[0] + 1 or two[1] <= one[0] + 1 or one[3] <= two[2] + 1 or two[3] <= one[2] + 1
-            assert apart, (a, b)
-    await context.close()
+    for width, height in ((320, 640), (915, 412), (1280, 800)):
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.evaluate(DRAWN)
+        boxes = await page.evaluate(PLACES)
+        for selector, left, right, top, bottom in boxes:
+            assert -0.5 <= left, (selector, width)
+            assert right <= width + 0.5, (selector, width)
+            assert -0.5 <= top, (selector, width)
+            assert bottom <= height + 0.5, (selector, width)
+        for i, (a, *one) in enumerate(boxes):
+            for b, *two in boxes[i + 1 :]:
+                apart = one[1] <= two[0] + 1 or two[1] <= one[0] + 1 or one[3] <= two[2] + 1 or two[3] <= one[2] + 1
+                assert apart, (a, b, width)

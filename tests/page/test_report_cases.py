@@ -16,17 +16,25 @@ import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
 from tests.page.conftest import PHONE, Phone
-from tests.page.processes import Process, free_port, running, server, simulate
+from tests.page.processes import Drive, Process, driving, free_port, running, server, simulate, watching
+from tests.page.test_tabs import TABS
 
-TABS = ("home", "map", "scan", "files", "settings")
 LONG = 45_000  # ms: the car must first stop, or come to where the other one pulls out
 
 
-@pytest_asyncio.fixture(loop_scope="module")
-async def drive(tmp_path: Path) -> AsyncIterator[tuple[Process, Process]]:
-    """A simulated car and a server that watches it."""
-    async with running(*simulate()) as car, running(*server(tmp_path / "watch", car.address)) as watch:
-        yield car, watch
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def driven(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Drive]:
+    async with driving(tmp_path_factory.mktemp("watch")) as drive:
+        yield drive
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def drive(driven: Drive) -> AsyncIterator[Drive]:
+    """A simulated car without a fault, and a server that is newly connected to it: no alarm stands."""
+    car, watch = driven
+    await watching(watch, car.address)
+    yield driven
+    await car.type("stop")
 
 
 @contextlib.asynccontextmanager
@@ -45,9 +53,7 @@ async def a_phone_on_each_tab(browser: Browser, address: str) -> AsyncIterator[d
             await context.close()
 
 
-async def dialog_on_each_tab(
-    browser: Browser, drive: tuple[Process, Process], fault: str, title: str, words: str
-) -> None:
+async def dialog_on_each_tab(browser: Browser, drive: Drive, fault: str, title: str, words: str) -> None:
     """The dialog stands on every tab; one OK closes it on all, and each page is where it was."""
     car, watch = drive
     async with a_phone_on_each_tab(browser, watch.address) as pages:
@@ -80,9 +86,7 @@ async def test_case_01_an_address_without_a_car_opens_no_home(phone: Phone, tmp_
         await expect(phone.page.locator("#monitor")).to_be_hidden()
 
 
-async def test_case_02_the_right_address_opens_home(
-    phone: Phone, drive: tuple[Process, Process], tmp_path: Path
-) -> None:
+async def test_case_02_the_right_address_opens_home(phone: Phone, drive: Drive, tmp_path: Path) -> None:
     car, _ = drive
     async with running(*server(tmp_path)) as watch:
         await phone.open(watch.address)
@@ -133,7 +137,7 @@ async def test_case_04_a_lost_link_shows_its_dialog_and_what_was_recorded_is_sav
             await car.kill()
 
 
-async def test_case_06_no_position_is_told(phone: Phone, drive: tuple[Process, Process]) -> None:
+async def test_case_06_no_position_is_told(phone: Phone, drive: Drive) -> None:
     car, watch = drive
     await phone.open(watch.address)
     await phone.live()
@@ -148,7 +152,7 @@ async def test_case_06_no_position_is_told(phone: Phone, drive: tuple[Process, P
 
 
 @pytest.mark.timeout(120)
-async def test_case_08_a_car_that_stands_is_told(phone: Phone, drive: tuple[Process, Process]) -> None:
+async def test_case_08_a_car_that_stands_is_told(phone: Phone, drive: Drive) -> None:
     car, watch = drive
     await phone.open(watch.address)
     await phone.live()
@@ -161,14 +165,10 @@ async def test_case_08_a_car_that_stands_is_told(phone: Phone, drive: tuple[Proc
 
 
 @pytest.mark.timeout(150)
-async def test_case_09_and_19_and_20_an_obstacle_on_each_of_the_five_tabs(
-    browser: Browser, drive: tuple[Process, Process]
-) -> None:
+async def test_case_09_and_19_and_20_an_obstacle_on_each_of_the_five_tabs(browser: Browser, drive: Drive) -> None:
     await dialog_on_each_tab(browser, drive, "near-object 60", "Object too near", r"3\.5")
 
 
 @pytest.mark.timeout(150)
-async def test_case_15_and_16_an_errant_gps_on_each_of_the_five_tabs(
-    browser: Browser, drive: tuple[Process, Process]
-) -> None:
+async def test_case_15_and_16_an_errant_gps_on_each_of_the_five_tabs(browser: Browser, drive: Drive) -> None:
     await dialog_on_each_tab(browser, drive, "gps-drift 60", "GPS drift at standstill", r"Do not trust the position")

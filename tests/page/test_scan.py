@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import re
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import numpy as np
 import pytest
 import pytest_asyncio
-from axe_playwright_python.async_playwright import Axe
 from playwright.async_api import Worker, expect
 
+from server.app.config import Config
+from server.vehicle.vehicle import Vehicle
 from tests.page import drives
 from tests.page.conftest import Phone
-from tests.page.processes import replay, running, server, simulate
+from tests.page.processes import Drive, driving, replay, running, server
+from tests.page.roamer import roaming
 from tests.page.test_tabs import in_front, swipe
+from tests.page.touch import stroke
+from tests.server.conftest import serving
 
+LASER = drives.TOPICS["scan"][0]
 # Counts what one drawing puts on the plot: every square is a return.
 LISTEN = """() => {
   const kept = CanvasRenderingContext2D.prototype.rect;
@@ -63,6 +70,20 @@ PICTURE = """() => {
 WITHOUT_A_THREAD = "delete HTMLCanvasElement.prototype.transferControlToOffscreen"
 
 
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def driven(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Drive]:
+    async with driving(tmp_path_factory.mktemp("data")) as drive:
+        yield drive
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def drive(driven: Drive) -> AsyncIterator[Drive]:
+    """A simulated car whose laser speaks, and a server that watches it."""
+    yield driven
+    await driven[0].type("stop")
+
+
+@pytest.mark.own_phone
 async def test_681_beams_of_a_real_laser_with_those_below_range_min_not_drawn(
     phone: Phone, tmp_path: Path, recordings: Path
 ) -> None:
@@ -93,102 +114,105 @@ async def test_681_beams_of_a_real_laser_with_those_below_range_min_not_drawn(
         await expect(phone.f("beams", "#panel-scan")).to_contain_text("too close")
 
 
-async def test_the_scan_is_sent_only_while_its_tab_is_in_front(phone: Phone, tmp_path: Path) -> None:
-    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
-        scans: list[bytes] = []
-        phone.page.on(
-            "websocket",
-            lambda socket: socket.on(
-                "framereceived", lambda data: scans.append(data) if isinstance(data, bytes) else 0
-            ),
-        )
-        await phone.open(f"{watch.address}/#home")
-        await phone.live()
-        await phone.page.wait_for_timeout(800)
-        assert scans == []
-        await phone.page.locator("[data-tab=scan]").tap()
-        await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"))
-        async with asyncio.timeout(8):
-            while len(scans) < 6:  # Playwright tells by calling
-                await asyncio.sleep(0.05)
-        await phone.f("menu").tap()
-        await phone.page.locator("#sheet-menu").get_by_text("About").tap()
-        await phone.page.wait_for_timeout(300)
-        scans.clear()
-        await phone.page.wait_for_timeout(600)
-        assert scans == []  # another screen lies over it
-        await phone.f("back").tap()
-        await phone.page.wait_for_timeout(600)
-        assert scans
-        await phone.page.locator("[data-tab=home]").tap()
-        await phone.page.wait_for_timeout(600)
-        scans.clear()
-        await phone.page.wait_for_timeout(600)
-        assert scans == []
+@pytest.mark.own_phone
+async def test_the_scan_is_sent_only_while_its_tab_is_in_front(phone: Phone, drive: Drive) -> None:
+    _, watch = drive
+    scans: list[bytes] = []
+    phone.page.on(
+        "websocket",
+        lambda socket: socket.on("framereceived", lambda data: scans.append(data) if isinstance(data, bytes) else 0),
+    )
+    await phone.open(f"{watch.address}/#home")
+    await phone.live()
+    await phone.page.wait_for_timeout(800)
+    assert scans == []
+    await phone.page.locator("[data-tab=scan]").tap()
+    await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"))
+    async with asyncio.timeout(8):
+        while len(scans) < 6:  # Playwright tells by calling
+            await asyncio.sleep(0.05)
+    await phone.f("menu").tap()
+    await phone.page.locator("#sheet-menu").get_by_text("About").tap()
+    await phone.page.wait_for_timeout(300)
+    scans.clear()
+    await phone.page.wait_for_timeout(600)
+    assert scans == []  # another screen lies over it
+    await phone.f("back").tap()
+    await phone.page.wait_for_timeout(600)
+    assert scans
+    await phone.page.locator("[data-tab=home]").tap()
+    await phone.page.wait_for_timeout(600)
+    scans.clear()
+    await phone.page.wait_for_timeout(600)
+    assert scans == []
 
 
 async def test_case_05_no_scan_being_published_the_boundary_scan_graph_does_not_change(
-    phone: Phone, tmp_path: Path
+    phone: Phone, drive: Drive
 ) -> None:
     """Frozen as it was, hatched over, with its age: never shown as live. It goes on by itself."""
-    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
-        await phone.open(f"{watch.address}/#scan")
-        await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
-        await expect(phone.f("none", "#panel-scan")).to_be_hidden()
-        await car.type("silent-scan 5")
-        stale = phone.f("none-words", "#panel-scan")
-        await expect(stale).to_have_text(re.compile(r"STALE \d"))
-        for name in ("distance", "bearing", "stops"):
-            await expect(phone.f(name, "#panel-scan")).to_have_text("–")
-        before, first = await phone.page.evaluate(PICTURE), await stale.text_content()
-        await phone.page.wait_for_timeout(900)
-        assert await phone.page.evaluate(PICTURE) == before
-        assert age(await stale.text_content()) > age(first)
-        assert await phone.page.locator(".scanc").get_attribute("aria-label") != ""
-        await expect(phone.page.locator(".scanc")).to_have_attribute("aria-label", re.compile("STALE"))
-        await phone.f("aim", "#panel-scan").tap(position={"x": 150, "y": 200})
-        await expect(phone.f("marked", "#panel-scan")).to_be_hidden()  # nothing is read off a dead picture
-        await expect(phone.f("none", "#panel-scan")).to_be_hidden(timeout=12_000)
-        await phone.page.wait_for_function(f"before => ({PICTURE})() !== before", arg=before)
+    car, watch = drive
+    await phone.open(f"{watch.address}/#scan")
+    await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
+    await expect(phone.f("none", "#panel-scan")).to_be_hidden()
+    await car.type("silent-scan 5")
+    stale = phone.f("none-words", "#panel-scan")
+    await expect(stale).to_have_text(re.compile(r"STALE \d"))
+    for name in ("distance", "bearing", "stops"):
+        await expect(phone.f(name, "#panel-scan")).to_have_text("–")
+    before, first = await phone.page.evaluate(PICTURE), await stale.text_content()
+    await phone.page.wait_for_timeout(900)
+    assert await phone.page.evaluate(PICTURE) == before
+    assert age(await stale.text_content()) > age(first)
+    assert await phone.page.locator(".scanc").get_attribute("aria-label") != ""
+    await expect(phone.page.locator(".scanc")).to_have_attribute("aria-label", re.compile("STALE"))
+    await phone.f("aim", "#panel-scan").tap(position={"x": 150, "y": 200})
+    await expect(phone.f("marked", "#panel-scan")).to_be_hidden()  # nothing is read off a dead picture
+    await expect(phone.f("none", "#panel-scan")).to_be_hidden(timeout=12_000)
+    await phone.page.wait_for_function(f"before => ({PICTURE})() !== before", arg=before)
 
 
-async def test_two_fingers_zoom_the_plot_and_leave_the_tab_where_it_is(phone: Phone, tmp_path: Path) -> None:
-    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
-        await phone.open(f"{watch.address}/#scan")
-        await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
-        await phone.acknowledge_all()
-        twenty = phone.page.locator("[data-range='20']")
-        await twenty.tap()
-        await expect(twenty).to_have_attribute("aria-pressed", "true")
-        await fingers(phone, [(206, 250, 206, 200), (206, 350, 206, 400)])  # 100 px apart, then 200
-        assert await reach(phone) == pytest.approx(10.0, rel=0.15)
-        await expect(twenty).to_have_attribute("aria-pressed", "false")
-        await in_front(phone, "scan")
-        await fingers(phone, [(100, 300, 150, 300), (320, 300, 260, 300)])  # across, where a swipe would go
-        assert await reach(phone) == pytest.approx(20.0, rel=0.3)
-        await in_front(phone, "scan")
-        await swipe(phone, -250)
-        await in_front(phone, "files")
-        await swipe(phone, 250)
-        await in_front(phone, "scan")
-        ten = phone.page.locator("[data-range='10']")
-        await ten.tap()
-        await phone.f("farther", "#panel-scan").tap()
-        assert await reach(phone) == pytest.approx(14.1, abs=0.1)
-        await phone.f("farther", "#panel-scan").tap()
-        await expect(twenty).to_have_attribute("aria-pressed", "true")
-        await phone.f("aim", "#panel-scan").focus()
-        await phone.page.keyboard.press("+")
-        await phone.page.keyboard.press("+")
-        await expect(ten).to_have_attribute("aria-pressed", "true")
-        await phone.page.keyboard.press("-")
-        await phone.page.reload()
-        await phone.live()
-        await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
-        assert await reach(phone) == pytest.approx(14.1, abs=0.1)  # remembered
+async def test_two_fingers_zoom_the_plot_and_leave_the_tab_where_it_is(phone: Phone, drive: Drive) -> None:
+    _, watch = drive
+    await phone.open(f"{watch.address}/#scan")
+    await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
+    await phone.acknowledge_all()
+    await phone.acknowledge_meanwhile()
+    twenty = phone.page.locator("[data-range='20']")
+    await twenty.tap()
+    await expect(twenty).to_have_attribute("aria-pressed", "true")
+    await stroke(phone.page, (206, 250, 206, 200), (206, 350, 206, 400))  # 100 px apart, then 200
+    assert await reach(phone) == pytest.approx(10.0, rel=0.15)
+    await expect(twenty).to_have_attribute("aria-pressed", "false")
+    await in_front(phone, "scan")
+    await stroke(phone.page, (100, 300, 150, 300), (320, 300, 260, 300))  # across, where a swipe would go
+    assert await reach(phone) == pytest.approx(20.0, rel=0.3)
+    await in_front(phone, "scan")
+    await swipe(phone, -250)
+    await in_front(phone, "files")
+    await swipe(phone, 250)
+    await in_front(phone, "scan")
+    for key in ("nearer", "farther"):
+        box = await phone.f(key, "#panel-scan").bounding_box()
+        assert min(box["width"], box["height"]) >= 56
+    ten = phone.page.locator("[data-range='10']")
+    await ten.tap()
+    await phone.f("farther", "#panel-scan").tap()
+    assert await reach(phone) == pytest.approx(14.1, abs=0.1)
+    await phone.f("farther", "#panel-scan").tap()
+    await expect(twenty).to_have_attribute("aria-pressed", "true")
+    await phone.f("aim", "#panel-scan").focus()
+    await phone.page.keyboard.press("+")
+    await phone.page.keyboard.press("+")
+    await expect(ten).to_have_attribute("aria-pressed", "true")
+    await phone.page.keyboard.press("-")
+    await phone.page.reload()
+    await phone.live()
+    await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
+    assert await reach(phone) == pytest.approx(14.1, abs=0.1)  # remembered
 
 
-@pytest_asyncio.fixture(loop_scope="module", scope="module")
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def street(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[str]:
     """A server that watches a car at 4.2 m/s in a street, its wheels turned to the left, something 12 m ahead."""
     data = tmp_path_factory.mktemp("street")
@@ -238,6 +262,7 @@ async def test_a_tapped_return_is_told_in_words_and_stays_until_tapped_away(phon
     await expect(aim).to_have_attribute("aria-valuetext", "no return marked")
 
 
+@pytest.mark.own_phone
 async def test_corridor_gap_and_stopping_distance_are_those_of_the_judge(phone: Phone, street: str) -> None:
     await phone.page.add_init_script(f"{WITHOUT_A_THREAD}; ({LINES})()")
     await phone.open(f"{street}/#scan")
@@ -263,26 +288,27 @@ async def test_corridor_gap_and_stopping_distance_are_those_of_the_judge(phone: 
     await expect(phone.page.locator("#scan-told")).to_have_text(re.compile(r"invalid from \d+° right to \d+° right"))
 
 
-async def test_of_a_thread_that_draws_no_more_the_page_takes_over(phone: Phone, tmp_path: Path) -> None:
+async def test_of_a_thread_that_draws_no_more_the_page_takes_over(phone: Phone, drive: Drive) -> None:
     """A picture that stands still is not shown as live meanwhile."""
-    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
-        await phone.open(f"{watch.address}/#scan")
-        await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
-        thread = painter(phone)
-        assert await thread.evaluate("[...fonts].map((one) => one.status)") == ["loaded", "loaded"]
-        await expect(phone.f("none", "#panel-scan")).to_be_hidden()
-        await thread.evaluate("onmessage = () => {}")
-        await expect(phone.f("none-words", "#panel-scan")).to_have_text(re.compile(r"STALE 1"))
-        await expect(phone.f("none", "#panel-scan")).to_be_hidden()
-        assert phone.page.workers == []
-        (said,) = phone.complaints
-        assert "drawn by the page itself" in said
-        phone.complaints.clear()
+    _, watch = drive
+    await phone.open(f"{watch.address}/#scan")
+    await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
+    thread = painter(phone)
+    assert await thread.evaluate("[...fonts].map((one) => one.status)") == ["loaded", "loaded"]
+    await expect(phone.f("none", "#panel-scan")).to_be_hidden()
+    await thread.evaluate("onmessage = () => {}")
+    await expect(phone.f("none-words", "#panel-scan")).to_have_text(re.compile(r"STALE 1"))
+    await expect(phone.f("none", "#panel-scan")).to_be_hidden()
+    assert phone.page.workers == []
+    assert [said for said in phone.complaints if "now draws the scan itself" in said] != []
+    phone.complaints.clear()
 
 
 async def test_the_thread_draws_what_the_page_would(phone: Phone, tmp_path: Path) -> None:
-    async with running(*simulate()) as car, running(*server(tmp_path, car.address)) as watch:
+    """With a car of its own, for the corridor is drawn from its speed and steering, too."""
+    async with driving(tmp_path) as (car, watch):
         await phone.open(f"{watch.address}/#scan")
+        await phone.acknowledge_meanwhile()
         await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
         await car.type("silent-scan 60")
         await expect(phone.f("none-words", "#panel-scan")).to_have_text(re.compile(r"STALE \d"))
@@ -333,35 +359,42 @@ SAYS = {
 }
 
 
-@pytest.mark.parametrize("odd", ODD)
-async def test_no_scan_is_too_odd(phone: Phone, tmp_path: Path, odd: str) -> None:
+def as_json(scan: Any) -> dict[str, Any]:
+    """A laser's message as a bridge has it."""
+    stamp = {"secs": scan.header.stamp.sec, "nsecs": scan.header.stamp.nanosec}
+    numbers = ("angle_min", "angle_max", "angle_increment", "time_increment", "scan_time", "range_min", "range_max")
+    return {
+        "header": {"seq": 0, "stamp": stamp, "frame_id": "laser"}, **{name: getattr(scan, name) for name in numbers},
+        "ranges": scan.ranges, "intensities": scan.intensities,
+    }  # fmt: skip
+
+
+async def test_no_scan_is_too_odd(phone: Phone) -> None:
     """Whatever a laser says, the page draws it or says why not, and its console stays clean."""
-    says = {"speed": lambda t: drives.twist(1.0 + 0.001 * np.sin(9 * t)), "scan": ODD[odd]}
-    drive = drives.write(tmp_path / "odd.bag", says, seconds=4.0)
-    async with running(*replay(drive)) as car, running(*server(tmp_path, car.address)) as watch:
-        await phone.open(f"{watch.address}/#scan")
-        distance, beams, told = SAYS[odd]
-        await expect(phone.f("beams", "#panel-scan")).to_contain_text(beams, timeout=12_000)
-        await phone.acknowledge_all()
-        await expect(phone.f("distance", "#panel-scan")).to_contain_text(distance)
-        await expect(phone.page.locator("#scan-told")).to_contain_text(told)
-        await expect(phone.f("straight", "#panel-scan")).to_be_visible()
-        await phone.f("aim", "#panel-scan").tap(position={"x": 206, "y": 100})
-        await phone.f("aim", "#panel-scan").focus()
-        for key in ("Enter", "ArrowLeft", "ArrowRight", "+", "-", "Escape"):
-            await phone.page.keyboard.press(key)
+    async with roaming() as car:
+        car.bridge.advertise(LASER, "sensor_msgs/LaserScan")
+        laser = {"scan": ODD["narrow"]}
 
+        async def scan() -> None:
+            for n in itertools.count():
+                car.bridge.publish(LASER, as_json(laser["scan"](n / 10)))
+                await asyncio.sleep(0.1)
 
-@pytest.mark.parametrize("scheme", ["dark", "light"])
-async def test_the_tab_has_no_barrier(phone: Phone, street: str, scheme: str) -> None:
-    await phone.page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
-    await phone.open(f"{street}/#scan")
-    await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile("of 1440"), timeout=12_000)
-    found = await Axe().run(phone.page, context="#panel-scan")
-    assert [(one["id"], [node["html"] for node in one["nodes"]]) for one in found.response["violations"]] == []
-    for key in ("nearer", "farther"):
-        box = await phone.f(key, "#panel-scan").bounding_box()
-        assert min(box["width"], box["height"]) >= 56
+        scanning = asyncio.create_task(scan())
+        async with serving(Config(vehicles=(Vehicle(name="car", address=car.address),))) as address:
+            await phone.open(f"{address}/#scan")
+            for odd, (distance, beams, told) in SAYS.items():
+                laser["scan"] = ODD[odd]
+                await expect(phone.f("beams", "#panel-scan")).to_contain_text(beams, timeout=12_000)
+                await phone.acknowledge_all()
+                await expect(phone.f("distance", "#panel-scan")).to_contain_text(distance)
+                await expect(phone.page.locator("#scan-told")).to_contain_text(told)
+                await expect(phone.f("straight", "#panel-scan")).to_be_visible()
+                await phone.f("aim", "#panel-scan").tap(position={"x": 206, "y": 100})
+                await phone.f("aim", "#panel-scan").focus()
+                for key in ("Enter", "ArrowLeft", "ArrowRight", "+", "-", "Escape"):
+                    await phone.page.keyboard.press(key)
+        scanning.cancel()
 
 
 def age(words: str | None) -> float:
@@ -372,22 +405,3 @@ def age(words: str | None) -> float:
 
 async def reach(phone: Phone) -> float:
     return float(await phone.page.evaluate("localStorage.getItem('catgraph.range')"))
-
-
-async def fingers(phone: Phone, ways: list[tuple[float, float, float, float]]) -> None:
-    """Fingers that touch the plot together and move together, from x, y to x, y on the screen."""
-    cdp = await phone.page.context.new_cdp_session(phone.page)
-
-    def points(part: float) -> list[dict[str, float]]:
-        return [
-            {"x": x + (to_x - x) * part, "y": y + (to_y - y) * part, "id": i}
-            for i, (x, y, to_x, to_y) in enumerate(ways)
-        ]
-
-    await cdp.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": points(0)[:1]})
-    await cdp.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": points(0)})
-    for step in range(11):
-        await cdp.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": points(step / 10)})
-        await asyncio.sleep(0.016)
-    await cdp.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-    await cdp.detach()

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 import pytest
-from playwright.async_api import Browser, Page, expect
+from playwright.async_api import Page, expect
 
 from tests.page.canned import Canned, alarm, live, slow, slowed
-from tests.page.conftest import PHONE
+from tests.page.conftest import Phone
 
 SIZES = [(320, 640), (360, 640), (412, 915), (640, 360), (915, 412), (800, 600), (1180, 820), (1280, 800), (1440, 900)]
+LISTED = 1000  # from this width on the list of alarms is in sight, and a warning needs no snackbar
 LONG = "The newest fix of the phone (Ann-Kathrin, of 3 phones) is 12 s old and comes too late over the radio. " * 3
 # Which of these overlap a snackbar that is seen, by how many square pixels. A panel out of sight does not count.
 COVERED = """() => {
@@ -36,13 +38,11 @@ def warned(**more: Any) -> dict[str, Any]:
     return live() | {"alarms": [alarm("phone_missing", "Phone position missing", text=LONG)]} | more
 
 
-async def opened(browser: Browser, served: Canned, width: int, height: int) -> Page:
-    context = await browser.new_context(**PHONE | {"viewport": {"width": width, "height": height}})
-    page = await context.new_page()
-    await page.goto(served.address)
-    await expect(page.locator("[data-f=warning]")).to_be_visible()
-    await page.evaluate("document.fonts.ready")
-    return page
+async def opened(phone: Phone, canned: Canned) -> Page:
+    await phone.open(f"{canned.address}/#home")
+    await expect(phone.page.locator("[data-f=warning]")).to_be_visible()
+    await phone.page.evaluate("document.fonts.ready")
+    return phone.page
 
 
 async def nothing_covered(page: Page, *, snacks: int, is_low: bool = False) -> None:
@@ -58,44 +58,45 @@ async def nothing_covered(page: Page, *, snacks: int, is_low: bool = False) -> N
 
 
 @pytest.mark.world(n=18)
-@pytest.mark.parametrize(("width", "height"), SIZES)
-@pytest.mark.parametrize("armed", ["armed", "slowing"])
-async def test_a_warning_covers_neither_speed_nor_strip_nor_slide(
-    browser: Browser, width: int, height: int, armed: str
-) -> None:
-    served = Canned()
-    async with served.running():
-        served.state = warned(decelerate=slow("armed") if armed == "armed" else slowed(True))
-        page = await opened(browser, served, width, height)
-        await nothing_covered(page, snacks=1, is_low=armed == "slowing" and height < 400)
-        await page.context.close()
+async def test_a_warning_covers_neither_speed_nor_strip_nor_slide(phone: Phone, canned: Canned) -> None:
+    for name, decelerate in (("armed", slow("armed")), ("slowing", slowed(True))):
+        canned.state = warned(decelerate=decelerate)
+        await phone.page.set_viewport_size({"width": 320, "height": 640})
+        page = await opened(phone, canned)
+        for width, height in SIZES:
+            await page.set_viewport_size({"width": width, "height": height})
+            await nothing_covered(page, snacks=int(width < LISTED), is_low=name == "slowing" and height < 400)
 
 
 @pytest.mark.world(n=18)
-@pytest.mark.parametrize(("width", "height"), [(360, 640), (412, 915), (1440, 900)])
-async def test_nor_do_a_warning_and_a_notice_together(browser: Browser, width: int, height: int) -> None:
-    served = Canned()
-    async with served.running():
-        served.state = warned(decelerate=slow("armed"))
-        page = await opened(browser, served, width, height)
-        served.refuses["acknowledge"] = "Ben is in control."
+async def test_nor_do_a_warning_and_a_notice_together(phone: Phone, canned: Canned) -> None:
+    canned.state = warned(decelerate=slow("armed"))
+    page = await opened(phone, canned)
+    canned.refuses["acknowledge"] = "Ben is in control."
+    for width, height in ((360, 640), (412, 915), (800, 600)):
+        await page.set_viewport_size({"width": width, "height": height})
         await page.locator("[data-f=warning]").get_by_role("button", name="Acknowledge").tap()
         await nothing_covered(page, snacks=2)
-        await page.context.close()
 
 
 @pytest.mark.world(n=18)
-async def test_a_warning_costs_the_map_of_a_wide_screen_nothing(browser: Browser) -> None:
-    served = Canned()
-    async with served.running():
-        served.state = warned()
-        page = await opened(browser, served, 1440, 900)
-        await page.locator("#tab-map").tap()
-        box = page.locator("#monitor .mapbox")
-        await expect(box).to_be_visible()
-        await expect(page.locator("#monitor .banner:visible")).to_have_count(0)  # that no sound is allowed yet
-        under = (await box.bounding_box() or {})["height"]
-        served.state = live()
-        await expect(page.locator("[data-f=warning]")).to_be_hidden()
-        assert (await box.bounding_box() or {})["height"] == under
-        await page.context.close()
+async def test_a_warning_costs_a_wide_screen_nothing(phone: Phone, canned: Canned) -> None:
+    canned.state = warned()
+    page = await opened(phone, canned)
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await page.locator("#tab-home").tap()  # now it may sound
+    listed = page.locator("#monitor [data-pane=alarms] [data-kind=unacknowledged]")
+    await expect(listed).to_contain_text("Phone position missing")
+    await expect(page.locator("[data-f=warning]")).to_be_hidden()
+    box = page.locator("#monitor .mapbox")
+    await expect(box).to_be_visible()
+    await expect(page.locator("#monitor .banner:visible")).to_have_count(0)  # that no sound is allowed yet
+    under = (await box.bounding_box() or {})["height"]
+    await page.locator("#tab-files").tap()  # it hides the list
+    await expect(page.locator("[data-f=warning]")).to_be_visible()
+    await page.locator("#tab-home").tap()
+    canned.state = live()
+    await expect(listed).to_have_count(0)
+    async with asyncio.timeout(8):
+        while (await box.bounding_box() or {}).get("height") != under:  # it is laid out once the tab is there
+            await asyncio.sleep(0.05)

@@ -15,10 +15,11 @@ from tests.page.conftest import Phone
 from tests.page.main_thread import heap_bytes, measure
 from tests.page.processes import replay, running, server
 
-SHARE = 0.40  # of the main thread
+pytestmark = pytest.mark.own_phone  # its processor is slowed down
+SHARE = {"scan": 0.40, "home": 0.40, "desk": 0.60}  # of the main thread; desk: all panes in sight at 1440 × 900
 
 
-@pytest_asyncio.fixture(loop_scope="module", scope="module")
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
 async def street(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[str]:
     """A server that watches a car in a street: 1440 beams 20 times a second, beside its other signals."""
     data = tmp_path_factory.mktemp("street")
@@ -38,38 +39,43 @@ async def street(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[str]
 
 
 async def shown(phone: Phone, address: str, tab: str) -> None:
-    await phone.open(f"{address}/#{tab}")
+    is_desk = tab == "desk"
+    if is_desk:
+        await phone.page.set_viewport_size({"width": 1440, "height": 900})
+    await phone.open(f"{address}/#{'home' if is_desk else tab}")
     await phone.live()
-    if tab == "scan":
+    if is_desk:
+        await expect(phone.f("head-scan")).to_have_text(re.compile("of 1440"), timeout=12_000)
+    elif tab == "scan":
         await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile("of 1440"), timeout=12_000)
     else:
         await phone.page.locator("[data-trend=brake]").scroll_into_view_if_needed()
     await phone.page.wait_for_timeout(1500)
 
 
-@pytest.mark.parametrize("tab", ["scan", "home"])
+@pytest.mark.parametrize("tab", SHARE)
 async def test_the_main_thread_keeps_time(phone: Phone, street: str, tab: str) -> None:
     await shown(phone, street, tab)
     cost = await measure(phone.page, 8.0)
     print(tab, cost)
     # Without the painting: a machine without a graphics card does that on the processor, and others work beside it.
-    assert cost.own_share <= SHARE, str(cost)
+    assert cost.own_share <= SHARE[tab], str(cost)
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("tab", ["scan", "home"])
+@pytest.mark.parametrize("tab", SHARE)
 async def test_60_frames_a_second(phone: Phone, street: str, tab: str) -> None:
     """The long form, for a machine that does nothing else."""
     await shown(phone, street, tab)
     cost = await measure(phone.page, 30.0)
     print(tab, cost)
-    assert cost.share <= SHARE, str(cost)
+    assert cost.share <= SHARE[tab], str(cost)
     assert cost.frames_hz > 55, str(cost)
-    assert tab != "scan" or cost.scans_hz > 19, str(cost)
+    assert tab == "home" or cost.scans_hz > 19, str(cost)
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("tab", ["scan", "home"])
+@pytest.mark.parametrize("tab", SHARE)
 async def test_a_flat_heap_for_half_an_hour(phone: Phone, street: str, tab: str) -> None:
     await shown(phone, street, tab)
     heaps = []

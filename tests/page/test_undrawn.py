@@ -176,7 +176,7 @@ def over(number: int) -> dict[str, Any]:
     )  # fmt: skip
 
 
-@pytest_asyncio.fixture(loop_scope="module")
+@pytest_asyncio.fixture(loop_scope="session")
 async def canned() -> AsyncIterator[Canned]:
     served = Canned()
     async with served.running():
@@ -200,7 +200,7 @@ async def broken_while_live(browser: Browser, functions: Functions) -> list[str]
         glass = await opened(browser, served)
         for number, (owner, name, kind) in enumerate(functions, 1):
             served.state["alarms"] = []
-            served.state["signals"]["speed"]["value"] = {"speed_mps": 4.2}
+            served.state["signals"]["speed"]["value"]["speed_mps"] = 4.2
             if await glass.until(is_calm, 30) is None:
                 wrong.append(f"before {owner}.{name}: not recovered, {await glass.look()}")
                 await glass.close()
@@ -208,7 +208,7 @@ async def broken_while_live(browser: Browser, functions: Functions) -> list[str]
                 await glass.until(is_calm, 30)
             await glass.do(f"catgraphBreak({owner!r}, {name!r}, {kind!r})")
             speed = f"{5 + number / 10:.1f}"
-            served.state["signals"]["speed"]["value"] = {"speed_mps": float(speed)}
+            served.state["signals"]["speed"]["value"]["speed_mps"] = float(speed)
             served.state["alarms"] = [over(number)]
             seen = await glass.until(
                 lambda seen, speed=speed: is_covered(seen) or is_silent(seen) or is_true(seen, speed), 8
@@ -270,7 +270,7 @@ async def broken_before(browser: Browser, served: Canned, function: tuple[str, s
 
 
 async def before_in_lanes(browser: Browser, served: Canned, functions: Functions) -> list[str]:
-    served.state["signals"]["speed"]["value"] = {"speed_mps": 12.6}
+    served.state["signals"]["speed"]["value"]["speed_mps"] = 12.6
     served.state["alarms"] = [over(1)]
     wrong: list[str | None] = []
     for n in range(0, len(functions), LANES):

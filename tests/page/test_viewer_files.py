@@ -6,9 +6,9 @@ import pytest
 from playwright.async_api import Browser, expect
 
 from tests.page.canned import Canned
-from tests.page.conftest import PHONE, Phone
+from tests.page.conftest import PHONE, phone_in
 
-pytestmark = [pytest.mark.browser, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [pytest.mark.browser, pytest.mark.asyncio(loop_scope="session")]
 
 
 async def test_a_viewer_may_take_the_file_and_orders_no_other_form_of_it(browser: Browser) -> None:
@@ -16,7 +16,7 @@ async def test_a_viewer_may_take_the_file_and_orders_no_other_form_of_it(browser
     server.role = "viewer"
     async with server.running():
         context = await browser.new_context(**PHONE)
-        phone = Phone(await context.new_page())
+        phone = await phone_in(context)
         try:
             await phone.open(server.address)
             await phone.live()

@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Minute, SPAN, SPECS, STEP_S, extent, unknown_s, viewAfter } from '../../static/js/home/trends-layout.js';
+import { Minute, SPAN, SPECS, STEP_S } from '../../static/js/home/trends-layout.js';
 
 const NAMES = SPECS.map(({ name }) => name);
 
@@ -93,8 +93,6 @@ test('peaks of a fast signal are kept', () => {
   minute.take(told(0, [4, 3.1, 4], { highest: [4, 9.5, 4] }));
   const course = minute.course('speed', 3, 0.05);
   assert.deepEqual([course.low, course.high], [3.1, 9.5]);
-  assert.deepEqual(extent(course, -0.21, 0), { low: 4, high: 4 });
-  assert.deepEqual(extent(course, 1, 2), { low: NaN, high: NaN });
 });
 
 test('another car, or another run of the server, begins anew', () => {
@@ -132,23 +130,4 @@ test('scales are round, hold what is shown, and keep zero', () => {
   assert.deepEqual(ends('steering', -4, 3), [-20, 20]);
   assert.deepEqual(ends('acceleration', -4.5, 1), [-4.5, 4.5]);
   assert.deepEqual(ends('brake', 0, 42), [0, 100]);
-});
-
-test('zoom and pan stay within the minute', () => {
-  assert.deepEqual(viewAfter([-60, 0], { zoom: 0.5 }), [-30, 0]);
-  assert.deepEqual(viewAfter([-30, 0], { pan: -0.5 }), [-45, -15]);
-  assert.deepEqual(viewAfter([-45, -15], { pan: -9 }), [-60, -30]);
-  assert.deepEqual(viewAfter([-45, -15], { pan: 9 }), [-30, 0]);
-  assert.deepEqual(viewAfter([-30, 0], { zoom: 9 }), [-60, 0]);
-  assert.deepEqual(viewAfter([-4, 0], { zoom: 0.1 }), [-4, 0]);
-  assert.deepEqual(viewAfter([-40, -20], { zoom: 0.5, about: 0.5 }), [-35, -25]);
-});
-
-test('how much of what is looked at nobody knows', () => {
-  const minute = new Minute();
-  minute.take(told(0, [...Array(250).fill(1), ...Array(25).fill(null), ...Array(25).fill(1)]));
-  const course = minute.course('speed', 300, 0.05);
-  assert.ok(Math.abs(unknown_s(course, -60, 0) - 5) < 1e-9);
-  assert.ok(Math.abs(unknown_s(course, -8, 0) - 3) < 1e-9);
-  assert.equal(unknown_s(course, -4, 0), 0);
 });

@@ -47,7 +47,7 @@ test('the speeds of a sentence follow, nothing else does', () => {
     ['12.6 m/s, limit 11.0 m/s', '45.4 km/h, limit 39.6 km/h'],
     ['FAULT 12.6 m/s', 'FAULT 45.4 km/h'],
     ['Speed limit: 11 → 9 m/s', 'Speed limit: 39.6 → 32.4 km/h'],
-    ['Speed limit: 0.5 to 40 m/s is possible.', 'Speed limit: 1.8 to 144 km/h is possible.'],
+    ['Speed limit: 0.5 to 40 m/s is allowed.', 'Speed limit: 1.8 to 144 km/h is allowed.'],
     ['-3.0 m/s', '−10.8 km/h'],
     ['braking 0.3 m/s², at least 0.5 m/s²', 'braking 0.3 m/s², at least 0.5 m/s²'],
     ['5 m ahead', '5 m ahead'],

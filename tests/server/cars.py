@@ -42,6 +42,7 @@ async def driving(
     hz: float = 20.0,
     scans: bool = False,
     steers: bool = False,
+    beams: int = 181,
 ) -> AsyncIterator[list[int]]:
     """A car that publishes its speed until the block ends; yields a list whose length counts messages.
 
@@ -57,7 +58,7 @@ async def driving(
             if steers:
                 bridge.publish("/catvehicle/steering", {"force": dict(ZERO), "torque": dict(ZERO)})
             if scans:
-                bridge.publish("/scan", scan(np.full(181, 5.0 + len(sent) % 10)))
+                bridge.publish("/scan", scan(np.full(beams, 5.0 + len(sent) % 10)))
             sent.append(1)
             await asyncio.sleep(1 / hz)
 

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import AsyncIterator
-from pathlib import Path
 
 import pytest
 import uvicorn
@@ -17,14 +16,6 @@ from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
 from server.web.middleware import http_protocol
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Real sockets, processes, clocks on two busy cores: what fails is tried again, and the summary says so."""
-    here = Path(__file__).parent
-    for item in items:
-        if here in item.path.parents:
-            item.add_marker(pytest.mark.flaky(reruns=2, reruns_delay=1))
 
 
 @contextlib.asynccontextmanager

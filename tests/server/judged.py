@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from monitor import catalog
 from monitor.catalog import AllLimits
 from monitor.link import LinkFacts
-from monitor.phones import PhoneWord
+from monitor.phones import PhoneReport
 from monitor.runner import Monitor, Transition
 from monitor.state import State
 from monitor.values import PhoneFix
@@ -86,7 +86,7 @@ def judged(
             phone_s += 1.0
             truth = car.state()["truth"]
             fix = PhoneFix(lat_deg=truth["lat_deg"], lon_deg=truth["lon_deg"], accuracy_m=5.0)
-            state.hear_phone(PhoneWord(phone="in the car", is_handheld=True, fix=fix, measured_s=now_s), now_s)
+            state.receive_phone(PhoneReport(phone="in the car", is_handheld=True, fix=fix, measured_s=now_s), now_s)
         for message in step.messages:
             heard = sources.get(message.topic)
             if heard is None:

@@ -1,4 +1,4 @@
-"""Runs a test on both event loops: asyncio's own, and uvloop, under which the server runs."""
+"""Runs a test on both event loops: asyncio's own, in its debug mode, and uvloop, under which the server runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def on_both_loops(story: Callable[..., Coroutine[Any, Any, None]]) -> Callable[.
 
     @functools.wraps(story)
     def test(new_loop: Callable[[], asyncio.AbstractEventLoop], **given: Any) -> None:
-        with asyncio.Runner(loop_factory=new_loop) as runner:
+        with asyncio.Runner(debug=new_loop is asyncio.new_event_loop, loop_factory=new_loop) as runner:
             runner.run(story(**given))
 
     kinds = inspect.signature(story).parameters

@@ -14,6 +14,7 @@ from monitor.link import LinkFacts
 from monitor.runner import Monitor
 from monitor.state import State
 from server.judge import pipeline
+from server.judge.phone_report import phone_report
 from server.judge.profiles import GENERIC
 from server.judge.reception_stats import Reception
 from server.judge.topics import map_signals
@@ -21,7 +22,6 @@ from server.protocol import commands
 from server.simulator.car import SimulatedCar
 from server.simulator.place import metres_per_degree
 from server.simulator.scenarios import Planned
-from server.vehicle import phone
 
 WANDER_S = 40.0  # the error of a receiver wanders slowly
 WALL_MS = 1_790_000_000_000  # the server's time of day at the beginning
@@ -140,7 +140,7 @@ def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[P
         if said is not None:
             command = commands.read(said)
             assert isinstance(command, commands.Position)
-            state.hear_phone(phone.word(command, now_s, WALL_MS + now_s * 1000), now_s)
+            state.receive_phone(phone_report(command, now_s, WALL_MS + now_s * 1000), now_s)
         for message in step.messages:
             heard = sources.get(message.topic)
             if heard is not None:

@@ -12,6 +12,8 @@ from typing import Any
 
 import websockets
 
+from tests.frames import check_frame
+
 
 class Viewer:
     """Takes what it is offered and keeps it."""
@@ -39,6 +41,7 @@ class Viewer:
         if isinstance(message, bytes):
             self.scans.append(message)
         else:
+            check_frame(message)
             frame = json.loads(message)
             match frame["kind"]:
                 case "state":
@@ -59,11 +62,11 @@ class Viewer:
     async def send(self, message: dict[str, Any]) -> None:
         await self.socket.send(json.dumps(message))
 
-    async def ask(self, **command: Any) -> dict[str, Any]:
+    async def ask(self, *, within_s: float = 5.0, **command: Any) -> dict[str, Any]:
         """Sends a command and answers its reply."""
         identity = f"test {next(self._ids)}"
         await self.send(command | {"id": identity})
-        return await self.until(lambda: next((r for r in self.other if r.get("id") == identity), None))
+        return await self.until(lambda: next((r for r in self.other if r.get("id") == identity), None), within_s)
 
     async def until(self, found: Callable[[], Any], within_s: float = 5.0) -> Any:
         """Waits for `found()` to be something and answers it."""

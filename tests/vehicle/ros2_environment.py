@@ -12,7 +12,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.environment import users_own
 from tests.tree import PROJECT
 
 ENVIRONMENT = PROJECT / ".venv-ros2"
@@ -49,7 +48,6 @@ def install() -> str | None:
                 check=False,
                 stdin=subprocess.DEVNULL,
                 timeout=INSTALL_WITHIN_S,
-                env=users_own(),
             )
         except (OSError, subprocess.TimeoutExpired) as error:
             return f"{command[0]}: {error}"

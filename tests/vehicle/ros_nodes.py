@@ -17,7 +17,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from tests.environment import users_own
 from tests.tree import PROJECT
 from tests.vehicle import ros2_environment
 from tests.vehicle.conftest import GUARD
@@ -185,7 +184,7 @@ def ros1(folder: Path) -> Iterator[dict[str, str]]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = int(free.getsockname()[1])
-    environment = users_own() | {
+    environment = os.environ | {
         "PATH": "/usr/bin:/bin:/usr/sbin:/sbin",  # nodes are found by `env python3`, which is Debian's own here
         "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
         "ROS_IP": "127.0.0.1",
@@ -209,7 +208,7 @@ def ros1(folder: Path) -> Iterator[dict[str, str]]:
 @contextlib.contextmanager
 def ros2(folder: Path) -> Iterator[dict[str, str]]:
     """The environment of ROS 2 nodes that see this machine's only. Topics are apart by the namespace."""
-    yield users_own() | {
+    yield os.environ | {
         "ROS_DOMAIN_ID": str(os.getpid() % 100 + 1),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",

@@ -27,6 +27,7 @@ pytestmark = pytest.mark.world(n=8)
 MISSING = "Service /rosapi/get_time does not exist"
 NO_MASTER = "Unable to communicate with master!"
 KILLED = "Unable to communicate with service [/rosapi/get_time], address [rosrpc://127.0.0.1:40583]"
+NO_PACKAGE = "call_service InvalidPackageException: Unable to load the manifest for package rosapi. Caused by: rosapi"
 NO_NODE = "failed to get service names and types: rcl node's context is invalid, at /project/src/rcl/node.c:401"
 
 # Answers one a second, None: good; what is named at the end, while messages of the car come.
@@ -42,7 +43,10 @@ ENDINGS = {
     "the node has died": ([None, NO_NODE], "bridge_node_dead"),
     "the node is dead from the beginning": ([NO_NODE], "bridge_node_dead"),
     "mended": ([None, MISSING, MISSING, None], None),
-    "other words": ([None, "busy", "busy"], None),
+    "other words, twice": ([None, "busy", "busy"], None),
+    "other words, again and again": ([None, "busy", "busy", "busy"], "rosapi_failing"),
+    "rosapi is not installed where the bridge runs": ([NO_PACKAGE] * 3, "rosapi_failing"),
+    "mended after other words": ([NO_PACKAGE] * 3 + [None], None),
 }
 
 
@@ -72,12 +76,12 @@ def test_a_restarted_rosbridge_has_nothing_left_to_mend() -> None:
 def test_the_subscriptions_are_renewed_once_roscore_is_back() -> None:
     one = Diagnosis()
     one.answered(0.0)
-    assert not one.master_came_back()
+    assert not one.master_restarted()
     one.failed(NO_MASTER)
-    assert not one.master_came_back()
+    assert not one.master_restarted()
     one.answered(2.0)
-    assert one.master_came_back()
-    assert not one.master_came_back()
+    assert one.master_restarted()
+    assert not one.master_restarted()
 
 
 @pytest.mark.parametrize(
@@ -162,10 +166,10 @@ async def test_after_a_neighbour_left_its_topics_are_subscribed_to_anew_and_no_g
     subscribers: tuple[str, ...] = ("/rosbridge_websocket",)
     renewed: list[tuple[float, str]] = []
 
-    async def ask_subscribers(asks: Any, topic: str) -> tuple[str, ...]:
+    async def fetch_subscribers(asks: Any, topic: str) -> tuple[str, ...]:
         return subscribers
 
-    monkeypatch.setattr(discovery, "ask_subscribers", ask_subscribers)
+    monkeypatch.setattr(discovery, "fetch_subscribers", fetch_subscribers)
     watch = MissingWatch(
         now=lambda: clock[0],
         renew=lambda topic: renewed.append((clock[0], topic)),
@@ -216,7 +220,8 @@ async def test_a_question_that_is_not_answered_holds_up_no_command() -> None:
         asks, _ = await opened(link, ear)
         with pytest.raises(CallFailed):
             await asks.call("/rosapi/get_time", timeout_s=0.05)
-        link.unsubscribe_all()
+        for row in link.subscriptions:
+            link.unsubscribe(row.topic)
         link.send_now({"op": "advertise", "id": "a", "topic": "/cmd", "type": "geometry_msgs/Twist"})
         await until(lambda: any(said for said in bridge.connections if said and said[0]["op"] == "advertise"))
         assert [[one["op"] for one in said] for said in bridge.connections] == [["advertise"], ["call_service"]]
@@ -285,7 +290,7 @@ async def test_questions_end_with_the_link() -> None:
 
 SAID = {
     "ros1/auth": (2, "wants a login"),
-    "ros1/discover_no_rosapi": (1, "rosapi does not run"),
+    "ros1/discover_no_rosapi": (1, "rosapi is not running"),
     "ros1/lifecycle_roscore": (2, "roscore"),
     "ros2/lifecycle_sigterm": (2, "ROS node has died"),
 }

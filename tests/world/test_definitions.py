@@ -49,7 +49,7 @@ UNKNOWN: dict[RosVersion, set[str]] = {
 async def test_the_definitions_of_a_real_rosapi_are_learnt(version: RosVersion) -> None:
     types = set(definitions(version))
     link: Any = Link({"/rosapi/topics_and_raw_types": answer(version)})
-    found = await discovery.ask_definitions(link, types, version)
+    found = await discovery.fetch_definitions(link, types, version)
     assert types - set(found) <= {"std_msgs/Empty", "rosbridge_msgs/msg/ConnectedClients"}
     assert "message_details" not in " ".join(link.called) or version == 1
     assert not any("failed to get" in text for text in found.values()), "a message about a failure is no definition"
@@ -72,7 +72,7 @@ async def test_the_misspelled_field_is_not_accepted(version: RosVersion) -> None
     values = answer(version)
     values["typedefs_full_texts"] = values.pop("typedefs_full_text")
     link: Any = Link({"/rosapi/topics_and_raw_types": values})
-    assert await discovery.ask_definitions(link, set(values["types"]), version) == {}
+    assert await discovery.fetch_definitions(link, set(values["types"]), version) == {}
 
 
 async def test_nothing_is_asked_of_ros_2_that_can_end_rosapi() -> None:
@@ -80,7 +80,7 @@ async def test_nothing_is_asked_of_ros_2_that_can_end_rosapi() -> None:
     empty = {"topics": [], "types": [], "typedefs_full_text": []}
     for version, calls in ((1, 2), (2, 1), (None, 1)):
         link: Any = Link({"/rosapi/topics_and_raw_types": empty})
-        assert await discovery.ask_definitions(link, {"car_msgs/Bounded"}, version) == {}  # type: ignore[arg-type]
+        assert await discovery.fetch_definitions(link, {"car_msgs/Bounded"}, version) == {}  # type: ignore[arg-type]
         assert len(link.called) == calls
 
 

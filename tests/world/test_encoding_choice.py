@@ -12,7 +12,7 @@ import pytest
 
 from server.app.config import Config
 from server.judge.message import RosVersion
-from server.judge.topics import TOPICS
+from server.judge.signals import TOPICS
 from server.vehicle.encoding_choice import fit_for_cbor
 from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving
@@ -150,4 +150,4 @@ async def test_what_holds_too_much_to_be_read_as_cbor_is_recorded_as_json(tmp_pa
             finally:
                 drawing.cancel()
             assert one.states[-1]["link"]["unreadable_frames"] >= 1
-            assert any(event["text"].startswith("/polygon is received as JSON") for event in one.events)
+            assert any(event["text"].startswith("/polygon is now received as JSON") for event in one.events)

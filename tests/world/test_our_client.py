@@ -17,8 +17,8 @@ import numpy as np
 import orjson
 import pytest
 
-from server.bus.bus import LocalBus
 from server.bus.journal import Journal
+from server.bus.local import LocalBus
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
 from tests.world.bridge_player import FILES, Player, name_of, playing

@@ -360,9 +360,10 @@ def test_whatever_a_bridge_offers_nothing_harmful_is_asked_of_it(
         if (learning := talk._definitions._task) is not None:
             await asyncio.gather(learning, return_exceptions=True)
         for topic in topics:
-            await discovery.ask_publishers(link, topic)
+            await discovery.fetch_publishers(link, topic)
             link.subscribe(Subscription(topic=topic, type=types[0] if types else None))
-        link.unsubscribe_all()
+        for row in link.subscriptions:
+            link.unsubscribe(row.topic)
         talk.end()
         return wire.sent
 
@@ -381,7 +382,7 @@ async def test_a_refused_row_costs_no_other_and_a_refused_call_is_a_failed_one(
     assert [row.topic for row in link.subscriptions] == ["/good"]
     assert len(wire.sent) == 1
     assert "not a name!" in caplog.text
-    assert await discovery.ask_publishers(link, "not a name!") is None
+    assert await discovery.fetch_publishers(link, "not a name!") is None
     assert len(wire.sent) == 1
     with pytest.raises(NotAllowed):
         link.send_now({"op": "publish", "topic": "/good", "msg": {}})

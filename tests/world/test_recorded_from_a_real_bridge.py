@@ -236,16 +236,16 @@ async def test_what_is_recorded_only_is_asked_for_though_rosapi_ended_before_its
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """rosapi named the topics, and ended before the recording began: they are recorded as far as they are known."""
-    ask_topics, has_ended = discovery.ask_topics, False
+    fetch_topics, has_ended = discovery.fetch_topics, False
 
     async def topics_while_it_lives(asks: Asks) -> discovery.Offer | None:
-        return None if has_ended else await ask_topics(asks)
+        return None if has_ended else await fetch_topics(asks)
 
     async def no_definitions(*_: object) -> dict[str, str]:
         raise CallFailed("Service /rosapi/topics_and_raw_types does not exist")
 
-    monkeypatch.setattr(discovery, "ask_topics", topics_while_it_lives)
-    monkeypatch.setattr(discovery, "ask_definitions", no_definitions)
+    monkeypatch.setattr(discovery, "fetch_topics", topics_while_it_lives)
+    monkeypatch.setattr(discovery, "fetch_definitions", no_definitions)
     async with car(2) as (bridge, port), serving(Config(data=tmp_path)) as base, viewer(base, name="Ann") as one:
         assert (await one.ask(kind="set", values={"recording.automatic": 0}))["ok"]
         assert (await one.ask(kind="connect", address=f"127.0.0.1:{port}"))["ok"]
@@ -263,13 +263,13 @@ async def test_what_is_asked_for_before_its_definition_is_recorded_as_its_type(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """How many clients the bridge has: its first message comes at once, and definitions take a while."""
-    ask_definitions, may_answer = discovery.ask_definitions, asyncio.Event()
+    fetch_definitions, may_answer = discovery.fetch_definitions, asyncio.Event()
 
     async def slow_definitions(*asked: Any) -> dict[str, str]:
         await may_answer.wait()
-        return await ask_definitions(*asked)
+        return await fetch_definitions(*asked)
 
-    monkeypatch.setattr(discovery, "ask_definitions", slow_definitions)
+    monkeypatch.setattr(discovery, "fetch_definitions", slow_definitions)
     async with car(1) as (bridge, port):
         bridge.advertise("/catvehicle/brake", "geometry_msgs/Wrench")
         bridge.advertise(CLIENT_COUNT, "std_msgs/Int32", latch=True)

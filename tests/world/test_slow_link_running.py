@@ -159,12 +159,12 @@ async def test_old_looks_old_less_is_asked_for_and_all_of_it_once_the_link_is_fa
             proxy.rate_Bps = SLOW_BPS
             late = await one.until(lambda: next((e for e in one.events if e.get("alarm")), None), SOON_S)
             assert "the link is too slow" in late["text"]
+            await one.until(lambda: max(throttle or 0 for throttle in asked.throttles[SCAN]) > 0, SOON_S)
             await one.state(lambda s: steps(one) and s["link"]["late_s"] < 1.0, SOON_S)
             during = steps(one)
             assert during == sorted(during)
             assert during[0] == 1, "first of all what is only recorded"
             assert asked.now(NOISE) is None
-            assert max(throttle or 0 for throttle in asked.throttles[SCAN]) > 0
             for topic in JUDGED:
                 assert None not in asked.throttles[topic]
             assert all(

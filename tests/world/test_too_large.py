@@ -63,7 +63,7 @@ async def test_the_second_such_message_ends_its_subscription_and_names_the_topic
                 state = await one.state(lambda s: bool(s["recording"]["too_large"]), within_s=60)
                 assert state["recording"]["too_large"] == [{"topic": "/camera", "mb": 21.3}]
                 assert "/camera" in state["recording"]["left_out"]
-                text = "/camera is not received any more: its messages have 21 MB, and 16 MB are the most."
+                text = "/camera is no longer received: its messages have 21 MB, and 16 MB is the limit."
                 note = await one.until(lambda: next((e for e in one.events if e["text"] == text), None))
                 assert note["change"] == "not_received"
                 topic = bridge.graph.find("/camera")

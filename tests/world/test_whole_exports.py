@@ -78,7 +78,7 @@ def test_what_is_left_out_is_named_and_answered_with_1(
     code, said = exported(drive(tmp_path, [*GOOD, row]), format, capsys)
     assert code == 1, said
     assert named in said
-    assert said.endswith("catgraph export: the file does not hold all of the recording.\n")
+    assert said.endswith("catgraph export: the export is incomplete.\n")
 
 
 @pytest.mark.parametrize(("format", "profile"), [("bag", "ros1"), ("bag", "ros2"), ("ros2", "ros2")])

@@ -66,7 +66,7 @@ def _read(name: str, body: Mapping[str, Any]) -> Profile:
 
 
 def choose(profiles: Mapping[str, Profile], topics: Mapping[str, str], ros: int | None) -> Profile:
-    """The profile that says most of a car with these topics; the generic one where none fits."""
+    """The best matching profile for a car with these topics; the generic one if none matches."""
     names = frozenset(name.lower() for name in topics)
     fitting = [profile for profile in profiles.values() if profile is not GENERIC and profile.fits(names, ros)]
     return max(fitting, key=lambda profile: len(profile.has) + len(profile.lacks), default=GENERIC)

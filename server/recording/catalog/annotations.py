@@ -1,4 +1,4 @@
-"""What people say of a recording: title, note, tags, in a small file beside it, so that no database can lose them."""
+"""Title, note and tags of a recording, in a small file beside it, so that they survive the loss of the database."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def read(recording: Path) -> Annotations:
 
 
 def write(recording: Path, annotations: Annotations) -> None:
-    """Keeps them, whole or not at all; with none the file goes. Raises OSError."""
+    """Write them atomically; without any the file is deleted. Raises OSError."""
     path = beside(recording)
     if annotations == NONE:
         path.unlink(missing_ok=True)
@@ -111,7 +111,7 @@ def _unique(tags: Sequence[str]) -> tuple[str, ...]:
 
 
 def line(words: Any) -> str:
-    """In one line, of letters that are seen: a title must not rewrite what stands beside it."""
+    """One line of printable characters, because a title must not change the text beside it."""
     return " ".join("".join(map(_seen, words)).split()) if isinstance(words, str) else ""
 
 

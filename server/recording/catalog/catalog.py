@@ -1,6 +1,6 @@
-"""The list of recordings: what is there, what people call it, and what was deleted and can still be taken back.
+"""The catalog of recordings: files, annotations, and the trash.
 
-Files are the truth, the database is a memory of them: it is made anew where it is lost. A file is surveyed by a
+The files are authoritative; the database is a cache that is rebuilt if it is lost. A file is surveyed by a
 process of its own (survey_worker.py), so that the event loop never waits for one; until then it is listed by its name.
 """
 
@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import asyncio
 import shutil
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import orjson
+
+from server.protocol.answers import Recording, RecordingNames, Total
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog_db import Which
 from server.recording.catalog.entries import Entries
@@ -39,12 +43,12 @@ class Catalog:
     # -- its life ------------------------------------------------------------------------------------------------------
 
     async def start(self) -> None:
-        """Begins to look through the folder and to read what is new in it."""
+        """Start to scan the folder and to survey new files."""
         await self._survey.start()
 
     async def stop(self) -> None:
         await self._survey.stop()
-        self._entries.close()
+        await asyncio.to_thread(self._entries.close)
 
     def problems(self) -> list[str]:
         """What is wrong with its task, a sentence each."""
@@ -69,7 +73,7 @@ class Catalog:
         self._listing.walk()
 
     def rebuild(self) -> None:
-        """Forgets what is known and makes it anew from the files."""
+        """Rebuild the catalog from the files."""
         self._entries.forget([entry.path for entry in self._entries.select("", [])])
         self.walk()
         self._survey.rouse()
@@ -84,10 +88,21 @@ class Catalog:
         self._listing.list_fresh()
         return page_of(self._entries, which or Which(), cursor=cursor, limit=limit)
 
-    def row(self, id: str, *, is_trashed: bool = False) -> dict[str, Any] | None:
-        """One recording, with what was raised in it; None: it is not there."""
+    def row(self, id: str, *, is_trashed: bool = False) -> Recording | None:
+        """One recording, with what was raised in it and its speed; None: it is not there."""
         entry = self._listing.entry(id, is_trashed=is_trashed)
-        return None if entry is None else row_of(entry) | {"raised": (entry.found or {}).get("raised", [])}
+        if entry is None:
+            return None
+        found = entry.found or {}
+        return {**row_of(entry), "raised": found.get("raised", []), "speed_mps": found.get("speed_mps", [])}
+
+    def trends(self, id: str) -> dict[str, Any] | None:
+        """The sketch of all its signals; None: it has not been read yet."""
+        entry = self._listing.entry(id)
+        sha256 = (entry.found or {}).get("sha256") if entry is not None else None
+        body = self._entries.trends(sha256) if sha256 is not None else None
+        found: dict[str, Any] | None = None if body is None else orjson.loads(zlib.decompress(body))
+        return found
 
     def path(self, id: str) -> Path | None:
         """Its file; None: it is not there. No id leads out of the folder."""
@@ -95,7 +110,7 @@ class Catalog:
         path = self.folder / entry.path if entry is not None else None
         return path if path is not None and path.is_file() else None
 
-    def totals(self, which: Which | None = None) -> dict[str, int]:
+    def totals(self, which: Which | None = None) -> Total:
         """How many recordings there are of some kind, and how large together."""
         return self._entries.totals(which)
 
@@ -108,12 +123,12 @@ class Catalog:
     def unreadable(self) -> int:
         return self._entries.unreadable
 
-    def names(self) -> dict[str, list[str]]:
+    def names(self) -> RecordingNames:
         """The vehicles and tags that recordings have, to choose among."""
         return self._entries.names()
 
     def free_bytes(self) -> int | None:
-        """What the disk has left; None: it does not tell."""
+        """The free space of the disk [B]; None: unknown."""
         folder = self.folder
         while not folder.exists() and folder != folder.parent:
             folder = folder.parent
@@ -126,7 +141,7 @@ class Catalog:
 
     def annotate(
         self, id: str, *, title: str | None = None, note: str | None = None, tags: Sequence[str] | None = None
-    ) -> dict[str, Any]:
+    ) -> Recording:
         """Another title, note or tags; None leaves it. Raises NotThere, Refused, BadAnnotation."""
         with self._entries.lock:
             entry = self._listing.need(id)
@@ -134,18 +149,18 @@ class Catalog:
             try:
                 annotation_store.write(self.folder / entry.path, new)
             except OSError as why:
-                raise Refused(f"It cannot be kept: {(why.strerror or str(why)).lower()}.") from None
+                raise Refused(f"It cannot be stored: {(why.strerror or str(why)).lower()}.") from None
             self._entries.put([replace(entry, annotations=new)])
             return row_of(replace(entry, annotations=new))
 
-    def delete(self, id: str) -> dict[str, Any]:
+    def delete(self, id: str) -> Recording:
         """Into the trash, where it stays until somebody empties it. Raises NotThere, Refused."""
         return row_of(self._trash.delete(id))
 
-    def restore(self, id: str) -> dict[str, Any]:
+    def restore(self, id: str) -> Recording:
         """Out of the trash, to where it was. Raises NotThere, Refused."""
         return row_of(self._trash.restore(id))
 
-    def destroy(self, id: str | None) -> dict[str, int]:
+    def destroy(self, id: str | None) -> Total:
         """For good: one of the trash, or with None all of it; how many and how large. Raises NotThere, Refused."""
         return self._trash.destroy(id)

@@ -1,4 +1,4 @@
-"""The catalog's database: one row a file, and how rows are found. All of it can be made anew from the files."""
+"""The catalog's database: one row per file, and the search. It can be rebuilt from the files."""
 
 from __future__ import annotations
 
@@ -34,7 +34,12 @@ CREATE TABLE IF NOT EXISTS recording (
 ) WITHOUT ROWID;
 CREATE INDEX IF NOT EXISTS recording_kept ON recording (trashed_ms, started_ms DESC, id DESC);
 CREATE INDEX IF NOT EXISTS recording_id ON recording (id);
+CREATE TABLE IF NOT EXISTS trends (sha256 TEXT PRIMARY KEY, body BLOB NOT NULL) WITHOUT ROWID;
 PRAGMA user_version = {(VERSION := 1)};
+"""
+# Of files that are gone. A file that is being moved is forgotten for a moment, so this is done at the start only.
+_FORGET_TRENDS = """
+DELETE FROM trends WHERE sha256 NOT IN (SELECT found ->> 'sha256' FROM recording WHERE found ->> 'sha256' IS NOT NULL)
 """
 COLUMNS = "path, id, trashed_ms, vehicle, started_ms, size, changed_ns, found, title, note, tags"
 
@@ -61,22 +66,22 @@ class Which:
     vehicle: str | None = None
     tag: str | None = None
     text: str | None = None  # in title, note, tags, vehicle or name
-    since_ms: int | None = None  # begun then or later
-    until_ms: int | None = None  # begun before
+    since_ms: int | None = None  # started then or later
+    until_ms: int | None = None  # started before
     is_trashed: bool = False
 
 
 def open_at(path: Path | None) -> sqlite3.Connection:
-    """The database at `path`, in memory where it is None or cannot be written. A damaged one is made anew."""
+    """Open the database at `path`; in memory if it is None or not writable. A damaged one is rebuilt."""
     if path is not None:
         for _ in range(2):
             try:
                 return _open(str(path))
             except sqlite3.DatabaseError as why:
                 if isinstance(why, sqlite3.OperationalError):
-                    log.warning("the catalog of recordings is kept in memory only: %s", why)
+                    log.warning("catalog in memory only: error=%s", why)
                     break
-                log.warning("the catalog of recordings is made anew: %s", why)
+                log.warning("catalog rebuilt: error=%s", why)
                 with contextlib.suppress(OSError):
                     for suffix in ("", "-wal", "-shm"):
                         path.with_name(path.name + suffix).unlink(missing_ok=True)
@@ -90,9 +95,10 @@ def _open(name: str) -> sqlite3.Connection:
         if version not in (0, VERSION):
             database.execute("DROP TABLE IF EXISTS recording")
         database.execute("PRAGMA journal_mode=WAL")
-        database.execute("PRAGMA synchronous=OFF")  # what a loss of power takes from it is made anew from the files
+        database.execute("PRAGMA synchronous=OFF")  # after a power loss it is rebuilt from the files
         database.executescript(_SCHEMA)
         database.execute("PRAGMA quick_check").fetchone()
+        database.execute(_FORGET_TRENDS)
         return database
     except BaseException:
         database.close()
@@ -139,8 +145,18 @@ def forget(database: sqlite3.Connection, paths: Iterable[str]) -> None:
     database.executemany("DELETE FROM recording WHERE path = ?", [(os.fsencode(path),) for path in paths])
 
 
+def put_trends(database: sqlite3.Connection, sha256: str, body: bytes) -> None:
+    """Keeps the trends of a file by its content, so that a file that is moved has them still."""
+    database.execute("INSERT OR REPLACE INTO trends VALUES (?, ?)", (sha256, body))
+
+
+def trends(database: sqlite3.Connection, sha256: str) -> bytes | None:
+    row = database.execute("SELECT body FROM trends WHERE sha256 = ?", (sha256,)).fetchone()
+    return row[0] if row is not None else None
+
+
 def _words(e: Entry) -> str:
-    """What a search looks through; each tag stands between lines of its own, so that whole ones can be asked for."""
+    """The searchable text; each tag is on its own line, so that a search can match whole tags."""
     tags = "".join(f"\n#{tag}\n" for tag in e.annotations.tags)
     return f"{e.annotations.title}\n{e.annotations.note}\n{e.vehicle}\n{e.id}{tags}".casefold()
 

@@ -1,4 +1,4 @@
-"""Which files below a folder are recordings, and what their place alone says of them."""
+"""Recordings below a folder, and what their path alone implies."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ def id_of(inside: str) -> str:
 
 
 def vehicle_of(found: dict[str, Any] | None, origin: str) -> str:
-    told = (found or {}).get("vehicle")
+    kept = (found or {}).get("vehicle")
     folder = Path(origin).parts[0] if len(Path(origin).parts) > 1 else ""
-    return annotation_store.line(told or folder)[:40]
+    return annotation_store.line(kept or folder)[:40]
 
 
 def started_ms_of(found: dict[str, Any] | None, name: str, changed_ns: int) -> int:
     """By what was recorded; until it is read by the name, else by the file's own time."""
-    told = (found or {}).get("started_ms")
-    if isinstance(told, int):
-        return told
+    kept = (found or {}).get("started_ms")
+    if isinstance(kept, int):
+        return kept
     stamp = _STAMP.search(name)
     if stamp is not None:
         with contextlib.suppress(ValueError):
@@ -74,7 +74,7 @@ def files_below(folder: Path) -> Iterator[Path]:
 
 
 def shape_of(folder: Path) -> list[tuple[str, int]]:
-    """What changes when a file below a folder comes, goes, or is called otherwise."""
+    """A value that changes when a file below a folder is added, removed or renamed."""
     found = []
     for at, folders, _ in os.walk(folder):
         folders.sort()

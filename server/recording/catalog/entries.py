@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from server.protocol.answers import RecordingNames, Total
 from server.recording.catalog import catalog_db
 from server.recording.catalog.catalog_db import COLUMNS, Entry, Which
 
@@ -59,7 +60,18 @@ class Entries:
             if paths and not self._is_closed:
                 self._write(lambda database: catalog_db.forget(database, paths))
 
-    def totals(self, which: Which | None = None) -> dict[str, int]:
+    def put_trends(self, sha256: str, body: bytes) -> None:
+        """Keeps the sketch of a drive's signals."""
+        with self.lock:
+            if not self._is_closed:
+                self._write(lambda database: catalog_db.put_trends(database, sha256, body))
+
+    def trends(self, sha256: str) -> bytes | None:
+        """What `put_trends` kept; None: nothing."""
+        with self.lock:
+            return None if self._is_closed else catalog_db.trends(self._database, sha256)
+
+    def totals(self, which: Which | None = None) -> Total:
         """How many recordings there are of some kind, and how large together."""
         where, values = catalog_db.condition(which or Which())
         with self.lock:
@@ -80,7 +92,7 @@ class Entries:
             query = "SELECT COUNT(*) FROM recording WHERE trashed_ms IS NULL AND found ->> 'problem' IS NOT NULL"
             return int(self._database.execute(query).fetchone()[0])
 
-    def names(self) -> dict[str, list[str]]:
+    def names(self) -> RecordingNames:
         """The vehicles and tags that recordings have, to choose among."""
         with self.lock:
             vehicles = [row[0] for row in self._database.execute("SELECT DISTINCT vehicle FROM recording ORDER BY 1")]
@@ -95,7 +107,7 @@ class Entries:
         try:
             how(self._database)
         except sqlite3.Error as why:
-            log.warning("the catalog of recordings goes on in memory: %s", why)
+            log.warning("catalog continues in memory: error=%s", why)
             old, self._database = self._database, catalog_db.open_at(None)
             with contextlib.suppress(sqlite3.Error):
                 old.backup(self._database)

@@ -1,4 +1,4 @@
-"""Why the catalog refuses what somebody asks of it."""
+"""Refusals of the catalog."""
 
 
 class NotThere(Exception):

@@ -14,7 +14,7 @@ from server.recording.catalog.entries import Entries
 from server.recording.catalog.errors import NotThere
 from server.recording.catalog.survey import VERSION
 
-GROWS_MS = 120_000  # a file that changed so recently may still be copied: its folder does not tell
+GROWS_MS = 120_000  # a file that changed this recently may still be copied
 MAX_FRESH = 1000  # finished recordings that wait to be listed; more are found by walking the folder
 
 
@@ -29,7 +29,7 @@ class FolderListing:
         self._shape: object = None  # of the folders, when they were last walked
 
     def add(self, path: Path) -> None:
-        """A recording is finished: it is listed from the next look on."""
+        """A recording was finished: list it at the next scan."""
         self._fresh.append(path)
 
     @property
@@ -46,7 +46,7 @@ class FolderListing:
         """One recording. Raises NotThere."""
         entry = self.entry(id, is_trashed=is_trashed)
         if entry is None:
-            raise NotThere("That recording is not in the trash." if is_trashed else "There is no such recording.")
+            raise NotThere("The recording is not in the trash." if is_trashed else "There is no such recording.")
         return entry
 
     def walk(self) -> None:
@@ -109,7 +109,7 @@ class FolderListing:
         """Lists what was added since."""
         entries = []
         while self._fresh:
-            with contextlib.suppress(IndexError, ValueError):  # another thread took it; or it lies elsewhere
+            with contextlib.suppress(IndexError, ValueError):  # another thread took it, or it is elsewhere
                 entry = self.look(self._fresh.popleft(), None)
                 if entry is not None:
                     entries.append(entry)

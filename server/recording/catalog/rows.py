@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from server.protocol.answers import Recording
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import catalog_db
 from server.recording.catalog.catalog_db import Entry, Which
@@ -22,7 +22,7 @@ _CURSOR = re.compile(r"(-?\d{1,16})\.([A-Za-z0-9][A-Za-z0-9_-]{0,89})")
 class Page:
     """Some rows, newest first, and where the next page begins; None: there is none."""
 
-    rows: list[dict[str, Any]]
+    rows: list[Recording]
     next: str | None
 
 
@@ -33,7 +33,7 @@ def page_of(entries: Entries, which: Which, *, cursor: str | None, limit: int) -
     if cursor is not None:
         at = _CURSOR.fullmatch(cursor)
         if at is None:
-            raise Refused("That page of the list is not there: begin anew.")
+            raise Refused("That page of the list does not exist: start again.")
         where += f" AND ({order}, id) < (?, ?)"
         values += [int(at[1]), at[2]]
     limit = max(1, min(limit, MAX_ROWS))
@@ -48,7 +48,7 @@ def page_of(entries: Entries, which: Which, *, cursor: str | None, limit: int) -
     )
 
 
-def row_of(entry: Entry) -> dict[str, Any]:
+def row_of(entry: Entry) -> Recording:
     """A recording as docs/protocol.md has it."""
     found = entry.found or {}
     problem = found.get("problem")

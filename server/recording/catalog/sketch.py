@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from monitor.geo import Plane
 from monitor.tracks import TrackPoint
+from server.protocol.answers import SketchAnswer
 
 SIDE = 64.0
 MARGIN = 9.0
-LEAST_M = 20.0  # a smaller way does not fill the picture: the drift of a standing receiver would look like a drive
+LEAST_M = 20.0  # a smaller track does not fill the picture: the drift of a standing receiver would look like a drive
 TOLERANCE = 0.6  # units: less than half of the line's own width
 MOST_POINTS = 120  # of all lines
 MOST_MARKS = 30
 _PIECE = 0.05  # of all points: a smaller piece beyond a leap of the receiver does not decide the scale
-_DRAWN = ("warning", "critical")  # advisories are counted, not drawn; critical ones lie on top
+_DRAWN = ("warning", "critical")  # advisories are counted, not drawn; critical ones are on top
 Points = NDArray[np.float64]
 
 
@@ -32,12 +32,12 @@ class Sketch:
     start: tuple[float, float]
     marks: tuple[tuple[float, float, str], ...] = ()  # x, y, priority
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> SketchAnswer:
         """Lines as flat lists x, y, x, y …: some hundred bytes a drive."""
         return {
             "lines": [[number for point in line for number in point] for line in self.lines],
             "start": list(self.start),
-            "marks": [list(mark) for mark in self.marks],
+            "marks": list(self.marks),
         }
 
 
@@ -118,9 +118,9 @@ _MARKS = {"critical": ("M0-5l5 5-5 5-5-5z", "#c80a1c"), "warning": ("M0-6.5l6 10
 
 
 def svg(drawn: Sketch | None, words: str) -> str:
-    """A picture of its own: lines in the colour of the text around it, so that it does in any theme.
+    """A stand-alone SVG in the current text colour, for any theme.
 
-    `words` says what is seen for whoever cannot; it must not hold markup. None: a plain square that says why.
+    `words` is the text alternative, without markup. None: an empty square with the reason.
     """
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 64 64" role="img"><title>{words}</title>'
     if drawn is None:
@@ -142,7 +142,7 @@ def svg(drawn: Sketch | None, words: str) -> str:
     )
 
 
-def from_json(body: dict[str, Any] | None) -> Sketch | None:
+def from_json(body: SketchAnswer | None) -> Sketch | None:
     """What `as_json` made."""
     if body is None:
         return None

@@ -1,15 +1,15 @@
-"""Reads a recording once and tells what a list says of it: how long, how far, how fast, which alarms, along which way.
+"""Reads a recording once for the list of recordings: length, distance, top speed, alarms, track.
 
 As a process of its own (`python -m server.recording.catalog.survey`): the path of a file in hex on each line of its
-input, what was found as one line of JSON on its output. It gives way to everything else on the machine, and a file
-that breaks it
-breaks nothing else.
+input, what was found as one line of JSON on its output. It runs at the lowest priority, and a file that makes it fail
+harms nothing else.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 import os
 import resource
 import sys
@@ -20,28 +20,32 @@ from typing import Any
 
 import orjson
 
+from monitor.drive_trends import DriveTrends
+from monitor.signals import CHARTED
 from monitor.state import State
-from server.judge import pipeline
-from server.judge.profiles import GENERIC
-from server.judge.reception_stats import Reception
-from server.judge.topics import map_signals
+from server.judge.drive import Drive
+from server.judge.offline import Observer, OfflineRun
+from server.judge.speed_trace import SpeedTrace
+from server.protocol.drive_trends import DriveFacts, DriveTrendsAnswer, Wanted, answer
 from server.recording.catalog.annotations import line
 from server.recording.catalog.sketch import sketch
+from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
-from server.storage import bounded_toml
 
-VERSION = 3  # of what is found: with another one, files are read again
+VERSION = 5  # of what is found: with another one, files are read again
 PRIORITIES = ("critical", "warning", "advisory")
-MAX_RAISED = 200  # alarms told one by one; all are counted
+MAX_RAISED = 200  # alarms listed one by one; all are counted
 MAX_SENTENCES = 10
+SKETCH_BUCKETS = 360
+DRAWN = tuple(name for name in CHARTED if name != "scan")  # a laser's messages take longer than all others together
 _MEMORY_BYTES = 4 << 30  # a damaged length must not take the machine's
 _ALARMS = "/catgraph/alarms"
 
 
 def survey(path: Path) -> dict[str, Any]:
-    """What one file holds. `problem` is the sentence why it cannot be read, and then it is all there is.
+    """The survey of one file. `problem` is the reason why it cannot be read; then it is the only entry.
 
-    Lengths in m and s, speeds in m/s, moments in ms since 1970. Unknown is None: `alarms` where nobody recorded any.
+    Lengths in m and s, speeds in m/s, times in ms since 1970. Unknown is None; `alarms` is None if none were recorded.
     """
     try:
         with open_recording([path]) as recording:
@@ -49,20 +53,20 @@ def survey(path: Path) -> dict[str, Any]:
     except RecordingUnreadable as why:
         return {"problem": _sentence(str(why), path)}
     except MemoryError:
-        return {"problem": _sentence(f"{path} tells of a part that is larger than this machine can hold", path)}
+        return {"problem": _sentence(f"{path} has a part that is larger than this machine's memory", path)}
     found["sha256"] = _digest(path)
     return found
 
 
 def _read(recording: Recording, path: Path) -> dict[str, Any]:
     metadata: Mapping[str, str] = recording.metadata
-    state, top_mps, broke_off = _drive(recording, metadata)
+    state, motion, broke_off = _drive(recording)
     events, has_alarms = _raised(recording)
     snapshot = state.snapshot(recording.duration_s + 1.0)
     drawn = sketch(snapshot.track, [(at_s - recording.start_s, event.get("priority", "")) for at_s, event in events])
     counts = Counter(event.get("priority") for _, event in events)
     started_ms = _whole(metadata.get("started_ms"))
-    if started_ms is None or "clip_of" in metadata:  # a clip may have been asked for from before its drive began
+    if started_ms is None or "clip_of" in metadata:  # a clip can have been requested from before its drive started
         started_ms = round(recording.start_s * 1000)
     damage = [_sentence(words, path) for words in (*recording.damage, *broke_off)]
     return {
@@ -76,7 +80,8 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "messages": recording.count,
         "topics": len(recording.topics),
         "distance_m": None if snapshot.track_m is None else round(snapshot.track_m, 1),
-        "top_speed_mps": None if top_mps is None else round(top_mps, 2),
+        "top_speed_mps": None if motion.top_mps is None else round(motion.top_mps, 2),
+        "speed_mps": [] if motion.top_mps is None else motion.trace.rounded(),
         "alarms": {name: counts.get(name, 0) for name in PRIORITIES} if has_alarms else None,
         "raised": [_told(at_s, event) for at_s, event in events[:MAX_RAISED]],
         "ended": _text(metadata.get("ended")),
@@ -89,6 +94,7 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "not_received_count": _count(metadata, "not_received"),
         "damage": damage[:MAX_SENTENCES],
         "sketch": None if drawn is None else drawn.as_json(),
+        "trends": motion.sketch(recording),
     }
 
 
@@ -97,62 +103,62 @@ def _names(lines: str) -> list[str]:
 
 
 def _count(metadata: Mapping[str, str], name: str) -> int:
-    """How many there are; older files say it only by their names."""
+    """The number of topics; older files have only their names."""
     named = sum(1 for line in metadata.get(name, "").split("\n") if line)
     return max(named, _whole(metadata.get(f"{name}_count")) or 0)
 
 
-def _drive(recording: Recording, metadata: Mapping[str, str]) -> tuple[State, float | None, list[str]]:
-    """Speeds and positions by the road of everything that is judged, so that distances are those the operator saw."""
-    types = {name: topic.type for name, topic in recording.topics.items() if topic.count}
-    mapped = map_signals(types, _chosen(metadata.get("settings", "")))
-    wanted = [mapped[name] for name in ("speed", "position") if name in mapped and mapped[name].decode is not None]
-    if not any(source.signal == "speed" for source in wanted) and "odometry" in mapped:
-        wanted.append(mapped["odometry"])
-    listeners = pipeline.by_topic(source for source in wanted if source.decode is not None)
-    state, reception = State(), Reception()
-    top_mps: float | None = None
+class _Motion(Observer):
+    """The highest speed of a run, its course, and that of all other signals."""
+
+    def __init__(self, speed: str, length_s: float) -> None:
+        """`speed`: the signal that has it."""
+        self.top_mps: float | None = None
+        self.trace = SpeedTrace(length_s)
+        self._speed = speed
+        self._trends = DriveTrends(0.0)
+
+    def signals_changed(self, changed: tuple[str, ...], state: State, now_s: float) -> None:
+        """Keeps the trends."""
+        self._trends.receive(changed, state, now_s)
+
+    def sketch(self, recording: Recording) -> DriveTrendsAnswer:
+        """The whole drive in so few buckets that a chart shows it at once."""
+        length_s = recording.duration_s
+        facts = DriveFacts(now_s=length_s, start_ms=round(recording.start_s * 1000), length_s=length_s)
+        return answer(self._trends, Wanted(signals=DRAWN, buckets=SKETCH_BUCKETS), facts)
+
+    def value_decoded(self, signal: str, value: Any, now_s: float, stamp_s: float | None) -> None:
+        """Compares the speed; NaN and what no car drives are no speed."""
+        speed_mps = getattr(value, "speed_mps", None) if signal == self._speed else None
+        if speed_mps is not None and abs(speed_mps) < 1000.0:
+            self.top_mps = max(self.top_mps or 0.0, abs(speed_mps))
+            self.trace.add(now_s, speed_mps)
+
+
+def _drive(recording: Recording) -> tuple[State, _Motion, list[str]]:
+    """The state at the end, the speed, and why the recording could not be read to its end.
+
+    By the loop of everything that is judged, so that distances are those the operator saw. Nothing is judged: a list
+    names the alarms that were announced, and judging takes twice as long.
+    """
+    recorded = read_recorded_events(recording)
+    drive = Drive(recording, recorded, signals=DRAWN)
+    has_speed = any("speed" in epoch.published for epoch in drive.epochs)
+    motion = _Motion("speed" if has_speed else "odometry", drive.length_s)
+    run = OfflineRun(recording, drive, observer=motion, with_checks=False)
     broke_off = []
     try:
-        for message in recording.messages(0.0, listeners):
-            sources = listeners.get(message.topic)
-            if sources is None:
-                continue
-            at_s = message.at_s - recording.start_s
-            changed = pipeline.receive(
-                sources,
-                message.message,
-                at_s,
-                None,
-                reception=reception,
-                state=state,
-                profile=GENERIC,
-                tyre_rad_per_unit=0.0,
-            )
-            for signal in changed:
-                if signal in ("speed", "odometry"):
-                    reading = state.get(signal)
-                    speed_mps = getattr(reading.value, "speed_mps", None) if reading is not None else None
-                    if speed_mps is not None and abs(speed_mps) < 1000.0:  # NaN and what no car drives are no speed
-                        top_mps = max(top_mps or 0.0, abs(speed_mps))
+        run.advance(math.inf, to_last_message=True)
     except RecordingUnreadable as why:
         broke_off.append(str(why))
-        if not reception.received:
+        if not run.run_state.reception.received:
             raise
-    return state, top_mps, broke_off
-
-
-def _chosen(toml: str) -> dict[str, str]:
-    """The topics the operator had picked for signals, by the settings of the drive."""
-    try:
-        topics = bounded_toml.loads(toml).get("topics", {})
-    except bounded_toml.BadToml:
-        return {}
-    return {k: v for k, v in topics.items() if isinstance(v, str)} if isinstance(topics, dict) else {}
+    return run.run_state.state, motion, broke_off
 
 
 def _raised(recording: Recording) -> tuple[list[tuple[float, dict[str, Any]]], bool]:
-    """When which alarms were raised, oldest first; and whether the file tells of alarms at all."""
+    """The raised alarms, oldest first; and whether the file has an alarm log."""
     tells = bool(recording.metadata)
     found = []
     for at_s, event in recording.own(_ALARMS):
@@ -163,8 +169,8 @@ def _raised(recording: Recording) -> tuple[list[tuple[float, dict[str, Any]]], b
 
 
 def _told(at_s: float, event: Mapping[str, Any]) -> dict[str, Any]:
-    told = {name: (_text(event.get(name)) or "")[:300] for name in ("alarm", "title", "text")}
-    return {"at_ms": round(at_s * 1000), "priority": event["priority"], **told}
+    entry = {name: (_text(event.get(name)) or "")[:300] for name in ("alarm", "title", "text")}
+    return {"at_ms": round(at_s * 1000), "priority": event["priority"], **entry}
 
 
 def _text(value: object) -> str | None:
@@ -196,12 +202,12 @@ def _answers(names: Iterable[str]) -> Iterator[bytes]:
         try:
             found = survey(path)
         except FileNotFoundError:
-            found = {"problem": _sentence(f"{path} is not there any more", path)}
+            found = {"problem": _sentence(f"{path} no longer exists", path)}
         except OSError as why:
             found = {"problem": _sentence(f"{path} cannot be read: {why.strerror or why}", path)}
-        except Exception as why:  # a file that nobody thought of is told like any other
+        except Exception as why:  # an unforeseen fault of a file is reported like any other
             print(f"{path}: {why!r}", file=sys.stderr)
-            found = {"problem": _sentence(f"{path} could not be read: it made the reader fail", path)}
+            found = {"problem": _sentence(f"{path} could not be read: the reader failed", path)}
         yield orjson.dumps(found, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
@@ -209,8 +215,8 @@ def main() -> None:
     os.nice(15)
     with contextlib.suppress(ValueError, OSError):
         resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
-    for answer in _answers(sys.stdin):
-        sys.stdout.buffer.write(answer + b"\n")
+    for line_of_one in _answers(sys.stdin):
+        sys.stdout.buffer.write(line_of_one + b"\n")
         sys.stdout.buffer.flush()
 
 

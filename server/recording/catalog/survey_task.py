@@ -1,14 +1,17 @@
-"""Keeps the catalog up to date while a server runs: walks the folder when asked, and has each new file surveyed."""
+"""Keeps the catalog up to date while a server runs: scans the folder on request, and surveys each new file."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 import os
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import orjson
 
 from server.recording.catalog.catalog_db import Entry
 from server.recording.catalog.discovery import started_ms_of, vehicle_of
@@ -20,7 +23,7 @@ from server.system.supervision import Supervisor
 
 log = logging.getLogger("catgraph.catalog")
 
-LOOK_AGAIN_S = 20.0  # at most so often the folder is walked because a list is asked for
+LOOK_AGAIN_S = 20.0  # shortest interval of folder scans for requests of the list
 
 
 class SurveyTask:
@@ -39,7 +42,7 @@ class SurveyTask:
         self._walked_s: float | None = None
 
     async def start(self) -> None:
-        """Begins to look through the folder and to read what is new in it."""
+        """Start to scan the folder and to survey new files."""
         self._loop = asyncio.get_running_loop()
         self._supervisor.keep("survey", self._work)
 
@@ -84,7 +87,7 @@ class SurveyTask:
                     await asyncio.to_thread(self._keep, entry, found)
                     await asyncio.to_thread(self._listing.list_fresh)
             except Exception:  # whatever a disk does, the next call finds a catalog at work
-                log.exception("the catalog of recordings stumbled")
+                log.exception("catalog task failed")
             await self._surveyor.rest()
             await self._wake.wait()
 
@@ -99,6 +102,9 @@ class SurveyTask:
             now = next(iter(self._entries.select("WHERE path = ?", [os.fsencode(entry.path)])), None)
             if now is None or (now.size, now.changed_ns) != (entry.size, entry.changed_ns):
                 return
+            trends = found.pop("trends", None)  # beside the row: a list reads every row, and needs none of it
+            if trends is not None:
+                self._entries.put_trends(found["sha256"], zlib.compress(orjson.dumps(trends), 6))
             found = {**found, "survey": VERSION}
             origin = entry.path.split("/", 2)[2] if entry.trashed_ms is not None else entry.path
             new = replace(

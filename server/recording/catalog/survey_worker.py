@@ -42,9 +42,9 @@ class Surveyor:
             await self.rest()
             return {"problem": f"{line(path.name)} could not be read within {LONGEST_S / 60:.0f} minutes."}
         except (OSError, ValueError, orjson.JSONDecodeError) as why:  # it was killed, or ran out of memory
-            log.warning("reading %s ended the reader: %r", path, why)
+            log.warning("recording reader failed: recording=%s error=%r", path, why)
             await self.rest()
-            return {"problem": f"{line(path.name)} could not be read: it made the reader fail."}
+            return {"problem": f"{line(path.name)} could not be read: the reader failed."}
         return found if isinstance(found, dict) else {"problem": f"{line(path.name)} could not be read."}
 
     async def rest(self) -> None:
@@ -57,7 +57,7 @@ class Surveyor:
         with contextlib.suppress(ProcessLookupError):
             process.kill()
         await process.communicate()  # to the end of its pipes: else they outlive the loop
-        self._starting = None  # not before: whoever was cancelled here leaves it to the next call
+        self._starting = None  # not before: a cancelled caller leaves it to the next call
 
     async def _running(self) -> asyncio.subprocess.Process:
         if self._starting is not None and (await asyncio.shield(self._starting)).returncode is not None:

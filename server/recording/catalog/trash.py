@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from server.protocol.answers import Total
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import atomic_move
 from server.recording.catalog.catalog_db import Entry
@@ -44,11 +45,11 @@ class Trash:
             entry = self._listing.need(id, is_trashed=True)
             back = replace(entry, path=entry.path.split("/", 2)[2], trashed_ms=None)
             if (self._folder / back.path).exists():
-                raise Refused("There is another recording of that name again: rename its file first.")
+                raise Refused("A recording of that name exists: rename its file first.")
             self._move(entry, back)
             return back
 
-    def destroy(self, id: str | None) -> dict[str, int]:
+    def destroy(self, id: str | None) -> Total:
         """For good: one of the trash, or with None all of it; how many and how large. Raises NotThere, Refused."""
         with self._entries.lock:
             chosen = (
@@ -79,7 +80,7 @@ class Trash:
             raise Refused(f"It cannot be moved: {(why.strerror or str(why)).lower()}.") from None
         if not target.exists():
             self._entries.forget([old.path])
-            raise NotThere("That recording is not there any more.")
+            raise NotThere("The recording no longer exists.")
         self._entries.forget([old.path])
         self._entries.put([new])
         if old.trashed_ms is not None:

@@ -14,10 +14,10 @@ __all__ = ["ExportRefused", "Made", "make_export"]
 async def make_export(path: Path, format: str, into: Path, progress: Progress = nothing) -> Made:
     """Writes a recording in a format of FORMATS into a folder, by a process of its own.
 
-    `progress` is told parts from 0 to 1. Raises ExportRefused with one sentence, ValueError for an unknown format,
+    `progress` is called with 0 to 1. Raises ExportRefused with one sentence, ValueError for an unknown format,
     OSError. Where it is cancelled the process is ended and leaves nothing behind.
     """
     if format not in FORMATS:
         raise ValueError(f"There is no format {format[:40]!r}.")
-    out = into / f"{path.name.partition('.')[0]}.{FORMATS[format].ending}"
+    out = into / f"{path.name.partition('.')[0]}.{FORMATS[format].extension}"
     return await run_worker([str(path), "--format", format, "--out", str(out)], progress)

@@ -48,7 +48,7 @@ class BagFile:
     """A bag that is being written. `close` makes it whole; without it the file is worthless."""
 
     def __init__(self, path: Path, compression: Compression = "none") -> None:
-        """Writes over what stands there. Raises OSError."""
+        """Overwrite existing data. Raises OSError."""
         self._file: BinaryIO = path.open("wb")
         self._compression = compression
         self._pack = _COMPRESSORS[compression]
@@ -77,7 +77,7 @@ class BagFile:
     def write(self, connection: int, time_ns: int, raw: bytes | memoryview) -> None:
         """Adds a message. Raises BagTimeOutOfRange, OSError."""
         if not 0 <= time_ns <= _LAST_NS:
-            raise BagTimeOutOfRange(f"{time_ns} ns since 1970 is no time that a bag can hold")
+            raise BagTimeOutOfRange(f"{time_ns} ns since 1970 is outside a bag's range of times")
         chunk = self._chunk
         seconds, nanoseconds = divmod(max(time_ns, 1), 1_000_000_000)  # 0 is "no time" in ROS
         if not chunk.index:
@@ -113,7 +113,7 @@ class BagFile:
             self._file.close()
 
     def abandon(self) -> None:
-        """Ends the writing of a file that nobody will read."""
+        """Abort writing; the file is not used."""
         self._file.close()
 
     def _end_chunk(self) -> None:

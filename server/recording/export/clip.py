@@ -1,8 +1,8 @@
 """The minute around an alarm as a recording of its own: what came then, and what was already so when it begins.
 
-A clip is a recording like any other: the same channels and definitions, the same stamps. At its beginning stand the
-settings in force, the state of the link and the last message of each latched topic; its metadata names the recording
-it was cut from, and the alarms that stood.
+Messages are copied as bytes and never decoded, so a clip holds what was recorded: the same channels, definitions and
+stamps. It begins with the settings in force, the state of the link and the last message of each latched topic. Its
+metadata names the recording it was cut from, and what was in force: alarms, pause, chosen phone, slow-down.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ BEFORE_S = AFTER_S = 30.0
 LONGEST_S = 3600.0  # before and after: beyond that it is a drive and no clip
 _ALARMS, _SETTINGS, _LINK = f"{OWN}alarms", f"{OWN}settings", f"{OWN}link"
 _HELD = 5000  # messages written and not yet handed to the system: a few MB
-_LATCHED = {"offered_qos_profiles": "- durability: transient_local"}  # as the readers look for it
+_LATCHED = {"offered_qos_profiles": "- durability: transient_local"}  # in the form that the readers expect
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +71,7 @@ def write_clip(
         with contextlib.suppress(OSError):
             path.with_name(id_of(path) + WRITING).unlink()
         raise
-    outcome.remarks += _short(window, first_ns, last_ns)
+    outcome.notices += _short(window, first_ns, last_ns)
     outcome.notes += _damage(recording, first_ns)
     return outcome
 

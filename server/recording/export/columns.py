@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
+from monitor.signals import SIGNALS, Signal
 from monitor.values import Diagnostics, LaserScan
 
 TIMES = ("time", "since start [s]", "stamp by the car [s since 1970]")
@@ -16,12 +17,11 @@ TIMES = ("time", "since start [s]", "stamp by the car [s since 1970]")
 class Table:
     """What one signal becomes."""
 
-    what: str  # for the reader of README.txt
     columns: tuple[str, ...]  # with their units
     rows: Callable[[Any], Iterator[tuple[Any, ...]]]  # of one value; mostly one
 
 
-def _table(what: str, **columns: str) -> Table:
+def _table(**columns: str) -> Table:
     """Field of the value → its column."""
     get = attrgetter(*columns)
 
@@ -29,7 +29,7 @@ def _table(what: str, **columns: str) -> Table:
         found = get(value)
         yield found if len(columns) > 1 else (found,)
 
-    return Table(what=what, columns=tuple(columns.values()), rows=rows)
+    return Table(columns=tuple(columns.values()), rows=rows)
 
 
 def _scan(scan: LaserScan) -> Iterator[tuple[Any, ...]]:
@@ -53,21 +53,24 @@ def _components(diagnostics: Diagnostics) -> Iterator[tuple[Any, ...]]:
         yield component.name, component.level, component.message
 
 
-TABLES: Mapping[str, Table] = {
-    "speed": _table("Speed of the car, forward positive.", speed_mps="speed [m/s]", yaw_rate_radps="yaw rate [rad/s]"),
-    "acceleration": _table("Longitudinal acceleration.", acceleration_mps2="acceleration [m/s^2]"),
-    "brake": _table("How far the brake is pressed.", percent="brake [%]"),
-    "accelerator": _table("How far the accelerator is pressed.", percent="accelerator [%]"),
-    "steering": _table("How far the steering is turned, negative = left.", percent="steering [%]"),
-    "distance": _table(
-        "Distance to the nearest object ahead, by the car's estimator. Empty: nothing in range, or it did not say.",
-        distance_m="distance [m]",
-        none_in_range="none in range",
-    ),
-    "bearing": _table("Where the nearest object is: counter-clockwise, 0 = ahead.", bearing_rad="bearing [rad]"),
+_ASCII = str.maketrans({"°": "deg", "²": "^2", "³": "^3", "µ": "u", "Ω": "ohm"})  # units in headings
+
+
+def _number(signal: Signal) -> Table:
+    """A signal that is one number."""
+    return _table(value=f"{signal.label.lower()} [{signal.unit.translate(_ASCII)}]")
+
+
+# What is not named here is one number: see `monitor.values.Number`.
+_TABLES: Mapping[str, Table] = {
+    "speed": _table(speed_mps="speed [m/s]", yaw_rate_radps="yaw rate [rad/s]"),
+    "acceleration": _table(acceleration_mps2="acceleration [m/s^2]"),
+    "brake": _table(percent="brake [%]"),
+    "accelerator": _table(percent="accelerator [%]"),
+    "steering": _table(percent="steering [%]"),
+    "distance": _table(distance_m="distance [m]", none_in_range="none in range"),
+    "bearing": _table(bearing_rad="bearing [rad]"),
     "position": _table(
-        "Position on the WGS84 ellipsoid. Status -1 = no fix. Sigma is the horizontal one-sigma error where the "
-        "receiver states a trustworthy one.",
         lat_deg="latitude [deg]",
         lon_deg="longitude [deg]",
         alt_m="altitude above the ellipsoid [m]",
@@ -76,7 +79,6 @@ TABLES: Mapping[str, Table] = {
         covariance_type="covariance type",
     ),
     "odometry": _table(
-        "Pose in the frame named, speed in the body frame.",
         x_m="x [m]",
         y_m="y [m]",
         z_m="z [m]",
@@ -84,9 +86,8 @@ TABLES: Mapping[str, Table] = {
         speed_mps="speed [m/s]",
         frame_id="frame",
     ),
-    "heading": _table("Compass heading, 0 = north, clockwise.", heading_deg="heading [deg]"),
+    "heading": _table(heading_deg="heading [deg]"),
     "scan": Table(
-        what="Laser: one row a scan, with its nearest usable return. The ranges are in the MCAP and the bag.",
         columns=(
             "beams",
             "usable beams",
@@ -101,19 +102,16 @@ TABLES: Mapping[str, Table] = {
         ),
         rows=_scan,
     ),
-    "diagnostics": Table(
-        what="The car's own diagnostics, one row a component. Level 0 OK, 1 WARN, 2 ERROR, 3 STALE.",
-        columns=("component", "level", "message"),
-        rows=_components,
-    ),
-    "command": _table("What the car was asked to do.", speed_mps="speed [m/s]", tyre_angle_rad="tyre angle [rad]"),
-    "fuel": _table("What is left of fuel or charge.", value="level", unit="unit"),
+    "diagnostics": Table(columns=("component", "level", "message"), rows=_components),
+    "command": _table(speed_mps="speed [m/s]", tyre_angle_rad="tyre angle [rad]"),
+    "fuel": _table(value="level", unit="unit"),
 }
+TABLES: Mapping[str, Table] = {name: _TABLES.get(name) or _number(signal) for name, signal in SIGNALS.items()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OwnTable:
-    """What one of catgraph's own channels becomes; what has no column stands in `details` as JSON."""
+    """The table of one of catgraph's own channels; values without a column are in `details` as JSON."""
 
     what: str
     file: str
@@ -122,7 +120,7 @@ class OwnTable:
 
 OWN_TABLES: Mapping[str, OwnTable] = {
     "/catgraph/phone": OwnTable(
-        what="What operators' phones said of their own position (WGS84), or why they could not.",
+        what="Positions reported by operators' phones (WGS84), or the reason for none.",
         file="phone.csv",
         columns={
             "phone": "phone",
@@ -138,19 +136,19 @@ OWN_TABLES: Mapping[str, OwnTable] = {
         },
     ),
     "/catgraph/operator": OwnTable(
-        what="What operators asked for, and whether it was done.",
+        what="Commands of operators, and their results.",
         file="operator.csv",
         columns={"kind": "kind", "by": "by", "done": "ok", "reason": "reason"},
     ),
     "/catgraph/commands": OwnTable(
-        what="What was sent to the car.",
+        what="Frames sent to the car.",
         file="commands.csv",
         columns={"topic": "topic", "type": "type", "by": "by"},
     ),
     "/catgraph/delay": OwnTable(
-        what="How late the link was, whenever that changed. `delays` in the details: of each topic's newest message.",
+        what="The delay of the link, whenever it changed. `delays` in the details: of each topic's newest message.",
         file="delay.csv",
-        columns={"late [s]": "late_s", "asked for less": "reduced"},
+        columns={"late [s]": "late_s", "throttled": "reduced"},
     ),
     "/catgraph/link": OwnTable(
         what="The link to the car whenever it changed.",

@@ -1,6 +1,6 @@
-"""The exports of one server: begun, followed, cancelled, fetched, and swept away when nobody fetches them.
+"""The export jobs of one server: start, progress, cancel, download, and deletion of unused files.
 
-One is made at a time, each by a process of its own; what waits, what is kept and for how long is bounded.
+One job runs at a time, each in its own process; queue, stored files and their lifetime are bounded.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+from server.protocol.answers import ExportJob, ExportState
 from server.recording.export.clip import Window
 from server.recording.export.formats import CLIP, FORMATS
 from server.recording.export.outcome import ExportRefused
@@ -31,13 +32,11 @@ MOST_WAITING = 20  # jobs that are not done
 MOST_KEPT = 100  # jobs that are
 KEEP_S = 3600.0  # the file of a job that is done
 KEEP_BYTES = 2_000_000_000  # of all such files together
-FLUSHED_S = 1.5  # after so long the recorder has put what it heard on the disk
+FLUSHED_S = 1.5  # after this time the recorder has written what it received
 POLL_S = 0.25
-NOT_ALL = "Not all of the recording is in it."
+NOT_ALL = "The export is incomplete."
 NOT_WHOLE = f"It is ready. {NOT_ALL}"
 AHEAD_S = 60.0  # a clip may end so long after now: it is waited for
-
-State = Literal["waiting", "working", "done", "failed", "cancelled"]
 
 
 class TooMany(Exception):
@@ -49,7 +48,7 @@ class NoSuchRecording(Exception):
 
 
 class NotYet(Exception):
-    """What is asked for lies in the future. The text is one sentence."""
+    """The requested time is in the future. The text is one sentence."""
 
 
 @dataclass(slots=True, eq=False)
@@ -60,9 +59,9 @@ class Job:
     of: str  # the recording
     format: str
     key: tuple[Any, ...]  # the same for the same work
-    state: State = "waiting"
+    state: ExportState = "waiting"
     progress: float = 0.0
-    sentence: str = "Waits for the one before it."
+    sentence: str = "Waiting for the previous export."
     notes: list[str] = field(default_factory=list)  # what is not in it, and why
     is_whole: bool | None = None  # False: something of the recording is not in it; None: not made yet
     path: Path | None = None
@@ -75,7 +74,7 @@ class Job:
     def is_over(self) -> bool:
         return self.state in ("done", "failed", "cancelled")
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> ExportJob:
         return {
             "job": self.id,
             "of": self.of,
@@ -103,8 +102,8 @@ class Exports:
         now: Callable[[], float],
         wall_ms: Callable[[], int],
     ) -> None:
-        """`folder` is this class's own: what lies there is removed. `path_of` finds finished recordings, in any thread;
-        `on_clip` is told of each new one."""
+        """`folder` belongs to this class: existing files are deleted. `path_of` finds finished recordings, in any
+        thread; `on_clip` is called for each new one."""
         self._folder = folder
         self._recordings = recordings
         self._path_of = path_of
@@ -113,6 +112,7 @@ class Exports:
         self._wall_ms = wall_ms
         self._jobs: dict[str, Job] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
+        self._removing: set[asyncio.Task[None]] = set()  # of files that can no longer be downloaded
         self._turn = asyncio.Lock()
 
     async def start(self) -> None:
@@ -123,7 +123,7 @@ class Exports:
         """Ends all that is going on and removes every file."""
         for task in list(self._tasks.values()):
             task.cancel()
-        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
+        await asyncio.gather(*self._tasks.values(), *self._removing, return_exceptions=True)
         await asyncio.to_thread(shutil.rmtree, self._folder, ignore_errors=True)
 
     def job(self, id: str) -> Job | None:
@@ -144,16 +144,18 @@ class Exports:
         """Cuts a recording, one being written too. Raises NoSuchRecording, NotYet, TooMany."""
         await asyncio.to_thread(self._source, of)
         if window.to_ns / 1e6 > self._wall_ms() + AHEAD_S * 1000:
-            raise NotYet("That moment has not come yet.")
+            raise NotYet("This time is in the future.")
         return self._begin(of, CLIP, (of, CLIP, window), lambda job: self._clip(job, window))
 
-    def cancel(self, id: str) -> None:
-        """Ends a job that is going on and removes its file."""
+    async def cancel(self, id: str) -> None:
+        """Ends a job that is going on; its file is gone when this returns."""
         job, task = self._jobs.get(id), self._tasks.get(id)
-        if task is not None:
+        if job is not None and task is not None:
             task.cancel()
+            await job.finished.wait()
         elif job is not None and job.state == "done":
             self._drop(job)
+            await asyncio.gather(*self._removing)
 
     def _begin(self, of: str, format: str, key: tuple[Any, ...], work: Callable[[Job], Any]) -> Job:
         self._sweep()
@@ -161,7 +163,7 @@ class Exports:
             if job.key == key and (not job.is_over or (job.state == "done" and job.path is not None)):
                 return job
         if len(self._tasks) >= MOST_WAITING:
-            raise TooMany(f"{MOST_WAITING} exports are waiting already: try again when some are done.")
+            raise TooMany(f"{MOST_WAITING} exports are already waiting: try again later.")
         job = Job(id=secrets.token_hex(8), of=of, format=format, key=key)
         self._jobs[job.id] = job
         task = self._tasks[job.id] = asyncio.create_task(self._run(job, work), name=f"export {of} as {format}")
@@ -180,8 +182,8 @@ class Exports:
         except OSError as error:
             job.state, job.sentence = "failed", f"It cannot be written: {why(error)}."
         except Exception:
-            log.exception("an export failed")
-            job.state, job.sentence = "failed", "The server made a mistake; it is in its log."
+            log.exception("export failed")
+            job.state, job.sentence = "failed", "Internal server error; the server's log has the details."
         finally:
             if job.state != "done" or job.format == CLIP:
                 await asyncio.shield(asyncio.to_thread(shutil.rmtree, self._folder / job.id, ignore_errors=True))
@@ -196,7 +198,7 @@ class Exports:
 
     async def _export(self, job: Job, source: Path) -> None:
         async with self._turn:
-            out = await self._place(job, f"{job.of}.{FORMATS[job.format].ending}")
+            out = await self._place(job, f"{job.of}.{FORMATS[job.format].extension}")
             made = await self._work(job, [source], ["--format", job.format, "--name", job.of, "--out", str(out)])
             job.path = made.path
             job.size = (await asyncio.to_thread(made.path.stat)).st_size
@@ -219,25 +221,27 @@ class Exports:
                 made = await self._work(job, sources[:1], arguments)  # another part must not spoil this one
             path = await asyncio.to_thread(_keep, made.path, sources[0].parent, f"{job.of[:50]}_clip_{moment:%H%M%S}")
             job.recording, job.size = id_of(path), (await asyncio.to_thread(path.stat)).st_size
-            job.sentence = "It is among the recordings." if made.is_whole else f"It is among the recordings. {NOT_ALL}"
+            job.sentence = (
+                "It is in the list of recordings." if made.is_whole else f"It is in the list of recordings. {NOT_ALL}"
+            )
             self._on_clip(path)
 
     async def _until_recorded(self, job: Job, window: Window) -> None:
-        """What is being recorded is waited for; not longer than the recording goes on."""
+        """Wait for data that is still being recorded, at most until the recording ends."""
         while True:
             left_s = window.to_ns / 1e9 + FLUSHED_S - self._wall_ms() / 1000
             source = await asyncio.to_thread(self._source, job.of)
             if left_s <= 0 or not source.name.endswith(WRITING):
                 return
-            job.sentence = f"Waits until the {window.after_s:.0f} s after it are recorded: {left_s:.0f} s more."
+            job.sentence = f"Waiting for {window.after_s:.0f} s after it to be recorded: {left_s:.0f} s left."
             await asyncio.sleep(min(left_s, POLL_S))
 
     async def _work(self, job: Job, sources: Sequence[Path], arguments: Sequence[str]) -> Made:
-        def told(part: float) -> None:
+        def on_progress(part: float) -> None:
             job.progress = max(job.progress, min(part, 0.999))
 
-        job.state, job.sentence = "working", "It is being made."
-        made = await run_worker([*map(str, sources), *arguments], told)
+        job.state, job.sentence = "working", "In progress."
+        made = await run_worker([*map(str, sources), *arguments], on_progress)
         job.notes, job.is_whole = made.notes, made.is_whole
         return made
 
@@ -268,7 +272,9 @@ class Exports:
 
     def _sweep(self) -> None:
         """Forgets what was done long ago, and the oldest files where they are too many."""
-        ended = {job.id: job.done_s for job in self._jobs.values() if job.done_s is not None}  # what tidies up goes on
+        ended = {
+            job.id: job.done_s for job in self._jobs.values() if job.done_s is not None
+        }  # the clean-up task continues
         done = sorted((self._jobs[id] for id in ended), key=lambda job: ended[job.id])
         room = sum(job.size or 0 for job in done if job.path is not None)
         for index, job in enumerate(done):
@@ -281,7 +287,9 @@ class Exports:
     def _drop(self, job: Job) -> None:
         self._jobs.pop(job.id, None)
         if job.path is not None:
-            shutil.rmtree(job.path.parent, ignore_errors=True)  # one file: no time to speak of
+            removing = asyncio.create_task(asyncio.to_thread(shutil.rmtree, job.path.parent, ignore_errors=True))
+            self._removing.add(removing)
+            removing.add_done_callback(self._removing.discard)
 
 
 def _stat(path: Path) -> tuple[int, int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-Progress = Callable[[float], None]  # told now and then, from 0 to 1
+Progress = Callable[[float], None]  # called now and then, with 0 to 1
 
 
 class ExportRefused(RuntimeError):
@@ -20,8 +20,8 @@ class Outcome:
     notes: list[str] = field(
         default_factory=list
     )  # what is not in it, and why, in sentences for a person; empty: whole
-    remarks: list[str] = field(default_factory=list)  # what else is to be known of it; nothing is missing for it
+    notices: list[str] = field(default_factory=list)  # what else is to be known of it; nothing is missing for it
 
 
 def nothing(part: float) -> None:
-    """Progress that nobody wants to hear of."""
+    """Ignore the progress."""

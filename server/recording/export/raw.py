@@ -1,4 +1,4 @@
-"""Messages of a recording as they lie in it, of all its files in the order of time."""
+"""Messages of a recording as bytes, of all its files in the order of time, for copies that decode and judge nothing."""
 
 from __future__ import annotations
 

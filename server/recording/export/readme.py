@@ -1,4 +1,4 @@
-"""README.txt of the tables: what they are, in words, for whoever gets the zip years later."""
+"""README.txt of the tables: their description for later readers of the zip."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from server.recording.export.columns import OWN_TABLES, TABLES
-from server.recording.export.drive import Drive
+from monitor.signals import SIGNALS
+from server.recording.export.columns import OWN_TABLES
+from server.recording.export.decoded_drive import DecodedDrive
 from server.version import catgraph_version
 
 
@@ -19,7 +20,7 @@ class Written:
     rows: int
 
 
-def readme(drive: Drive, tables: Sequence[Written], notes: Sequence[str]) -> str:
+def readme(drive: DecodedDrive, tables: Sequence[Written], notes: Sequence[str]) -> str:
     recording, metadata = drive.recording, drive.recording.metadata
     lines = [
         f"A drive of {metadata.get('vehicle') or 'a car'}, as tables, made by catgraph {catgraph_version()}.",
@@ -31,7 +32,7 @@ def readme(drive: Drive, tables: Sequence[Written], notes: Sequence[str]) -> str
         f"Kind:       {drive.profile.title}, ROS {recording.ros_version}",
         *([f"Ended:      {_ended(metadata)}"] if metadata.get("ended") else []),
         "",
-        "Every table is comma-separated UTF-8 with one line of headings; units stand in brackets.",
+        "Every table is comma-separated UTF-8 with one line of headings; units are in brackets.",
         "  time                            when the message was received, UTC, ISO 8601",
         "  since start [s]                 the same, in seconds since the first message of the recording",
         "  stamp by the car [s since 1970] the message's own stamp, on the car's clock; empty where it has none",
@@ -50,24 +51,24 @@ def readme(drive: Drive, tables: Sequence[Written], notes: Sequence[str]) -> str
     if "alarms.csv" not in {table.name for table in tables}:
         lines += [
             "",
-            "No alarm log was recorded in this file. `catgraph check FILE` tells which alarms it would raise.",
+            "No alarm log was recorded in this file. `catgraph check FILE` lists the alarms that it would raise.",
         ]
     if drive.settings_toml is not None:
         lines += [
             "",
-            "settings.toml: what was judged by when the recording began; each later change is a file of its own.",
+            "settings.toml: the settings in force at the start of the recording; each later change has its own file.",
         ]
     if notes:
-        lines += ["", "Not in the tables, or not whole:", *(f"  - {note}" for note in notes)]
+        lines += ["", "Missing or incomplete in the tables:", *(f"  - {note}" for note in notes)]
     return "\r\n".join(_plain(line) for line in lines) + "\r\n"
 
 
 def _what(name: str) -> str:
     if name == "alarms.csv":
-        return "Every event of the alarm log: raised, acknowledged, cleared, and what monitoring itself did."
-    signal = TABLES.get(name.removesuffix(".csv"))
+        return "Every event of the alarm log: raised, acknowledged, cleared, and events of the monitoring itself."
+    signal = SIGNALS.get(name.removesuffix(".csv"))
     if signal is not None:
-        return signal.what
+        return signal.about
     return next((table.what for table in OWN_TABLES.values() if table.file == name), "")
 
 

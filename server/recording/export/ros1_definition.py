@@ -1,4 +1,4 @@
-"""The md5sum by which ROS 1 knows a message type, reckoned from its definition as genmsg reckons it.
+"""The md5sum of a ROS 1 message type, computed from its definition as genmsg does.
 
 Sources: genmsg's gentools (the text that is hashed: constants first, as written; then fields, nested types by their own
 sum) and the form of full definitions, "gendeps --cat" (each nested type behind a line of = and one of `MSG: pkg/Type`).
@@ -74,7 +74,7 @@ def _constant(kind: str, text: str) -> str:
 
 
 def _full(base: str, inside: str, texts: Mapping[str, str]) -> str:
-    """The whole name of a nested type as it stands in a field."""
+    """The full name of a nested type in a field."""
     if "/" in base:
         return base
     if base == "Header":

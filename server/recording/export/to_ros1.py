@@ -47,7 +47,9 @@ def ros1_form(channel: Channel, source: FileSource) -> Ros1Form:
         case "cdr":
             return _from_cdr(channel, source)
         case "json":
-            raise Undecodable("it was recorded as JSON: its type's definition was not known, or it was not of its type")
+            raise Undecodable(
+                "it was recorded as JSON: its type's definition was unknown, or it did not match its type"
+            )
         case other:
             raise Undecodable(f"messages encoded as {other!r} are not supported")
 
@@ -59,21 +61,21 @@ def _as_it_is(channel: Channel) -> Ros1Form:
         if channel.type not in noetic.fielddefs:
             raise Undecodable(f"the definition of {type} is missing")
         definition = str(noetic.generate_msgdef(channel.type)[0])
-    elif _is_told_by_a_bridge(channel):
+    elif _is_from_bridge(channel):
         definition = str(noetic.generate_msgdef(channel.type)[0])
     return Ros1Form(type=type, definition=definition, md5sum=md5sum(type, definition), convert=_same)
 
 
-def _is_told_by_a_bridge(channel: Channel) -> bool:
-    """Whether a standard type came without its constants: a bridge does not tell them, and the sum needs them."""
+def _is_from_bridge(channel: Channel) -> bool:
+    """Whether a standard type has no constants: a bridge does not send them, and the md5sum needs them."""
     if channel.type not in _noetic().fielddefs or "=" in channel.definition.replace("=" * 80, ""):
         return False
     try:
-        told = _store(dict(get_types_from_msg(bounded(channel.definition), channel.type)))
-        return bool(is_same_wireformat(told, _noetic(), channel.type, channel.type)) and _names(told, channel.type) == (
-            _names(_noetic(), channel.type)
-        )
-    except Exception:  # the parser says what is wrong in many ways: then it stays as it is
+        types = _store(dict(get_types_from_msg(bounded(channel.definition), channel.type)))
+        return bool(is_same_wireformat(types, _noetic(), channel.type, channel.type)) and _names(
+            types, channel.type
+        ) == (_names(_noetic(), channel.type))
+    except Exception:  # the parser raises many exception types: then it stays as it is
         return False
 
 
@@ -90,7 +92,7 @@ def _from_cdr(channel: Channel, source: FileSource) -> Ros1Form:
         there = _ros1_store(type, here)
         definition, sum = there.generate_msgdef(type)
         is_same = is_same_wireformat(here, there, type, type)
-        here.get_msgdef(type), there.get_msgdef(type)  # compiles what is needed, or says that it cannot
+        here.get_msgdef(type), there.get_msgdef(type)  # compiles what is needed, or raises
     except Undecodable:
         raise
     except Exception:  # the generators fail in every way there is on what they do not know

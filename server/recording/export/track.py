@@ -11,11 +11,11 @@ from datetime import UTC, datetime
 from typing import Any
 
 from monitor.values import GpsFix
-from server.recording.export.drive import Drive
+from server.recording.export.decoded_drive import DecodedDrive
 from server.recording.export.outcome import ExportRefused, Progress, nothing
 
-GAP_S = 5.0  # after so long without a position a track begins anew, as on the map
-NEAR_S = 5.0  # an alarm stands where the car was, if it was known within so long
+GAP_S = 5.0  # after this time without a position a new track starts, as on the map
+NEAR_S = 5.0  # an alarm is active where the car was, if it was known within so long
 MOST_PHONES = 50  # a track each
 _RAISED = ("raised", "recaused")
 
@@ -85,26 +85,28 @@ class Tracks:
     phones: dict[str, Track] = field(default_factory=dict)
     alarms: list[Place] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)  # what is not in it
-    remarks: list[str] = field(default_factory=list)
+    notices: list[str] = field(default_factory=list)
 
     @property
     def points(self) -> int:
         return len(self.car.at_s) + sum(len(track.at_s) for track in self.phones.values()) + len(self.alarms)
 
 
-def tracks_of(drive: Drive, progress: Progress = nothing) -> Tracks:
-    """Raises ExportRefused where neither car nor phone told a position, RecordingUnreadable."""
+def tracks_of(drive: DecodedDrive, progress: Progress = nothing) -> Tracks:
+    """Raises ExportRefused where there is no position of car or phone, RecordingUnreadable."""
     recording = drive.recording
     tracks = Tracks(name=f"{recording.metadata.get('vehicle') or 'car'} {when(recording.start_s)}")
-    for said in drive.values({"position"}, progress):
-        fix: GpsFix = said.value
+
+    def add(signal: str, fix: GpsFix, at_s: float, stamp_s: float | None) -> None:
         if fix.status >= 0 and _is_place(fix.lat_deg, fix.lon_deg):
-            tracks.car.add(said.at_s, fix.lat_deg, fix.lon_deg, fix.alt_m)
+            tracks.car.add(at_s, fix.lat_deg, fix.lon_deg, fix.alt_m)
+
+    drive.read(add, signals={"position"}, progress=progress)
     _phones(drive, tracks)
     if not tracks.points:
         raise ExportRefused("No position was recorded in this drive: there is no track to export.")
     if not tracks.car.at_s:
-        tracks.remarks.append("The car told no position: only that of the phone is in the file.")
+        tracks.notices.append("The car published no position: only that of the phone is in the file.")
     _alarms(drive, tracks)
     tracks.notes += drive.losses()
     return tracks
@@ -119,17 +121,17 @@ def when(at_s: float) -> str:
     return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
-def _phones(drive: Drive, tracks: Tracks) -> None:
+def _phones(drive: DecodedDrive, tracks: Tracks) -> None:
     unfit, beyond = 0, set()
-    for at_s, told in drive.recording.own("/catgraph/phone"):
-        fix = told.get("fix")
+    for at_s, entry in drive.recording.own("/catgraph/phone"):
+        fix = entry.get("fix")
         if not isinstance(fix, Mapping):
             continue
         lat_deg, lon_deg = _number(fix.get("lat_deg")), _number(fix.get("lon_deg"))
         if lat_deg is None or lon_deg is None or not _is_place(lat_deg, lon_deg):
             unfit += 1
             continue
-        name = str(told.get("phone") or "phone")[:80]
+        name = str(entry.get("phone") or "phone")[:80]
         if name not in tracks.phones and len(tracks.phones) >= MOST_PHONES:
             beyond.add(name)
             continue
@@ -137,12 +139,12 @@ def _phones(drive: Drive, tracks: Tracks) -> None:
         measured_s = at_s - age_s if 0.0 <= age_s <= 60.0 else at_s
         tracks.phones.setdefault(name, Track()).add(measured_s, lat_deg, lon_deg, _number(fix.get("alt_m")))
     if unfit:
-        tracks.notes.append(f"{unfit} positions of phones are left out: they are no places on the Earth.")
+        tracks.notes.append(f"{unfit} positions of phones are left out: they are not valid coordinates.")
     if beyond:
-        tracks.notes.append(f"{len(beyond)} phones are left out: {MOST_PHONES} are the most.")
+        tracks.notes.append(f"{len(beyond)} phones are left out: {MOST_PHONES} is the limit.")
 
 
-def _alarms(drive: Drive, tracks: Tracks) -> None:
+def _alarms(drive: DecodedDrive, tracks: Tracks) -> None:
     nowhere = 0
     for at_s, event in drive.recording.own("/catgraph/alarms"):
         if event.get("alarm") is None or event.get("change") not in _RAISED:
@@ -163,7 +165,7 @@ def _alarms(drive: Drive, tracks: Tracks) -> None:
         )
     if nowhere:
         what = "1 alarm was" if nowhere == 1 else f"{nowhere} alarms were"
-        tracks.notes.append(f"{what} raised while the car's position was not known, and cannot be drawn.")
+        tracks.notes.append(f"{what} raised while the car's position was unknown, and cannot be drawn.")
 
 
 def _is_place(lat_deg: float, lon_deg: float) -> bool:

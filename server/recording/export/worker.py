@@ -37,13 +37,13 @@ async def run_worker(arguments: Sequence[str], progress: Progress) -> Made:
     where this is cancelled."""
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "server", "export", "--background", *arguments),
-        stdin=asyncio.subprocess.PIPE,  # never written to: its end tells the process that the server has gone
+        stdin=asyncio.subprocess.PIPE,  # never written to: its end signals the end of the server
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,
         cwd=_ROOT,
         limit=_LINE,
     )
-    complaints = asyncio.create_task(_last_words(process))
+    complaints = asyncio.create_task(_last_output(process))
     try:
         answer = await _listen(process, progress)
         await process.wait()
@@ -51,11 +51,11 @@ async def run_worker(arguments: Sequence[str], progress: Progress) -> Made:
         await asyncio.shield(_end(process))
         said = await complaints
     if answer is None:
-        log.error("an export ended with %s: %s", process.returncode, said)
-        raise ExportRefused("The export failed: it ran out of memory or was ended from outside.")
+        log.error("export process ended: status=%s error=%s", process.returncode, said)
+        raise ExportRefused("The export failed: it ran out of memory or was killed.")
     if "refused" in answer:
         if said:
-            log.error("an export failed: %s", said)
+            log.error("export failed: %s", said)
         raise ExportRefused(str(answer["refused"]))
     return Made(
         path=Path(answer["done"]),
@@ -66,20 +66,20 @@ async def run_worker(arguments: Sequence[str], progress: Progress) -> Made:
 
 
 async def _listen(process: asyncio.subprocess.Process, progress: Progress) -> dict[str, Any] | None:
-    """Its last word; None where it ended without one."""
+    """The last message of the process; None: it ended without one."""
     assert process.stdout is not None
     last: dict[str, Any] | None = None
     async for line in process.stdout:
         with contextlib.suppress(orjson.JSONDecodeError, KeyError, TypeError):
-            told = orjson.loads(line)
-            if "progress" in told:
-                progress(float(told["progress"]))
-            elif "done" in told or "refused" in told:
-                last = told
+            message = orjson.loads(line)
+            if "progress" in message:
+                progress(float(message["progress"]))
+            elif "done" in message or "refused" in message:
+                last = message
     return last
 
 
-async def _last_words(process: asyncio.subprocess.Process) -> str:
+async def _last_output(process: asyncio.subprocess.Process) -> str:
     """The end of what it complained of."""
     assert process.stderr is not None
     said = b""

@@ -1,4 +1,4 @@
-"""The index of a file's chunks, read from the file when it is asked for instead of kept in memory.
+"""The index of a file's chunks, read from the file when needed instead of kept in memory.
 
 A recording has five chunks a second and an index entry of some kilobyte each: kept as objects until the end they would
 take some 20 MB for each hour.
@@ -33,7 +33,7 @@ class ChunkIndexes:
         self._count = 0
 
     def append(self, index: ChunkIndex) -> None:
-        """Counts it: all that it says can be read from the file."""
+        """Count the entry; its content can be read from the file."""
         self._count += 1
 
     def __len__(self) -> int:

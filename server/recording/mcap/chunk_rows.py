@@ -25,7 +25,7 @@ ChunkRow = tuple[int, int, bytes]  # ns, channel, message
 
 
 class Part(Protocol):
-    """What an index says of a chunk."""
+    """A chunk's entry in the index."""
 
     @property
     def message_start_time(self) -> int: ...  # ns
@@ -54,8 +54,8 @@ def in_order(parts: Iterable[P], read: Callable[[P], list[ChunkRow]]) -> Iterato
 
 
 def read_chunk(file: IO[bytes], at: int) -> Chunk:
-    """The chunk whose record begins at a place in the file. What it says of lengths is not believed: none reserves
-    memory. Damage makes the reader fail in every way there is."""
+    """The chunk whose record starts at an offset of the file. Its declared lengths are not trusted and reserve no
+    memory. Damage can raise any exception."""
     left = file.seek(0, os.SEEK_END) - at - HEAD_BYTES
     file.seek(at)
     length = int.from_bytes(file.read(HEAD_BYTES)[1:], "little")

@@ -26,7 +26,7 @@ class WholeChunk:
     """A chunk that its checksum vouches for, and what is in it."""
 
     at: int  # its place in the file
-    raw: bytes  # the record, as it stands there
+    raw: bytes  # the record, unchanged
     record: Chunk
     schemas: list[Schema] = field(default_factory=list)
     channels: list[Channel] = field(default_factory=list)
@@ -39,7 +39,7 @@ class WholeChunk:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BadChunk:
-    """One that is not what its checksum says."""
+    """A chunk with a wrong checksum."""
 
     at: int
     size: int

@@ -20,7 +20,7 @@ _FORMATS: dict[str, DefinitionFormat] = {"ros1msg": "msg", "ros2msg": "msg", "ro
 
 
 def is_bag2(path: Path) -> bool:
-    """Whether a recorder of ROS 2 wrote it, whose files rosbags reads with all they say of themselves."""
+    """Whether a ROS 2 recorder wrote the file, which rosbags reads with its metadata."""
     with path.open("rb") as file:
         header = make_reader(cast("IO[bytes]", file)).get_header()
         return header.profile == "ros2" and not header.library.startswith(LIBRARY)
@@ -35,7 +35,7 @@ class Index:
     counts: Mapping[int, int]  # of messages by channel
     parts: Sequence[ChunkIndex]
     span_ns: tuple[int, int] | None = None  # first and last message; None: that of the parts
-    metadata: Mapping[str, str] = field(default_factory=dict)  # what catgraph says of its own recording
+    metadata: Mapping[str, str] = field(default_factory=dict)  # metadata of catgraph's own recording
     profile: str = ""
 
 
@@ -122,14 +122,14 @@ def _share_channels(parts: Sequence[ChunkIndex]) -> None:
 
 
 def _matters(part: ChunkIndex, numbers: set[int], start_ns: int) -> bool:
-    """Whether any wanted message may be in a part; where its index does not say which channels it has, it may."""
+    """Whether a part may contain a wanted message; without its channels in the index it may."""
     return part.message_end_time >= start_ns and (
         not part.message_index_offsets or not numbers.isdisjoint(part.message_index_offsets)
     )
 
 
 def latest(records: Iterable[Metadata]) -> dict[str, str]:
-    """What the last record of ours says: the first was written at the beginning, one more when the file was closed."""
+    """Our last metadata record: one is written at the start, one more when the file is closed."""
     found: dict[str, str] = {}
     for record in records:
         if record.name == METADATA:

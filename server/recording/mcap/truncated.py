@@ -29,7 +29,7 @@ def is_cut(path: Path) -> bool:
 
 
 class CutMcapFile(McapFile):
-    """An MCAP file without its index, which is made anew from the chunks that are whole."""
+    """An MCAP file without its index, which is rebuilt from the whole chunks."""
 
     is_cut = True
 
@@ -59,7 +59,7 @@ class CutMcapFile(McapFile):
             at += _HEAD_BYTES + length
         if not parts:
             raise RecordingUnreadable(f"{self.path} is not complete: it ends too early")
-        if not channels:  # no part tells what its messages are
+        if not channels:  # no part has the definitions of its messages
             raise RecordingUnreadable(f"{self.path} is not complete, and none of its {len(parts)} parts can be read")
         return Index(
             schemas=schemas, channels=channels, counts=counts, parts=parts, metadata=latest(notes), profile=profile
@@ -71,7 +71,7 @@ class CutMcapFile(McapFile):
         """The index of one chunk; what it declares and holds is noted. None where it holds no message."""
         try:
             chunk = Chunk.read(ReadDataStream(self._file))
-        except Exception:  # damaged besides, and nothing can be told of it
+        except Exception:  # also damaged, with unknown content
             return None
         part = ChunkIndex(
             chunk_length=_HEAD_BYTES + length,

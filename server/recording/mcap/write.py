@@ -166,7 +166,7 @@ class _Stream:
         return self._size
 
     def flush(self) -> None:
-        """Not yet: the library asks for it in the middle of things."""
+        """Do nothing yet: the library calls it during other work."""
 
     def drain(self) -> None:
         """Writes all that waits, or none of it."""
@@ -184,7 +184,7 @@ class _Stream:
 
 
 def make_folder(folder: Path) -> None:
-    """Makes it and what it stands in, and has the disk know each. Raises OSError."""
+    """Create the folder with its parents, and sync each. Raises OSError."""
     missing = [each for each in (folder, *folder.parents) if not each.exists()]
     for each in reversed(missing):
         each.mkdir(exist_ok=True)

@@ -69,7 +69,7 @@ def compile_decoder(type: str, definitions: dict[str, Any], version: RosVersion)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Layout:
-    """How bytes lie: packed in ROS 1, aligned in CDR."""
+    """The byte layout: packed in ROS 1, aligned in CDR."""
 
     ros1: bool
     order: str  # "<" or ">"

@@ -34,7 +34,7 @@ def demand_few_fields(type: str, definitions: Mapping[str, Any]) -> None:
 
     def count(name: str, depth: int) -> int:
         if name not in known:
-            known[name] = 1  # where it contains itself, whoever writes it out says so
+            known[name] = 1  # recursion is reported by the code generator
             fields = definitions[name][1] if name in definitions and depth < 100 else ()
             known[name] = 1 + sum(count(inner, depth + 1) if (inner := _inner(what)) else 1 for _, what in fields)
         return known[name]

@@ -30,7 +30,7 @@ def definitions_of(channel: Channel, version: RosVersion, distro: str | None) ->
                 found.update(get_types_from_idl(text))
     except Undecodable:
         raise
-    except Exception:  # the parsers say what is wrong in many ways
+    except Exception:  # the parsers raise many exception types
         raise Undecodable(f"the definition of {channel.type} cannot be understood") from None
     return found
 

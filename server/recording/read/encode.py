@@ -52,24 +52,24 @@ _MISTAKES = (struct.error, ValueError, TypeError, KeyError, OverflowError, Attri
 _Kind = tuple[str, np.dtype[Any], str]  # typecode of array, dtype of numpy, name
 
 
-class Misfit(Exception):
+class TypeMismatch(Exception):
     """A message that is not of its type: a field too many or too few, or a value of another kind."""
 
 
 def compile_encoder(type: str, definitions: dict[str, Any], version: RosVersion) -> Encode:
     """The function that writes messages of a type ("geometry_msgs/msg/Twist" in both versions, as rosbags spells it).
 
-    It takes what decode.py gives and what a bridge sends: null among floats is NaN (JSON has no other word for it),
+    It takes the output of decode.py and of a bridge: null among floats is NaN (JSON has no other form),
     uint8[] may be base64, bytes or a list. Raises Undecodable here where the type is not known or not supported, and
-    Misfit from the function.
+    TypeMismatch from the function.
     """
     demand_few_fields(type, definitions)
     writer = _Writer(definitions, ros1=version == 1)
     writer.message(type, "m", 0)
     writer.flush()
     lines = ["def encode(m):", f" out = bytearray({b'' if version == 1 else _CDR_HEADER!r})", " try:", *writer.lines]
-    lines += [" except mistakes as why:", "  raise Misfit(str(why)) from None", " return bytes(out)"]
-    names: dict[str, Any] = {"Misfit": Misfit, "mistakes": _MISTAKES} | _ROAD | writer.constants
+    lines += [" except mistakes as why:", "  raise TypeMismatch(str(why)) from None", " return bytes(out)"]
+    names: dict[str, Any] = {"TypeMismatch": TypeMismatch, "mistakes": _MISTAKES} | _ROAD | writer.constants
     exec(compile("\n".join(lines), f"<encoder of {type}>", "exec"), names)
     encode: Encode = names["encode"]
     return encode
@@ -231,7 +231,7 @@ class _Writer:
         return found
 
     def _check(self, condition: str) -> None:
-        self._write(f"if {condition}: raise Misfit('it does not fit its type')")
+        self._write(f"if {condition}: raise TypeMismatch('it does not fit its type')")
 
     def _constant(self, value: Any) -> str:
         name = f"c{len(self.constants)}"
@@ -259,7 +259,7 @@ def _floats(given: Any, kind: _Kind) -> bytes:
             return bytes(given.tobytes())
         given = given.tolist()
     elif given.__class__ is not list:
-        raise Misfit("no list of numbers")
+        raise TypeMismatch("not a list of numbers")
     try:
         return array(code, given).tobytes()
     except TypeError:
@@ -271,7 +271,7 @@ def _one_float(given: Any) -> float:
     if given is None:
         return _NAN
     if given.__class__ is not int:
-        raise Misfit("no number")
+        raise TypeMismatch("no number")
     return float(given)
 
 
@@ -285,12 +285,12 @@ def _numbers(given: Any, kind: _Kind) -> bytes:
     elif given.__class__ is bytes and dtype.itemsize == 1:
         return bytes(given)
     elif given.__class__ is not list:
-        raise Misfit("no list of numbers")
+        raise TypeMismatch("not a list of numbers")
     if primitive == "bool":
         if any(one not in (False, True) for one in given):
-            raise Misfit("no list of truth values")
+            raise TypeMismatch("not a list of booleans")
     elif any(one.__class__ is bool for one in given):
-        raise Misfit("a truth value among numbers")
+        raise TypeMismatch("a boolean among numbers")
     if primitive == "byte":
         given = [_one_byte(one) for one in given]
     return array(code, given).tobytes()
@@ -309,7 +309,7 @@ def _base64(text: str) -> bytes:
     try:
         return base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError):
-        raise Misfit("no base64") from None
+        raise TypeMismatch("no base64") from None
 
 
 def _one_byte(given: Any) -> int:
@@ -322,7 +322,7 @@ def _one_byte(given: Any) -> int:
     if given.__class__ is bytes and len(given) == 1:
         given = given[0]
     if given.__class__ is not int or not -128 <= given <= 255:
-        raise Misfit("no byte")
+        raise TypeMismatch("no byte")
     return int(given - 256 if given > 127 else given)
 
 

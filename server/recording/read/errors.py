@@ -8,4 +8,4 @@ class RecordingUnreadable(Exception):
 
 
 class Undecodable(Exception):
-    """One message, or all messages of one type, cannot be understood. The text says why."""
+    """One message, or all messages of a type, cannot be decoded. The text has the reason."""

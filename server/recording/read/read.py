@@ -39,7 +39,7 @@ class TopicInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Road:
+class _ChannelReader:
     """How messages of one channel become ours."""
 
     topic: str
@@ -47,17 +47,17 @@ class _Road:
     decode: Decode
 
 
-Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, what it says
+Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, content
 
 
 def open_recording(paths: Sequence[Path]) -> Recording:
-    """Opens one drive that lies in one or several files, of ROS 1 or of ROS 2.
+    """Open one drive of one or several files, of ROS 1 or ROS 2.
 
     A path is a ROS 1 bag, a ROS 2 bag directory, a single .mcap or .db3 file, or a directory with such files in it.
     Raises RecordingUnreadable with one sentence that names the file.
     """
     if not paths:
-        raise RecordingUnreadable("no recording was named")
+        raise RecordingUnreadable("no recording was given")
     sources: list[FileSource] = []
     try:
         for path in paths:
@@ -85,10 +85,10 @@ class Recording:
         )
         self.rejected: dict[str, int] = {}  # messages by topic that could not be decoded while reading
         self.why_rejected: dict[str, str] = {}
-        self._roads: list[dict[int, _Road]] = []
+        self._readers: list[dict[int, _ChannelReader]] = []
         decoders: dict[tuple[str, str, str], Decode] = {}
         for source in sources:
-            self._roads.append(self._roads_of(source, decoders))
+            self._readers.append(self._readers_of(source, decoders))
         filled = [source for source in sources if any(channel.count for channel in source.channels)]
         self._start_ns = min((source.start_ns for source in filled), default=0)
         end_ns = max((source.end_ns for source in filled), default=self._start_ns)
@@ -106,7 +106,7 @@ class Recording:
 
     @property
     def files(self) -> Sequence[FileSource]:
-        """What it lies in, for whoever copies messages as they are."""
+        """The source files, for copying messages unchanged."""
         return self._sources
 
     @property
@@ -115,24 +115,24 @@ class Recording:
         return sum(topic.count for topic in self.topics.values())
 
     def messages(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Message]:
-        """All messages in time order, from `start_s` after the beginning on, read as they are asked for; see `rows`."""
+        """All messages in time order, from `start_s` after the start, read lazily; see `rows`."""
         return (
             Message(at_s=at_s, topic=topic, type=type, message=message)
             for at_s, topic, type, message in self.rows(start_s, topics)
         )
 
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
-        """As `messages`, for whoever takes them apart at once: time, topic, type, and what it says.
+        """Like `messages`, as tuples: time, topic, type, content.
 
-        Where `topics` are given, those of other topics come too, but empty: unpacking is most of the work. What cannot
+        With `topics`, messages of other topics are empty, because decoding is most of the work. What cannot
         be decoded is left out and counted in `rejected`, what is damaged is left out where the rest can be told from
         it, and named in `damage`. Raises RecordingUnreadable where it cannot, or nothing is whole.
         """
         start_ns = self._start_ns + round(start_s * 1e9)
         streams = [
-            self._read(source, roads, start_ns, topics)
-            for source, roads in zip(self._sources, self._roads, strict=True)
-            if roads
+            self._read(source, readers, start_ns, topics)
+            for source, readers in zip(self._sources, self._readers, strict=True)
+            if readers
         ]
         return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=operator.itemgetter(0))
 
@@ -160,8 +160,10 @@ class Recording:
     ) -> None:
         self.close()
 
-    def _roads_of(self, source: FileSource, decoders: dict[tuple[str, str, str], Decode]) -> dict[int, _Road]:
-        roads: dict[int, _Road] = {}
+    def _readers_of(
+        self, source: FileSource, decoders: dict[tuple[str, str, str], Decode]
+    ) -> dict[int, _ChannelReader]:
+        readers: dict[int, _ChannelReader] = {}
         for channel in source.channels:
             if channel.topic.startswith(PREFIX) and channel.encoding == "json":
                 continue
@@ -177,24 +179,24 @@ class Recording:
                 if channel.count:
                     self.notes.append(f"{channel.topic} ({channel.count} messages) is left out: {why}")
                 continue
-            roads[channel.number] = _Road(topic=channel.topic, type=type, decode=decoders[key])
+            readers[channel.number] = _ChannelReader(topic=channel.topic, type=type, decode=decoders[key])
             self.topics[channel.topic] = TopicInfo(
                 type=type,
                 count=channel.count + (known.count if known else 0),
                 definition=_definition_of(channel) or (known.definition if known else None),
                 is_latched=channel.is_latched or (known is not None and known.is_latched),
             )
-        return roads
+        return readers
 
     def _read(
-        self, source: FileSource, roads: dict[int, _Road], start_ns: int, topics: Collection[str] | None
+        self, source: FileSource, readers: dict[int, _ChannelReader], start_ns: int, topics: Collection[str] | None
     ) -> Iterator[Row]:
         ways = {
             number: (road.topic, road.type, road.decode if topics is None or road.topic in topics else _nothing)
-            for number, road in roads.items()
+            for number, road in readers.items()
         }
         try:
-            for time_ns, number, raw in source.messages(set(roads), start_ns):
+            for time_ns, number, raw in source.messages(set(readers), start_ns):
                 topic, type, decode = ways[number]
                 try:
                     message = decode(raw)
@@ -235,7 +237,7 @@ def _open(path: Path, kind: Kind) -> FileSource:
         raise RecordingUnreadable(_what_is_wrong(path, error)) from None
 
 
-# How the readers of others say that the end of a file, and so its index, is missing.
+# Messages of other readers for a missing end of a file, and thus a missing index.
 _ENDS_EARLY = (
     "File end magic is invalid",
     "Header could not be read from file",

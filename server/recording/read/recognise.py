@@ -1,4 +1,4 @@
-"""Tells by a file's first bytes what it is, and says in words what it is when it is no recording."""
+"""Recognizes a file by its first bytes, and describes it if it is not a recording."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _OTHERS = {
 
 
 def recognise(path: Path) -> list[tuple[Path, Kind]]:
-    """The recordings that a path stands for: itself, or what a directory without metadata holds.
+    """The recordings of a path: itself, or the content of a directory without metadata.
 
     Raises RecordingUnreadable where there are none.
     """
@@ -58,7 +58,7 @@ def recognise(path: Path) -> list[tuple[Path, Kind]]:
 
 def _kind(path: Path) -> Kind:
     if not path.is_file():  # a pipe would make us wait for ever
-        raise RecordingUnreadable(f"{path} is no ordinary file")
+        raise RecordingUnreadable(f"{path} is not a regular file")
     try:
         with path.open("rb") as file:
             start = file.read(512)
@@ -71,7 +71,7 @@ def _kind(path: Path) -> Kind:
     for magic, kind in _RECORDINGS.items():
         if start.startswith(magic):
             return kind
-    raise RecordingUnreadable(f"{path} is no recording: it is {_in_words(start)}")
+    raise RecordingUnreadable(f"{path} is not a recording: it is {_in_words(start)}")
 
 
 def _in_words(start: bytes) -> str:

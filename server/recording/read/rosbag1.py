@@ -35,7 +35,7 @@ _Entry = tuple[int, int, int, int]  # of an index: ns, chunk, place in it, conne
 
 
 class _Packed(NamedTuple):
-    """One chunk, and what its header says."""
+    """One chunk and its header."""
 
     datasize: int
     datapos: int
@@ -108,7 +108,7 @@ class Bag1:
         self._chunk_bytes = 0
         self._ahead = ThreadPoolExecutor(1, "bag")
         self._coming: dict[int, Future[bytes]] = {}  # at most one
-        self._reader = _Reader(path, self._begin_unpacking)  # whoever opens a bag reads it, as a rule from there
+        self._reader = _Reader(path, self._begin_unpacking)  # a bag is usually read from its start after opening
         try:
             self._reader.open()
         except BaseException:
@@ -150,7 +150,9 @@ class Bag1:
         header, file = self._reader.chunks[position], cast("BinaryIO", self._reader.bio)
         try:
             file.seek(header.datapos)
-            packed = file.read(min(header.datasize, os.fstat(file.fileno()).st_size))  # not what it says: it reserves
+            packed = file.read(
+                min(header.datasize, os.fstat(file.fileno()).st_size)
+            )  # not the declared size, which would reserve memory
         except (OSError, MemoryError) as error:
             failed: Future[bytes] = Future()
             failed.set_exception(error)
@@ -170,7 +172,7 @@ class Bag1:
             chunk = future.result()
         except PartTooLarge as why:
             raise RecordingUnreadable(f"{self.path.name} cannot be read: of a part of it, {why}") from None
-        except (OSError, EOFError, ValueError, RuntimeError, MemoryError):  # what bz2, lz4 and the disk may say
+        except (OSError, EOFError, ValueError, RuntimeError, MemoryError):  # exceptions of bz2, lz4 and the disk
             raise RecordingUnreadable(f"{self.path.name} is damaged: a part of it cannot be unpacked") from None
         self._chunks[position] = chunk
         self._chunk_bytes += len(chunk)

@@ -126,7 +126,7 @@ class Bag2:
 
 
 def _assert_whole(path: Path) -> None:
-    """SQLite reads what is missing at the end of a database as zeros. Its header says how long it should be."""
+    """Check the length in the header, because SQLite reads a missing end of a database as zeros."""
     with path.open("rb") as file:
         header = file.read(100)
     page_bytes = int.from_bytes(header[16:18], "big")

@@ -1,4 +1,4 @@
-"""Bounds what the rosbags library takes for a file that somebody sent.
+"""Bounds the rosbags library for files from elsewhere.
 
 The library unpacks whatever it is given, and reads YAML whose references can multiply without end. It has no options
 for either, so its own functions are replaced here. What a bag of ROS 2 says of quality of service and cannot be read
@@ -30,7 +30,7 @@ MOST_QOS = 64 << 10  # letters of the quality of service of one topic
 DEEPEST = 30
 MOST_ENTRIES = 100_000
 LEAVE_FREE = 1 << 30  # bytes of the disk with the temporary files
-_LOOK_EVERY = 32 << 20  # bytes unpacked between two looks at the disk
+_LOOK_EVERY = 32 << 20  # bytes unpacked between two checks of the disk
 
 
 def install() -> None:
@@ -70,7 +70,7 @@ def _why_not_plain(text: str) -> str | None:
     except RecursionError:
         return "it is nested too deeply"
     except (YAMLError, ValueError):
-        return None  # it is no YAML: the library says what is wrong
+        return None  # it is not YAML: the library raises
     return None
 
 

@@ -56,7 +56,7 @@ class TypeBook:
                 self._known.pop(long_type(type), None)
 
     def schema(self, type: str | None) -> Schema | None:
-        """How messages of a type are written as ROS writes them; None where nobody knows its definition."""
+        """The schema for messages of a type in ROS encoding; None if its definition is unknown."""
         if not type:
             return None
         long = long_type(type)
@@ -65,7 +65,7 @@ class TypeBook:
         return self._known[long]
 
     def loose(self, type: str | None) -> Schema:
-        """The same as JSON: for a type nobody knows, and for messages that are not of their type."""
+        """The same as JSON: for unknown types, and for messages that do not match their type."""
         return Schema(
             name=self._spelled(long_type(type)) if type else "",
             encoding="jsonschema",
@@ -79,7 +79,7 @@ class TypeBook:
         if text is not None:
             try:
                 return self._made(type, *self._completed(text, dict(get_types_from_msg(bounded(text), type))))
-            except Exception:  # the parser says what is wrong in many ways; the distribution may still know it
+            except Exception:  # the parser raises many exception types; the distribution may still know it
                 pass
         try:
             text = str(self._store.generate_msgdef(type, ros_version=self.version)[0])

@@ -35,7 +35,7 @@ class Damage:
     lost: list[tuple[int, int]] = field(default_factory=list)  # first and last ns of each damaged one, by its index
 
     too_large: int = 0  # of the lost ones: larger, unpacked, than may be read
-    is_cut: bool = False  # its end is missing besides, nobody knows how much
+    is_cut: bool = False  # its end is missing too, of unknown length
 
     def leave_out(self, start_ns: int, end_ns: int, why: Exception) -> None:
         """One part cannot be read."""

@@ -12,18 +12,18 @@ import zstandard
 from server.system.memory_limit import free_bytes
 
 MOST_BYTES = 1 << 30  # of one part, unpacked; recorders write 1 MB, and one message is hardly ever larger than 100 MB
-UNASKED_BYTES = 16 << 20  # up to so much, the machine is not asked for its free memory
+UNASKED_BYTES = 16 << 20  # below this size the free memory is not checked
 FREE_PART = 0.25  # of the free memory, for one part
 
 
 class PartTooLarge(Exception):
-    """A part would take more memory, unpacked, than is allowed; `str()` says how much is, without a file's name."""
+    """An unpacked part would exceed the memory limit; `str()` has the limit, without a file name."""
 
 
 def unpack(compression: str, packed: bytes, size: int, most: int = MOST_BYTES) -> bytes:
-    """What is packed in a part that says it holds `size` bytes.
+    """Unpack a part with a declared size of `size` bytes.
 
-    Raises PartTooLarge where it says or holds too many, and ValueError, RuntimeError, EOFError, OSError or
+    Raises PartTooLarge if it declares or holds too many, and ValueError, RuntimeError, EOFError, OSError or
     zstandard.ZstdError where it is damaged or is not of its size. `compression`: "", "none", "bz2", "lz4" or "zstd".
     """
     allowed = allowed_bytes(most) if size > UNASKED_BYTES else most
@@ -76,7 +76,7 @@ def too_large(allowed: int) -> PartTooLarge:
 
 
 def _streamed(unpacker: Any, packed: bytes, size: int) -> bytes:
-    """At most one byte more than it says."""
+    """Unpack at most one byte more than declared."""
     data = bytes(unpacker.decompress(packed, size + 1))
     if len(data) == size and not unpacker.eof:  # its end mark may not have been read yet
         data += unpacker.decompress(b"", 1)
@@ -86,7 +86,7 @@ def _streamed(unpacker: Any, packed: bytes, size: int) -> bytes:
 
 
 def _zstd(packed: bytes, size: int) -> bytes:
-    told = zstandard.frame_content_size(packed)
-    if told >= 0 and told != size:  # what a frame says is reserved before anything is unpacked
+    declared = zstandard.frame_content_size(packed)
+    if declared >= 0 and declared != size:  # the declared size is reserved before unpacking
         raise ValueError("another size than it says")
     return zstandard.ZstdDecompressor().decompress(packed, max_output_size=max(1, size))

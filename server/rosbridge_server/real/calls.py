@@ -12,7 +12,7 @@ from rosbags.typesys import get_types_from_msg
 from server.judge.ros_names import BadName
 from server.rosbridge_server.completion import zero
 from server.rosbridge_server.interface import ServiceHost
-from server.rosbridge_server.real.convert import Converter, Poison, Unfit
+from server.rosbridge_server.real.convert import Converter, Unfit, UnpackableMessage
 from server.rosbridge_server.real.shape import fields
 from server.rosbridge_server.services import Service
 
@@ -21,7 +21,7 @@ _RCL = "at /project/src/rcl/expand_topic_name.c:73"
 
 
 class Failure(Exception):
-    """The call fails; the text goes to the caller."""
+    """The call fails; the text is sent to the caller."""
 
 
 class NoAnswer(Exception):
@@ -85,6 +85,6 @@ def _request(bridge: ServiceHost, service: Service, args: Any) -> dict[str, Any]
     converter = Converter(long, definitions, bridge.ros_version, bridge.now, root=f"{package}/{kind}{suffix}")
     try:
         found = converter.message(given)
-    except (Unfit, Poison) as error:
+    except (Unfit, UnpackableMessage) as error:
         raise Failure(str(error)) from None
     return {field.name: found.get(field.name, zero(field.type)) for field in fields(long, definitions)}

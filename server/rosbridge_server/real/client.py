@@ -19,14 +19,14 @@ from server.rosbridge_server.real import text as writing
 from server.rosbridge_server.real.calls import Failure, NoAnswer, call
 from server.rosbridge_server.real.client_topics import ClientTopics
 from server.rosbridge_server.real.fragments import RealFragments
-from server.rosbridge_server.real.intake import Deaf, Intake
+from server.rosbridge_server.real.intake import Intake, ReaderEnded
 from server.rosbridge_server.real.operation_fields import CALL, check
 from server.rosbridge_server.real.options import is_open
 from server.rosbridge_server.real.provider import Providers
 from server.rosbridge_server.real.shape import Lost
 
 BACKLOG_BYTES = 64_000_000
-DEFAULT_BYTES = 10_000_000  # ROS 2: the longest frame that comes in, and that goes out in one piece
+DEFAULT_BYTES = 10_000_000  # ROS 2: the longest incoming frame, and the longest outgoing one in one piece
 _log = logging.getLogger("catgraph.bridge.real")
 
 
@@ -73,7 +73,7 @@ class RealClient:
         return self._outbox.is_empty and self._connection.is_drained
 
     async def run(self) -> None:
-        """Serves the client until it goes."""
+        """Serve the client until it disconnects."""
         try:
             while True:
                 raw = await self._connection.recv()
@@ -86,7 +86,7 @@ class RealClient:
             self.leave()
 
     def take(self, raw: str | bytes) -> bool:
-        """Does what a frame asks for; False where it is too long."""
+        """Execute a frame; False if it is too long."""
         limit = self._bridge.real.max_message_bytes or DEFAULT_BYTES
         if self._bridge.ros_version == 2 and len(raw if isinstance(raw, bytes) else raw.encode()) > limit:
             return False
@@ -105,7 +105,7 @@ class RealClient:
         return True
 
     def incoming(self, text: str) -> None:
-        """Does what the text asks for, as far as it is whole."""
+        """Execute the complete operations of the text."""
         if self._is_deaf:
             return
         if self._blocking is not None:
@@ -117,8 +117,8 @@ class RealClient:
                 operation = self._intake.next()
                 if operation is None or not self._do(operation) or not self._intake.has_more():
                     return
-        except Deaf as why:
-            _log.debug("a client is deaf now: %s", why)
+        except ReaderEnded as why:
+            _log.debug("client stopped receiving: error=%s", why)
             self._is_deaf = True
 
     def send(self, message: Any) -> None:
@@ -154,20 +154,20 @@ class RealClient:
         self._outbox.send(self._lane, text_frame(text.encode("utf-8", "surrogatepass")))
 
     def _do(self, operation: dict[str, Any]) -> bool:
-        """Does one operation; False where the real bridge stops reading what stands behind it. Raises Deaf."""
+        """Execute one operation; False if the real bridge stops reading the rest. Raises ReaderEnded."""
         op = operation.get("op")
         if isinstance(op, dict | list):
-            raise Deaf(f"unhashable type: {type(op).__name__!r}")
+            raise ReaderEnded(f"unhashable type: {type(op).__name__!r}")
         handler = self._operations.get(op) if isinstance(op, str) else None
         if handler is None:
             return False
         if "fragment_size" in operation:
             self._fragment_size = operation["fragment_size"]
         if "png" in operation and "msg" not in operation:
-            raise Deaf("'msg'")
+            raise ReaderEnded("'msg'")
         try:
             handler(operation, operation.get("id"))
-        except Exception as why:  # the real bridge writes it to its log and tells nobody
+        except Exception as why:  # the real bridge only logs it
             _log.debug("%s: %s", op, why)
         return True
 

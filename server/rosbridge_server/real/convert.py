@@ -22,7 +22,7 @@ class Unfit(Exception):
     """The message is not of its type: the real bridge drops it. The text is the real one."""
 
 
-class Poison(Exception):
+class UnpackableMessage(Exception):
     """The message is of its type and cannot be packed: in ROS 1 this ends its topic."""
 
 
@@ -39,7 +39,7 @@ class Converter:
         self._root = root or shown(type, version)
 
     def message(self, given: Any) -> dict[str, Any]:
-        """The whole message. Raises Unfit and, in ROS 1, Poison."""
+        """The whole message. Raises Unfit and, in ROS 1, UnpackableMessage."""
         message = self._object(self._type, given, ())
         return message
 
@@ -109,7 +109,7 @@ class Converter:
                 with np.errstate(over="ignore"):
                     short = float(np.float32(value))
                 if self._version == 1 and math.isinf(short) and not math.isinf(value):
-                    raise Poison("float too large to pack with f format")
+                    raise UnpackableMessage("float too large to pack with f format")
                 return short
             return value
         return given if field.type == "bool" else self._integer(field, given, is_alone=is_alone)
@@ -120,7 +120,7 @@ class Converter:
         if isinstance(given, int) and int(limits.min) <= given <= int(limits.max):
             return int(given)
         if self._version == 1:
-            raise Poison(f"{field.name} does not fit into {field.type}")
+            raise UnpackableMessage(f"{field.name} does not fit into {field.type}")
         if not isinstance(given, int) or not -(2**63) <= given < (2**64 if code.kind == "u" else 2**63):
             raise Unfit(f"{field.name} does not fit into {field.type}")
         if code.kind == "u" and given < 0:
@@ -203,7 +203,7 @@ class Converter:
         return zero(field.type)
 
     def _unpackable(self, text: str) -> Exception:
-        return Poison(text) if self._version == 1 else Unfit(text)
+        return UnpackableMessage(text) if self._version == 1 else Unfit(text)
 
     def _mismatch(self, expected: str, path: tuple[str, ...], given: Any) -> Unfit:
         if expected == self._root:
@@ -216,7 +216,7 @@ def _float(value: Any) -> float:
     try:
         return float(value)
     except OverflowError:
-        raise Poison("int too large to convert to float") from None
+        raise UnpackableMessage("int too large to convert to float") from None
 
 
 def _split(at_s: float) -> dict[str, int]:

@@ -8,7 +8,7 @@ from typing import Any
 MOST_TRIES = 20_000  # pairs of brackets; the real bridge has no limit and tries for minutes
 
 
-class Deaf(Exception):
+class ReaderEnded(Exception):
     """The real bridge's reading thread has ended: this connection does nothing more."""
 
 
@@ -23,7 +23,7 @@ class Intake:
         self._buffer += text
 
     def next(self) -> dict[str, Any] | None:
-        """The operation that stands in the buffer, empty where it is JSON without an op. Raises Deaf."""
+        """The operation in the buffer, empty if it is JSON without an op. Raises ReaderEnded."""
         try:
             found = json.loads(self._buffer)
             self._buffer = ""
@@ -33,17 +33,17 @@ class Intake:
             return found
         if isinstance(found, list | str) and "id" not in found and "op" not in found:
             return {}
-        raise Deaf(f"a {type(found).__name__} is no operation")
+        raise ReaderEnded(f"a {type(found).__name__} is no operation")
 
     def has_more(self) -> bool:
-        """Is there something left to look at after an operation?"""
+        """Whether data is left after an operation."""
         if not self._buffer or self._before == self._buffer:
             return False
         self._before = self._buffer
         return True
 
     def _search(self) -> Any:
-        """The first object with an op, from any opening to any closing bracket; what lies before it is dropped."""
+        """The first object with an op, from any opening to any closing bracket; data before it is dropped."""
         closings = [at for at, letter in enumerate(self._buffer) if letter == "}"]
         tries = 0
         found: Any = None

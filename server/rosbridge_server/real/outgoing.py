@@ -17,7 +17,7 @@ from server.rosbridge_server.real.values import Values
 
 
 class RealOutgoing(Outgoing):
-    """`type` is the publisher's; a type that nobody defined is written as it stands."""
+    """`type` is the publisher's; an undefined type is written unchanged."""
 
     __slots__ = ("_bridge", "_forms", "type")
 
@@ -28,7 +28,7 @@ class RealOutgoing(Outgoing):
         self._forms: dict[str, Any] = {}
 
     def json_values(self) -> Any:
-        """What goes into `msg` of a JSON frame. Raises Lost."""
+        """The `msg` of a JSON frame. Raises Lost."""
         return self._form("json")
 
     def cbor_frame(self, topic: str) -> bytes:

@@ -8,7 +8,7 @@ from typing import Any
 from server.judge.ros_names import canonical_name
 from server.rosbridge_server.graph import Topic
 from server.rosbridge_server.interface import TopicHost
-from server.rosbridge_server.real.convert import Converter, Poison
+from server.rosbridge_server.real.convert import Converter, UnpackableMessage
 from server.rosbridge_server.real.loader import load
 from server.rosbridge_server.real.subscribers import Conflict
 
@@ -59,7 +59,7 @@ class Publishers:
         self._timers[spelling] = asyncio.get_running_loop().call_later(KEPT_S, self._end, spelling)
 
     def publish(self, client: object, spelling: str, given: Any, *, latches: bool) -> None:
-        """Raises Conflict, Unfit and Poison: what the real bridge only writes to its log."""
+        """Raises Conflict, Unfit and UnpackableMessage: what the real bridge only writes to its log."""
         self.register(client, spelling, None, latches=latches)
         found = self._found[spelling]
         definitions = self._bridge.types.definitions(found.type)
@@ -71,7 +71,7 @@ class Publishers:
             found.count += 1
             try:
                 message = converter.message(given)
-            except Poison:
+            except UnpackableMessage:
                 found.is_poisoned = True
                 raise
             header = message.get("header")

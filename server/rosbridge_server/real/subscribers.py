@@ -24,7 +24,7 @@ class Conflict(Exception):
 
 
 class RosSubscriber:
-    """Takes messages of one type, or of any where a client asked for raw bytes first."""
+    """Accept messages of one type, or of any if a client requested raw bytes first."""
 
     def __init__(self, topic: Topic, type: str | None) -> None:
         self.topic = topic

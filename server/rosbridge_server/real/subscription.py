@@ -1,4 +1,4 @@
-"""One client's subscription at a real bridge: several ids, one stream of frames in the strongest form asked for."""
+"""One client's subscription at a real bridge: several ids, one stream of frames in the strongest requested form."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from server.rosbridge_server.real.shape import Lost
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """What one subscribe operation asked for."""
+    """The request of one subscribe operation."""
 
     throttle_s: float
     queue_length: int
@@ -38,7 +38,7 @@ class RealSubscription:
         self._timer: asyncio.TimerHandle | None = None
 
     def settle(self) -> None:
-        """Takes what was asked for into account: the highest rate, the shortest queue, the strongest compression."""
+        """Apply the requests: the highest rate, the shortest queue, the strongest compression."""
         if not self.asked:
             return
         asked = self.asked.values()

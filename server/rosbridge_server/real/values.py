@@ -28,12 +28,12 @@ class Values:
         self._definitions = definitions
 
     def json(self, type: str, message: Any) -> dict[str, Any]:
-        """What goes into `msg`. Raises Lost."""
+        """The value of `msg`. Raises Lost."""
         given = _object(message)
         return {field.name: self._json_field(field, given.get(field.name)) for field in self._fields(type)}
 
     def cbor(self, type: str, message: Any) -> dict[str, Any]:
-        """What goes into `msg`, with Tagged arrays. Raises Lost."""
+        """The value of `msg`, with Tagged arrays. Raises Lost."""
         given = _object(message)
         return {field.name: self._cbor_field(field, given.get(field.name)) for field in self._fields(type)}
 

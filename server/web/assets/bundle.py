@@ -1,7 +1,7 @@
-"""The page's scripts and styles as they are sent: joined and made small when catgraph is installed.
+"""The page's scripts and styles, bundled and minified when catgraph is installed.
 
-What is written lies in static/js and static/css, and is served as it is wherever the joined files are absent or older,
-so that nobody is ever shown yesterday's page. The build hook loads this file by its path: standard library only.
+The sources in static/js and static/css are served directly if the bundles are missing or outdated, so that no page is
+ever outdated. The build hook loads this file by its path: standard library only.
 """
 
 from __future__ import annotations
@@ -18,9 +18,21 @@ from functools import lru_cache
 from pathlib import Path
 
 FOLDER = "built"  # in static/, beside js/ and css/, so that what they name by ../ is found from here too
-STYLES = ("tokens", "frame", "instruments", "map", "sheets", "screens", "settings", "slowing", "wide")  # in this order
+STYLES = (
+    "tokens",
+    "frame",
+    "topbar",
+    "instruments",
+    "map",
+    "sheets",
+    "screens",
+    "settings",
+    "slowing",
+    "wide",
+    "watch",
+)  # in this order
 ENTRY = "main.js"
-EARLY = "boot/early.js"  # stands in the page itself
+EARLY = "boot/early.js"  # inline in the page
 THREADS = ("scan/scan-painter",)  # scripts of threads, each joined for itself
 _LIST = "built.json"  # written last
 _TARGET = "es2022"  # private fields and top-level await: every browser of 2022 and later
@@ -33,15 +45,15 @@ class Built:
 
     script: str
     style: str
-    needed: tuple[str, ...]  # scripts that `script` asks for at once
+    needed: tuple[str, ...]  # scripts that `script` imports at once
     early: str  # the text of the script that runs before all others
     name: str  # of this build: other sources have another
 
 
 def join(tools: Path, static: Path) -> None:
-    """Makes static/built from static/js and static/css, with what lies in node_modules/.bin.
+    """Build static/built from static/js and static/css with the tools in node_modules/.bin.
 
-    Raises SystemExit with the tool's words where it cannot.
+    Raises SystemExit with the tool's message.
     """
     into = static / FOLDER
     into.mkdir(exist_ok=True)
@@ -79,7 +91,7 @@ def join(tools: Path, static: Path) -> None:
 
 
 def find(static: Path) -> Built | None:
-    """The joined files, or None where they were made of other sources than lie here now."""
+    """The bundles, or None if they are not of the current sources."""
     try:
         stamps = tuple((str(path), path.stat().st_mtime_ns) for path in _sources(static))
         listed_ns = (static / FOLDER / _LIST).stat().st_mtime_ns
@@ -98,7 +110,7 @@ def digest_of_sources(static: Path) -> str:
 
 @lru_cache(maxsize=8)
 def _find(static: Path, stamps: tuple[tuple[str, int], ...], listed_ns: int) -> Built | None:
-    # The times stand in the call so that a changed file is read anew; they decide nothing, for a clone has none.
+    # The times are arguments only to invalidate the cache; they decide nothing, because a clone has none.
     try:
         listed = json.loads((static / FOLDER / _LIST).read_text(encoding="utf-8"))
         needed, name = tuple(listed["needed"]), listed["sources"][:12]

@@ -1,7 +1,7 @@
-"""The icons as pictures of points, for phones and shops of apps that take no SVG: drawn when catgraph is installed.
+"""PNG icons for phones and launchers without SVG support, rendered when catgraph is installed.
 
-They lie in static/drawn and are never committed. Where they cannot be drawn the page is served with the SVG alone. The
-build hook loads this file by its path: standard library only.
+They are in static/drawn and never committed. If they cannot be rendered, only the SVG is served. The build hook loads
+this file by its path: standard library only.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from pathlib import Path
 
 FOLDER = "drawn"  # in static/
 WITHOUT = (
-    "The icons were not drawn as PNG when catgraph was installed: the SVG is served alone, and a phone that takes no "
-    "SVG shows a picture of the page instead."
+    "The icons were not rendered as PNG when catgraph was installed: only the SVG is served, and a phone without "
+    "SVG support shows a picture of the page instead."
 )
 _STAMP = "drawn.json"  # written last
 _LONGEST_S = 60.0
@@ -82,7 +82,7 @@ def draw(modules: Path, static: Path) -> str | None:
 
 
 def are_drawn(static: Path) -> bool:
-    """Whether all of them lie there, and were drawn of what lies here now."""
+    """Whether all icons exist and are of the current sources."""
     try:
         stamp = json.loads((static / FOLDER / _STAMP).read_text(encoding="utf-8"))
         is_current: bool = stamp["sources"] == digest_of_sources(static)

@@ -1,8 +1,8 @@
-"""The page's shell as a phone keeps it: which files, under which name, and the worker that keeps them.
+"""The page's shell in a phone's cache: its files, its name, and the service worker.
 
-Kept are only files whose address holds the hash of their content, the page that says that the server does not answer,
-and its fonts. Nothing that is live is ever among them. With single modules, as during development, there is no worker,
-and one that a phone still has takes itself away.
+Cached are only files whose address contains a hash of their content, the page for an unreachable server, and its fonts.
+Live data is never cached. With single modules, as during development, there is no worker, and an installed one removes
+itself.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Shell:
 
 
 def build_of(built: Built | None) -> str:
-    """The name of the page as it is joined now; "" for single modules, of which no page can say that it is old."""
+    """The name of the current bundle; "" for single modules, which have no version."""
     return "" if built is None else f"{catgraph_version()}-{built.name}"
 
 

@@ -1,7 +1,7 @@
-"""The page's files as they go out: compressed once and kept.
+"""The page's files as served: compressed once and cached.
 
-What a browser must never do is run yesterday's script: a file with the hash of its content in its address may be kept
-for ever, every other one is asked about each time, and answered 304 while it is the same.
+A browser must never run an outdated script: a file with a hash in its address may be cached forever, every other one is
+revalidated each time, with 304 while it is unchanged.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from stat import S_ISREG
 
+from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
@@ -35,7 +36,7 @@ _TYPES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Packed:
-    """One file as it goes out."""
+    """One file as served."""
 
     plain: bytes
     small: bytes  # gzip
@@ -70,12 +71,16 @@ class StaticText(StaticFiles):
         if "\0" in path or any(len(part) > _LONGEST_NAME for part in path.split(os.sep)):
             raise HTTPException(404)  # no file is called so, and asking for it is an error of its own kind
         if media_type is not None and scope["method"] == "GET":
-            full, stat = self.lookup_path(path)
-            if stat is not None and S_ISREG(stat.st_mode):
-                return answer(_read(Path(full), stat.st_mtime_ns), Headers(scope=scope), media_type, keep)
+            text = await run_in_threadpool(self._text, path)
+            if text is not None:
+                return answer(text, Headers(scope=scope), media_type, keep)
         response = await super().get_response(path, scope)
         response.headers["Cache-Control"] = keep
         return response
+
+    def _text(self, path: str) -> Packed | None:
+        full, stat = self.lookup_path(path)
+        return _read(Path(full), stat.st_mtime_ns) if stat is not None and S_ISREG(stat.st_mode) else None
 
 
 @lru_cache(maxsize=512)

@@ -24,7 +24,7 @@ class Part:
 
     name: str
     version: str
-    license: str  # SPDX where its maker says so, else in their words; "see its text" where they do not
+    license: str  # SPDX if declared, else the declared name; "see its text" without one
     where: str  # "page" or "server"
     text: str  # of its licence files; "" where it brings none
 

@@ -12,7 +12,7 @@ T = TypeVar("T")
 _Work = tuple[Callable[[], Any], "asyncio.Future[Any]"]
 
 
-class Hands:
+class DaemonThreads:
     """So many pieces of work at a time; what hangs is left to hang."""
 
     def __init__(self, count: int) -> None:
@@ -44,7 +44,7 @@ class Hands:
             failed: BaseException | None = None
             try:
                 found = work()
-            except BaseException as why:  # it is raised where it was asked for
+            except BaseException as why:  # it is raised in the caller
                 failed = why
             loop = answer.get_loop()
             if not loop.is_closed():

@@ -1,6 +1,6 @@
-"""How a server of tiles wants to be treated: how long its answers hold, when to ask again, how much. No clock here.
+"""HTTP caching and rate limits of a tile server: lifetimes, retries, request limits. Pure: times are arguments.
 
-HTTP caching is RFC 9111, Retry-After RFC 9110 10.2.3. Where a server says nothing, tiles hold for seven days.
+HTTP caching is RFC 9111, Retry-After RFC 9110 10.2.3. Without headers tiles are valid for seven days.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Mapping
 from email.utils import parsedate_to_datetime
 
-UNSAID_S = 7 * 86_400.0  # for want of a word: the least that OpenStreetMap's rules for its tiles want them kept
+UNSAID_S = 7 * 86_400.0  # without headers: the least that OpenStreetMap's tile policy requires
 LONGEST_S = 365 * 86_400.0
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 5.0, 300.0  # after a failure; each doubles the one before
 ASKED_PAUSE_S = (1.0, 86_400.0)  # what a Retry-After may ask for
@@ -38,7 +38,7 @@ def fresh_for_s(headers: Mapping[str, str], wall_s: float) -> float | None:
 
 
 def retry_after_s(value: str | None, wall_s: float) -> float | None:
-    """The pause that is asked for [s], within reason; None where none is."""
+    """The requested pause [s], bounded; None: none."""
     if not value:
         return None
     asked_s = _number(value)
@@ -49,7 +49,7 @@ def retry_after_s(value: str | None, wall_s: float) -> float | None:
 
 
 class Pace:
-    """When the next tile may be asked for. Times are monotonic [s]."""
+    """When the next tile may be requested. Times are monotonic [s]."""
 
     def __init__(self) -> None:
         self.problem: str | None = None  # what went wrong last; None once it is over
@@ -69,7 +69,7 @@ class Pace:
         self._pause_s = FIRST_PAUSE_S
 
     def failed(self, why: str, now_s: float, wanted_s: float | None = None) -> None:
-        """It did not; `wanted_s` is the pause that it asks for. Two failures at a time count once."""
+        """Record a failure; `wanted_s` is the requested pause. Two concurrent failures count once."""
         is_new = now_s >= self._until_s
         self.problem = why
         self._until_s = max(self._until_s, now_s + (self._pause_s if wanted_s is None else wanted_s))
@@ -77,7 +77,7 @@ class Pace:
             self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
 
     def words(self, now_s: float) -> str | None:
-        """What stands against asking, as one sentence for the operator."""
+        """Why no request is allowed now, as one sentence for the operator."""
         if self.problem is not None:
             return self.problem
         if self._is_spent(now_s):

@@ -1,4 +1,4 @@
-"""What kind of picture some bytes are: the three that every browser draws, told by their first bytes, not by a name."""
+"""The image type of some bytes, by their first bytes: the three types that every browser draws."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def media_type(data: bytes) -> str | None:
 
 
 def pixels(data: bytes) -> tuple[int, int] | None:
-    """Width and height by the picture's own header: some bytes may unpack to gigapixels. None: it does not say."""
+    """Width and height from the image header, because few bytes can unpack to gigapixels. None: unknown."""
     try:
         match media_type(data):
             case "image/png":

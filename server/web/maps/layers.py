@@ -10,8 +10,8 @@ from server.web.maps.site_image import SiteImage, site_image
 from server.web.maps.tile_proxy import Upstream
 
 
-class Ground:
-    """What may be fetched, the open map files in the order in which they lie on it, and the picture above them."""
+class MapLayers:
+    """The map layers from bottom to top: fetched tiles, map files, site image."""
 
     def __init__(
         self, maps: Iterable[Path] = (), image: Path | None = None, upstream: Callable[[], Upstream] | None = None

@@ -1,4 +1,4 @@
-"""Where map tiles may be fetched from, if anywhere (off by default): what command line and environment say, checked."""
+"""The optional tile server, from command line and environment, validated. Off by default."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class MapUpstream:
 
     @property
     def host(self) -> str:
-        """The one host that is ever asked, with its port where it is named."""
+        """The only host that is contacted, with its port if given."""
         return urlsplit(self.template).netloc
 
 
@@ -38,22 +38,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f"shows are fetched, and kept in the data folder as MBTiles. With a key in it, rather set {ENVIRONMENT}",
     )
     parser.add_argument(
-        "--map-attribution", metavar="TEXT", help="whose map that is; needed with it, and shown on the map"
+        "--map-attribution",
+        metavar="TEXT",
+        help="the map's attribution, shown on the map; required with --map-upstream",
     )
     parser.add_argument(
-        "--map-upstream-zoom", metavar="MIN-MAX", default="0-19", help="zoom levels asked for there (default 0-19)"
+        "--map-upstream-zoom", metavar="MIN-MAX", default="0-19", help="zoom levels to fetch (default 0-19)"
     )
     parser.add_argument(
         "--map-upstream-mb",
         type=int,
         metavar="N",
         default=500,
-        help="so many MB of its tiles are kept; then those go that were not looked at for longest (default 500)",
+        help="size limit in MB; beyond it the least recently viewed tiles are deleted (default 500)",
     )
 
 
 def read(args: argparse.Namespace) -> MapUpstream | None:
-    """What the arguments say; None: nothing is fetched. Raises ValueError with one sentence."""
+    """The tile server of the arguments; None: nothing is fetched. Raises ValueError with one sentence."""
     template = args.map_upstream or os.environ.get(ENVIRONMENT)
     if not template:
         return None
@@ -64,7 +66,7 @@ def checked(template: str, attribution: str, zoom: str, limit_mb: int) -> MapUps
     """Raises ValueError with one sentence, in which the address does not stand: it may hold a key."""
     _check_template(template)
     if not attribution.strip():
-        raise ValueError("--map-upstream needs --map-attribution: whose map it is must stand on the map.")
+        raise ValueError("--map-upstream needs --map-attribution, which is shown on the map.")
     found = re.fullmatch(r"([0-9]{1,2})-([0-9]{1,2})", zoom)
     if found is None or not int(found[1]) <= int(found[2]) <= DEEPEST:
         raise ValueError(f"--map-upstream-zoom is two levels from 0 to {DEEPEST}, as 0-19.")
@@ -78,12 +80,12 @@ def checked(template: str, attribution: str, zoom: str, limit_mb: int) -> MapUps
 def _check_template(template: str) -> None:
     said = "The address of --map-upstream"
     if len(template) > _LONGEST or not template.isascii() or not template.isprintable() or " " in template:
-        raise ValueError(f"{said} is too long, or holds characters that no address has.")
+        raise ValueError(f"{said} is too long or has characters that are not allowed.")
     try:
         parts = urlsplit(template)
         port_is_usable = parts.port is None or 0 < parts.port < 65536
     except ValueError:
-        raise ValueError(f"{said} is no address.") from None
+        raise ValueError(f"{said} is not valid.") from None
     if parts.scheme not in ("http", "https") or not parts.hostname or not port_is_usable:
         raise ValueError(f"{said} must begin with https:// or http:// and a host.")
     if "@" in parts.netloc:

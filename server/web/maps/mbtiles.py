@@ -20,15 +20,15 @@ log = logging.getLogger("catgraph.map")
 LARGEST_BYTES = 4 << 20  # of a tile, and of all else that the file holds in one place; tiles have some 50 kB
 MOST_PIXELS = 4096  # along an edge of a tile; usual are 256 and 512
 MOST_METADATA = 1000  # rows
-LOOK_S, TILE_S = 60.0, 1.0  # a file may hold a view that never ends; without an index the look goes through all tiles
-_STEPS = 100_000  # of SQLite between two looks at the clock, some ms
+LOOK_S, TILE_S = 60.0, 1.0  # a file may contain an endless view; without an index a lookup scans all tiles
+_STEPS = 100_000  # SQLite steps between two checks of the clock, some ms
 DEEPEST = 24  # 1 cm a pixel; a deeper number is no zoom level
 _VECTOR = ("pbf", "mvt", "mlt")
 _GZIP = b"\x1f\x8b"  # vector tiles are packed so, pictures never
 
 
 class MapRefused(Exception):
-    """A file that cannot be shown under the map; `str()` is one sentence for whoever started the server."""
+    """A file that cannot be used as a map; `str()` is one sentence for the user."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,10 +43,10 @@ class Layer:
 
 
 class MapFile:
-    """One open map file. Its tiles may be asked for from any thread."""
+    """One open map file. Tiles can be read from any thread."""
 
     def __init__(self, path: Path) -> None:
-        """Opens and looks through it. Raises MapRefused."""
+        """Open and validate the file. Raises MapRefused."""
         self._path = path
         self._lock = threading.Lock()
         self._said_damaged = False
@@ -76,7 +76,7 @@ class MapFile:
         except sqlite3.Error as why:
             if not self._said_damaged:
                 self._said_damaged = True
-                log.error("the map %s is damaged: %s", self._path, why)
+                log.error("map damaged: path=%s error=%s", self._path, why)
             return None
         kind = media_type(data) if data else None
         if not data or not kind or max(pixels(data) or (0, 0)) > MOST_PIXELS:
@@ -95,7 +95,7 @@ class MapFile:
     def _look(self) -> Layer:
         names = {row[0] for row in self._rows.execute("SELECT name FROM sqlite_master WHERE type IN ('table', 'view')")}
         if "tiles" not in names:
-            raise MapRefused(f"{self._path} is no MBTiles file: it has no tiles.")
+            raise MapRefused(f"{self._path} is not an MBTiles file: it has no tiles.")
         told: dict[str, str] = {}
         if "metadata" in names:
             told = {
@@ -104,11 +104,11 @@ class MapFile:
             }
         one = self._rows.execute("SELECT tile_data FROM tiles LIMIT 1").fetchone()
         if one is None:
-            raise MapRefused(f"The map {self._path} has no tile in it.")
+            raise MapRefused(f"The map {self._path} has no tiles.")
         data = one[0] if isinstance(one[0], bytes) else b""
         if told.get("format", "").lower() in _VECTOR or data.startswith(_GZIP):
             raise MapRefused(
-                f"The map {self._path} holds vector tiles; catgraph draws pictures: export it as png or jpg tiles."
+                f"The map {self._path} has vector tiles; catgraph draws raster tiles: export it as png or jpg."
             )
         if media_type(data) is None:
             raise MapRefused(f"The map {self._path} holds tiles that are neither png, nor jpg, nor webp.")
@@ -139,7 +139,7 @@ def _opened(path: Path) -> sqlite3.Connection:
         raise MapRefused(f"There is no map {path}.")
     rows: sqlite3.Connection | None = None
     why: Exception | None = None
-    # A file left in WAL mode cannot even be read without writing beside it, unless it is promised that nobody writes.
+    # A file in WAL mode cannot be read without writing beside it, unless it is opened as immutable.
     for promise in ("mode=ro", "mode=ro&immutable=1"):
         try:
             rows = sqlite3.connect(f"{path.resolve().as_uri()}?{promise}", uri=True, check_same_thread=False)
@@ -152,11 +152,11 @@ def _opened(path: Path) -> sqlite3.Connection:
             why = error
             if rows is not None:
                 rows.close()
-    raise MapRefused(f"{path} is no MBTiles file, or is damaged: {why}.")
+    raise MapRefused(f"{path} is not an MBTiles file, or is damaged: {why}.")
 
 
 def _bounds(said: str | None) -> tuple[float, float, float, float]:
-    """West, south, east, north as the file says; the whole world where what it says can be no bounds."""
+    """West, south, east, north of the file [deg]; the whole world if they are invalid."""
     try:
         west, south, east, north = (float(part) for part in (said or "").split(","))
     except ValueError:

@@ -45,7 +45,7 @@ class _Beside(BaseModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SiteImage:
-    """The picture and where it lies: latitude and longitude of its top left, top right and bottom left corner."""
+    """The image and the latitude and longitude of its top left, top right and bottom left corner."""
 
     name: str
     data: bytes
@@ -74,7 +74,7 @@ def site_image(path: Path) -> SiteImage:
     try:
         told = _Beside.model_validate(bounded_toml.loads(_beginning(beside)))
     except OSError as why:
-        raise MapRefused(f"The corners of the site image must stand in {beside}: {why.strerror or why}.") from None
+        raise MapRefused(f"The corners of the site image must be in {beside}: {why.strerror or why}.") from None
     except ValidationError as why:
         first = why.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "it"
@@ -107,9 +107,9 @@ def _check(corners: tuple[Place, Place, Place], beside: Path) -> None:
     for edge_m in ((across[0] ** 2 + across[1] ** 2) ** 0.5, (down[0] ** 2 + down[1] ** 2) ** 0.5):
         if not LEAST_M <= edge_m <= MOST_M:
             raise MapRefused(
-                f"The corners of the site image in {beside} lie {edge_m:.0f} m apart; "
+                f"The corners of the site image in {beside} are {edge_m:.0f} m apart; "
                 f"{LEAST_M:.0f} m to {MOST_M / 1000:.0f} km can be drawn."
             )
     area = abs(across[0] * down[1] - across[1] * down[0])
     if area < 0.05 * (across[0] ** 2 + across[1] ** 2) ** 0.5 * (down[0] ** 2 + down[1] ** 2) ** 0.5:
-        raise MapRefused(f"The corners of the site image in {beside} lie on one line.")
+        raise MapRefused(f"The corners of the site image in {beside} are on one line.")

@@ -1,7 +1,6 @@
-"""Tiles that were fetched, kept as an MBTiles file: any program that reads MBTiles reads it, and so does `--map`.
+"""The cache of fetched tiles: an MBTiles file, readable by other programs and by `--map`.
 
-Beside what MBTiles 1.3 asks for stands one table more: until when each tile holds, how to ask whether it still does,
-and when it was looked at last. Any thread may use it.
+One table is added to MBTiles 1.3: expiry, validators and last use of each tile. Any thread may use it.
 """
 
 from __future__ import annotations
@@ -46,13 +45,13 @@ class Kept:
     """A tile that is kept, or that is known not to exist (`data` None)."""
 
     data: bytes | None
-    until_s: float  # time of day, after which it is to be asked for again
+    until_s: float  # time of day, after which it is requested again
     etag: str | None
     modified: str | None
 
 
 class TileCache:
-    """One file. What cannot be written is not kept, and said once; nobody waits for it."""
+    """One cache file. A write error is logged once and the tile is not stored."""
 
     def __init__(self, path: Path, *, title: str, attribution: str, limit_bytes: int) -> None:
         """Opens or makes it; a file that is no such is put aside. Raises OSError where the folder cannot be used."""
@@ -65,11 +64,11 @@ class TileCache:
         self._is_open = True  # a fetch may end after the server did
         path.parent.mkdir(parents=True, exist_ok=True)
         told = {"name": title, "attribution": attribution, "type": "baselayer", "version": "1"}
-        told["description"] = "Tiles that catgraph fetched because somebody looked at them."
+        told["description"] = "Tiles that catgraph fetched when they were viewed."
         try:
             self._rows = self._open(told)
         except sqlite3.DatabaseError as why:
-            log.warning("the kept tiles %s are damaged (%s): they are put aside, and others fetched", path, why)
+            log.warning("tile cache damaged, set aside: path=%s error=%s", path, why)
             for end in ("-wal", "-shm"):
                 path.with_name(path.name + end).unlink(missing_ok=True)
             path.replace(path.with_name(path.name + ".damaged"))
@@ -90,7 +89,7 @@ class TileCache:
                 self._describe()
                 self._rows.execute("PRAGMA journal_mode = delete")
             except sqlite3.Error as why:
-                log.warning("the kept tiles %s could not be closed well: %s", self.path, why)
+                log.warning("tile cache not closed: path=%s error=%s", self.path, why)
             self._rows.close()
 
     def get(self, place: Place, now_s: float) -> Kept | None:
@@ -140,7 +139,7 @@ class TileCache:
             self._say(why)
 
     def renew(self, place: Place, kept: Kept) -> None:
-        """The tile itself is the same; it holds anew."""
+        """Renew the lifetime of an unchanged tile."""
         at = _mbtiles(place)
         try:
             with self._lock, self._writing() as is_open:
@@ -195,11 +194,11 @@ class TileCache:
         for table in ("tiles", "catgraph_kept"):
             self._rows.executemany(f"DELETE FROM {table} WHERE {_AT}", places)
         self.evicted += gone
-        log.warning("%d map tiles that nobody looked at for longest made room for others in %s", gone, self.path)
+        log.warning("map tiles deleted, least recently viewed: count=%d path=%s", gone, self.path)
         return total
 
     def _widen(self, zoom: int, data: bytes) -> None:
-        """What is told of the zoom levels, so that a file whose writer was killed is read rightly as well."""
+        """Write the zoom levels, so that a file is valid even if its writer is killed."""
         least, deepest = self._zoom
         if least is not None and least <= zoom <= deepest:
             return
@@ -227,8 +226,8 @@ class TileCache:
 
     def _say(self, why: sqlite3.Error) -> None:
         if self.problem is None:
-            log.error("map tiles cannot be kept in %s: %s", self.path, why)
-        self.problem = "Tiles cannot be kept: is the disk full?"
+            log.error("map tiles not stored: path=%s error=%s", self.path, why)
+        self.problem = "Tiles cannot be stored: check the disk space."
 
 
 def _mbtiles(place: Place) -> Place:

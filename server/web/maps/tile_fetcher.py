@@ -89,7 +89,7 @@ class TileSource:
             finally:
                 _leave(answer)
         except NameResolutionError:
-            raise SourceTrouble(f"The map's server {self.host} is not found: is there internet?") from None
+            raise SourceTrouble(f"The map's server {self.host} is not found: check the internet connection.") from None
         except SSLError:
             raise SourceTrouble(f"The certificate of the map's server {self.host} is not trusted.") from None
         except (HTTPError, OSError):  # its words hold the address, and that may hold a key
@@ -110,19 +110,19 @@ class TileSource:
                 return Fetched(fresh_s=fresh_s)
             case 429 | 503:
                 pause_s = retry_after_s(answer.headers.get("Retry-After"), wall_s)
-                raise SourceTrouble(f"The map's server {self.host} asks for a pause.", pause_s)
+                raise SourceTrouble(f"The map's server {self.host} requests a pause.", pause_s)
             case 401 | 403:
-                why = f"The map's server {self.host} refuses ({answer.status}): is the key right?"
+                why = f"The map's server {self.host} refuses ({answer.status}): check the key."
                 raise SourceTrouble(why, REFUSED_PAUSE_S)
             case 200:
                 pass
             case 301 | 302 | 303 | 307 | 308:
-                raise SourceTrouble(f"The map's server {self.host} points elsewhere, which is not followed.")
+                raise SourceTrouble(f"The map's server {self.host} redirects, which is not followed.")
             case status:
                 raise SourceTrouble(f"The map's server {self.host} answers with status {status}.")
         data = self._body(answer)
         if media_type(data) is None:
-            raise SourceTrouble(f"The map's server {self.host} answers with something that is no picture.")
+            raise SourceTrouble(f"The map's server {self.host} answers with something that is not an image.")
         etag, modified = answer.headers.get("ETag"), answer.headers.get("Last-Modified")
         return Fetched(data=data, fresh_s=fresh_s, etag=etag, modified=modified)
 

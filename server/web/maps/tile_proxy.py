@@ -1,7 +1,7 @@
-"""A layer of tiles that are fetched when a page shows them, kept, and shown from there when there is no internet.
+"""A map layer that fetches tiles when a page shows them, and serves them from its cache without internet.
 
-Two fetches at a time, the newest wish first. A tile that is kept is shown at once, also an old one, which is then
-asked for anew behind it. Nothing waits on the loop: files and sockets are the business of threads.
+Two fetches run at a time, newest request first. A cached tile is served at once; an expired one is then revalidated in
+the background. Files and sockets are used in threads only, never on the loop.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from server.web.maps.daemon_threads import Hands
+from server.web.maps.daemon_threads import DaemonThreads
 from server.web.maps.http_cache import Pace
 from server.web.maps.image_type import media_type, plain_text
 from server.web.maps.map_options import MapUpstream
@@ -26,7 +26,7 @@ from server.web.maps.tile_fetcher import CONNECTIONS, SourceTrouble, TileSource
 log = logging.getLogger("catgraph.map")
 
 WAITS_S = 12.0  # a page for a tile; then the place stays empty, and the tile is kept for the next time
-LONGEST_QUEUE = 96  # three screens of tiles: older wishes are of what was in sight before
+LONGEST_QUEUE = 96  # three screens of tiles: older requests are no longer in view
 ABSENT_S = 86_400.0  # at most so long is believed that a tile does not exist
 _BOUNDS = (-180.0, -85.06, 180.0, 85.06)
 
@@ -41,7 +41,7 @@ class Tile:
 
 
 @dataclass(slots=True)
-class _Wish:
+class _TileRequest:
     place: Place
     kept: Kept | None
     answer: asyncio.Future[Kept | None]
@@ -51,8 +51,8 @@ class _Wish:
 class _Queue:
     """What is wished for and not yet there; only the loop touches it."""
 
-    wishes: dict[Place, _Wish] = field(default_factory=dict)
-    waiting: list[_Wish] = field(default_factory=list)
+    wishes: dict[Place, _TileRequest] = field(default_factory=dict)
+    waiting: list[_TileRequest] = field(default_factory=list)
     at_work: set[asyncio.Task[None]] = field(default_factory=set)
     dropped: int = 0
 
@@ -65,7 +65,7 @@ class Upstream:
     ) -> None:
         """Raises MapRefused."""
         if folder is None:
-            raise MapRefused("--map-upstream needs a data folder: what is fetched is kept there.")
+            raise MapRefused("--map-upstream needs a data folder: fetched tiles are stored there.")
         digest = hashlib.sha256(upstream.template.encode()).hexdigest()
         attribution = plain_text(upstream.attribution)
         path = folder / "maps" / f"{_slug(upstream.host)}-{digest[:8]}.mbtiles"
@@ -82,7 +82,7 @@ class Upstream:
         self._now, self._wall_s = now, wall_s
         self._pace = Pace()
         self._queue = _Queue()
-        self._hands = Hands(CONNECTIONS)
+        self._hands = DaemonThreads(CONNECTIONS)
         self._is_closed = False
 
     def close(self) -> None:
@@ -92,7 +92,7 @@ class Upstream:
         self._cache.close()
 
     def told(self) -> dict[str, Any]:
-        """What a page is told; the address is not, for it may hold a key."""
+        """The layer's description for a page, without the address, which may contain a key."""
         return {
             "host": self._source.host,
             "problem": self._pace.words(self._now()) or self._cache.problem,
@@ -123,14 +123,14 @@ class Upstream:
             return None
         return Tile(data=kept.data, kind=kind, fresh_s=max(0.0, kept.until_s - self._wall_s()))
 
-    def _wish(self, place: Place, kept: Kept | None) -> _Wish | None:
-        """Has a tile fetched; None where the server of tiles is not to be asked now."""
+    def _wish(self, place: Place, kept: Kept | None) -> _TileRequest | None:
+        """Queue a fetch; None if the tile server must not be contacted now."""
         queue = self._queue
         if place in queue.wishes:
             return queue.wishes[place]
         if not self._pace.may_ask(self._now()):
             return None
-        wish = _Wish(place, kept, asyncio.get_running_loop().create_future())
+        wish = _TileRequest(place, kept, asyncio.get_running_loop().create_future())
         queue.wishes[place] = wish
         queue.waiting.append(wish)
         if len(queue.waiting) > LONGEST_QUEUE:
@@ -155,7 +155,7 @@ class Upstream:
         self._queue.at_work.discard(work)
         self._go_on()
 
-    async def _fulfil(self, wish: _Wish) -> None:
+    async def _fulfil(self, wish: _TileRequest) -> None:
         found = wish.kept
         try:
             found = await self._hands.do(lambda: self._fetch(wish.place, wish.kept))
@@ -164,12 +164,12 @@ class Upstream:
             self._pace.well()
         except SourceTrouble as why:
             if self._pace.problem is None:
-                log.warning("%s What was kept is shown.", why)
+                log.warning("%s Stored tiles are shown.", why)
             self._pace.failed(str(why), self._now(), why.pause_s)
         finally:
             self._done(wish, found)
 
-    def _done(self, wish: _Wish, found: Kept | None) -> None:
+    def _done(self, wish: _TileRequest, found: Kept | None) -> None:
         self._queue.wishes.pop(wish.place, None)
         if not wish.answer.done():
             wish.answer.set_result(found)

@@ -1,7 +1,7 @@
-"""Lets a request or a socket in, or not: the outermost gate of the server, and the only place where that is decided.
+"""Authenticates and authorizes every request and socket: the outermost middleware, and the only place for it.
 
-In this order: is it this server that is meant (Host), is it a page of this server that asks (Origin), who asks (key,
-cookie, and for a socket a ticket), and may who asks do that (rules.py). Who is let in is named to everything inside.
+The order of checks: Host, Origin, identity (key, cookie, and a ticket for a socket), role (rules.py). The identity is
+stored in the ASGI scope.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.access.access import Access, Admitted
-from server.access.active_connections import Visit
+from server.access.active_connections import ActiveConnection
 from server.access.identity import SCOPE_KEY
 from server.access.rules import Needs, is_enough, needs_of
 from server.web.middleware.errors import problem
@@ -26,7 +26,7 @@ _CHANGES_NOTHING = ("GET", "HEAD")
 
 
 class _Refused(Exception):
-    """Not let in; `answer` says why to a request, while a socket is told nothing."""
+    """Access denied; `answer` has the reason for a request, and a socket gets none."""
 
     def __init__(self, answer: Response) -> None:
         super().__init__()
@@ -49,7 +49,7 @@ class Guard:
             case "lifespan":
                 await self._app(scope, receive, send)
             case other:
-                raise RuntimeError(f"nobody judges whether a {other} may come in")
+                raise RuntimeError(f"a {other} connection is not authorized by any rule")
 
     # -- requests ----------------------------------------------------------------------------------------------------
 
@@ -85,25 +85,25 @@ class Guard:
                     await problem(401, because, code="removed")(scope, receive, send)
 
     def _let_in(self, scope: Scope) -> Admitted | None:
-        """Who sends it; None: nobody who is known, and nobody need be. Raises _Refused."""
+        """The sender; None: unknown on a public route. Raises _Refused."""
         method, path = scope["method"], scope["path"]
         headers = self._headers(scope)
         self._check_names(headers, scope["scheme"])
         site, mode = headers.get("sec-fetch-site"), headers.get("sec-fetch-mode")
         if site in ("cross-site", "same-site") and mode != "navigate":  # an image or a script of another page
-            raise _Refused(problem(403, "This was asked for by a page of another server.", code="origin"))
+            raise _Refused(problem(403, "This request comes from another server's page.", code="origin"))
         needs = needs_of(method, path)
         known = self._access.known(headers, scheme=scope["scheme"])
         by_browser = known is None or known.by == "cookie"
         if by_browser and method not in _CHANGES_NOTHING and "origin" not in headers:
             if known is not None or needs is Needs.NOBODY:
-                raise _Refused(problem(403, "A browser says which page asks; this did not.", code="origin"))
+                raise _Refused(problem(403, "The request has no Origin header.", code="origin"))
         if needs is Needs.NOBODY:
             return known
         if known is None:
             raise _Refused(self._unknown(scope, headers, mode))
         if not is_enough(known.who.role, needs):
-            raise _Refused(problem(403, "A viewer looks and changes nothing: an operator may.", code="viewer"))
+            raise _Refused(problem(403, "A viewer cannot make changes; an operator can.", code="viewer"))
         return known
 
     def _unknown(self, scope: Scope, headers: dict[str, str], mode: str | None) -> Response:
@@ -146,7 +146,7 @@ class Guard:
         if known.by == "cookie":
             is_used = [self._access.use_ticket(ticket, known.who) for ticket in _tickets(scope)]
             if is_used != [True] or "origin" not in headers:
-                raise _Refused(problem(403, "A socket is opened with a fresh ticket."))
+                raise _Refused(problem(403, "A socket needs a new ticket."))
         return known
 
     # -- both --------------------------------------------------------------------------------------------------------
@@ -156,7 +156,7 @@ class Guard:
         for raw_name, raw_value in scope["headers"]:
             name, value = raw_name.decode("latin-1").lower(), raw_value.decode("latin-1")
             if name in found and name in _ALONE:
-                raise _Refused(problem(400, f"The header {name} stands in this request more than once."))
+                raise _Refused(problem(400, f"The header {name} is in this request more than once."))
             found[name] = f"{found[name]}; {value}" if name in found and name == "cookie" else value
         return found
 
@@ -167,7 +167,7 @@ class Guard:
             remedy = f"Start it with --name {shown.rpartition(':')[0] or shown} if it is to be." if shown else ""
             raise _Refused(problem(403, f"This server is not called “{shown}”. {remedy}".strip(), code="host"))
         if origin is not None and not self._access.names.may_ask(origin, scheme=scheme, host=host):
-            raise _Refused(problem(403, "This was asked for by a page of another server.", code="origin"))
+            raise _Refused(problem(403, "This request comes from another server's page.", code="origin"))
 
 
 def _tickets(scope: Scope) -> list[str]:
@@ -178,8 +178,8 @@ def _tickets(scope: Scope) -> list[str]:
     return [value for name, value in fields if name == "ticket"]
 
 
-def _ended(visit: Visit, cancelled: asyncio.CancelledError) -> str:
-    """Why the visit was ended; a cancellation that is not ours goes on."""
+def _ended(visit: ActiveConnection, cancelled: asyncio.CancelledError) -> str:
+    """Why the connection was ended by us; any other cancellation is propagated."""
     if visit.ended_because is None:
         raise cancelled
     visit.task.uncancel()

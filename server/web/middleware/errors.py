@@ -22,7 +22,7 @@ class _Document(JSONResponse):
 
 
 class Problem(HTTPException):
-    """An error that says more than its sentence; `more` becomes members of the problem document."""
+    """An error with further members of its problem document, `more`."""
 
     def __init__(self, status: int, detail: str, **more: Any) -> None:
         super().__init__(status, detail)
@@ -56,4 +56,4 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(Exception)
     async def of_bug(_: Request, error: Exception) -> JSONResponse:
         log.error("a request failed", exc_info=error)
-        return problem(500, "The server made a mistake; it is in its log.")
+        return problem(500, "Internal server error; the server's log has the details.")

@@ -1,9 +1,8 @@
-"""Headers every answer carries, errors included: what a page of ours may load and use, and who may embed it.
+"""Security headers of every response, errors included.
 
-Strict-Transport-Security comes with a certificate that was given to us (`--tls CERT KEY`), and only then: it binds a
-host's name to HTTPS for a year, on phones that trust else only this server's own authority. Reinstalled, or started
-once with `--tls off`, the server could then not be reached from any of them, and the browser would not even let its
-user go on. The plain listener only explains; docs/security.md says more.
+Strict-Transport-Security is sent only with a given certificate (`--tls CERT KEY`): it binds a host name to HTTPS for a
+year. With the server's own authority, a server that is reinstalled or started once with `--tls off` could no longer be
+reached from any phone, and browsers offer no way around. See docs/security.md.
 """
 
 from __future__ import annotations
@@ -77,7 +76,7 @@ class SecurityHeaders:
     """Around all of the app, so that no answer leaves without; pure ASGI, so that nothing is buffered."""
 
     def __init__(self, app: ASGIApp, *, is_strict: bool = False) -> None:
-        """`is_strict`: whoever came over HTTPS is to come so for a year."""
+        """`is_strict`: send Strict-Transport-Security for a year."""
         self._app = app
         self._is_strict = is_strict
 
@@ -100,7 +99,7 @@ class SecurityHeaders:
 
 
 def _is_of_this_machine(scope: Scope) -> bool:
-    """Whether it was asked for as localhost, a name that all servers of a machine share."""
+    """Whether Host is localhost, a name that all servers of a machine share."""
     host = Headers(scope=scope).get("host", "")
     return host.rpartition(":")[0] == "localhost" or host == "localhost"
 

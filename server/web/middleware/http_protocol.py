@@ -26,7 +26,7 @@ _quiet.propagate = False
 
 
 def options(limits: Limits) -> dict[str, Any]:
-    """What uvicorn is to be told of the connections it takes, beside where it listens."""
+    """uvicorn's settings for connections, beside the address."""
     return {
         "http": type("PageRequests", (PageRequests,), {"limits": limits}),
         "h11_max_incomplete_event_size": limits.head_bytes,
@@ -34,7 +34,7 @@ def options(limits: Limits) -> dict[str, Any]:
         "ws_max_size": 64 * 1024,  # what a page may send at once
         "ws_ping_interval": 5.0,  # a phone that went out of range is let go
         "ws_ping_timeout": 10.0,
-        "proxy_headers": False,  # who asks is never told by a header that anybody can write
+        "proxy_headers": False,  # the peer is never taken from a header that anybody can write
         "server_header": False,
         "access_log": False,
         "log_level": "warning",
@@ -70,14 +70,14 @@ class PageRequests(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         if self._is_between_requests() and self._is_head_too_long(data):
-            self.send_400_response("The head of this request is too long.")
+            self.send_400_response("The request's header is too long.")
             return
         super().data_received(data)
 
     def handle_events(self) -> None:
         super().handle_events()
         if self._is_between_requests():
-            if self.conn.trailing_data[0] and self._head_due is None:  # a head has begun
+            if self.conn.trailing_data[0] and self._head_due is None:  # a head has started
                 self._await_head()
         else:
             self._head_came()
@@ -90,14 +90,14 @@ class PageRequests(H11Protocol):
             self.transport.write(self.conn.send(h11.Data(data=msg.encode("ascii"))))
             self.transport.write(self.conn.send(h11.EndOfMessage()))
         except h11.LocalProtocolError:
-            pass  # amid an answer: there is no way to say it
+            pass  # during a response no error can be sent
         self.transport.close()
 
     def _is_between_requests(self) -> bool:
         return self.conn.their_state is h11.IDLE
 
     def _is_head_too_long(self, data: bytes) -> bool:
-        """h11 looks only at a head of which the end has not come yet."""
+        """h11 limits only a head whose end has not arrived."""
         begun = self.conn.trailing_data[0]
         if len(begun) + len(data) <= self.limits.head_bytes:
             return False

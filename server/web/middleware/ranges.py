@@ -14,7 +14,7 @@ from urllib.parse import quote
 from fastapi import HTTPException, Request
 from fastapi.responses import Response, StreamingResponse
 
-_PORTION = 256 * 1024  # bytes a step: read in a thread, so that a slow disk holds up nobody
+_PORTION = 256 * 1024  # bytes per step, read in a thread, so that a slow disk blocks nobody
 _RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})", re.ASCII)
 _SEVERAL = re.compile(r"bytes=[^,]+,", re.ASCII)
 _FORBIDDEN = frozenset('/\\:*?"<>|%')  # in names of files, somewhere; % because some programs decode it
@@ -25,13 +25,13 @@ MAX_NAME = 120
 def file_answer(request: Request, path: Path, *, name: str, media_type: str) -> Response:
     """The file at `path` to be saved as `name`: 200, 206, 304, 416. Call it off the event loop (a `def` route).
 
-    A download that broke goes on where it stopped: the ETag is of size and time of change, so that a file which was
-    replaced meanwhile is sent from its beginning. Raises HTTPException: 404 where it is gone.
+    A broken download can resume: the ETag is of size and modification time, so that a replaced file is sent from its
+    start. Raises HTTPException: 404 if the file is missing.
     """
     try:
         file = path.open("rb")
     except FileNotFoundError:
-        raise HTTPException(404, "The file is not there any more.") from None
+        raise HTTPException(404, "The file no longer exists.") from None
     except OSError as why:
         raise HTTPException(503, f"The file cannot be read: {why.strerror or why}.") from None
     try:
@@ -67,7 +67,7 @@ def _asked(request: Request, stat: os.stat_result) -> tuple[int, int, int, dict[
         return 200, 0, size - 1, told
     if _SEVERAL.match(wish):
         raise HTTPException(
-            416, "Several parts at once are not sent: ask for one.", headers={"Content-Range": f"bytes */{size}"}
+            416, "Several ranges at once are not supported: request one.", headers={"Content-Range": f"bytes */{size}"}
         )
     part = _RANGE.fullmatch(wish.replace(" ", ""))
     if part is None or part.group(1) == part.group(2) == "":

@@ -19,7 +19,7 @@ _LAST = {"Connection": "close"}  # what is still on its way is not read
 
 
 class Throttle:
-    """Pure ASGI, inside the guard, which says whose request it is; without a device it is the peer's address."""
+    """Rate limits, as pure ASGI inside the access guard: per device, or per peer address without one."""
 
     def __init__(self, app: ASGIApp, *, limits: Limits, now: Callable[[], float]) -> None:
         self._app = app
@@ -77,7 +77,7 @@ class Throttle:
         peer = scope.get("client")
         key = f"device {who.id}" if who is not None else f"address {peer[0] if peer else ''}"
         is_slow_down = scope["type"] == "http" and scope["path"].startswith(SLOW_DOWN_PATH)
-        if is_slow_down:  # has an allowance of its own: whatever else a device asks for does not use it up
+        if is_slow_down:  # has its own limit, which other requests of the device do not use up
             key = f"slow-down of {key}"
         found = self._known.get(key)
         if found is None:
@@ -92,14 +92,14 @@ class Throttle:
         return self._limits.local_requests if who is LOCAL else self._limits.requests
 
     def _forget(self) -> None:
-        """Those who asked nothing for a while; where that is not enough, the half that was known first."""
+        """Drop idle entries; if that is not enough, the older half."""
         now_s = self._now()
         kept = {key: one for key, one in self._known.items() if not one.is_whole(now_s)}
         self._known = dict(list(kept.items())[-_KEPT // 2 :])
 
 
 def _length(scope: Scope) -> int | None:
-    """What the head says of the body [bytes]; 0: nothing, None: no number."""
+    """The declared body length [B]; 0: none, None: not a number."""
     for name, value in scope["headers"]:
         if name == b"content-length":
             return int(value) if value.isdigit() and len(value) < 19 else None

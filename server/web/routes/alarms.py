@@ -1,21 +1,15 @@
-"""The events and the standing alarms of each vehicle over HTTP, and their acknowledgement."""
+"""The events and the alarms of each vehicle over HTTP, as JSON."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from fastapi import APIRouter, Path, Query, Request, Response
 
-from server.web.routes.session_request import Done, VehicleName, as_json, ask, vehicle_of
+from server.web.routes.session_request import ReplayToken, VehicleName, as_json, ask, ask_either, vehicle_of
 from server.web.services import services
 
 router = APIRouter(tags=["alarms"])
-
-
-class AcknowledgeRequest(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-    occurrence: int = Field(ge=0, le=2**53, description="Which occurrence was seen; an older one is refused")
 
 
 @router.get("/api/events", summary="The numbered log of what happened, oldest first")
@@ -30,14 +24,16 @@ async def events(
     return as_json({"events": await app.bus.events_after(name, after, limit), "last": app.bus.last_event(name)})
 
 
-@router.get("/api/alarms", summary="The alarms that stand, most urgent first")
+@router.get("/api/alarms", summary="The alarms that are active or not acknowledged, most urgent first")
 async def alarms(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json({"alarms": (await ask(request, vehicle, {"kind": "state"}))["alarms"]})
 
 
-@router.post("/api/alarms/{alarm}/acknowledge", summary="The operator has seen this occurrence")
-async def acknowledge(
-    request: Request, alarm: str, body: Annotated[AcknowledgeRequest, Body()], vehicle: VehicleName = None
-) -> Done:
-    await ask(request, vehicle, {"kind": "acknowledge", "alarm": alarm, "occurrence": body.occurrence})
-    return Done()
+@router.get("/api/checks/{check}", summary="One check: what it found, its last minute, its thresholds, what it needs")
+async def check(
+    request: Request,
+    check: Annotated[str, Path(max_length=120)],
+    vehicle: VehicleName = None,
+    replay: ReplayToken = None,
+) -> Response:
+    return as_json(await ask_either(request, vehicle, replay, {"kind": "check", "check": check}))

@@ -1,4 +1,4 @@
-"""Pairing over HTTP: a new device comes in, a socket gets its ticket, an operator looks after the list."""
+"""Pairing over HTTP: pair a device, issue socket tickets, manage the list of devices."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from server.access.devices import Device
 from server.access.identity import Principal, Role, principal_of
 from server.access.invitations import LASTS_S
 from server.access.tickets import LASTS_S as TICKET_LASTS_S
+from server.protocol.answers import DeviceList, DeviceRow
 from server.system.loopback import is_loopback
 from server.web.middleware.errors import Problem
 from server.web.services import services
 
 router = APIRouter()
 DeviceId = Annotated[str, Path(max_length=40)]
-_NOT_KEPT = "The list of devices cannot be kept on the server's disk"
+_NOT_KEPT = "The list of devices cannot be stored on the server's disk"
 
 
 class PairRequest(BaseModel):
@@ -33,7 +34,7 @@ class PairRequest(BaseModel):
 
 
 class Me(BaseModel):
-    """Who asks, as the server knows it."""
+    """The identity of the client."""
 
     id: str
     name: str
@@ -79,7 +80,7 @@ async def pair(request: Request, response: Response, body: Annotated[PairRequest
         raise HTTPException(422, "Either a token or a PIN lets a device in.")
     peer = request.client.host if request.client is not None else ""
     try:
-        device, secret = access.pair(token=body.token, pin=body.pin, name=body.name, peer=peer)
+        device, secret = await access.pair(token=body.token, pin=body.pin, name=body.name, peer=peer)
     except NotPaired as why:
         raise _not_paired(why) from None
     except OSError as why:
@@ -99,7 +100,7 @@ def _not_paired(why: NotPaired) -> Problem:
     return found
 
 
-@router.get("/api/me", tags=["access"], summary="Who asks, as the server knows it")
+@router.get("/api/me", tags=["access"], summary="The identity of the caller")
 async def me(request: Request) -> Me:
     return _me(principal_of(request))
 
@@ -110,7 +111,7 @@ async def ticket(request: Request) -> Ticket:
 
 
 @router.get("/api/devices", tags=["access"], summary="The paired devices, newest first")
-async def devices(request: Request) -> dict[str, Any]:
+async def devices(request: Request) -> DeviceList:
     access = services(request).access
     return {
         "you": principal_of(request).id,
@@ -123,7 +124,7 @@ async def devices(request: Request) -> dict[str, Any]:
 async def invite(request: Request, body: Annotated[InviteRequest, Body()]) -> Invited:
     access = services(request).access
     if access.is_open:
-        raise HTTPException(409, "This server is open to its own machine only: nobody pairs. Start it with --host.")
+        raise HTTPException(409, "This server accepts its own machine only, without pairing. Start it with --host.")
     made = access.another(body.role)
     link = f"{_base(request)}#pair={made.token}"
     code = segno.make(link, error="m", micro=False).svg_data_uri(border=4, dark="#000", light="#fff", omitsize=True)
@@ -131,9 +132,9 @@ async def invite(request: Request, body: Annotated[InviteRequest, Body()]) -> In
 
 
 @router.patch("/api/devices/{id}", tags=["access"], summary="Another role or name; it counts at once")
-async def change(request: Request, id: DeviceId, body: Annotated[DeviceChange, Body()]) -> dict[str, Any]:
+async def change(request: Request, id: DeviceId, body: Annotated[DeviceChange, Body()]) -> DeviceRow:
     try:
-        device = services(request).access.change(id, role=body.role, name=body.name, but=answering())
+        device = await services(request).access.change(id, role=body.role, name=body.name, but=answering())
     except OSError as why:
         raise HTTPException(503, f"{_NOT_KEPT}: {why.strerror or why}.") from None
     return _listed(request, _there(device))
@@ -144,9 +145,9 @@ async def remove(request: Request, id: DeviceId) -> dict[str, bool]:
     access = services(request).access
     who = principal_of(request)
     try:
-        _there(access.remove(id, by="itself" if who.id == id else who.name, but=answering()))
+        _there(await access.remove(id, by="itself" if who.id == id else who.name, but=answering()))
     except OSError as why:
-        detail = f"It is out now, but may come again after a restart. {_NOT_KEPT}: {why.strerror or why}."
+        detail = f"Its access ended, but it returns after a restart. {_NOT_KEPT}: {why.strerror or why}."
         raise HTTPException(503, detail) from None
     return {"ok": True}
 
@@ -157,11 +158,11 @@ def _there(device: Device | None) -> Device:
     return device
 
 
-def _listed(request: Request, device: Device) -> dict[str, Any]:
+def _listed(request: Request, device: Device) -> DeviceRow:
     return {
         "id": device.id,
         "name": device.name,
-        "role": device.role,
+        "role": "operator" if device.role is Role.OPERATOR else "viewer",
         "paired_ms": device.paired_ms,
         "seen_ms": device.seen_ms,
         "sockets": services(request).access.visits.sockets(device.id),  # pages it has open now

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from fastapi import APIRouter, Request
-from fastapi.responses import HTMLResponse
+from fastapi.responses import HTMLResponse, JSONResponse
 from fastapi.templating import Jinja2Templates
 
 from server.system.page_files import templates_dir
 
-router = APIRouter()
+router = APIRouter(include_in_schema=False)  # making the description takes half a second: in a thread, by `def`
 
 
-@router.get("/docs", response_class=HTMLResponse, include_in_schema=False)
-async def docs(request: Request) -> HTMLResponse:
+@router.get("/openapi.json")
+def described(request: Request) -> JSONResponse:
+    return JSONResponse(request.app.openapi())
+
+
+@router.get("/docs", response_class=HTMLResponse)
+def docs(request: Request) -> HTMLResponse:
     schema = request.app.openapi()
     context = {
         "info": schema["info"],

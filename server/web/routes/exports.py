@@ -1,15 +1,16 @@
-"""Exports and clips over HTTP: asked for, followed, cancelled, fetched."""
+"""Exports and clips over HTTP: start, progress, cancel, download."""
 
 from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, HTTPException, Request, Response
 from fastapi import Path as InPath
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema
 
+from server.protocol.answers import ExportJob
 from server.recording.export.clip import AFTER_S, BEFORE_S, LONGEST_S, Window
 from server.recording.export.formats import FORMATS
 from server.recording.export.jobs import Exports, Job, NoSuchRecording, NotYet, TooMany
@@ -20,12 +21,20 @@ from server.web.services import services
 router = APIRouter(tags=["recordings"])
 Id = Annotated[str, InPath(max_length=100, description="The recording's `id` in the list")]
 JobId = Annotated[str, InPath(max_length=40, description="`job` of the answer that began it")]
-Format = Literal["bag", "ros2", "csv", "gpx", "geojson", "html"]
+
+
+def _known(name: str) -> str:
+    if name not in FORMATS:
+        raise ValueError(f"there is no format {name[:40]!r}")
+    return name
+
+
+Format = Annotated[str, AfterValidator(_known), WithJsonSchema({"type": "string", "enum": [*FORMATS]})]
 
 
 class ExportRequest(BaseModel):
     model_config = ConfigDict(extra="forbid")
-    format: Format = Field(description="; ".join(f"{form.name}: {form.what}" for form in FORMATS.values()))
+    format: Format = Field(description="; ".join(f"{form.name}: {form.label}, {form.use}" for form in FORMATS.values()))
 
 
 class ClipRequest(BaseModel):
@@ -38,18 +47,18 @@ class ClipRequest(BaseModel):
 def exports(request: Request) -> Exports:
     found: Exports | None = services(request).exports
     if found is None:
-        raise HTTPException(404, "This server keeps nothing: start it with --data FOLDER to have recordings.")
+        raise HTTPException(404, "This server stores nothing: start it with --data FOLDER for recordings.")
     return found
 
 
 @router.post("/api/recordings/{id}/exports", status_code=202, summary="Begin an export")
-async def begin(request: Request, id: Id, body: Annotated[ExportRequest, Body()]) -> dict[str, Any]:
+async def begin(request: Request, id: Id, body: Annotated[ExportRequest, Body()]) -> ExportJob:
     """Answers at once; the same export that is going on or still there is answered instead of another."""
     return (await _begun(request, id, body.format)).as_json()
 
 
 @router.post("/api/recordings/{id}/clip", status_code=202, summary="Cut out the time around a moment, as a recording")
-async def clip(request: Request, id: Id, body: Annotated[ClipRequest, Body()]) -> dict[str, Any]:
+async def clip(request: Request, id: Id, body: Annotated[ClipRequest, Body()]) -> ExportJob:
     """A recording that is going on may be cut too; what is not recorded yet is waited for, at most a minute. The job
     that is done names the new recording."""
     window = Window(at_ns=round(body.at_ms * 1_000_000), before_s=body.before_s, after_s=body.after_s)
@@ -72,22 +81,20 @@ async def exported(request: Request, id: Id, format: Format) -> Response:
     return await _file(request, job)
 
 
-@router.get("/api/exports", summary="The exports that wait, go on, or can still be fetched")
+@router.get("/api/exports", summary="The exports that wait, run, or can be downloaded")
 async def listed(request: Request) -> dict[str, Any]:
     return {"exports": [job.as_json() for job in exports(request).jobs()]}
 
 
 @router.get("/api/exports/{job}", summary="How far an export is")
-async def followed(request: Request, job: JobId) -> dict[str, Any]:
+async def followed(request: Request, job: JobId) -> ExportJob:
     return _found(request, job).as_json()
 
 
 @router.delete("/api/exports/{job}", summary="Cancel an export, or remove its file")
 async def cancelled(request: Request, job: JobId) -> dict[str, Any]:
     found = _found(request, job)
-    exports(request).cancel(job)
-    if not found.is_over:
-        await found.finished.wait()
+    await exports(request).cancel(job)
     return {"ok": True, "state": found.state}
 
 
@@ -113,7 +120,7 @@ async def _begun(request: Request, id: str, format: str) -> Job:
 def _found(request: Request, id: str) -> Job:
     job = exports(request).job(id)
     if job is None:
-        raise HTTPException(404, "There is no such export: it is kept for an hour.")
+        raise HTTPException(404, "There is no such export; exports are kept for an hour.")
     return job
 
 
@@ -129,8 +136,8 @@ def _answer(request: Request, job: Job, path: Path) -> Response:
     """Named after the recording as the list has it."""
     form, recordings = FORMATS[job.format], services(request).recordings
     row = recordings.row(job.of) if recordings is not None else None
-    name = f"{job.of} {(row or {}).get('title') or ''}".strip()
-    answer = file_answer(request, path, name=f"{name}.{form.ending}", media_type=form.media_type)
+    name = f"{job.of} {row['title'] if row is not None else ''}".strip()
+    answer = file_answer(request, path, name=f"{name}.{form.extension}", media_type=form.media_type)
     if job.is_whole is False:
         answer.headers["Catgraph-Not-Whole"] = str(len(job.notes))  # its notes are in the job
     return answer

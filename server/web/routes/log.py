@@ -13,14 +13,14 @@ from fastapi import APIRouter, Depends, Query, Request
 from fastapi.responses import Response, StreamingResponse
 
 from monitor.alarm_spec import Priority
-from server.bus.bus import LocalBus
+from server.bus.bus import PageBus
 from server.bus.event_table import COLUMNS, event_row
 from server.web.routes.session_request import VehicleName, vehicle_of
-from server.web.services import services
+from server.web.services import Services, services
 
 router = APIRouter()
 _PAGE = 500
-_LOOKED_THROUGH = 2000  # events for one page of those that fit: the loop must not stand still for a rare word
+_LOOKED_THROUGH = 2000  # events scanned per page of results: a rare search text must not block the loop
 
 Text = Annotated[str | None, Query(max_length=120)]
 Urgency = Annotated[Priority | None, Query(description="Only of alarms of this priority")]
@@ -77,8 +77,8 @@ async def log_page(
     before: Annotated[int | None, Query(ge=1, le=2**53, description="Only numbers below this")] = None,
     limit: Annotated[int, Query(ge=1, le=500)] = 100,
 ) -> Response:
-    """`next_before` asks for the page after this one; null: there is none. A page may be short, even empty, with more
-    to come: after 2000 events that do not fit, looking further is another request."""
+    """`next_before` requests the following page; null: there is none. A page can be short or empty with more to come:
+    after 2000 events without a match the search continues in the next request."""
     app = services(request)
     name = vehicle_of(app, vehicle)
     events, more = await _page(app.bus, name, which, before, limit)
@@ -91,7 +91,7 @@ async def log_csv(request: Request, which: Wanted, vehicle: VehicleName = None) 
     app = services(request)
     name = vehicle_of(app, vehicle)
     return StreamingResponse(
-        _csv(_all(app.bus, name, which)),
+        _csv(_all(app.bus, name, which), _named(app, name)),
         media_type="text/csv; charset=utf-8",
         headers=_attachment(f"catgraph-log-{name}.csv"),
     )
@@ -102,14 +102,14 @@ async def log_json(request: Request, which: Wanted, vehicle: VehicleName = None)
     app = services(request)
     name = vehicle_of(app, vehicle)
     return StreamingResponse(
-        _json(_all(app.bus, name, which)),
+        _json(_all(app.bus, name, which), _named(app, name)),
         media_type="application/json",
         headers=_attachment(f"catgraph-log-{name}.json"),
     )
 
 
 async def _page(
-    bus: LocalBus, vehicle: str, which: Which, before: int | None, limit: int
+    bus: PageBus, vehicle: str, which: Which, before: int | None, limit: int
 ) -> tuple[list[dict[str, Any]], int | None]:
     """Newest first, and where the next page begins."""
     found: list[dict[str, Any]] = []
@@ -138,7 +138,7 @@ def _attachment(name: str) -> dict[str, str]:
     return {"Content-Disposition": f'attachment; filename="{name}"'}
 
 
-async def _all(bus: LocalBus, vehicle: str, which: Which) -> AsyncIterator[list[dict[str, Any]]]:
+async def _all(bus: PageBus, vehicle: str, which: Which) -> AsyncIterator[list[dict[str, Any]]]:
     """All events of a vehicle that fit, oldest first, in portions."""
     n = 0
     while events := await bus.events_after(vehicle, n, _PAGE):
@@ -146,24 +146,29 @@ async def _all(bus: LocalBus, vehicle: str, which: Which) -> AsyncIterator[list[
         yield [event for event in events if which.has(event)]
 
 
-async def _csv(portions: AsyncIterator[list[dict[str, Any]]]) -> AsyncIterator[str]:
+def _named(app: Services, vehicle: str) -> dict[str, str]:
+    """What each exported event says of its car: its name where the server has several, so that files can be joined."""
+    return {"vehicle": vehicle} if len(app.sessions) > 1 else {}
+
+
+async def _csv(portions: AsyncIterator[list[dict[str, Any]]], named: dict[str, str]) -> AsyncIterator[str]:
     text = io.StringIO()
     rows = csv.writer(text)
-    rows.writerow(COLUMNS)
+    rows.writerow([*named, *COLUMNS])
     async for events in portions:
         for event in events:
-            rows.writerow(event_row(event))
+            rows.writerow([*named.values(), *event_row(event)])
         yield text.getvalue()
         text.seek(0)
         text.truncate()
     yield text.getvalue()  # the columns, where there is no event
 
 
-async def _json(portions: AsyncIterator[list[dict[str, Any]]]) -> AsyncIterator[bytes]:
+async def _json(portions: AsyncIterator[list[dict[str, Any]]], named: dict[str, str]) -> AsyncIterator[bytes]:
     yield b"["
     first = True
     async for events in portions:
         for event in events:
-            yield (b"" if first else b",\n") + orjson.dumps(event)
+            yield (b"" if first else b",\n") + orjson.dumps({**named, **event})
             first = False
     yield b"]"

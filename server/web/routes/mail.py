@@ -16,7 +16,7 @@ from server.mail.mail_folder import MailRefused
 from server.mail.mailer import Mailer
 from server.mail.order import Format, Letter, Order, Recipient, State, TooLarge, Way
 from server.mail.settings import BadMailSetting, MailSettings, Security
-from server.mail.test_mail import Trial, TrialFailed, try_out
+from server.mail.test_mail import MailTestFailed, Trial, try_out
 from server.web.middleware.errors import Problem
 from server.web.routes.session_request import NAME_HEADER
 from server.web.services import services
@@ -30,7 +30,7 @@ Line = Annotated[str, StringConstraints(max_length=400)]
 
 
 class MailOrder(BaseModel):
-    """What is to be mailed to whom."""
+    """Recordings, recipients and text of a mail."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
     recordings: list[Annotated[str, StringConstraints(min_length=1, max_length=100)]] = Field(
@@ -46,7 +46,7 @@ class MailOrder(BaseModel):
         "split", description="What becomes of more than the size limit: numbered parts, or a link"
     )
     key: str | None = Field(
-        None, pattern=r"^[A-Za-z0-9-]{8,64}$", description="A name for this order: given twice, it is one order"
+        None, pattern=r"^[A-Za-z0-9-]{8,64}$", description="A name for this request: sent twice, it is one mail"
     )
 
 
@@ -72,7 +72,7 @@ class PartOut(BaseModel):
 
 
 class MailOut(BaseModel):
-    """One order and where it stands."""
+    """One order and its state."""
 
     n: int
     key: str
@@ -146,14 +146,14 @@ class MailSettingsOut(BaseModel):
     complaints: list[str] = Field(description="What was found wrong with what was kept, when the server started")
 
 
-class TrialIn(BaseModel):
+class MailTestIn(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
     to: str | None = Field(
         None, max_length=400, description="Where a short mail is sent; left out: only the login is tried"
     )
 
 
-class TrialOut(BaseModel):
+class MailTestOut(BaseModel):
     """The server took it."""
 
     sentence: str
@@ -172,7 +172,7 @@ async def order(request: Request, body: Annotated[MailOrder, Body()]) -> MailOut
     except address.BadAddress as why:
         raise Problem(422, str(why), field="to") from None
     if not header_text.is_one_line(body.subject):
-        raise Problem(422, "A subject is one line of letters that can be seen.", field="subject")
+        raise Problem(422, "A subject is one line of printable characters.", field="subject")
     if any((ord(letter) < 32 and letter not in "\t\r\n") or letter == "\x7f" for letter in body.text):
         raise Problem(422, "The message holds signs that are no text.", field="text")
     recordings = tuple(dict.fromkeys(body.recordings))
@@ -231,7 +231,7 @@ async def change_settings(request: Request, body: Annotated[MailSettingsIn, Body
 
 
 @router.post("/test", summary="Dial the mail server with the settings in force, log in, send a short mail")
-async def test(request: Request, body: Annotated[TrialIn, Body()]) -> TrialOut:
+async def test(request: Request, body: Annotated[MailTestIn, Body()]) -> MailTestOut:
     mailer = _mailer(request)
     if not mailer.settings.is_complete:
         raise Problem(409, "Give SMTP host and sender first.", field="host" if not mailer.settings.host else "sender")
@@ -245,9 +245,9 @@ async def test(request: Request, body: Annotated[TrialIn, Body()]) -> TrialOut:
             raise Problem(422, f"{to.shown} is not among the allowed recipients.", field="to")
     try:
         found: Trial = await try_out(mailer.settings, to, services(request).wall_ms())
-    except TrialFailed as why:
+    except MailTestFailed as why:
         raise Problem(502, str(why)) from None
-    return TrialOut(**asdict(found))
+    return MailTestOut(**asdict(found))
 
 
 @router.get("/{n}", summary="One mail of the outbox")
@@ -280,7 +280,7 @@ async def resend(request: Request, n: Number) -> MailOut:
 def _mailer(request: Request) -> Mailer:
     found: Mailer | None = services(request).mailer
     if found is None:
-        raise Problem(404, "This server keeps nothing: start it with --data FOLDER to send mail.")
+        raise Problem(404, "This server stores nothing: start it with --data FOLDER to send mail.")
     return found
 
 
@@ -289,7 +289,7 @@ def _problem(why: MailRefused) -> Problem:
 
 
 def _base(request: Request) -> str:
-    """The address by which whoever ordered reached this server, for links; empty where it is none that could be one."""
+    """The server's address in the request, for links; empty if it is not valid."""
     host = request.headers.get("host", "")
     return f"{request.url.scheme}://{host}" if _HOST.fullmatch(host) else ""
 

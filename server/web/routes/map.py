@@ -1,4 +1,4 @@
-"""What lies under the map: tiles that may be fetched, those of map files, and the picture of the site above them."""
+"""The map layers over HTTP: fetched tiles, map files, site image."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DAY_S = 86_400  # a phone keeps a fetched tile no longer: it may be another one
 _NUMBER = re.compile(r"[0-9]{1,9}")  # more digits are no tile's, and turning them into a number may cost or fail
 
 
-@router.get("/api/map", tags=["map"], summary="What lies under the map: layers of tiles, the picture of the site")
+@router.get("/api/map", tags=["map"], summary="The layers below the map: tiles, and the image of the site")
 async def ground(request: Request) -> dict[str, Any]:
     under = services(request).ground
     image, fetched = under.image, under.upstream
@@ -64,7 +64,7 @@ async def tile(request: Request, name: str, z: str, x: str, y: str) -> Response:
     if found is None and fetched is not None:
         return await _fetched(fetched, int(z), int(x), int(y))
     assert found is not None
-    # In a thread: a file may lie on a slow disk, and the loop must not wait for it.
+    # In a thread, because a file may be on a slow disk.
     picture = await run_in_threadpool(found.tile, int(z), int(x), int(y))
     if picture is None:
         return Response(status_code=204, headers={"Cache-Control": "public, max-age=3600"})

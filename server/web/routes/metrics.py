@@ -34,7 +34,7 @@ async def metrics(request: Request) -> PlainTextResponse:
     )
     add("up_seconds", "gauge", "Seconds since the server started.", [("", app.now() - app.started_s)])
     if app.recordings is not None:
-        for name, help, rows in await asyncio.to_thread(_recorded, app.recordings):  # it looks at a disk
+        for name, help, rows in await asyncio.to_thread(_recorded, app.recordings):  # it reads a disk
             add(name, "gauge", help, rows)
     received, rejected, open_, lag, load, chattering, kept, phones = [], [], [], [], [], [], [], []
     for name, session in app.sessions.items():
@@ -59,13 +59,13 @@ async def metrics(request: Request) -> PlainTextResponse:
     add("alarms_announced_10_min", "gauge", "Alarms announced in the last ten minutes; more than 10: a flood.", load)
     add("alarms_chattering", "gauge", "Alarms that came and went three times within the last minute.", chattering)
     add("alarm_log_kept", "gauge", "1 while the alarm log is kept on the disk.", kept)
-    add("phones", "gauge", "Phones that tell their position, or why they cannot.", phones)
+    add("phones", "gauge", "Phones that share their position, or the reason why not.", phones)
     add("tick_lag_seconds", "gauge", "How late the newest tick was.", lag)
     return PlainTextResponse("\n".join(lines) + "\n", media_type=_TEXT)
 
 
 def _recorded(catalog: Catalog) -> list[tuple[str, str, list[tuple[str, float]]]]:
-    """Name, help and rows of what there is to say of the recordings."""
+    """Name, help and rows of the metrics of recordings."""
     places = [('{place="kept"}', catalog.totals()), ('{place="trash"}', catalog.totals(Which(is_trashed=True)))]
     free = catalog.free_bytes()
     return [

@@ -5,7 +5,8 @@ from __future__ import annotations
 from fastapi import APIRouter, WebSocket
 
 from server.access.identity import principal_of
-from server.replay import commands
+from server.protocol import replay_commands
+from server.protocol.messages import Hello, RoleName
 from server.web.services import services
 
 router = APIRouter()
@@ -22,5 +23,6 @@ async def page_socket(
         await socket.close(code=1008, reason="no such vehicle")
         return
     principal = principal_of(socket)
-    hello = app.hello(name) | {"who": {"id": principal.id, "name": principal.name, "role": principal.role}}
-    await app.hub.serve(socket, name, hello, principal=principal, replay=commands.opening(replay, t))
+    role: RoleName = "operator" if principal.is_operator else "viewer"
+    hello: Hello = {**app.hello(name), "who": {"id": principal.id, "name": principal.name, "role": role}}
+    await app.hub.serve(socket, name, hello, principal=principal, replay=replay_commands.opening(replay, t))

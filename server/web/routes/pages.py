@@ -16,6 +16,7 @@ from markupsafe import Markup
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse
 
+from server.access.identity import is_known
 from server.system.page_files import check_vendor, static_dir, templates_dir
 from server.web.assets.bundle import EARLY, ENTRY, STYLES, Built, find
 from server.web.assets.icons import FOLDER as DRAWN
@@ -26,6 +27,7 @@ from server.web.assets.static_files import StaticText, answer, packed
 from server.web.middleware.headers import policy_of
 from server.web.routes.session_request import vehicle_of
 from server.web.services import services
+from server.web.tabs import TABS
 
 log = logging.getLogger("catgraph.page")
 
@@ -33,20 +35,24 @@ _HTML = "text/html; charset=utf-8"
 
 
 def parts_of(built: Built | None, asset: Callable[[str], str]) -> dict[str, object]:
-    """The addresses of what the page begins with: few joined files, or all that there are."""
+    """What the page begins with: its tabs, and the addresses of few joined files, or of all that there are."""
     if built is None:
-        return {"styles": [asset(f"css/{name}.css") for name in STYLES], "script": asset(f"js/{ENTRY}"), "needed": []}
+        styles = [asset(f"css/{name}.css") for name in STYLES]
+        return {"tabs": TABS, "styles": styles, "script": asset(f"js/{ENTRY}"), "needed": []}
     style, script, *needed = (f"/static/{name}" for name in (built.style, built.script, *built.needed))
-    return {"styles": [style], "script": script, "needed": needed}
+    return {"tabs": TABS, "styles": [style], "script": script, "needed": needed}
 
 
 def early_of(built: Built | None, static: Path) -> str:
-    """The script that stands in a page itself: asked for by an address it would hold up all that comes after it."""
+    """The inline script of a page; as a separate file it would block everything after it."""
     return built.early if built is not None else (static / "js" / EARLY).read_text(encoding="utf-8")
 
 
 class PageFiles:
-    """The page, its offline form and its worker, filled in from templates and the static folder."""
+    """The page, its offline form and its worker, filled in from templates and the static folder.
+
+    All of it reads files: it is for threads, and so none of the routes below is `async`.
+    """
 
     def __init__(self, static: Path, templates: Jinja2Templates) -> None:
         self.static = static
@@ -100,25 +106,33 @@ def _page_routes(files: PageFiles) -> APIRouter:
     router, static = APIRouter(include_in_schema=False), files.static
 
     @router.get("/", response_class=HTMLResponse)
-    async def page(request: Request, vehicle: str | None = None) -> Response:
+    def page(request: Request, vehicle: str | None = None) -> Response:
         one, built = services(request), find(static)
+        one.build = build_of(built)
         access = "open" if one.access.is_open else "paired"
-        context = {"version": one.version, "vehicle": vehicle_of(one, vehicle), "access": access}
+        names = list(one.sessions) if is_known(request) else []
+        if vehicle is not None and vehicle not in one.sessions:
+            body = files.render("no_car.html", request, built, name=vehicle[:40], vehicles=names)
+            answered = files.response(body, request, built)
+            answered.status_code = 404
+            return answered
+        context = {"version": one.version, "vehicle": vehicle_of(one, vehicle), "access": access, "vehicles": names}
         body = files.render("page.html", request, built, worker=built is not None and one.keeps_shell, **context)
         return files.response(body, request, built)
 
     @router.get(OFFLINE, response_class=HTMLResponse)
-    async def offline(request: Request, v: str | None = None) -> Response:
+    def offline(request: Request, v: str | None = None) -> Response:
         """What a phone shows while the server does not answer; `v` names the shell it is to belong to."""
         built = find(static)
         if v is not None and (built is None or files.shell(request, built).version != v):
-            raise HTTPException(404, "The page has changed since.")
+            raise HTTPException(404, "The page has changed.")
         return files.response(files.render("offline.html", request, built), request, built)
 
     @router.get(WORKER)
-    async def worker(request: Request) -> Response:
-        """The worker that keeps the shell; with single modules, or where there shall be none, the one that goes."""
+    def worker(request: Request) -> Response:
+        """The service worker; with single modules or `--no-worker`, a script that removes it."""
         built = find(static)
+        services(request).build = build_of(built)
         is_kept = built is not None and services(request).keeps_shell
         script = files.shell(request, built).worker(static) if built is not None and is_kept else withdrawn(static)
         answered = answer(packed(script.encode()), request.headers, "text/javascript; charset=utf-8", "no-cache")
@@ -129,22 +143,22 @@ def _page_routes(files: PageFiles) -> APIRouter:
 
 
 def _install_routes(files: PageFiles) -> APIRouter:
-    """What a phone asks for when it installs the page."""
+    """The web app manifest."""
     router, static = APIRouter(include_in_schema=False), files.static
 
     @router.get("/manifest.webmanifest")
-    async def manifest(request: Request) -> Response:
+    def manifest(request: Request) -> Response:
         body = json.dumps(manifest_of(files.asset, are_drawn=are_drawn(static)), indent=1).encode()
         return answer(packed(body), request.headers, "application/manifest+json", "no-cache")
 
     @router.get("/favicon.ico")
     @router.get("/apple-touch-icon.png")
-    async def asked_by_name(request: Request) -> FileResponse:
-        """Pictures that browsers ask for at these addresses, whatever a page says."""
+    def requested_by_name(request: Request) -> FileResponse:
+        """Icons that browsers request at fixed addresses."""
         name = "favicon.png" if request.url.path == "/favicon.ico" else "apple-touch-icon.png"
         path = static / DRAWN / name
         if not path.is_file():
-            raise HTTPException(404, "This picture was not drawn when catgraph was installed.")
+            raise HTTPException(404, "This icon was not rendered when catgraph was installed.")
         return FileResponse(path, media_type="image/png", headers={"Cache-Control": "no-cache"})
 
     return router

@@ -11,17 +11,19 @@ from fastapi import APIRouter, Body, HTTPException, Query, Request, Response
 from fastapi import Path as InPath
 from pydantic import BaseModel, ConfigDict, Field
 
+from server.protocol.answers import ExportFormat, RecordingList
 from server.recording.catalog import sketch
 from server.recording.catalog.annotations import BadAnnotation
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.catalog_db import Which
 from server.recording.catalog.errors import NotThere, Refused
 from server.recording.catalog.rows import MAX_ROWS
+from server.recording.export.formats import FORMATS
 from server.web.middleware.errors import Problem
 from server.web.middleware.ranges import file_answer
 from server.web.services import services
 
-# None of these routes is `async`: they look at a disk, so they run in threads, and the event loop goes on.
+# None of these routes is `async`: they read a disk and therefore run in threads.
 router = APIRouter(tags=["recordings"])
 Id = Annotated[str, InPath(max_length=100, description="The recording's `id` in the list")]
 Text = Annotated[str | None, Query(max_length=200)]
@@ -44,7 +46,7 @@ class AnnotationsChange(BaseModel):
 def catalog(request: Request) -> Catalog:
     found: Catalog | None = services(request).recordings
     if found is None:
-        raise HTTPException(404, "This server keeps nothing: start it with --data FOLDER to have recordings.")
+        raise HTTPException(404, "This server stores nothing: start it with --data FOLDER for recordings.")
     return found
 
 
@@ -60,7 +62,7 @@ def _asked(what: Callable[[], T]) -> T:
 
 
 def _json(request: Request, body: Any) -> Response:
-    """304 where the page has the same already: a list that is looked at is asked for again and again."""
+    """304 if the list is unchanged, because an open list is requested repeatedly."""
     raw = orjson.dumps(body)
     headers = {"ETag": f'"{hashlib.sha256(raw).hexdigest()[:20]}"', "Cache-Control": "private, no-cache"}
     if headers["ETag"] in request.headers.get("if-none-match", ""):
@@ -79,29 +81,36 @@ def listed(
     since_ms: Milliseconds = None,
     until_ms: Milliseconds = None,
 ) -> Response:
-    """`next` asks for the page after this one; null: there is none. What was just recorded, and what was copied into
-    the folder by hand, is listed by its name until it has been read (`state` waiting)."""
+    """`next` requests the following page; null: there is none. New recordings and copied files are listed by name until
+    they have been read (`state` waiting)."""
     recordings = catalog(request)
     which = Which(vehicle=vehicle, tag=tag, text=text, since_ms=since_ms, until_ms=until_ms)
     recordings.look_again()
     page = _asked(lambda: recordings.rows(which, cursor=cursor, limit=limit))
     free = recordings.free_bytes()
-    return _json(
-        request,
-        {
-            "recordings": page.rows,
-            "next": page.next,
-            "found": recordings.totals(which),
-            "all": recordings.totals(),
-            "trash": recordings.totals(Which(is_trashed=True)),
-            "free_bytes": None if free is None else free - free % 10_000_000,  # the same for a while: see ETag
-            "waiting": recordings.waiting,
-            **recordings.names(),
-        },
-    )
+    found: RecordingList = {
+        "recordings": page.rows,
+        "next": page.next,
+        "found": recordings.totals(which),
+        "all": recordings.totals(),
+        "trash": recordings.totals(Which(is_trashed=True)),
+        "free_bytes": None if free is None else free - free % 10_000_000,  # the same for a while: see ETag
+        "waiting": recordings.waiting,
+        "formats": listed_formats(),
+        **recordings.names(),
+    }
+    return _json(request, found)
 
 
-@router.post("/api/recordings/rescan", summary="Look through the folder again, and read anew what could not be read")
+def listed_formats() -> list[ExportFormat]:
+    """The export formats as the page's keys show them."""
+    return [
+        {"name": form.name, "label": form.label, "use": form.use, "ros_version": form.ros_version}
+        for form in FORMATS.values()
+    ]
+
+
+@router.post("/api/recordings/rescan", summary="Scan the folder again, and read again what could not be read")
 def rescan(request: Request) -> dict[str, Any]:
     recordings = catalog(request)
     recordings.rebuild()
@@ -135,7 +144,7 @@ def delete(request: Request, id: Id) -> Response:
     response_class=Response,
 )
 def file(request: Request, id: Id) -> Response:
-    """A recording that was copied in may be a ROS 1 bag or a db3 file; its name says so."""
+    """The recording's file; a copied one can be a ROS 1 bag or a db3 file, as its name shows."""
     recordings = catalog(request)
     row, path = recordings.row(id), recordings.path(id)
     if row is None or path is None:
@@ -144,7 +153,7 @@ def file(request: Request, id: Id) -> Response:
     return file_answer(request, path, name=name, media_type=_TYPES.get(row["format"], "application/octet-stream"))
 
 
-@router.get("/api/recordings/{id}/track.svg", summary="The way it went, with its alarms", response_class=Response)
+@router.get("/api/recordings/{id}/track.svg", summary="Its track, with its alarms", response_class=Response)
 def track(request: Request, id: Id) -> Response:
     row = catalog(request).row(id)
     if row is None:
@@ -169,7 +178,7 @@ def trash(
     return _json(request, {"recordings": page.rows, "next": page.next, "all": recordings.totals(which)})
 
 
-@router.post("/api/trash/{id}/restore", summary="Take it back")
+@router.post("/api/trash/{id}/restore", summary="Restore")
 def restore(request: Request, id: Id) -> Response:
     recordings = catalog(request)
     return _json(request, _asked(lambda: recordings.restore(id)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import orjson
@@ -18,6 +19,9 @@ from server.web.services import Services, services
 NAME_HEADER = "x-catgraph-name"  # what the caller wants to be called in the log
 FENCE_HEADER = "x-catgraph-fence"  # the number of the lease of control by which a page orders
 VehicleName = Annotated[str | None, Query(description="Which vehicle; the first where it is left out", max_length=40)]
+MeantVehicle = Annotated[
+    str | None, Query(description="Which vehicle; required where there are several", max_length=40)
+]
 ReplayToken = Annotated[str | None, Query(description="Of a page's replay, as its state names it", max_length=40)]
 
 
@@ -35,7 +39,17 @@ def vehicle_of(app: Services, name: str | None) -> str:
     return name
 
 
-async def ask(request: Request, vehicle: str | None, message: dict[str, Any]) -> dict[str, Any]:
+def meant_vehicle(request: Request, name: str | None) -> str | None:
+    """The vehicle that a command acts on: it must be named where there are several."""
+    names = services(request).sessions
+    if name is None and len(names) > 1:
+        raise HTTPException(
+            422, f"This server has several cars: name the one that is meant by ?vehicle= ({', '.join(names)})."
+        )
+    return name
+
+
+async def ask(request: Request, vehicle: str | None, message: dict[str, Any]) -> Mapping[str, Any]:
     """The session's answer; refused commands become 409 with the session's sentence.
 
     Who gave the order is in the log as the header X-Catgraph-Name has it, else as "api" and the program's name.
@@ -67,8 +81,8 @@ def _sender(request: Request) -> dict[str, Any]:
 
 async def ask_either(
     request: Request, vehicle: str | None, replay: str | None, message: dict[str, Any]
-) -> dict[str, Any]:
-    """What is asked of the live car, or of one page's replay."""
+) -> Mapping[str, Any]:
+    """Requests to the live car or to a page's replay."""
     if replay is None:
         return await ask(request, vehicle, message)
     try:

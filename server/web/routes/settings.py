@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from fastapi import APIRouter, Body, HTTPException, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel
 
+from server.protocol import commands
+from server.web.routes.commands import body_of
 from server.web.routes.session_request import VehicleName, as_json, ask, vehicle_of
 from server.web.services import services
 
 router = APIRouter(tags=["settings"])
-
-
-class SettingsChange(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-    values: dict[str, float | None] = Field(
-        default_factory=dict,
-        examples=[{"speed_limit.max_mps": 9.0}],
-        description="In SI; null goes back to the default",
-    )
-    topics: dict[str, str | None] = Field(default_factory=dict, description="Signal → topic; null: as found")
-    profile: str | None = Field(None, description="A profile's name, or auto")
-    version: int | None = Field(None, description="Refused with 409 when the settings are no longer at this version")
+if TYPE_CHECKING:
+    SettingsChange = BaseModel
+else:
+    SettingsChange = body_of(commands.Set, is_strict=True)
 
 
 @router.get("/api/settings", summary="Settings in force, their defaults, ranges and units")
@@ -55,7 +49,7 @@ async def import_settings(request: Request, vehicle: VehicleName = None) -> Resp
     try:
         text = (await limited_body(request, 64 * 1024)).decode("utf-8")
     except UnicodeDecodeError:
-        raise HTTPException(422, "This is not text in UTF-8.") from None
+        raise HTTPException(422, "This is not UTF-8 text.") from None
     await ask(request, vehicle, {"kind": "import", "toml": text})
     return await settings(request, vehicle)
 

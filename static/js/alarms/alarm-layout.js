@@ -1,12 +1,12 @@
 // Which alarm shows where: one rule a place, none an alarm. Pure functions.
 
 import { stripWords } from '../slowdown/slow-layout.js';
-import { counted, fixed, timeOfDay } from '../core/format.js';
+import { fixed, timeOfDay } from '../core/format.js';
 
 /**
- * @typedef {import('../core/protocol.js').Alarm} Alarm
- * @typedef {import('../core/protocol.js').State} State
- * @typedef {import('../core/protocol.js').SoundName} SoundName
+ * @typedef {import('../core/protocol-types.js').StandingAlarm} Alarm
+ * @typedef {import('../core/protocol-types.js').State} State
+ * @typedef {import('../core/protocol-types.js').Sound} SoundName
  */
 
 const RANK = { critical: 3, warning: 2, advisory: 1 };
@@ -20,7 +20,7 @@ const isAsking = (alarm) => alarm.state === 'UNACKED' || alarm.state === 'RTN_UN
  * @param {Alarm} alarm
  */
 export const isAboutLink = (alarm) => LINK_ACTIONS.some((action) => alarm.actions.includes(action));
-const LINK_ACTIONS = ['retry', 'reconnect', 'exit', 'change_address'];
+const LINK_ACTIONS = /** @type {const} */ (['reconnect', 'exit', 'change_address']);
 
 /**
  * An alarm's title; of one that returned to normal, that it did.
@@ -57,7 +57,7 @@ export function layOut(alarms) {
 }
 
 /**
- * The sound that must be heard now, or null. What is acknowledged, shelved or over is silent. While paused the server
+ * The sound that must be heard now, or null. What is acknowledged, silenced, shelved or over is silent. While paused the server
  * tells only what a pause does not hide: a lost link, a pause that somebody forgot. A server that fell silent while it
  * watched a car is the loudest alarm of all, for nothing else can be announced; a paused one watches nothing.
  * @param {State | null} frame
@@ -68,12 +68,12 @@ export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
   if (!frame) return null;
   if (isServerLost) return isLossAcknowledged || frame.session.paused ? null : 'high';
   if (frame.decelerate.countdown) return 'count';
-  const asking = frame.alarms.filter((alarm) => alarm.state === 'UNACKED').map((alarm) => alarm.sound);
+  const asking = frame.alarms.filter((alarm) => alarm.state === 'UNACKED' && !alarm.silenced_until_ms).map((alarm) => alarm.sound);
   return LOUD.find((sound) => asking.includes(sound)) ?? null;
 }
 
-/** @typedef {{kind: 'crit' | 'warn' | 'invert' | 'order' | 'armed' | '', icon: string, text: string, end: string, opens: 'alarms' | 'signals', hasReturned?: boolean}} Strip
- * hasReturned: nothing urgent stands any more, and nobody has acknowledged it */
+/** @typedef {{kind: 'crit' | 'warn' | 'invert' | 'order' | 'armed' | '', icon: string, text: string, end: string, opens: 'alarms' | 'signals', hasReturned?: boolean, isKnown?: boolean}} Strip
+ * hasReturned: nothing urgent stands any more, and nobody has acknowledged it; isKnown: it stands, and was acknowledged */
 
 /**
  * The one line under the tabs.
@@ -84,7 +84,7 @@ export function soundOf(frame, { isServerLost, isLossAcknowledged }) {
 export function stripOf(frame, { isSilent, chain, paused_s }) {
   if (!frame) return { kind: 'invert', icon: 'unknown', text: 'Nothing received yet', end: 'not checked', opens: 'signals' };
   if (frame.session.paused && !isSilent) {
-    return { kind: 'invert', icon: 'pause', text: `Paused ${paused(paused_s)}: no alarm will come`, end: '', opens: 'alarms' };
+    return { kind: 'invert', icon: 'pause', text: `Paused ${paused(paused_s)}: no alarm is raised`, end: '', opens: 'alarms' };
   }
   if (chain.word === 'Lost') {
     return { kind: 'crit', icon: 'link-off', text: 'Connection lost', end: chain.since_ms === null ? '' : `since ${timeOfDay(chain.since_ms)}`, opens: 'alarms' };
@@ -93,6 +93,7 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
   const { standing, shelved } = layOut(frame.alarms);
   // An advisory that stands does not hide a warning that returned and waits to be acknowledged.
   const worst = standing.find(({ priority }) => priority !== 'advisory') ?? standing[0];
+  const listed = frame.alarms.length + (frame.suppressed ?? []).length; // what the list behind it has
   const order = stripWords(frame.decelerate, standing.length);
   // A critical alarm comes before the order, whose steps stand beneath; all else after it.
   if (order && order.kind !== 'armed' && worst?.priority !== 'critical') {
@@ -100,30 +101,37 @@ export function stripOf(frame, { isSilent, chain, paused_s }) {
   }
   if (worst && worst.priority !== 'advisory') {
     const isOne = standing.length === 1 && worst.priority === 'critical' && worst.active;
-    const among = isOne ? `${fixed(worst.for_s)} s` : counted(standing.length, 'alarm', 'alarms');
+    const among = isOne && listed === 1 ? `${fixed(worst.for_s)} s` : amongWords(listed);
     return {
       kind: worst.priority === 'critical' ? 'crit' : 'warn', icon: worst.priority === 'critical' ? 'crit' : 'warn',
-      text: titleOf(worst), end: among, hasReturned: !worst.active, opens: 'alarms',
+      text: titleOf(worst), end: among, hasReturned: !worst.active, isKnown: worst.active && !isAsking(worst), opens: 'alarms',
     };
   }
   if (chain.cut === 2) {
     const isFirst = frame.link.topics_heard === 0;
     return { kind: 'invert', icon: isFirst ? 'unknown' : 'clock', text: isFirst ? 'Nothing received yet' : 'Values are not live', end: 'not checked', opens: 'signals' };
   }
-  const ok = tilesOf(frame.checks).filter((tile) => tile.verdict === 'ok').length;
-  const unknown = tilesOf(frame.checks).filter((tile) => tile.verdict === 'unknown' && tile.brief !== 'not published').length;
+  const tiles = tilesOf(frame.checks);
+  const ok = tiles.filter((tile) => tile.verdict === 'ok').length;
+  const isFuelAbsent = frame.signals.fuel?.freshness === 'not_published' && !tiles.some((tile) => tile.label === 'Fuel'); // counted as its tile is
+  const unknown = tiles.filter((tile) => tile.verdict === 'unknown').length + Number(isFuelAbsent);
   const counts = `${ok} OK · ${unknown} not checked`;
   if (worst) {
-    const end = standing.length > 1 ? counted(standing.length, 'alarm', 'alarms') : unknown ? `${unknown} not checked` : `${ok} OK`;
+    const end = listed > 1 ? amongWords(listed) : unknown ? `${unknown} not checked` : `${ok} OK`;
     return { kind: '', icon: 'info', text: worst.title, end, opens: 'alarms' };
   }
   if (order) return { ...order, icon: 'slow', opens: 'alarms' };
   return { kind: '', icon: 'ok', text: 'No alarms', end: shelved ? `${shelved} shelved · ${unknown} not checked` : counts, opens: 'alarms' };
 }
 
+/** Of how many in the list this is one. @param {number} listed */
+function amongWords(listed) {
+  return listed > 1 ? `1 of ${listed}` : '1 alarm';
+}
+
 /**
- * @typedef {import('../core/protocol.js').Check} Check
- * @typedef {{label: string, verdict: import('../core/protocol.js').Verdict, brief: string, text: string, ids: string[]}} Tile
+ * @typedef {import('../core/protocol-types.js').Tile} Check
+ * @typedef {{label: string, verdict: import('../core/protocol-types.js').Verdict, brief: string, text: string, ids: string[]}} Tile
  */
 
 const WORSE = { fault: 2, unknown: 1, ok: 0 };

@@ -41,7 +41,7 @@ export class AlarmSound {
 
   /**
    * Sound this from now on, or be still.
-   * @param {import('../core/protocol.js').SoundName | 'count' | null} name
+   * @param {import('../core/protocol-types.js').Sound | 'count' | null} name
    */
   say(name) {
     const sound = name === 'none' ? null : name;

@@ -1,27 +1,35 @@
-// The list of alarms as words: which row stands where, how its state reads, what its keys are. Pure functions, no DOM.
+// The list of alarms as words: which row stands where, how its state reads, what its keys are, what fits a page of it. Pure functions, no DOM.
 
 import { snackWords } from './standing.js';
-import { timeOfDay } from '../core/format.js';
+import { fixed, timeOfDay } from '../core/format.js';
 
 /**
- * @typedef {import('../core/protocol.js').Alarm} Alarm
- * @typedef {import('../core/protocol.js').Suppressed} Suppressed
+ * @typedef {import('../core/protocol-types.js').StandingAlarm} Alarm
+ * @typedef {import('../core/protocol-types.js').SuppressedAlarm} Suppressed
  * @typedef {'unacknowledged' | 'returned' | 'acknowledged' | 'shelved' | 'suppressed'} Kind
- * @typedef {{key: string, kind: Kind, icon: string, priority: string, title: string, words: string, at: string, state: string, keys: ('acknowledge' | 'shelve' | 'unshelve')[], alarm: Alarm | null}} Row
+ * @typedef {'silence' | 'acknowledge' | 'shelve' | 'unshelve'} Key
+ * @typedef {{key: string, id: string, kind: Kind, icon: string, priority: string, title: string, words: string, at: string, state: string, silent: string, keys: Key[], alarm: Alarm | null}} Row
  */
 
 const ORDER = /** @type {Kind[]} */ (['unacknowledged', 'returned', 'acknowledged', 'shelved', 'suppressed']);
 const RANK = { critical: 0, warning: 1, advisory: 2 };
-const ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
+export const ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
 const KINDS = /** @type {Record<Alarm['state'], Kind>} */ ({ UNACKED: 'unacknowledged', RTN_UNACKED: 'returned', ACKED: 'acknowledged', SHELVED: 'shelved' });
+/** So long a row must have been in sight whole before one tap answers it together with others [ms]. */
+export const SEEN_MS = 1000;
 
 /**
  * What waits for the operator first, and of it what still stands; then by danger, then the newest.
  * @param {Alarm[]} alarms
  */
 export function byDanger(alarms) {
-  const place = (/** @type {Alarm} */ { state }) => ORDER.indexOf(KINDS[state] ?? 'acknowledged');
+  const place = (/** @type {Alarm} */ alarm) => ORDER.indexOf(kindOf(alarm));
   return [...alarms].sort((a, b) => place(a) - place(b) || RANK[a.priority] - RANK[b.priority] || b.raised_ms - a.raised_ms);
+}
+
+/** @param {Pick<Alarm, 'state'>} alarm @returns {Kind} */
+export function kindOf({ state }) {
+  return KINDS[state] ?? 'acknowledged';
 }
 
 /**
@@ -37,22 +45,39 @@ export function rowsOf(alarms, suppressed, mayAct) {
 
 /** @param {Alarm} alarm @param {boolean} mayAct @returns {Row} */
 function rowOf(alarm, mayAct) {
-  const kind = KINDS[alarm.state] ?? 'acknowledged';
-  /** @type {Row['keys']} */
-  const keys = kind === 'unacknowledged' || kind === 'returned' ? ['acknowledge'] : [];
-  if (kind === 'shelved') keys.push('unshelve');
-  else if (kind !== 'returned' && alarm.actions.includes('shelve')) keys.unshift('shelve');
+  const kind = kindOf(alarm);
   return {
-    key: `${alarm.id} ${alarm.occurrence} ${alarm.state}`, kind, icon: kind === 'shelved' ? 'clock' : ICONS[alarm.priority], priority: alarm.priority, title: alarm.title,
-    words: kind === 'returned' ? alarm.trip_text || alarm.text : snackWords(alarm), at: timeOfDay(alarm.raised_ms), state: stateWords(alarm), keys: mayAct ? keys : [], alarm,
+    key: `${alarm.id} ${alarm.occurrence} ${alarm.state}`, id: alarm.id, kind, icon: kind === 'shelved' ? 'clock' : ICONS[alarm.priority], priority: alarm.priority, title: alarm.title,
+    words: rowWords(alarm), at: timeOfDay(alarm.raised_ms), state: stateWords(alarm), silent: silentWords(alarm), keys: mayAct ? keysOf(alarm) : [], alarm,
   };
+}
+
+/**
+ * What can be done about an alarm, the first answer last: where the thumb is.
+ * @param {Alarm} alarm
+ * @returns {Key[]}
+ */
+export function keysOf(alarm) {
+  const kind = kindOf(alarm);
+  if (kind === 'shelved') return ['unshelve'];
+  if (kind === 'returned') return ['acknowledge'];
+  if (kind === 'acknowledged') return alarm.actions.includes('shelve') ? ['shelve'] : [];
+  return alarm.sound === 'none' || alarm.silenced_until_ms ? ['acknowledge'] : ['silence', 'acknowledge'];
+}
+
+/** What is measured against what, as short as it can be said. @param {Alarm} alarm */
+function rowWords(alarm) {
+  const { active, verdict, measured, limit } = alarm;
+  if (!active) return alarm.trip_text || alarm.text;
+  const isCompared = verdict === 'fault' && measured && limit && measured.unit === limit.unit && measured.value !== null && limit.value !== null;
+  return isCompared ? `${fixed(measured.value)} of ${fixed(limit.value)} ${measured.unit}` : snackWords(alarm);
 }
 
 /** @param {Suppressed} one @returns {Row} */
 function suppressedRow({ id, title, priority, by, raised_ms }) {
   return {
-    key: `${id} suppressed`, kind: 'suppressed', icon: 'unknown', priority, title, words: `cause: ${by.join(', ')}`, at: raised_ms === null ? '' : timeOfDay(raised_ms),
-    state: 'suppressed', keys: [], alarm: null,
+    key: `${id} suppressed`, id, kind: 'suppressed', icon: 'unknown', priority, title, words: `cause: ${by.join(', ')}`, at: raised_ms === null ? '' : timeOfDay(raised_ms),
+    state: 'suppressed', silent: '', keys: [], alarm: null,
   };
 }
 
@@ -64,10 +89,49 @@ export function stateWords(alarm) {
   return alarm.state === 'ACKED' ? `acknowledged${by(alarm.acknowledged_by)}` : 'unacknowledged';
 }
 
+/** Who took its sound, and until when; empty: nobody did. @param {Alarm} alarm */
+export function silentWords({ silenced_until_ms, silenced_by }) {
+  return silenced_until_ms ? `silent until ${timeOfDay(silenced_until_ms)}${silenced_by ? ` by ${silenced_by}` : ''}` : '';
+}
+
 /** "3 unacknowledged"; what is shelved or suppressed is not called acknowledged. @param {Row[]} rows */
 export function countWords(rows) {
   const waiting = rows.filter(({ kind }) => kind === 'unacknowledged' || kind === 'returned').length;
   return waiting ? `${waiting} unacknowledged` : rows.length === 0 ? '' : rows.some(({ kind }) => kind !== 'acknowledged') ? 'none to acknowledge' : 'all acknowledged';
+}
+
+/**
+ * What one tap may acknowledge together although it still stands: all that waits on this page but what is critical, and
+ * only once each was in sight for a second, so that no tap answers what came under the finger.
+ * @param {Row[]} shown the rows of this page
+ * @param {ReadonlyMap<string, number>} since when each came in sight, by its key
+ * @param {number} now_ms
+ * @returns {{alarms: Alarm[], isReady: boolean}}
+ */
+export function together(shown, since, now_ms) {
+  const waiting = shown.filter(({ kind, priority }) => kind === 'unacknowledged' && priority !== 'critical');
+  return {
+    alarms: waiting.flatMap(({ alarm }) => alarm ?? []),
+    isReady: waiting.every(({ key }) => now_ms - (since.get(key) ?? now_ms) >= SEEN_MS),
+  };
+}
+
+/**
+ * Where each page of a list begins, so that no row is sliced.
+ * @param {number[]} heights of the rows
+ * @param {number} room
+ */
+export function pagesOf(heights, room) {
+  const pages = [0];
+  let used = 0;
+  heights.forEach((height, i) => {
+    if (i > (pages.at(-1) ?? 0) && used + height > room) {
+      pages.push(i);
+      used = 0;
+    }
+    used += height;
+  });
+  return pages;
 }
 
 /**

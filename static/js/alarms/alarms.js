@@ -1,29 +1,39 @@
 // The list of alarms behind the strip: every one that stands, has returned, is shelved or suppressed, with its keys.
 
-import { countWords, noneWords, rowsOf } from './alarms-layout.js';
+import { countWords, noneWords, rowsOf, together } from './alarms-layout.js';
 import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
+import { openScreen } from '../core/open-screen.js';
+import { PagedList } from './pager.js';
 import { openShelve } from './shelve.js';
 import { loadWords } from './standing.js';
 import { speedUnit, speedWords } from '../core/units.js';
 
 /**
  * @typedef {import('./alarms-layout.js').Row} Row
+ * @typedef {import('../core/protocol-types.js').StandingAlarm} Alarm
  * @typedef {{element: HTMLElement, words: HTMLElement, state: HTMLElement}} Drawn
  */
 
-const LABELS = { acknowledge: 'Acknowledge', shelve: 'Shelve', unshelve: 'Unshelve' };
+const LABELS = { silence: 'Silence', acknowledge: 'Acknowledge', shelve: 'Shelve', unshelve: 'Unshelve' };
 
 /**
  * @param {HTMLElement} root
  * @param {import('../core/store.js').Store} store
+ * @param {{close?: () => void, inHead?: () => string | null}} [where] close: it stands alone and can be closed; inHead: id and occurrence of the alarm that stands above the list
  */
-export function mount(root, store) {
-  const list = new AlarmList(root, store);
+export function mount(root, store, { close, inHead = () => null } = {}) {
+  const list = new AlarmList(root, store, close !== undefined, inHead);
   list.draw();
-  const stops = [store.on('draw', () => list.draw()), listen(list.parts.ended, 'click', () => list.acknowledgeEnded())];
+  const stops = [
+    store.on('draw', () => list.draw()),
+    listen(list.parts.ended, 'click', () => list.acknowledgeEnded()),
+    listen(list.parts.these, 'click', () => list.acknowledgeThese()),
+    ...(close ? [listen(list.parts.close, 'click', close)] : []),
+  ];
   return () => {
     stops.forEach((stop) => stop());
+    list.pager.stop();
     root.replaceChildren();
   };
 }
@@ -34,47 +44,90 @@ class AlarmList {
   #order = '';
   /** @type {Row[]} */
   #rows = [];
+  /** Since when each row is in sight, by its key [ms]. @type {Map<string, number>} */
+  #since = new Map();
 
-  /** @param {HTMLElement} root @param {import('../core/store.js').Store} store */
-  constructor(root, store) {
+  /** @param {HTMLElement} root @param {import('../core/store.js').Store} store @param {boolean} isAlone @param {() => string | null} inHead */
+  constructor(root, store, isAlone, inHead) {
     this.store = store;
+    this.inHead = inHead;
     this.parts = build(root);
+    show(this.parts.close, isAlone);
+    this.pager = new PagedList(this.parts.list, () => this.#turned());
+    this.parts.foot.append(this.pager.element);
+  }
+
+  get mayAct() {
+    const { store } = this;
+    return !store.isViewer && !store.replaying && !store.isSilent;
   }
 
   acknowledgeEnded() {
     for (const { kind, alarm } of this.#rows) if (kind === 'returned' && alarm) void this.#command('acknowledge', alarm);
   }
 
+  acknowledgeThese() {
+    const { alarms, isReady } = this.#together();
+    if (isReady) for (const alarm of alarms) void this.#command('acknowledge', alarm);
+  }
+
   draw() {
-    const { store } = this;
-    const { count, speed, unit, load, note, none, ended } = this.parts;
+    const { store, mayAct } = this;
+    const { count, speed, unit, load, note, none } = this.parts;
     const { frame } = store;
-    const mayAct = !store.isViewer && !store.replaying && !store.isSilent;
-    this.#rows = frame ? rowsOf(frame.alarms, frame.suppressed ?? [], mayAct) : [];
+    const head = this.inHead();
+    const rows = frame ? rowsOf(frame.alarms, frame.suppressed ?? [], mayAct) : [];
+    this.#rows = head === null ? rows : rows.filter(({ alarm }) => !alarm || `${alarm.id} ${alarm.occurrence}` !== head);
+    this.pager.above = rows.length - this.#rows.length;
     this.#drawRows(mayAct);
     const { ink } = store.ink('speed');
     const speed_mps = store.signal('speed')?.value?.speed_mps;
     const isKnown = typeof speed_mps === 'number';
     write(speed, ink, isKnown ? speedWords(speed_mps)[0] ?? '–' : '–', unit, isKnown ? speedUnit() : '');
-    setWords(count, countWords(this.#rows));
+    setWords(count, countWords(rows));
     setWords(load, loadWords(frame?.alarm_load));
-    setText(note, this.#rows.length || frame?.session.paused ? whyNoKeys(store) : '');
-    show(none, this.#rows.length === 0);
+    setText(note, rows.length || frame?.session.paused ? whyNoKeys(store) : '');
+    show(none, rows.length === 0);
     setText(none, noneWords({
       isSilent: store.isSilent, isReplay: store.replaying, isPaused: frame?.session.paused === true,
       isChecked: frame?.replay ? frame.replay.silent_s !== null : store.chain.word === 'Live',
     }));
+    this.#drawFoot(mayAct);
+  }
+
+  /** @param {boolean} mayAct */
+  #drawFoot(mayAct) {
+    const { ended, these } = this.parts;
     const returned = this.#rows.filter(({ kind }) => kind === 'returned').length;
     setWords(ended, `Acknowledge all that ended${returned ? ` ${returned}` : ''}`);
+    show(ended, !this.store.replaying);
     setAttribute(ended, 'disabled', !mayAct || returned === 0);
+    const { alarms, isReady } = this.#together();
+    show(these, mayAct && alarms.length > 1);
+    setWords(these, `Acknowledge these ${alarms.length}`);
+    setAttribute(these, 'disabled', !isReady);
+  }
+
+  #together() {
+    const [from, to] = this.pager.shown;
+    return together(this.#rows.slice(from, to), this.#since, this.store.now());
+  }
+
+  /** Another page is shown, or other rows: what came in sight begins to be looked at. */
+  #turned() {
+    const shown = this.#rows.slice(...this.pager.shown).map(({ key }) => key);
+    for (const key of [...this.#since.keys()]) if (!shown.includes(key)) this.#since.delete(key);
+    for (const key of shown) if (!this.#since.has(key)) this.#since.set(key, this.store.now());
+    this.#drawFoot(this.mayAct);
   }
 
   /** Keeps the elements of rows that stay, so that a key does not vanish under a finger. @param {boolean} mayAct */
   #drawRows(mayAct) {
     const drawn = this.#drawn;
-    const keyed = new Map(this.#rows.map((row) => [`${mayAct} ${row.key} ${row.keys.join()}`, row]));
+    const keyed = new Map(this.#rows.map((row) => [`${mayAct} ${row.key} ${row.keys.join()} ${row.silent}`, row]));
     const order = [mayAct, ...keyed.keys()].join('|');
-    if (order !== this.#order) {
+    const isOther = order !== this.#order;
+    if (isOther) {
       for (const name of [...drawn.keys()]) if (!keyed.has(name)) drawn.delete(name);
       for (const [name, row] of keyed) if (!drawn.has(name)) drawn.set(name, this.#build(row));
       this.parts.list.replaceChildren(...[...keyed.keys()].map((name) => /** @type {Drawn} */ (drawn.get(name)).element));
@@ -86,6 +139,8 @@ class AlarmList {
       setWords(at.words, row.words);
       setWords(at.state, row.state);
     }
+    if (isOther) this.pager.lay();
+    else this.pager.look();
   }
 
   /** @param {Row} row @returns {Drawn} */
@@ -104,33 +159,46 @@ class AlarmList {
     });
     const mark = html('span', { class: 'mark' }, icon(row.icon));
     const isWaiting = row.kind === 'unacknowledged' || row.kind === 'returned';
-    const element = html('li', { 'data-kind': row.kind, 'data-priority': row.priority, 'data-wide': isWaiting && keys.length > 0 }, mark, html('span', { class: 't' }, row.title),
-      html('span', { class: 'n h' }, row.at), words, state, ...(keys.length ? [html('div', { class: 'ac' }, ...keys)] : []));
+    const title = html('span', { class: 't' }, row.title);
+    const at = html('span', { class: 'h' }, isWaiting || !row.at ? '' : 'since ', html('span', { class: 'n' }, row.at));
+    const text = html('button', { type: 'button', class: 'tx', 'data-f': 'open' }, ...(isWaiting ? [html('span', {}, title, at), html('span', {}, words, state)]
+      : [html('span', {}, title), html('span', {}, words), html('span', { class: 'l3' }, state, at)]));
+    text.addEventListener('click', () => openScreen('check', row.id));
+    const silent = html('span', { class: 'quiet' });
+    setWords(silent, row.silent);
+    const answers = [...(row.silent ? [silent] : []), ...keys];
+    const element = html('li', { 'data-kind': row.kind, 'data-priority': row.priority, 'data-waits': isWaiting }, mark, text,
+      ...(answers.length ? [html('div', { class: 'ac' }, ...answers)] : []));
     return { element, words, state };
   }
 
-  /** @param {'acknowledge' | 'unshelve'} kind @param {import('../core/protocol.js').Alarm} alarm */
+  /** @param {'acknowledge' | 'silence' | 'unshelve'} kind @param {Alarm} alarm */
   async #command(kind, alarm) {
     setWords(this.parts.says, '');
-    const answer = await this.store.ask(kind, { alarm: alarm.id, ...(kind === 'acknowledge' ? { occurrence: alarm.occurrence } : {}) });
+    const answer = await this.store.ask(kind, { alarm: alarm.id, ...(kind === 'unshelve' ? {} : { occurrence: alarm.occurrence }) });
     if (!answer.ok) setWords(this.parts.says, answer.reason ?? 'Refused.');
   }
 }
 
 /** Builds the parts of the list in `root`. @param {HTMLElement} root */
 function build(root) {
-  const count = html('b', { 'data-f': 'alarms-count' });
+  const count = html('span', { 'data-f': 'alarms-count' });
   const [speed, unit] = [html('span', { class: 'n v' }), html('span', { class: 'u' })];
+  const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close the list', 'data-f': 'close' }, icon('close'));
   const load = html('p', { class: 'sec', 'data-f': 'load' });
   const note = html('p', { class: 'sec', 'data-f': 'alarms-note' });
   const list = html('ul', { class: 'alarms', 'data-f': 'alarms' });
   const none = html('p', { class: 'state', 'data-f': 'alarms-none' });
   const says = html('p', { class: 'note-line bad', role: 'alert', 'data-f': 'alarms-says' });
-  const ended = html('button', { type: 'button', class: 'key wide', 'data-f': 'alarms-ended' });
-  root.replaceChildren(
-    html('div', { class: 'alarms-head' }, count, html('span', { class: 'alarms-speed', 'aria-label': 'Speed' }, speed, unit)), load, note, none, list, says,
-    html('div', { class: 'alarms-foot' }, ended, html('button', { type: 'button', class: 'key wide', 'data-screen': 'log' }, 'Alarm log')));
-  return { count, speed, unit, load, note, list, none, says, ended };
+  const ended = html('button', { type: 'button', class: 'key', 'data-f': 'alarms-ended' });
+  const these = html('button', { type: 'button', class: 'key', 'data-f': 'alarms-these', hidden: true });
+  const foot = html('div', { class: 'alarms-foot' }, ended, these);
+  root.replaceChildren(html('div', { class: 'alarm-list' },
+    html('div', { class: 'alarms-head' }, html('h2', { tabindex: -1 }, 'Alarms'), count,
+      html('span', { class: 'alarms-speed', 'aria-label': 'Speed' }, speed, unit),
+      html('button', { type: 'button', class: 'btn', 'aria-label': 'Alarm log', 'data-screen': 'log' }, icon('clock')), close),
+    load, note, none, list, says, foot));
+  return { count, speed, unit, close, load, note, list, none, says, ended, these, foot };
 }
 
 /** Why nothing can be acknowledged here now; empty where it can. @param {import('../core/store.js').Store} store */

@@ -1,10 +1,12 @@
-// One tile a check: OK, FAULT, or not checked and why.
+// The checks on Home: a row of marks in fixed places, and a tile each that says OK, FAULT, or not checked and why. Each opens.
 
 import { tilesOf } from './alarm-layout.js';
-import { field, html, icon, setAttribute, setIcon, setText, setWords } from '../core/dom.js';
+import { markAt } from './check-layout.js';
+import { field, html, icon, listen, setAttribute, setIcon, setText, setWords } from '../core/dom.js';
+import { openScreen } from '../core/open-screen.js';
 
 /**
- * @typedef {import('../core/protocol.js').State} State
+ * @typedef {import('../core/protocol-types.js').State} State
  * @typedef {{label: string, kind: 'ok' | 'unk' | 'crit' | 'warn' | 'info', icon: string, lines: string[]}} Shown
  */
 
@@ -49,22 +51,69 @@ function tile(label, kind, brief) {
  */
 export function mount(root, store) {
   const list = field(root, 'tiles');
+  const marks = field(root, 'marks');
   const count = field(root, 'count');
+  /** @type {Shown[]} */
+  let shown = [];
 
   function draw() {
     const { frame } = store;
     if (!frame) return;
-    const why = store.isSilent ? 'stale' : frame.session.phase !== 'monitoring' ? 'no link' : frame.session.paused ? 'paused'
-      : store.chain.cut !== null ? 'stale' : null;
-    const shown = showTiles(frame, why, store.ink('fuel').ink !== 'not_published');
+    shown = showTiles(frame, whyUnchecked(store), store.ink('fuel').ink !== 'not_published');
     while (list.children.length > shown.length) list.lastElementChild?.remove();
-    while (list.children.length < shown.length) list.append(html('li', {}, icon('ok', 's'), html('b'), html('span')));
-    shown.forEach((one, i) => write(/** @type {HTMLElement} */ (list.children[i]), one));
-    setWords(count, `${shown.filter(({ kind }) => kind === 'ok').length} OK of ${shown.length}`);
+    while (list.children.length < shown.length) list.append(html('li', {}, html('button', { type: 'button' }, icon('ok', 's'), html('b'), html('span'))));
+    while (marks.children.length > shown.length) marks.lastElementChild?.remove();
+    while (marks.children.length < shown.length) marks.append(html('span', {}, icon('ok')));
+    shown.forEach((one, i) => {
+      write(/** @type {HTMLElement} */ (list.children[i]), one);
+      writeMark(/** @type {HTMLElement} */ (marks.children[i]), one);
+    });
+    setWords(count, countWords(shown));
+    setAttribute(marks, 'aria-label', `Checks: ${countWords(shown)}`);
   }
 
+  /** @param {number} at */
+  const open = (at) => {
+    const one = shown[at];
+    if (one && store.frame?.checks.some(({ label }) => label === one.label)) openScreen('check', `tile:${one.label}`);
+  };
+  const stops = [
+    store.on('draw', draw),
+    listen(list, 'click', (event) => open([...list.children].indexOf(event.target.closest('li')))),
+    // The marks are smaller than a finger: the nearest that is not OK is meant. By key and for readers there are the tiles.
+    listen(marks, 'click', (event) => {
+      const { left, width } = marks.getBoundingClientRect();
+      open(markAt(event.clientX - left, shown.map(({ kind }) => kind), width / Math.max(1, shown.length)));
+    }),
+  ];
   draw();
-  return store.on('draw', draw);
+  return () => stops.forEach((stop) => stop());
+}
+
+/** Why nothing is checked now; null: it is. @param {import('../core/store.js').Store} store */
+export function whyUnchecked(store) {
+  if (store.isSilent) return 'stale';
+  const session = store.frame?.session;
+  if (session?.phase !== 'monitoring') return 'no link';
+  if (session.paused) return 'paused';
+  return store.chain.cut !== null ? 'stale' : null;
+}
+
+/** "20 OK · 1 fault · 4 not checked". @param {Shown[]} shown */
+export function countWords(shown) {
+  const of = (/** @type {(kind: Shown['kind']) => boolean} */ is) => shown.filter(({ kind }) => is(kind)).length;
+  const [ok, unknown] = [of((kind) => kind === 'ok'), of((kind) => kind === 'unk')];
+  const faults = shown.length - ok - unknown;
+  return [`${ok} OK`, faults ? `${faults} ${faults === 1 ? 'fault' : 'faults'}` : '', unknown ? `${unknown} not checked` : ''].filter(Boolean).join(' · ');
+}
+
+/** @param {HTMLElement} place @param {Shown} shown */
+function writeMark(place, { kind, icon: glyph }) {
+  const mark = place.firstElementChild;
+  if (!mark) return;
+  setAttribute(place, 'class', kind);
+  setAttribute(mark, 'class', kind === 'unk' ? 'i dashed' : 'i');
+  setIcon(mark, glyph);
 }
 
 /**
@@ -72,7 +121,7 @@ export function mount(root, store) {
  * @param {Shown} shown
  */
 function write(row, { label, kind, icon: glyph, lines }) {
-  const [mark, name, brief] = row.children;
+  const [mark, name, brief] = row.firstElementChild?.children ?? [];
   if (!mark || !name || !brief) return;
   setAttribute(row, 'class', kind);
   setAttribute(mark, 'class', kind === 'unk' ? 'i s dashed' : 'i s');

@@ -3,7 +3,7 @@
 import { age } from '../core/format.js';
 
 /**
- * @typedef {import('../core/protocol.js').AlarmEvent} AlarmEvent
+ * @typedef {import('../core/protocol-types.js').LogEvent} AlarmEvent
  * @typedef {import('../core/event-log.js').Row} Row
  * @typedef {'all' | 'critical' | 'warning' | 'advisory' | 'other'} Kind other: what is no alarm (paused, connected, settings …)
  * @typedef {{kind: Kind, text: string}} Filter
@@ -14,7 +14,7 @@ export const KINDS = /** @type {const} */ ([
 ]);
 export const MARKS = { critical: ['crit', 'c-crit'], warning: ['warn', 'c-warn'], advisory: ['info', ''] };
 const CHANGES = /** @type {Record<string, string>} */ ({
-  raised: '', recaused: 'again', cleared: 'cleared', acknowledged: 'acknowledged', shelved: 'shelved', unshelved: 'no longer shelved',
+  raised: '', recaused: 'again', cleared: 'cleared', acknowledged: 'acknowledged', shelved: 'shelved', unshelved: 'no longer shelved', silenced: 'silenced', unsilenced: 'sounds again',
   suppressed: 'not announced', unsuppressed: 'announced again',
 });
 const SLOWING = new Set(['armed', 'disarmed', 'slow_down']);

@@ -93,12 +93,18 @@ class AlarmLog {
     const today = new Date(Date.now()).toDateString(); // the headings of the days change at midnight
     const key = JSON.stringify([rows.length, last, events.length, this.filter, today]);
     if (key === this.#happened) return;
-    number.replaceChildren('No. ', html('span', { class: 'n' }, String(last ?? 0)));
+    number.replaceChildren('no. ', html('span', { class: 'n' }, String(last ?? 0)));
     const all = joined(rows, events, this.filter);
     list.replaceChildren(...(all.length ? all.flatMap((one, i) => withDay(one, all[i - 1], all))
-      : [html('li', { class: 'none' }, html('span'), html('span', { class: 't' }, this.isAll ? 'Nothing has happened yet' : 'Nothing found here'))]));
+      : [html('li', { class: 'none' }, html('span'), html('span', { class: 't' }, this.isAll ? 'No events yet. Alarms, acknowledgements, connections and changed settings are listed here.' : 'Nothing found here'))]));
     this.#happened = key;
   }
+}
+
+/** @param {'critical' | 'warning' | 'advisory'} kind */
+function markOf(kind) {
+  const [mark = 'info', colour = ''] = MARKS[kind];
+  return icon(mark, colour);
 }
 
 /** Builds the parts of the log in `root`. @param {HTMLElement} root */
@@ -111,15 +117,16 @@ function build(root) {
   const trouble = html('p', { class: 'sec', 'data-f': 'trouble', role: 'status' });
   const figure = (/** @type {string} */ label, /** @type {HTMLElement} */ value) => html('div', {}, html('span', { class: 'lab' }, label), html('br'), value);
   const kinds = html('div', { class: 'seg kinds', role: 'group', 'aria-label': 'Which events' },
-    ...KINDS.map(([kind, label]) => html('button', { type: 'button', 'data-kind': kind, 'aria-pressed': 'false' }, label)));
-  const find = /** @type {HTMLInputElement} */ (html('input', { type: 'search', id: 'log-find', maxlength: 100, enterkeyhint: 'search', autocomplete: 'off', placeholder: 'Find in the log', 'aria-label': 'Find in the log' }));
-  const [csv, json] = [html('a', { class: 'key', download: '' }, icon('download'), 'CSV'), html('a', { class: 'key', download: '' }, icon('download'), 'JSON')];
+    ...KINDS.map(([kind, label]) => html('button', { type: 'button', 'data-kind': kind, 'aria-pressed': 'false', 'aria-label': label, title: label },
+      kind === 'all' || kind === 'other' ? label : markOf(kind))));  // the marks of the rows: all filters on one line
+  const find = /** @type {HTMLInputElement} */ (html('input', { type: 'search', id: 'log-find', maxlength: 100, enterkeyhint: 'search', autocomplete: 'off', placeholder: 'Find', 'aria-label': 'Find in the log' }));
+  const [csv, json] = [html('a', { download: '' }, icon('download', 's'), 'CSV'), html('a', { download: '' }, icon('download', 's'), 'JSON')];
   const older = html('button', { type: 'button', class: 'key wide', 'data-f': 'older' }, 'Older');
   const note = html('p', { class: 'note-line', role: 'status', 'data-f': 'log-says' });
   root.replaceChildren(
-    html('section', { class: 'three' }, figure('In 10 min', inTen), figure('Standing', standing), figure('Shelved', shelved)), load, trouble, now,
-    html('div', { class: 'log-tools' }, kinds, html('div', { class: 'field' }, icon('find'), find), html('div', { class: 'pair' }, csv, json)),
-    html('div', { class: 'sec' }, html('span', {}, 'Newest first'), number), list, note, html('div', { class: 'keys' }, older));
+    html('section', { class: 'three' }, figure('In 10 min', inTen), figure('Active', standing), figure('Shelved', shelved)), load, trouble, now,
+    html('div', { class: 'log-tools' }, kinds, html('div', { class: 'field' }, icon('find', 's'), find)),
+    html('div', { class: 'sec log-save' }, html('span', {}, 'Newest first, ', number), html('span', {}, csv, json)), list, note, html('div', { class: 'keys' }, older));
   return { inTen, standing, shelved, number, list, now, load, trouble, kinds, find, csv, json, older, note };
 }
 

@@ -4,7 +4,7 @@ import { asked, lowest } from './log-layout.js';
 
 const BATCH = 100; // events a request
 
-/** @typedef {import('../core/protocol.js').AlarmEvent} AlarmEvent */
+/** @typedef {import('../core/protocol-types.js').LogEvent} AlarmEvent */
 
 /** The query of a request for events that fit a filter. @param {import('./log-layout.js').Filter} filter @param {Record<string, string>} [more] */
 export function queryOf(filter, more = {}) {

@@ -5,12 +5,12 @@ import { field, need, setWords } from '../core/dom.js';
 
 /**
  * @param {import('../core/store.js').Store} store
- * @param {import('../core/protocol.js').Alarm} alarm
+ * @param {import('../core/protocol-types.js').StandingAlarm} alarm
  * @param {(sentence: string, title?: string) => void} say
  */
 export function openShelve(store, alarm, say) {
   const sheet = /** @type {HTMLDialogElement} */ (need(document, '#sheet-shelve'));
-  setWords(field(sheet, 'words'), `“${alarm.title}” is not announced meanwhile. It comes back by itself.`);
+  setWords(field(sheet, 'words'), `“${alarm.title}” is not announced meanwhile. Shelving ends by itself.`);
   for (const key of /** @type {NodeListOf<HTMLElement>} */ (sheet.querySelectorAll('[data-minutes]'))) {
     key.onclick = async () => {
       closeSheet(sheet);

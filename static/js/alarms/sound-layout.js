@@ -1,7 +1,7 @@
 // The alarm sounds in the manner of IEC 60601-1-8, as numbers: when each pulse stands, and the samples of a burst.
 
 /**
- * @typedef {import('../core/protocol.js').SoundName} SoundName
+ * @typedef {import('../core/protocol-types.js').Sound} SoundName
  * @typedef {{at_s: number, for_s: number, hz: number}} Pulse
  * @typedef {{pulses: Pulse[], every_s: number, gain: number, vibration: number[]}} Burst
  */

@@ -4,7 +4,7 @@ import { age, fixed, timeOfDay } from '../core/format.js';
 
 /**
  * What is wrong, and who has said what to it.
- * @param {import('../core/protocol.js').Alarm} alarm
+ * @param {import('../core/protocol-types.js').StandingAlarm} alarm
  */
 export function standingWords(alarm) {
   return [alarm.active ? snackWords(alarm) : alarm.trip_text || alarm.text, said(alarm)].filter(Boolean).join(' · ');
@@ -12,7 +12,7 @@ export function standingWords(alarm) {
 
 /**
  * What the snackbar tells: what is wrong now; of what is over, what it was.
- * @param {import('../core/protocol.js').Alarm} alarm
+ * @param {import('../core/protocol-types.js').StandingAlarm} alarm
  */
 export function snackWords(alarm) {
   const was = alarm.trip_text || alarm.title;
@@ -23,7 +23,7 @@ export function snackWords(alarm) {
 
 /**
  * The sentences of an alarm's dialog: what is wrong where no two numbers say it, since when and with what it began, what to do.
- * @param {import('../core/protocol.js').Alarm} alarm
+ * @param {import('../core/protocol-types.js').StandingAlarm} alarm
  */
 export function dialogWords(alarm) {
   const at = timeOfDay(alarm.raised_ms);
@@ -32,10 +32,10 @@ export function dialogWords(alarm) {
   if (!alarm.active) return [`It has returned to normal; it began at ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
   const isBlind = alarm.verdict === 'unknown';
   const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.verdict === 'ok' ? `Returning to normal: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
-  return [cause, `Stands for ${age(alarm.for_s)} s, since ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
+  return [cause, `Active for ${age(alarm.for_s)} s, since ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
 }
 
-/** How bad it was, where that is not what is measured now. @param {import('../core/protocol.js').Alarm} alarm */
+/** How bad it was, where that is not what is measured now. @param {import('../core/protocol-types.js').StandingAlarm} alarm */
 function worstWords({ active, verdict, measured, worst }) {
   if (!worst) return '';
   const isNow = active && verdict !== 'unknown' && measured && fixed(measured.value) === fixed(worst.value);
@@ -47,7 +47,7 @@ function bare(sentence) {
   return sentence.replace(/[.!?]$/, '');
 }
 
-/** @param {import('../core/protocol.js').Alarm} alarm */
+/** @param {import('../core/protocol-types.js').StandingAlarm} alarm */
 function said(alarm) {
   const by = (/** @type {string | null | undefined} */ who) => (who ? ` by ${who}` : '');
   if (alarm.state === 'SHELVED') return `shelved${by(alarm.shelved_by)} until ${timeOfDay(alarm.shelved_until_ms)}`;
@@ -57,7 +57,7 @@ function said(alarm) {
 
 /**
  * When there are too many alarms to work by: "Alarm flood: 12 in 10 min", and which chatter; else nothing.
- * @param {import('../core/protocol.js').AlarmLoad | undefined} load
+ * @param {import('../core/protocol-types.js').AlarmLoad | undefined} load
  */
 export function loadWords(load) {
   if (!load) return '';

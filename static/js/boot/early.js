@@ -10,12 +10,24 @@
     // no storage: the phone's setting holds
   }
 
-  const { access, vehicle } = root.dataset;
+  const { access } = root.dataset;
   if (!access) return; // the page for when the server does not answer
+  if (!new URLSearchParams(location.search).has('vehicle')) root.dataset.vehicle = ownCar() ?? root.dataset.vehicle;
+  const { vehicle } = root.dataset;
   /** @type {import('./early-socket.js').Early} */
   const early = { told: [], hear: null, socket: null };
   /** @type {any} */ (globalThis).catgraphEarly = early;
   ticketOf(access).then(dial).catch(() => tell('close'));
+
+  /** The car that this phone opened last, where the server still has it. */
+  function ownCar() {
+    try {
+      const car = localStorage.getItem('catgraph.car');
+      return car && (root.dataset.vehicles ?? '').split(' ').includes(car) ? car : null;
+    } catch {
+      return null; // no storage: the server's first car
+    }
+  }
 
   /** Where devices are paired, a socket needs one. @param {string} way @returns {Promise<string | null>} */
   async function ticketOf(way) {

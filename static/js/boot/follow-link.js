@@ -2,6 +2,9 @@
 
 import { thenOf } from './pairing-token.js';
 
+/** Whether the address names a tab, before the page writes its own there. */
+const namesTab = location.hash.length > 1;
+
 /** Follows the address once this device is connected. @param {import('../core/store.js').Store} store @param {ReturnType<typeof import('../shell/notice.js').notices>} say */
 export function followLink(store, say) {
   const query = new URLSearchParams(location.search);
@@ -13,6 +16,6 @@ export function followLink(store, say) {
     isFollowed = true;
     if (query.has('then')) history.replaceState(history.state, '', location.pathname);
     if (then) location.assign(then);
-    if (recording) import('../replay/replay.js').then(({ openReplay }) => openReplay(recording, store, say, Number(query.get('t')) || 0)).catch(() => say('The replay could not be loaded.', 'Not replayed'));
+    if (recording) import('../replay/replay.js').then(({ openReplay }) => openReplay(recording, store, say, { at_s: Number(query.get('t')) || 0, staysOnTab: namesTab })).catch(() => say('The replay could not be loaded.', 'Not replayed'));
   });
 }

@@ -19,7 +19,7 @@ export function holdTaps() {
   return () => {
     document.removeEventListener('click', hold, { capture: true });
     for (const target of held) {
-      const dialog = [...document.querySelectorAll('dialog[open]')].at(-1);
+      const dialog = [...document.querySelectorAll('dialog[open]:not([data-docked])')].at(-1);
       if (dialog && !dialog.contains(target)) continue; // what lies under an alarm cannot be pressed
       if (target.isConnected) target.dispatchEvent(new MouseEvent('click', { bubbles: true, cancelable: true }));
     }

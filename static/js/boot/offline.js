@@ -43,9 +43,9 @@ function begin() {
   function draw() {
     const last = lastAnswer();
     write(answered, last === null ? 'not known on this phone' : `${clock(last.at_ms)}, ${ago(Date.now() - last.at_ms)}`);
-    write(then, last?.isMonitoring ? 'A car was being watched then. It may still be moving.' : '');
+    write(then, last?.isMonitoring ? 'A car was being monitored then. It may still be moving.' : '');
     write(network, navigator.onLine ? 'has a network' : 'has no network');
-    write(next, isTrying ? 'Asking the server now.' : 'This page asks again by itself every 3 s.');
+    write(next, isTrying ? 'Trying the server now.' : 'This page tries again every 3 s.');
     write(key, isTrying ? 'Trying' : 'Try now');
   }
 }
@@ -71,7 +71,7 @@ function clock(at_ms) {
 
 /** @param {number} ms */
 function ago(ms) {
-  if (ms < 0) return 'by a clock that was set since';
+  if (ms < 0) return 'by a clock that was changed since';
   const s = Math.floor(ms / 1000);
   if (s < 60) return `${s} s ago`;
   const minutes = Math.floor(s / 60);

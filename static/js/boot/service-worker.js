@@ -6,7 +6,7 @@ import { closeSheet } from '../shell/sheet.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
- * @typedef {import('../core/protocol.js').State} State
+ * @typedef {import('../core/protocol-types.js').State} State
  * @typedef {'kept' | 'missing' | 'refused' | 'off' | 'asked'} Keeping
  */
 
@@ -23,8 +23,8 @@ const STANDING_MPS = 0.3;
 export function holdsReload(frame, { isSilent, isMonitoring, hasDialog }) {
   if (!frame || isSilent) return 'the server does not answer';
   const alarms = [...frame.alarms, ...(frame.live?.alarms ?? [])].filter(({ state }) => state !== 'SHELVED');
-  if (alarms.some(({ priority, state }) => priority === 'critical' || (priority === 'warning' && state !== 'ACKED'))) return 'an alarm stands';
-  if (hasDialog) return 'a question is open';
+  if (alarms.some(({ priority, state }) => priority === 'critical' || (priority === 'warning' && state !== 'ACKED'))) return 'an alarm is active';
+  if (hasDialog) return 'a dialog is open';
   if (frame.replay) return 'a recording is shown';
   if (!['off', 'not_available', 'safe', 'armed'].includes(frame.decelerate.state)) return 'the car is being slowed';
   const speed_mps = frame.signals.speed?.value?.speed_mps;
@@ -108,7 +108,7 @@ export class Shell {
     show(this.key, isNew);
     if (!isNew || document.hidden || this.#held() !== null || now_ms - this.#offered_ms < OFFER_AGAIN_MS) return;
     this.#offered_ms = now_ms;
-    this.say('A new version is there.', 'catgraph', { label: 'Reload', act: () => this.#reload() });
+    this.say('A new version is available.', 'catgraph', { label: 'Reload', act: () => this.#reload() });
   }
 
   #reload() {
@@ -119,7 +119,7 @@ export class Shell {
 
   #held() {
     const { frame, isSilent, isMonitoring } = this.store;
-    return holdsReload(frame, { isSilent, isMonitoring, hasDialog: document.querySelector('dialog[open]') !== null });
+    return holdsReload(frame, { isSilent, isMonitoring, hasDialog: document.querySelector('dialog[open]:not([data-docked])') !== null });
   }
 }
 

@@ -15,7 +15,7 @@ export function mount(root, store) {
     const { chain: view, isSilent } = store;
     drawBigChain(chain, isSilent ? view : { ...view, nodes: view.nodes.map((node, i) => (i === 1 ? { ...node, mark: 'connecting', isBad: false } : node)) });
     setText(title, isSilent ? 'The server does not answer' : 'Reaching the server');
-    setWords(text, isSilent ? 'No value and no alarm can be shown. This page keeps trying by itself.' : '');
+    setWords(text, isSilent ? 'No value and no alarm can be shown. This page keeps trying.' : '');
   }
 
   draw();

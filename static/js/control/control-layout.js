@@ -3,9 +3,9 @@
 import { counted, fixed } from '../core/format.js';
 
 /**
- * @typedef {import('../core/protocol.js').ControlNow} ControlNow
- * @typedef {import('../core/protocol.js').ReachNow} ReachNow
- * @typedef {import('../core/protocol.js').AlarmEvent} AlarmEvent
+ * @typedef {import('../core/protocol-types.js').ControlState} ControlNow
+ * @typedef {import('../core/protocol-types.js').ReachState} ReachNow
+ * @typedef {import('../core/protocol-types.js').LogEvent} AlarmEvent
  */
 
 /**
@@ -26,7 +26,7 @@ export function chipOf(control, page, isSilent) {
  * @param {ReachNow | null | undefined} reach
  */
 export function reachOf(reach) {
-  if (!reach) return { text: 'Not known who can hear alarms', why: '', isBad: false };
+  if (!reach) return { text: 'Unknown who can hear alarms', why: '', isBad: false };
   const operators = counted(reach.of, 'operator', 'operators');
   if (reach.can === 0) return { text: `Nobody can hear alarms (${reach.of === 0 ? 'no operator' : operators})`, why: reach.why, isBad: true };
   return { text: `${reach.can} of ${operators} can hear alarms`, why: reach.why, isBad: false };
@@ -49,7 +49,7 @@ export function noticeOf(event, page) {
       return isByMe ? null : { title: 'Control is kept', text, offers: null };
     case 'lapsed':
       return wasMine
-        ? { title: 'You lost control', text: 'This page was not seen for more than 3 s. Now nobody is in control.', offers: 'take' }
+        ? { title: 'You lost control', text: 'This page was hidden for more than 3 s. Nobody is in control now.', offers: 'take' }
         : { title: 'Nobody is in control', text, offers: 'take' };
     case 'released':
       return isByMe ? null : { title: 'Nobody is in control', text, offers: 'take' };
@@ -75,10 +75,10 @@ export function sheetOf(control, reach, page) {
   const asked = (control.requests ?? []).find((one) => one.page === page);
   const former = control.former && control.former.page !== page ? ` ${control.former.name} can reclaim it for ${seconds(control.former.may_return_s)}.` : '';
   if (control.page === page && page) {
-    return { state: 'you', title: 'You are in control', text: 'Only this page may connect, pause, stop and change settings. Anybody may acknowledge alarms.', handTo: others, asked_s: null };
+    return { state: 'you', title: 'You are in control', text: 'Only this page can connect, pause, stop and change settings. Any operator can acknowledge alarms.', handTo: others, asked_s: null };
   }
   if (control.holder) {
-    const text = asked ? `You asked for control. It is granted in ${seconds(asked.left_s)} unless it is refused.` : 'A request is granted unless it is refused within 10 s. Taking over is announced to everyone.';
+    const text = asked ? `You requested control. It is granted in ${seconds(asked.left_s)} unless it is refused.` : 'A request is granted unless it is refused within 10 s. Taking over is announced to everyone.';
     return { state: asked ? 'asking' : 'other', title: `${control.holder} is in control`, text, handTo: [], asked_s: asked ? asked.left_s : null };
   }
   return { state: 'free', title: 'No one is in control', text: `The first to act takes control.${former}`, handTo: [], asked_s: null };

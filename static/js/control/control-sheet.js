@@ -72,12 +72,12 @@ class ControlSheet {
       button.addEventListener('click', act);
       return button;
     };
-    const order = (/** @type {string} */ act) => () => void this.#order(act);
+    const order = (/** @type {import('../core/protocol-types.js').TakeControlCommand['do']} */ act) => () => void this.#order(act);
     if (state === 'free') return [key('Take control', order('take'), 'main')];
-    if (state === 'you') return [key('Give control up', order('release'))];
+    if (state === 'you') return [key('Give up control', order('release'))];
     if (this.#isConfirming) return [key('Take over', order('take_over'), 'main'), key('Back', () => this.#confirm(false))];
     return [
-      state === 'asking' ? key('Cancel request', order('withdraw')) : key('Ask for control', order('request'), 'main'),
+      state === 'asking' ? key('Cancel request', order('withdraw')) : key('Request control', order('request'), 'main'),
       key('Take over …', () => this.#confirm(true)),
     ];
   }
@@ -88,7 +88,7 @@ class ControlSheet {
     this.#draw();
   }
 
-  /** @param {string} act @param {object} [fields] */
+  /** @param {import('../core/protocol-types.js').TakeControlCommand['do']} act @param {{to?: string | null}} [fields] */
   async #order(act, fields) {
     const answer = await this.control.order(act, fields);
     this.#isConfirming = false;

@@ -1,7 +1,7 @@
-// Who is in control, on every tab: the chip in the top bar, the request that its holder must answer, and what happened to it.
+// Who is in control: the request that its holder must answer, what happened to control, and the way to its sheet. The chip: cars.js.
 
-import { askedOf, chipOf, noticeOf, seconds } from './control-layout.js';
-import { field, html, icon, listen, need, setAttribute, setText, setWords } from '../core/dom.js';
+import { askedOf, noticeOf, seconds } from './control-layout.js';
+import { html, icon, listen, need, setAttribute, setWords } from '../core/dom.js';
 
 /** A refusal is answered with a key for so long: another one of the same words is another [ms]. */
 const REFUSED_MS = 3000;
@@ -29,11 +29,16 @@ export class Control {
     this.openPhone = openPhone;
   }
 
-  /** Ask the server for something about control. @param {string} act @param {object} [fields] */
+  /** Ask the server for something about control. @param {import('../core/protocol-types.js').TakeControlCommand['do']} act @param {{to?: string | null}} [fields] */
   async order(act, fields = {}) {
     const answer = await this.store.ask('control', { do: act, ...fields });
     if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Control not changed');
     return answer;
+  }
+
+  /** Opens who is in control, how this page gets it or gives it away. */
+  openSheet() {
+    import('./control-sheet.js').then(({ openControl }) => openControl(this.store, this)).catch(() => this.say('The list of operators could not be loaded.', 'Not opened'));
   }
 
   /** Told once of every refusal, so that whoever says it can offer a way. @param {import('../core/store.js').Answer} answer */
@@ -45,18 +50,16 @@ export class Control {
   wayOf(sentence) {
     const refused = this.#refused;
     if (refused?.reason !== sentence || this.store.now() - refused.at_ms > REFUSED_MS) return undefined;
-    return { label: 'Ask for control', act: () => void this.order('request') };
+    return { label: 'Request control', act: () => void this.order('request') };
   }
 }
 
 /**
- * @param {HTMLElement} root
  * @param {HTMLElement} snacks where the request stands
  * @param {Store} store
  * @param {Control} control
  */
-export function mount(root, snacks, store, control) {
-  const [chip, name] = [field(root, 'who'), field(root, 'who-name')];
+export function mount(snacks, store, control) {
   const text = html('span');
   const keep = html('button', { type: 'button', class: 'key' }, 'Keep');
   const give = html('button', { type: 'button', class: 'key solid' }, 'Hand over');
@@ -69,10 +72,6 @@ export function mount(root, snacks, store, control) {
   function draw() {
     speak();
     const { control: now } = store;
-    const chipWords = chipOf(now, store.page, store.isSilent);
-    setText(name, chipWords.text);
-    setAttribute(chip, 'aria-label', `${chipWords.text}: ${chipWords.label}`);
-    setAttribute(chip, 'data-is', chipWords.is);
     const request = store.isSilent ? null : askedOf(now, store.page);
     asking = request?.page ?? '';
     if (!request) asks.remove();
@@ -80,7 +79,7 @@ export function mount(root, snacks, store, control) {
     if (request) setWords(text, `${request.name} gets it in ${seconds(request.left_s - store.lag_s)} unless you keep it.`);
   }
 
-  /** @param {import('../core/protocol.js').AlarmEvent[]} events */
+  /** @param {import('../core/protocol-types.js').LogEvent[]} events */
   function tell(events) {
     const now_ms = store.frame?.server.time_ms ?? Infinity; // a page that was just loaded is told old news: who has control now, the bar says
     const notice = events.filter((event) => event.change === 'control' && now_ms - event.at_ms <= FRESH_MS).map((event) => noticeOf(event, store.page)).findLast((one) => one !== null);
@@ -95,7 +94,7 @@ export function mount(root, snacks, store, control) {
     if (store.now() - at_ms < SETTLES_MS) return;
     news = null;
     if (store.now() - at_ms > NEWS_MS) return;
-    const way = offers ? { label: offers === 'take' ? 'Take control' : 'Ask for it', act: () => void control.order(offers) } : undefined;
+    const way = offers ? { label: offers === 'take' ? 'Take control' : 'Request it', act: () => void control.order(offers) } : undefined;
     control.say(words, title, way);
     setAttribute(need(snacks, '.note'), 'data-of', 'control');
   }
@@ -105,8 +104,9 @@ export function mount(root, snacks, store, control) {
   const stops = [
     store.on('draw', draw),
     store.on('log', tell),
-    listen(chip, 'click', () => {
-      import('./control-sheet.js').then(({ openControl }) => openControl(store, control)).catch(() => control.say('What shows who is in control could not be fetched.', 'Not opened'));
+    store.on('switch', () => {
+      news = null;
+      asks.remove();
     }),
     listen(keep, 'click', () => void control.order('keep', { to: asking })),
     listen(give, 'click', () => void control.order('hand_over', { to: asking })),

@@ -13,8 +13,10 @@ export class Presence {
    * @param {import('../core/store.js').Store} store
    * @param {import('../boot/arming.js').Arming} arming
    * @param {import('../phone/device-status.js').DeviceStatus} deviceStatus
+   * @param {() => string[]} announced the other cars whose next alarm this page would announce
    */
-  constructor(store, arming, deviceStatus) {
+  constructor(store, arming, deviceStatus, announced) {
+    this.announced = announced;
     this.store = store;
     this.arming = arming;
     this.deviceStatus = deviceStatus;
@@ -25,6 +27,7 @@ export class Presence {
       this.#told_ms = -Infinity;
       look();
     });
+    store.on('leave', () => this.#send({ ...this.#word(), leaves: true }));
     document.addEventListener('visibilitychange', look);
     window.addEventListener('pageshow', look);
     window.addEventListener('pagehide', () => this.#send({ ...this.#word(), leaves: true }));
@@ -40,6 +43,7 @@ export class Presence {
       vibrates: this.deviceStatus.vibrates,
       battery: this.deviceStatus.battery,
       charging: this.deviceStatus.charging,
+      announces: this.announced(),
     };
   }
 

@@ -1,7 +1,7 @@
 // The numbered log of alarm events: each exactly once, in order, and what happened while the page was blind.
 
 /**
- * @typedef {import('./protocol.js').AlarmEvent} AlarmEvent
+ * @typedef {import('./protocol-types.js').LogEvent} AlarmEvent
  * @typedef {{blind_s: number, raised: number, cleared: number, at_ms: number}} Gap
  * @typedef {{event: AlarmEvent, gap: null} | {event: null, gap: Gap}} Row
  */
@@ -38,6 +38,12 @@ export class EventLog {
     if (isRestarted && last_event < this.last) this.last = 0;
     this.#blind = { until: last_event, gap: { blind_s, raised: 0, cleared: 0, at_ms } };
     return this.last;
+  }
+
+  /** Forget everything: what comes is of another car. */
+  clear() {
+    this.rows = [];
+    this.last = this.#boot = this.#blind = null;
   }
 
   /** What is kept, oldest first. */

@@ -4,8 +4,8 @@
 export const LAG_GRACE_S = 0.6;
 
 /**
- * @typedef {import('./protocol.js').Signal} Signal
- * @typedef {import('./protocol.js').Freshness} Freshness
+ * @typedef {import('./protocol-types.js').SignalState<any>} Signal
+ * @typedef {import('./protocol-types.js').SignalFreshness} Freshness
  */
 
 /**

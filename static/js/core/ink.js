@@ -3,7 +3,7 @@
 import { setAttribute, setText } from './dom.js';
 import { age } from './format.js';
 
-/** @typedef {import('./protocol.js').Freshness} Freshness */
+/** @typedef {import('./protocol-types.js').SignalFreshness} Freshness */
 
 /** What stands in the place of a value that never came. */
 export const ABSENT = /** @type {Record<'never' | 'not_published', string>} */ ({ never: 'no message yet', not_published: 'not published' });

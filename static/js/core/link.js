@@ -3,7 +3,7 @@
 import { age, timeOfDay } from './format.js';
 
 /**
- * @typedef {import('./protocol.js').State} State
+ * @typedef {import('./protocol-types.js').State} State
  * @typedef {{name: string, mark: string, isBad: boolean, isKnown: boolean}} Node
  *
  * @typedef {object} ChainView

@@ -1,6 +1,6 @@
 // What a frame says of the live car, also while the page shows a recording.
 
-/** @typedef {import('./protocol.js').State} State */
+/** @typedef {import('./protocol-types.js').State} State */
 
 /** What must be heard of; null: nothing is known of it. @param {State | null} frame @returns {State | null} */
 export function liveOf(frame) {

@@ -1,6 +1,6 @@
 // Keeps the log of events as the server has it: greets the server with what this page has, takes what follows.
 
-/** @typedef {import('./protocol.js').Hello} Hello */
+/** @typedef {import('./protocol-types.js').Hello} Hello */
 
 export class LogSync {
   /** The answer to the server's greeting, while it is owed. @type {(() => void) | null} */
@@ -50,7 +50,7 @@ export class LogSync {
     this.#emitter.emit('open', hello);
   }
 
-  /** @param {import('./protocol.js').AlarmEvent[]} events */
+  /** @param {import('./protocol-types.js').LogEvent[]} events */
   take(events) {
     if (this.#owed) { // they came before this page told what it has: from there they are sent again, and in order
       this.#owed();

@@ -35,7 +35,7 @@ export class Painter {
 
   /**
    * A fresh frame came: what asks for the operator is drawn at once; pointers ten times a second, the rest five times and with them.
-   * @param {import('./protocol.js').State} frame
+   * @param {import('./protocol-types.js').State} frame
    * @param {number} now_ms when it came
    * @param {boolean} isFirst nothing moves yet that a picture could fall between
    */
@@ -101,7 +101,7 @@ export class Painter {
 
 /**
  * What must not wait for the next drawing: alarms, the link, a pause.
- * @param {import('./protocol.js').State} frame
+ * @param {import('./protocol-types.js').State} frame
  */
 function urgentOf(frame) {
   const { session, link, alarms, decelerate } = frame;

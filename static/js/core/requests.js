@@ -4,6 +4,12 @@
 const REPLY_MS = 4000;
 
 /**
+ * @template {string} Kind
+ * @typedef {import('./protocol-types.js').PageMessage extends infer One ? One extends {kind: Kind} ? Omit<One, 'kind' | 'id'> : never : never} FieldsOf
+ *   what a command of this kind says
+ */
+
+/**
  * @typedef {{ok: boolean, reason?: string, suggestion?: string, version?: number, isConflict?: boolean, heldBy?: string}} Answer suggestion: an address
  *   that would do; version: of the settings, once changed; isConflict: somebody else changed them in between; heldBy: who is in control instead
  */
@@ -26,8 +32,9 @@ export class Requests {
 
   /**
    * Ask the server for something. It is refused at once where the server is not there: a command is never kept for later.
-   * @param {string} kind
-   * @param {object} fields
+   * @template {import('./protocol-types.js').PageMessage['kind']} Kind
+   * @param {Kind} kind
+   * @param {FieldsOf<Kind>} fields
    * @param {number} [within_ms]
    * @returns {Promise<Answer>}
    */
@@ -37,11 +44,11 @@ export class Requests {
     if (!this.#send({ kind, id, ...fields })) return Promise.resolve({ ok: false, reason: 'Not sent: the server does not answer.' });
     return new Promise((resolve) => {
       this.#waiting.set(id, resolve);
-      setTimeout(() => this.#settle(id, { ok: false, reason: 'The server gave no answer in time.' }), within_ms);
+      setTimeout(() => this.#settle(id, { ok: false, reason: 'The server did not answer in time.' }), within_ms);
     });
   }
 
-  /** The server answered one of them. @param {import('./protocol.js').Reply} reply */
+  /** The server answered one of them. @param {import('./protocol-types.js').Reply} reply */
   answered(reply) {
     this.#settle(reply.id, answerOf(reply));
   }
@@ -63,7 +70,7 @@ export class Requests {
 }
 
 /**
- * @param {import('./protocol.js').Reply} reply
+ * @param {import('./protocol-types.js').Reply} reply
  * @returns {Answer}
  */
 function answerOf({ ok, reason, problem, version, conflict, held_by }) {

@@ -17,6 +17,12 @@ export class ScanFeed {
     this.#send = send;
   }
 
+  /** What was scanned was of another car. */
+  forget() {
+    this.newest = null;
+    this.at_ms = this.#took_ms = -Infinity;
+  }
+
   /** A connection was opened: the server knows nothing of what is wanted. */
   opened() {
     if (this.#watchers.size) this.#send({ kind: 'watch', scan: true });

@@ -74,6 +74,12 @@ export class PageSocket {
     return true;
   }
 
+  /** Hang up; the next `look` dials again, without waiting. */
+  hangUp() {
+    this.#hangUp();
+    this.hurry();
+  }
+
   /** Hang up for good; `look` must not be called again. */
   stop() {
     this.#hangUp();

@@ -6,7 +6,8 @@ import { Emitter } from './emitter.js';
 import { EventLog } from './event-log.js';
 import { freshnessStyle } from './freshness.js';
 import { chainOf } from './link.js';
-import { controlOf, fenceOf, liveOf } from './live-car.js';
+import { Known } from './known.js';
+import { fenceOf } from './live-car.js';
 import { LogSync } from './log-sync.js';
 import { PageWatch } from './page-watch.js';
 import { DRAW_EVERY_MS, Painter } from './painter.js';
@@ -16,27 +17,24 @@ import { ScanFeed } from './scan-feed.js';
 import { PageSocket } from './socket.js';
 
 /**
- * @typedef {import('./protocol.js').State} State
- * @typedef {import('./protocol.js').AlarmEvent} AlarmEvent
+ * @typedef {import('./protocol-types.js').State} State
+ * @typedef {import('./protocol-types.js').Signals} Signals
+ * @typedef {import('./protocol-types.js').LogEvent} AlarmEvent
  * @typedef {import('./event-log.js').Gap} Gap
- * @typedef {'move' | 'draw' | 'drawn' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open' | 'replay' | 'refused'} Topic
+ * @typedef {'move' | 'draw' | 'drawn' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open' | 'replay' | 'refused' | 'switch' | 'leave' | 'cars'} Topic
+ *   switch: another car is shown from now on, and nothing is known of it yet · leave: the socket to the car before is about to be closed · cars: the list of cars came ·
  *   move: a fresh frame is to be drawn · draw: five times a second, seen or not by a frame · drawn: all of it was, and nothing failed · scan: a new scan ·
- *   beat: a fresh frame came (also while the page is hidden) · tick: time passed (seldom while it is hidden) · log: new events · gap: a blind time is over · open: connected · refused: an order was, with its answer · replay: its time line, or its end
+ *   beat: a fresh frame came (also while the page is hidden) · tick: time passed (seldom while it is hidden) · log: new events · gap: a blind time is over · open: connected · refused: an order was, with its answer · replay: its time line, the recording beside it, or an end
  * @typedef {import('./requests.js').Answer} Answer
  */
 
-export class Store {
-  /** @type {State | null} */
-  frame = null;
-  /** Wall clock of the last fresh frame. @type {number | null} */
-  heard_ms = null;
+export class Store extends Known {
   /** Frames and scans that could not be read. */
   unreadable = 0;
   log = new EventLog();
+  #cars_ms = -Infinity;
   /** The build of the page that the server has now; '' where it cannot say. */
   build = '';
-  /** The page shows a recording: frames of the live car are none of it, nor the other way round. */
-  replaying = false;
   deadMan = new DeadMan();
   #clock = new ServerClock();
   /** How long the newest frame was under way [ms]. */
@@ -44,8 +42,6 @@ export class Store {
   #started_ms = 0;
   /** What an answer said of this page's lease, until the frames have it. @type {number | null} */
   #granted = null;
-  /** Who this page is to the server. @type {import('./protocol.js').Hello['who'] | null} */
-  who = null;
   /** @type {Emitter<Topic>} */
   #emitter = new Emitter((error) => this.painter.failed(error));
   painter = new Painter(this.#emitter);
@@ -68,6 +64,7 @@ export class Store {
    * @param {() => string} [page] by which the server knows this page
    */
   constructor(dial, name = () => '', page = () => '') {
+    super();
     this.#nameOf = name;
     this.#pageOf = page;
     this.socket = new PageSocket(
@@ -111,6 +108,33 @@ export class Store {
     this.socket.stop();
   }
 
+  /**
+   * Show another car: all that is known of the one before is dropped before the other is dialled.
+   * @param {string} vehicle
+   */
+  show(vehicle) {
+    if (vehicle === this.vehicle) return;
+    this.#emitter.emit('leave');
+    this.socket.hangUp();
+    this.sync.closed();
+    this.#requests.broke();
+    this.turnTo(vehicle);
+    this.#forget();
+    this.#emitter.emit('switch');
+    this.painter.draw();
+    this.socket.look(this.now());
+  }
+
+  #forget() {
+    this.#granted = null;
+    this.deadMan = new DeadMan();
+    this.#clock.reset();
+    this.#delay_ms = 0;
+    this.#started_ms = this.now();
+    this.log.clear();
+    this.scans.forget();
+  }
+
   /** Monotonic time [ms]. */
   now() {
     return performance.now();
@@ -145,24 +169,9 @@ export class Store {
     return chainOf({ frame: this.frame, isSilent: this.isSilent, silence_s: this.silence_s, lag_s: this.lag_s, heard_ms: this.heard_ms });
   }
 
-  /** Is the vehicle being monitored, as far as the page knows? */
-  get isMonitoring() {
-    return this.frame?.session.phase === 'monitoring' || this.frame?.session.phase === 'lost';
-  }
-
-  /** This device was let in to look, and no more. */
-  get isViewer() {
-    return this.who?.role === 'viewer';
-  }
-
-  /** What must be heard of: the live car, also while a recording is shown. @returns {State | null} */
-  get heeded() {
-    return liveOf(this.frame);
-  }
-
-  /** Who is in control of the live car, also while a recording is shown. */
-  get control() {
-    return controlOf(this.frame);
+  /** Age of the list of cars at the glass [s]. */
+  get carsLag_s() {
+    return (this.now() - this.#cars_ms) / 1000;
   }
 
   /** The number of the lease by which this page is in control; null: it is not. */
@@ -170,31 +179,21 @@ export class Store {
     return fenceOf(this.control, this.page, this.#granted);
   }
 
-  /** A signal of the newest frame. @param {string} name */
-  signal(name) {
-    return this.frame?.signals[name];
-  }
-
   /** How much ink a signal deserves now. @param {string} name */
   ink(name) {
     return freshnessStyle(this.signal(name), this.lag_s);
   }
 
-  /** A limit of the newest frame, or null. @param {string} name */
-  limit(name) {
-    const value = this.frame?.limits[name];
-    return typeof value === 'number' ? value : null;
-  }
-
   /**
    * Ask the server for something, under the lease that this page has.
-   * @param {string} kind
-   * @param {object} [fields]
+   * @template {import('./protocol-types.js').PageMessage['kind']} Kind
+   * @param {Kind} kind
+   * @param {import('./requests.js').FieldsOf<Kind>} [fields]
    * @param {number} [within_ms]
    */
-  ask(kind, fields = {}, within_ms) {
+  ask(kind, fields, within_ms) {
     const { fence } = this;
-    return this.#requests.ask(kind, { ...fields, ...(fence === null ? {} : { fence }) }, within_ms);
+    return this.#requests.ask(kind, /** @type {any} */ ({ ...fields, ...(fence === null ? {} : { fence }) }), within_ms);
   }
 
   /** @param {string} text @param {number} [at_ms] when it came */
@@ -211,12 +210,16 @@ export class Store {
         return this.scans.offered(message.seq, this.now());
       case 'state':
         return this.#state(message, at_ms);
+      case 'cars':
+        this.cars = message;
+        this.#cars_ms = at_ms - this.#clock.note(message.time_ms, at_ms);
+        return this.#emitter.emit('cars');
       case 'events':
         return this.sync.take(message.events);
       case 'replay':
         this.replaying = false; // it ended: what comes now is live
         return this.#emitter.emit('replay', message);
-      case 'timeline':
+      case 'timeline': case 'beside': case 'beside_ended':
         return this.#emitter.emit('replay', message);
       case 'reply':
         this.#granted = message.fence ?? null;
@@ -226,11 +229,11 @@ export class Store {
     }
   }
 
-  /** @param {import('./protocol.js').Hello} hello @param {number} at_ms when it came */
+  /** @param {import('./protocol-types.js').Hello} hello @param {number} at_ms when it came */
   #greeted(hello, at_ms) {
+    if (!this.greet(hello)) return;
     this.#clock.note(hello.time_ms, at_ms);
     this.build = hello.build ?? '';
-    this.who = hello.who ?? null;
     this.sync.greeted(hello, { name: this.name, ...(this.page ? { page: this.page } : {}) }, this.heard_ms === null ? 0 : this.silence_s);
   }
 
@@ -240,12 +243,13 @@ export class Store {
       this.socket.proof(now_ms);
       return; // under way while the page turned, or while a recording is opened again
     }
+    if (!frame.replay && this.vehicle && frame.vehicle !== this.vehicle) return;
+    // What a part keeps, it keeps for one run of the server and one car.
+    frame.server.boot = `${frame.server.boot} ${this.vehicle}`;
     const delay_ms = this.#clock.note(frame.server.time_ms, now_ms);
     if (!this.deadMan.frame(now_ms, delay_ms)) return; // a memory, not service
-    const isFirst = this.frame === null;
-    this.frame = frame;
+    const isFirst = this.take(frame, Date.now() - (this.now() - now_ms));
     this.#delay_ms = delay_ms;
-    this.heard_ms = Date.now() - (this.now() - now_ms);
     this.socket.proof(now_ms);
     this.#emitter.emit('beat');
     this.painter.frame(frame, now_ms, isFirst);

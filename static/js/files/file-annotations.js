@@ -15,7 +15,7 @@ export function rename(dialog, model, row) {
   const input = /** @type {HTMLInputElement} */ (html('input', { type: 'text', id: 'file-name', value: row.title, maxlength: 120, autocomplete: 'off', enterkeyhint: 'done', dir: 'auto' }));
   const refused = html('p', { class: 'bad', role: 'alert' });
   const done = () => keep(dialog, model, row, { title: input.value }, refused);
-  dialog.show(`Rename ${nameOf(row, Date.now())}`, [refused], [html('div', { class: 'form-lines' }, html('label', { for: 'file-name' }, 'Name'), input, html('p', { class: 'sub' }, 'Empty: called by its time.'))],
+  dialog.show(`Rename ${nameOf(row, Date.now())}`, [refused], [html('div', { class: 'form-lines' }, html('label', { for: 'file-name' }, 'Name'), input, html('p', { class: 'sub' }, 'Empty: named by its time.'))],
     [dialog.key('Save the name', done, 'main')], 'Cancel');
   listen(input, 'keydown', (event) => {
     if (event.key === 'Enter') done();
@@ -30,7 +30,7 @@ export function annotate(dialog, model, row) {
   note.value = row.note;
   const tags = /** @type {HTMLInputElement} */ (html('input', { type: 'text', id: 'file-tags', value: row.tags.join(', '), autocomplete: 'off', dir: 'auto' }));
   const refused = html('p', { class: 'bad', role: 'alert' });
-  dialog.show(`Note and tags of ${nameOf(row, Date.now())}`, [refused], [html('div', { class: 'form-lines' }, html('label', { for: 'file-note' }, 'Note'), note, html('label', { for: 'file-tags' }, 'Tags, with commas between'), tags)],
+  dialog.show(`Note and tags of ${nameOf(row, Date.now())}`, [refused], [html('div', { class: 'form-lines' }, html('label', { for: 'file-note' }, 'Note'), note, html('label', { for: 'file-tags' }, 'Tags, separated by commas'), tags)],
     [dialog.key('Save', () => keep(dialog, model, row, { note: note.value, tags: tagsOf(tags.value) }, refused), 'main')], 'Cancel');
   note.focus();
 }

@@ -1,13 +1,15 @@
 // The sheet in which a recording's actions stand: a title, what is said, what can be done, and the key that closes it.
 
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
-import { html, icon, listen, setText, words } from '../core/dom.js';
+import { html, icon, listen, setAttribute, setText, words } from '../core/dom.js';
 
 /** What only an operator may do with a recording, by its icon. */
 const CHANGES = ['mail', 'crit', 'edit', 'info', 'trash'];
 
 export class FileDialog {
-  constructor() {
+  /** @param {HTMLElement} dock where it stands on a desktop, beside the list; elsewhere that is not shown */
+  constructor(dock) {
+    this.dock = dock;
     const nth = document.querySelectorAll('.file-sheet').length || ''; // another one may lie beneath the connect screen
     this.title = html('h2', { id: `file-title${nth}`, tabindex: -1, dir: 'auto' });
     this.about = html('div', { class: 'bd', id: `file-about${nth}` });
@@ -23,8 +25,22 @@ export class FileDialog {
     return this.sheet.open;
   }
 
+  /** Does it stand beside the list? */
+  get isDocked() {
+    return this.dock.offsetParent !== null;
+  }
+
+  /** In its dock it takes no focus. */
   open() {
-    openSheet(this.sheet);
+    const { dock, isDocked, sheet } = this;
+    const place = isDocked ? dock : document.body;
+    if (sheet.parentElement !== place) {
+      sheet.removeAttribute('open');
+      place.append(sheet);
+    }
+    setAttribute(sheet, 'data-docked', isDocked);
+    if (isDocked) sheet.setAttribute('open', '');
+    else openSheet(sheet);
   }
 
   close() {
@@ -44,13 +60,14 @@ export class FileDialog {
    * @param {string} [closes] what that one is called
    */
   show(title, about, what, keys = [], closes = 'Close') {
+    const takesFocus = this.sheet.open && (!this.isDocked || this.sheet.contains(document.activeElement));
     setText(this.title, title);
     this.about.replaceChildren(this.title, ...about);
     this.what.replaceChildren(...what);
     this.keys.replaceChildren(...keys, this.closing);
     setText(this.closing, closes);
     this.what.scrollTop = 0;
-    if (this.sheet.open) this.title.focus();
+    if (takesFocus) this.title.focus();
   }
 
   /** @param {string} title @param {string} sentence @param {() => void} [back] */

@@ -8,18 +8,9 @@ import { timeOfDay } from '../core/format.js';
 
 /** @typedef {import('./files-layout.js').Recording} Recording */
 
-/** What a recording can be had as: the name by which the server makes it, what it is called, and what it is for. */
-const FORMATS = /** @type {const} */ ([
-  ['bag', 'ROS 1 bag', 'for rosbag and rqt'],
-  ['ros2', 'ROS 2 bag', 'for ros2 bag and rosbags, zipped'],
-  ['csv', 'CSV tables', 'one for each signal, zipped'],
-  ['gpx', 'GPX track', 'for maps and watches'],
-  ['geojson', 'GeoJSON track', 'for QGIS and web maps'],
-  ['html', 'HTML report', 'plots and alarms in one page, works offline'],
-]);
 export const KINDS = /** @type {Record<string, [string, string]>} */ ({ mcap: ['MCAP', 'all of it, for Foxglove and Lichtblick'], bag: ['ROS 1 bag', 'the file as it is'], db3: ['ROS 2 db3', 'the file as it is'] });
 const CLIP_S = 30; // before and after an alarm
-const PRIORITY_ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
+export const PRIORITY_ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
 
 export class FileMaker {
   /** @type {FileJob | null} */
@@ -53,9 +44,9 @@ export class FileMaker {
     const kind = KINDS[row.format] ?? ['File', 'as it is'];
     const asItIs = html('a', { href: addressOf(row.id, '/file.mcap'), download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, kind[0]), html('small', {}, kind[1])), html('span', { class: 'end' }, ...words(sizeWords(row.size_bytes))));
     listen(asItIs, 'click', () => setTimeout(() => this.#dialog.close()));
-    const made = row.state === 'read' ? FORMATS.filter(([format]) => format !== row.format && (format !== 'ros2' || row.ros_version === 2)) : [];
+    const made = row.state === 'read' ? (this.#model.listing.formats ?? []).filter(({ name, ros_version }) => name !== row.format && (ros_version === null || ros_version === row.ros_version)) : [];
     this.#dialog.show(`Download ${name}`, [html('p', { class: 'sub' }, 'Other formats are made on request.')], [html('ul', { class: 'menu-list' }, html('li', {}, asItIs),
-      ...made.map(([format, label, use]) => {
+      ...made.map(({ name: format, label, use }) => {
         const key = html('button', { type: 'button', 'data-format': format, 'data-operator': true }, icon('download'), html('span', { class: 'tx' }, html('b', {}, label), html('small', {}, use)));
         listen(key, 'click', () => this.#make(row, format, label, back));
         return html('li', {}, key);
@@ -65,14 +56,14 @@ export class FileMaker {
   /** @param {Recording} row @param {string} format @param {string} label @param {() => void} back */
   async #make(row, format, label, back) {
     const job = new FileJob(addressOf(row.id, '/exports'), { format }, (told) => bar.tell(told));
-    const bar = this.#progress(`Making the ${label}`, job);
+    const bar = this.#progress(`Preparing the ${label}`, job);
     const over = await job.run();
     if (this.#job !== job || !this.#dialog.isOpen) return;
     if (over.state === 'done') {
       save(job.address);
-      this.#dialog.show(`${label} of ${nameOf(row, Date.now())}`, [html('p', { role: 'status' }, `Done. It is saved among this phone’s downloads.${over.is_whole === false ? ' Not all of the recording is in it:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#dialog.key('Save again', () => save(job.address)), this.#dialog.key('Back', () => this.download(row, back))]);
+      this.#dialog.show(`${label} of ${nameOf(row, Date.now())}`, [html('p', { role: 'status' }, `Done. It is in this phone’s downloads.${over.is_whole === false ? ' The export is incomplete:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#dialog.key('Save again', () => save(job.address)), this.#dialog.key('Back', () => this.download(row, back))]);
     } else if (over.state === 'cancelled') this.download(row, back);
-    else this.#dialog.refuse('Not made', over.sentence ?? 'The server could not make it.', back);
+    else this.#dialog.refuse('Not made', over.sentence ?? 'The server could not prepare it.', back);
   }
 
   /** @param {string} title @param {FileJob} job */
@@ -81,7 +72,7 @@ export class FileMaker {
     this.#job = job;
     const bar = /** @type {HTMLProgressElement} */ (html('progress', { max: 1, value: 0, 'aria-label': title }));
     const said = html('p', { role: 'status' });
-    setWords(said, 'The server begins.');
+    setWords(said, 'The server is starting.');
     this.#dialog.show(title, [], [html('div', { class: 'progress' }, bar, said)], [this.#dialog.key('Cancel', () => job.giveUp())]);
     return {
       /** @param {import('./files-job.js').Job} told */
@@ -92,18 +83,22 @@ export class FileMaker {
     };
   }
 
+  /** The alarms that were raised in a recording. @param {Recording} row @returns {Promise<NonNullable<Recording['raised']>>} */
+  async raised(row) {
+    const whole = /** @type {Recording} */ (await request(addressOf(row.id)));
+    return whole.raised ?? [];
+  }
+
   /** The alarms of a recording, to cut out the time around one. @param {Recording} row @param {() => void} back */
   async incidents(row, back) {
-    /** @type {Recording} */
-    let whole;
+    let raised;
     try {
-      whole = await request(addressOf(row.id));
+      raised = await this.raised(row);
     } catch (error) {
       this.#dialog.refuse('Not fetched', sentenceOf(error), back);
       return;
     }
-    const raised = whole.raised ?? [];
-    this.#dialog.show('Cut out an incident', [html('p', { class: 'sub' }, ...words(raised.length ? `From ${CLIP_S} s before an alarm to ${CLIP_S} s after it, as a recording of its own.` : 'No alarm was raised in this recording.'))],
+    this.#dialog.show('Cut out an incident', [html('p', { class: 'sub' }, ...words(raised.length ? `From ${CLIP_S} s before an alarm to ${CLIP_S} s after it, as a separate recording.` : 'No alarm was raised in this recording.'))],
       [html('ul', { class: 'menu-list' }, ...raised.map((alarm) => {
         const key = html('button', { type: 'button' }, icon(PRIORITY_ICONS[alarm.priority], alarm.priority === 'critical' ? 'c-crit' : alarm.priority === 'warning' ? 'c-warn' : ''),
           html('span', { class: 'tx' }, html('b', {}, ...words(alarm.title)), html('small', {}, ...words(alarm.text))), html('span', { class: 'end n' }, timeOfDay(alarm.at_ms)));
@@ -123,8 +118,8 @@ export class FileMaker {
       const made = this.#model.rows.find(({ id }) => id === over.recording);
       if (made) this.#open(made);
       else this.#dialog.close();
-      this.#say('The clip is in the list, as a recording of its own.', 'Incident cut out');
+      this.#say('The clip is in the list as its own recording.', 'Incident cut out');
     } else if (over.state === 'cancelled') back();
-    else this.#dialog.refuse('Not cut out', over.sentence ?? 'The server could not make it.', back);
+    else this.#dialog.refuse('Not cut out', over.sentence ?? 'The server could not prepare it.', back);
   }
 }

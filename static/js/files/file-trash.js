@@ -45,9 +45,9 @@ export class FileTrash {
   async #restore(row, name) {
     try {
       await this.#model.restore(row.id);
-      this.#say(`${name} is in the list again.`, 'Taken back');
+      this.#say(`${name} is back in the list.`, 'Taken back');
     } catch (error) {
-      this.#say(sentenceOf(error), 'Not taken back');
+      this.#say(sentenceOf(error), 'Not restored');
     }
   }
 
@@ -55,16 +55,16 @@ export class FileTrash {
   show(row, about) {
     const name = nameOf(row, Date.now());
     this.#dialog.show(name, about, [html('ul', { class: 'menu-list' },
-      this.#dialog.item('replay', 'Take it back', async () => {
+      this.#dialog.item('replay', 'Restore', async () => {
         this.#dialog.close();
         await this.#restore(row, name);
       }),
-      this.#dialog.item('trash', 'Delete for good', () => this.#askDestroy(row.id, `Delete ${name} for good?`, `${sizeWords(row.size_bytes)} are freed. It cannot be taken back.`), 'asks first'))]);
+      this.#dialog.item('trash', 'Delete for good', () => this.#askDestroy(row.id, `Delete ${name} for good?`, `${sizeWords(row.size_bytes)} are freed. This cannot be undone.`), 'asks first'))]);
   }
 
   /** All of the trash, after a question. @param {import('./files-layout.js').Total} total */
   askEmpty({ count, bytes }) {
-    this.#askDestroy(null, 'Empty the trash?', `${count === 1 ? '1 recording is' : `${count} recordings are`} deleted for good, ${sizeWords(bytes)} are freed. ${count === 1 ? 'It' : 'They'} cannot be taken back.`);
+    this.#askDestroy(null, 'Empty the trash?', `${count === 1 ? '1 recording is' : `${count} recordings are`} deleted for good, ${sizeWords(bytes)} are freed. ${count === 1 ? 'It' : 'They'} cannot be restored.`);
     this.#dialog.open();
   }
 

@@ -17,7 +17,7 @@ export function openSaved(store, say, router) {
   const board = html('div', { class: 'board saved-board', role: 'region', 'aria-label': 'Saved data' }, html('div', { class: 'titlebar' }, back, title), html('div', { class: 'view' }, panel));
   setAttribute(beneath, 'inert', true);
   document.body.append(board);
-  const files = mount(panel, store, say, () => true);
+  const files = mount(panel, { store, say, isFront: () => true });
   history.pushState({ saved: true }, '');
   title.focus();
 

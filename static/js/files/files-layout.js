@@ -5,51 +5,11 @@ import { duration, fixed, NOTHING } from '../core/format.js';
 import { speedWords } from '../core/units.js';
 
 /**
- * @typedef {'critical' | 'warning' | 'advisory'} Priority
- * @typedef {{lines: number[][], start: [number, number], marks: [number, number, Priority][]}} Sketch in a square of 64 units
- *
- * @typedef {object} Recording a row of GET /api/recordings
- * @property {string} id
- * @property {string} vehicle
- * @property {string | null} session
- * @property {number | null} part
- * @property {number} started_ms
- * @property {number | null} length_s null: not read yet, or unreadable
- * @property {number} size_bytes
- * @property {number | null} distance_m null: no position
- * @property {number | null} top_speed_mps
- * @property {Record<Priority, number> | null} alarms null: whoever recorded it recorded no alarms
- * @property {string} title
- * @property {string} note
- * @property {string[]} tags
- * @property {'waiting' | 'read' | 'unreadable'} state
- * @property {string | null} problem why it cannot be read
- * @property {string[]} damage what of it cannot be read
- * @property {string[]} [left_out] topics that were not recorded, the first of them
- * @property {number} [left_out_count]
- * @property {number} [not_received_count]
- * @property {string[]} [not_received] topics that had a publisher, and of which no message came
- * @property {1 | 2 | null} [ros_version] null: not read yet, or unreadable
- * @property {string | null} ended closed, recovered, or null where nobody says
- * @property {string | null} ended_why
- * @property {boolean} is_clip
- * @property {string} file its name in the folder
- * @property {string} format mcap, bag or db3
- * @property {Sketch | null} sketch
- * @property {number | null} trashed_ms
- * @property {{at_ms: number, priority: Priority, alarm: string, title: string, text: string}[]} [raised] of one recording asked for alone
- *
- * @typedef {{count: number, bytes: number}} Total
- * @typedef {object} Listing the answer of GET /api/recordings
- * @property {Recording[]} recordings
- * @property {string | null} next
- * @property {Total} found
- * @property {Total} all
- * @property {Total} trash
- * @property {number | null} free_bytes
- * @property {number} waiting
- * @property {string[]} vehicles
- * @property {string[]} tags
+ * @typedef {import('../core/protocol-types.js').Priority} Priority
+ * @typedef {import('../core/protocol-types.js').Recording} Recording
+ * @typedef {import('../core/protocol-types.js').Total} Total
+ * @typedef {import('../core/protocol-types.js').ExportFormat} ExportFormat
+ * @typedef {import('../core/protocol-types.js').RecordingList} Listing
  */
 
 const MONTHS = ['Jan', 'Feb', 'Mar', 'Apr', 'May', 'Jun', 'Jul', 'Aug', 'Sep', 'Oct', 'Nov', 'Dec'];
@@ -136,7 +96,7 @@ export function alarmWords(alarms) {
 /** All that is known of a recording in one sentence. @param {Recording} row */
 export function factWords(row) {
   if (row.state === 'unreadable') return `${sizeWords(row.size_bytes)}. ${row.problem ?? 'It cannot be read.'}`;
-  if (row.state === 'waiting') return `${sizeWords(row.size_bytes)}, being read now.`;
+  if (row.state === 'waiting') return `${sizeWords(row.size_bytes)}, being read.`;
   const [speed, unit] = speedWords(row.top_speed_mps);
   return `${[
     lengthWords(row.length_s), sizeWords(row.size_bytes), row.distance_m === null ? 'no position' : distanceWords(row.distance_m),
@@ -146,10 +106,10 @@ export function factWords(row) {
 
 /** What else there is to say of it, in sentences. @param {Recording} row */
 export function warningWords(row) {
-  const why = row.ended_why ?? 'the server ended while it was recorded.';
+  const why = row.ended_why ?? 'the server stopped during the recording.';
   const recovered = row.ended === 'recovered' ? [/recover/i.test(why) ? why : `Recovered: ${why}`] : [];
   const leftOut = row.left_out?.length ? [`Not recorded: ${namesWords(row.left_out, row.left_out_count)}.`] : [];
-  const silent = row.not_received?.length ? [`No message came from: ${namesWords(row.not_received, row.not_received_count)}.`] : [];
+  const silent = row.not_received?.length ? [`No messages from: ${namesWords(row.not_received, row.not_received_count)}.`] : [];
   return [...recovered, ...row.damage, ...leftOut, ...silent];
 }
 
@@ -224,7 +184,7 @@ export function liveOf(recorder, { vehicle, isMonitoring, isSilent }) {
   const isOn = state === 'recording';
   const facts = [for_s === null || state === 'off' ? '' : lengthWords(for_s), bytes ? sizeWords(bytes) : '', dropped ? `${dropped} messages lost: the disk is too slow` : ''];
   const mark = isOn ? [vehicle ?? '', (part ?? 1) > 1 ? `part ${part}` : ''] : [reason ?? ''];
-  if (isSilent) return { name: 'Recording?', mark: 'The server does not answer: it is unknown whether it records.', facts: '', missing: '', isOn: false, isBad: true, order: null };
+  if (isSilent) return { name: 'Recording?', mark: 'The server does not answer: the recording state is unknown.', facts: '', missing: '', isOn: false, isBad: true, order: null };
   return {
     missing: isOn || state === 'held' ? missingWords(recorder) : '',
     name: NAMES[state] ?? state, mark: mark.filter(Boolean).join(' · '), facts: facts.filter(Boolean).join(' · '), isOn, isBad: state === 'stopped' || Boolean(dropped),

@@ -22,7 +22,7 @@ export class FilesLive {
       const on = this.key.dataset['on'] === 'true';
       const answer = await store.ask('record', { on });
       if (!answer.ok) say(answer.reason ?? 'Refused.', on ? 'Not recorded' : 'Not ended');
-      else if (!on) say('What was recorded is saved and listed. The car is still monitored.', 'Recording ended');
+      else if (!on) say('The recording is saved and listed. The car is still monitored.', 'Recording ended');
     });
   }
 

@@ -30,7 +30,7 @@ export async function request(path, { method = 'GET', body, signal } = {}) {
     throw new Error(SILENT);
   }
   const told = await answer.json().catch(() => null);
-  if (!answer.ok) throw new Error(typeof told?.detail === 'string' ? told.detail : `The server refused it (${answer.status}).`);
+  if (!answer.ok) throw new Error(typeof told?.detail === 'string' ? told.detail : `The server refused the request (${answer.status}).`);
   return told;
 }
 

@@ -15,7 +15,7 @@ export class FilesSearch {
   constructor(model) {
     this.model = model;
     const text = /** @type {HTMLInputElement} */ (html('input', {
-      type: 'search', placeholder: 'Search', 'aria-label': 'Search the recordings', autocomplete: 'off', autocapitalize: 'off', spellcheck: 'false', enterkeyhint: 'search', maxlength: 100,
+      type: 'search', placeholder: 'Search', 'aria-label': 'Search recordings', autocomplete: 'off', autocapitalize: 'off', spellcheck: 'false', enterkeyhint: 'search', maxlength: 100,
     }));
     this.select = /** @type {HTMLSelectElement} */ (html('select', { 'aria-label': 'Which recordings' }));
     this.element = html('div', { class: 'files-find', hidden: true }, html('div', { class: 'field' }, icon('search'), text), this.select);

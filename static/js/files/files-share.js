@@ -27,7 +27,7 @@ export async function share({ row, name, address, say, offer, link, done }) {
   }
   const trial = new File([new Uint8Array(1)], fileName, { type });
   if (!navigator.canShare?.({ files: [trial] }) || row.size_bytes > MOST_BYTES) {
-    const why = row.size_bytes > MOST_BYTES ? `${sizeWords(row.size_bytes)} are too large for this phone to share` : 'This phone cannot share such files';
+    const why = row.size_bytes > MOST_BYTES ? `${sizeWords(row.size_bytes)} is too large for this phone to share` : 'This phone cannot share such files';
     say(`${why}: a link is shared instead. It works for anyone who can reach this server.`);
     offer('Share the link', () => hand({ title: name, url: address }, say, done));
     return;
@@ -37,10 +37,10 @@ export async function share({ row, name, address, say, offer, link, done }) {
     const answer = await fetch(address);
     if (!answer.ok) throw new Error(String(answer.status));
     const file = new File([await answer.blob()], fileName, { type });
-    say('It is here.');
+    say('Ready to share.');
     offer('Share the file', () => hand({ title: name, files: [file] }, say, done));
   } catch {
-    say('It could not be fetched from the server. Try again.');
+    say('It could not be loaded from the server. Try again.');
   }
 }
 

@@ -2,12 +2,15 @@
 
 import { annotate, rename } from './file-annotations.js';
 import { FileDialog } from './file-dialog.js';
-import { FileMaker, KINDS } from './file-maker.js';
+import { FileMaker, KINDS, PRIORITY_ICONS } from './file-maker.js';
 import { FileTrash } from './file-trash.js';
 import { factWords, nameOf, warningWords } from './files-layout.js';
 import { addressOf } from './files-model.js';
 import { share } from './files-share.js';
-import { html, setWords, words } from '../core/dom.js';
+import { thumbnail } from './files-row.js';
+import { duration } from '../core/format.js';
+import { html, icon, setWords, words } from '../core/dom.js';
+import { NO_ROOM, hasRoom } from '../replay/compare-room.js';
 
 /**
  * @typedef {import('./files-layout.js').Recording} Recording
@@ -15,10 +18,21 @@ import { html, setWords, words } from '../core/dom.js';
  * @typedef {(sentence: string, title?: string, way?: import('../shell/notice.js').Way) => void} Say
  */
 
+/** So many alarms are listed beside the list of recordings; all of them stand in its replay. */
+const MOST_RAISED = 8;
+
+/** @param {NonNullable<Recording['raised']>[number]} alarm @param {number} started_ms */
+function raisedLine({ at_ms, priority, title, text }, started_ms) {
+  return html('li', {}, html('span', { class: 'n' }, duration(Math.max(0, at_ms - started_ms) / 1000, true)), icon(PRIORITY_ICONS[priority], `s ${priority === 'critical' ? 'c-crit' : priority === 'warning' ? 'c-warn' : ''}`),
+    html('span', {}, html('b', {}, ...words(title)), ' ', ...words(text)));
+}
+
 export class FileSheet {
   /** @type {Recording | null} */
   #row = null;
-  #dialog = new FileDialog();
+  #dialog;
+  /** What its dock shows: as the list had it, and since when it is open there. */
+  #docked = '';
   #maker;
   #trash;
 
@@ -26,8 +40,10 @@ export class FileSheet {
    * @param {import('../core/store.js').Store} store
    * @param {FilesModel} model
    * @param {Say} say
+   * @param {HTMLElement} dock beside the list
    */
-  constructor(store, model, say) {
+  constructor(store, model, say, dock) {
+    this.#dialog = new FileDialog(dock);
     this.store = store;
     this.model = model;
     this.say = say;
@@ -50,13 +66,28 @@ export class FileSheet {
     this.#dialog.open();
   }
 
+  /**
+   * On a desktop one recording always stands beside the list: this one, opened again when it changed or a step of it was closed.
+   * @param {Recording | undefined} row
+   */
+  keep(row) {
+    const dialog = this.#dialog;
+    if (!dialog.isDocked) return;
+    const key = row ? JSON.stringify([row, this.store.replaying && this.store.frame?.replay?.id, hasRoom()]) : '';
+    if (key === this.#docked && (dialog.isOpen || !row)) return;
+    if (row && dialog.isOpen && row.id === this.#row?.id && !this.isAtActions) return; // a step of it is under way
+    this.#docked = key;
+    if (row) this.open(row);
+    else dialog.close();
+  }
+
   /** All of the trash, after a question. @param {import('./files-layout.js').Total} total */
   askEmpty(total) {
     this.#trash.askEmpty(total);
   }
 
   get row() {
-    if (!this.#row) throw new Error('No recording was chosen');
+    if (!this.#row) throw new Error('No recording selected');
     return this.#row;
   }
 
@@ -79,8 +110,10 @@ export class FileSheet {
     const isRead = row.state === 'read';
     const kind = KINDS[row.format] ?? ['file', ''];
     const back = () => this.#actions();
-    this.#dialog.show(this.name, this.#about(), [html('ul', { class: 'menu-list' },
-      ...(isRead ? [this.#dialog.item('replay', 'Open replay', () => this.#replay())] : []),
+    const { isDocked } = this.#dialog;
+    const seen = isDocked && isRead ? [html('div', { class: 'file-way' }, thumbnail(row)), this.#raised(row)] : [];
+    this.#dialog.show(this.name, this.#about(), [...seen, html('ul', { class: 'menu-list', 'data-f': 'file-actions' },
+      ...(isRead ? [this.#dialog.item('replay', 'Open replay', () => this.#replay()), ...this.#beside()] : []),
       this.#dialog.item('share', 'Share', () => this.#share()),
       ...(isRead ? [this.#dialog.item('mail', 'E-mail', () => this.#mail())] : []),
       this.#dialog.item('download', 'Download', () => this.#maker.download(row, back), isRead ? `${kind[0]} · bag · CSV …` : kind[0]),
@@ -90,11 +123,36 @@ export class FileSheet {
       this.#dialog.item('trash', 'Delete', () => this.#trash.askDelete(row, back), 'asks first'))]);
   }
 
+  get isAtActions() {
+    return this.#dialog.what.querySelector('[data-f="file-actions"]') !== null;
+  }
+
+  /** The alarms that were raised in it, once they are fetched. @param {Recording} row */
+  #raised(row) {
+    const list = html('ul', { class: 'file-raised', 'aria-label': 'Alarms' });
+    if (row.alarms) void this.#maker.raised(row).then((raised) => list.replaceChildren(...raised.slice(0, MOST_RAISED).map((alarm) => raisedLine(alarm, row.started_ms)),
+      ...(raised.length > MOST_RAISED ? [html('li', {}, ...words(`and ${raised.length - MOST_RAISED} more`))] : [])), () => {});
+    return list;
+  }
+
   async #replay() {
     const { id } = this.row;
     const { openReplay } = await this.#module(() => import('../replay/replay.js'));
     this.#dialog.close();
     openReplay(id, this.store, this.say);
+  }
+
+  /** A second recording beside the one that is replayed, or in a line why not. */
+  #beside() {
+    const replayed = this.store.frame?.replay?.id;
+    if (!this.store.replaying || replayed === undefined) return [];
+    if (replayed === this.row.id) return [html('li', { class: 'sub why' }, 'Shown in the replay now')];
+    if (!hasRoom()) return [html('li', { class: 'sub why' }, ...words(NO_ROOM))];
+    return [this.#dialog.item('plus', 'Compare with the replay', async () => {
+      const { openBeside } = await this.#module(() => import('../replay/compare.js'));
+      this.#dialog.close();
+      void openBeside(this.row.id, this.store, this.say);
+    })];
   }
 
   async #mail() {
@@ -114,7 +172,7 @@ export class FileSheet {
     try {
       return await load();
     } catch {
-      this.#dialog.refuse('Not opened', 'This part of the page could not be fetched from the server. Try again.', () => this.#actions());
+      this.#dialog.refuse('Not opened', 'This part of the page could not be loaded from the server. Try again.', () => this.#actions());
       return new Promise(() => {});
     }
   }

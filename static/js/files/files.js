@@ -14,12 +14,10 @@ const SELDOM_S = 10;
 
 /**
  * @param {HTMLElement} panel
- * @param {import('../core/store.js').Store} store
- * @param {(sentence: string, title?: string, way?: import('../shell/notice.js').Way) => void} say
- * @param {() => boolean} isShown whether any of it can be seen now
+ * @param {import('../shell/tab-contents.js').TabPage} page
  */
-export function mount(panel, store, say, isShown) {
-  const tab = new FilesTab(panel, store, say, isShown);
+export function mount(panel, { store, say, isFront }) {
+  const tab = new FilesTab(panel, store, say, isFront);
   tab.draw();
   tab.refresh();
   return {
@@ -37,6 +35,7 @@ class FilesTab {
   #drawn = new Map();
   #requested_ms = -Infinity;
   #recording = '';
+  #chosen = '';
 
   /**
    * @param {HTMLElement} panel
@@ -49,10 +48,11 @@ class FilesTab {
     this.store = store;
     this.isShown = isShown;
     const model = this.model = new FilesModel(() => this.draw());
-    const sheet = this.sheet = new FileSheet(store, model, say);
+    const dock = html('aside', { class: 'file-dock', 'aria-label': 'Chosen recording' });
+    const sheet = this.sheet = new FileSheet(store, model, say, dock);
     this.search = new FilesSearch(model);
     this.live = new FilesLive(store, say);
-    const { older, trash, back, clear } = this.parts = build(panel, this.search.element, this.live.element);
+    const { older, trash, back, clear } = this.parts = build(panel, this.search.element, this.live.element, dock);
     loadStyle(/** @type {HTMLElement} */ (panel.firstElementChild));
     this.stops = [
       store.on('draw', () => this.#beat()),
@@ -92,6 +92,15 @@ class FilesTab {
     this.#drawHead();
     this.#drawLive();
     this.#drawList();
+    this.#drawDock();
+  }
+
+  /** The recording beside the list: the one that was chosen, else the newest. */
+  #drawDock() {
+    const { rows } = this.model;
+    const row = rows.find(({ id }) => id === this.#chosen) ?? rows[0];
+    this.sheet.keep(row);
+    for (const [id, { element }] of this.#drawn) setAttribute(element, 'data-chosen', id === row?.id);
   }
 
   /** Follows the frames. */
@@ -99,6 +108,7 @@ class FilesTab {
     if (!this.isShown()) return;
     this.refresh();
     this.#drawLive();
+    this.#drawDock();
     if (this.store.isSilent || this.parts.state.textContent) this.#drawHead();
   }
 
@@ -127,7 +137,7 @@ class FilesTab {
     const { model: { at_ms, problem }, store } = this;
     if (store.isSilent) return `The server does not answer: nothing can be opened.${at_ms === null ? '' : ` This was the list at ${timeOfDay(at_ms)}.`}`;
     if (problem !== null) return problem;
-    return at_ms === null ? 'The recordings are being fetched from the server.' : '';
+    return at_ms === null ? 'Loading the recordings…' : '';
   }
 
   #drawList() {
@@ -139,7 +149,9 @@ class FilesTab {
       const old = this.#drawn.get(row.id);
       return [row.id, old && old.key === key ? old : { key, element: drawRow(row, now_ms, (one, from) => {
         from.focus({ preventScroll: true }); // the sheet returns the focus to it
+        this.#chosen = one.id;
         this.sheet.open(one);
+        this.#drawDock();
       }) }];
     }));
     const elements = [...next.values()].map(({ element }) => element);
@@ -170,8 +182,8 @@ class FilesTab {
   }
 }
 
-/** Builds the parts of the tab in `panel`. @param {HTMLElement} panel @param {HTMLElement} search @param {HTMLElement} live */
-function build(panel, search, live) {
+/** Builds the parts of the tab in `panel`. @param {HTMLElement} panel @param {HTMLElement} search @param {HTMLElement} live @param {HTMLElement} dock */
+function build(panel, search, live, dock) {
   const [count, free] = [html('span'), html('span')];
   const state = html('p', { class: 'state', role: 'status', 'data-f': 'files-state' });
   const list = html('ul', { class: 'list', 'data-f': 'recordings', 'aria-label': 'Recordings' });
@@ -181,7 +193,9 @@ function build(panel, search, live) {
   const trash = html('button', { type: 'button', class: 'key wide', 'data-f': 'files-trash' }, icon('trash'), html('span'));
   const back = html('button', { type: 'button', class: 'key wide', 'data-f': 'files-back' }, icon('back'), html('span', {}, 'Back to the recordings'));
   const clear = html('button', { type: 'button', class: 'key wide', 'data-f': 'files-empty' }, icon('trash'), html('span', {}, 'Empty the trash'));
-  panel.replaceChildren(html('div', { class: 'files' }, html('div', { class: 'sec' }, count, free), search, state, live, list, empty, html('div', { class: 'files-foot' }, older, trash, back, clear)));
+  const heads = html('div', { class: 'files-heads', 'aria-hidden': 'true' }, ...['Track', 'Recording', 'Car', 'Length', 'Size', 'Alarms'].map((name) => html('span', {}, name)));
+  panel.replaceChildren(html('div', { class: 'files' },
+    html('div', { class: 'files-side' }, html('div', { class: 'sec' }, count, free), search, state, heads, live, list, empty, html('div', { class: 'files-foot' }, older, trash, back, clear)), dock));
   return { count, free, state, list, empty, emptyTitle, emptyWords, older, trash, back, clear };
 }
 

@@ -21,7 +21,7 @@ export function missingWords({ left_out = [], left_out_count, not_received = [],
   return [
     names.length ? `Not recorded: ${namesWords(names, others)}.` : '',
     large.size ? `Too large to record: ${namesWords(sizes, too_large_count)}.` : '',
-    not_received.length ? `No message comes from: ${namesWords(not_received, not_received_count)}.` : '',
-    as_json ? `${as_json} messages kept as JSON: not of their type, or its definition is not known.` : '',
+    not_received.length ? `No messages from: ${namesWords(not_received, not_received_count)}.` : '',
+    as_json ? `${as_json} messages stored as JSON: their type definition is unknown or does not match.` : '',
   ].filter(Boolean).join(' ');
 }

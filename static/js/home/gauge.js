@@ -188,11 +188,11 @@ function showFace({ face, bug }, scale) {
   ] : []));
 }
 
-/** @param {import('../core/protocol.js').Freshness} ink */
+/** @param {import('../core/protocol-types.js').SignalFreshness} ink */
 const isValue = (ink) => ink !== 'never' && ink !== 'not_published';
 
 /**
- * @param {{ink: import('../core/protocol.js').Freshness, age_s: number | null}} state
+ * @param {{ink: import('../core/protocol-types.js').SignalFreshness, age_s: number | null}} state
  * @param {boolean} isKnown
  */
 function noteOf({ ink, age_s }, isKnown) {

@@ -3,6 +3,7 @@
 import { field, setAttribute, setText, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
 import { fixed, heading } from '../core/format.js';
+import { distanceWords } from '../map/map-text.js';
 
 /**
  * @param {HTMLElement} root
@@ -13,6 +14,7 @@ export function mount(root, store) {
   const fields = {
     latitude: at('latitude'), longitude: at('longitude'), altitude: at('altitude'), altitudeUnit: at('altitude-unit'),
     heading: at('heading'), headingUnit: at('heading-unit'), fix: at('fix'),
+    driven: at('driven'), drivenUnit: at('driven-unit'), apart: at('phone-apart'), apartUnit: at('phone-apart-unit'),
     fuelLine: at('fuel-line'), fuel: at('fuel'), fuelUnit: at('fuel-unit'),
   };
 
@@ -32,11 +34,16 @@ export function mount(root, store) {
     const course = typeof heading_deg === 'number' ? heading(heading_deg) : null;
     write(fields.heading, turn.ink, course ? course.degrees : '–', fields.headingUnit, course?.point ?? '');
 
+    const { session, phone } = store.frame ?? {};
+    const [driven, drivenUnit] = session?.track_m == null ? ['–', ''] : distanceWords(session.track_m);
+    write(fields.driven, ink, driven, fields.drivenUnit, drivenUnit);
+    const [apart, apartUnit] = !phone?.used || phone.apart_m == null ? ['–', ''] : distanceWords(phone.apart_m);
+    write(fields.apart, ink, apart, fields.apartUnit, apartUnit);
+
     const tank = store.ink('fuel');
     const fuel = store.signal('fuel')?.value;
     show(fields.fuelLine, tank.ink !== 'not_published');
-    const percent = fuel?.percent ?? null;
-    write(fields.fuel, tank.ink, fixed(percent ?? fuel?.litres ?? null), fields.fuelUnit, percent === null ? (fuel?.unit ?? 'l') : '%');
+    write(fields.fuel, tank.ink, fixed(fuel?.value ?? null), fields.fuelUnit, fuel?.unit ?? '');
   }
 
   if (store.frame) draw(); // before the first frame it is not shown

@@ -5,7 +5,7 @@ import { ABSENT, write } from '../core/ink.js';
 import { shownIn, speedWords } from '../core/units.js';
 import { age, counted, fixed, NOTHING } from '../core/format.js';
 
-/** @typedef {import('../core/protocol.js').Signal} Signal */
+/** @typedef {import('../core/protocol-types.js').SignalState<any>} Signal */
 
 const LEVELS = ['OK', 'WARN', 'ERROR', 'STALE'];
 
@@ -29,13 +29,14 @@ const HEADLINES = /** @type {Record<string, (value: any) => [string, string]>} *
 /**
  * @param {string} name
  * @param {Record<string, any> | null} value
+ * @param {string} [ofSignal] its unit, where the value does not name one
  * @returns {[string, string]}
  */
-export function headline(name, value) {
+export function headline(name, value, ofSignal = '') {
   if (!value) return [NOTHING, ''];
   if (HEADLINES[name]) return HEADLINES[name](value);
-  const number = value.percent ?? value.litres ?? value.value;
-  return [fixed(typeof number === 'number' ? number : null), String(value.unit ?? (value.percent === undefined ? '' : '%'))];
+  const number = value.percent ?? value.value;
+  return [fixed(typeof number === 'number' ? number : null), String(value.unit ?? (value.percent === undefined ? ofSignal : '%'))];
 }
 
 /**
@@ -46,10 +47,10 @@ export function headline(name, value) {
  */
 export function details(signal, name) {
   const rows = /** @type {[string, string | null | undefined][]} */ ([
-    ['Topic', signal.topic ?? (signal.value ? 'none of its own' : 'none that catgraph knows')],
+    ['Topic', signal.topic ?? (signal.value ? 'no own stamp' : 'no known topic')],
     ['Type', signal.type],
     ['Note', signal.note],
-    ['Messages', signal.topic ? `${signal.count}${signal.dropped ? `, ${signal.dropped} dropped` : ''}` : null],
+    ['Messages', signal.topic ? String(signal.count) : null],
     ['Rejected', signal.rejected ? `${signal.rejected}: ${signal.rejected_why ?? 'no reason given'}` : signal.count ? '0' : null],
     ['Repaired', signal.repaired ? `${signal.repaired}: ${signal.repaired_why ?? ''}` : null],
     ['Expected', signal.expected_hz ? `${fixed(signal.expected_hz)} Hz` : null],
@@ -107,11 +108,13 @@ export function mount(root, store) {
       fill(found, name, signal, store.ink(name));
     }
     const { session, link, server } = frame;
+    const isNone = Object.values(frame.signals).every(({ count }) => count === 0);
     const parts = [
+      isNone ? 'No signal has arrived yet. A row fills with the first message of its topic; press a row to choose its topic.' : '',
       `${session.received} messages received, ${session.rejected} rejected.`,
-      link.unreadable_frames ? `${counted(link.unreadable_frames, 'frame')} of the bridge unreadable: ${link.unreadable_why ?? ''}.` : '',
+      link.unreadable_frames ? `${counted(link.unreadable_frames, 'frame')} from the bridge unreadable: ${link.unreadable_why ?? ''}.` : '',
       server.frames_skipped ? `${counted(server.frames_skipped, 'frame')} skipped for pages that were slower than the car.` : '',
-      store.unreadable ? `${counted(store.unreadable, 'frame')} of the server unreadable here.` : '',
+      store.unreadable ? `${counted(store.unreadable, 'frame')} from the server unreadable here.` : '',
     ];
     setWords(summary, parts.filter(Boolean).join(' '));
   }
@@ -149,11 +152,11 @@ function row(choose) {
  * @param {ReturnType<typeof row>} at
  * @param {string} name
  * @param {Signal} signal
- * @param {{ink: import('../core/protocol.js').Freshness, age_s: number | null}} state
+ * @param {{ink: import('../core/protocol-types.js').SignalFreshness, age_s: number | null}} state
  */
 function fill(at, name, signal, { ink, age_s }) {
   const isAbsent = ink === 'never' || ink === 'not_published';
-  const [text, unit] = headline(name, signal.value);
+  const [text, unit] = headline(name, signal.value, signal.unit);
   setText(at.name, signal.label);
   setText(at.kind, kindWords(signal));
   setAttribute(at.element, 'data-faulty', signal.rejected > 0);

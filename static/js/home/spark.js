@@ -2,7 +2,7 @@
 
 import { SPAN, STEP_S } from './trends-layout.js';
 
-const COLOURS = /** @type {const} */ (['panel', 'line', 'ink', 'you', 'hatch']);
+const COLOURS = /** @type {const} */ (['panel', 'line', 'ink', 'ink2', 'edge', 'you', 'hatch', 'crit']);
 const HEIGHT = 52;
 
 /** @typedef {Record<typeof COLOURS[number], string>} Palette */
@@ -14,27 +14,29 @@ const HEIGHT = 52;
  * @param {import('./trend-feed.js').Trends} trends
  * @param {import('../core/store.js').Store} store
  * @param {Palette} palette
+ * @returns {[number, number] | null} the ends of the scale; null: nothing is drawn
  */
 export function drawSpark(canvas, spec, trends, store, palette) {
   const width = canvas.clientWidth;
+  const height = canvas.clientHeight || HEIGHT;
   const dpr = window.devicePixelRatio || 1;
   const g = canvas.getContext('2d', { alpha: false });
-  if (!width || !g) return;
-  const [w, h] = [Math.round(width * dpr), Math.round(HEIGHT * dpr)];
+  if (!width || !g) return null;
+  const [w, h] = [Math.round(width * dpr), Math.round(height * dpr)];
   if (canvas.width !== w || canvas.height !== h) {
     canvas.width = w;
     canvas.height = h;
   }
   g.setTransform(dpr, 0, 0, dpr, 0, 0);
   g.fillStyle = palette.panel;
-  g.fillRect(0, 0, width, HEIGHT);
+  g.fillRect(0, 0, width, height);
   const { ink } = store.ink(spec.name);
-  if (ink === 'not_published') return;
+  if (ink === 'not_published') return null;
   const course = trends.course(spec);
   const limits = store.frame?.limits ?? {};
   const [low, high] = spec.ends(limits, course.isEmpty ? 0 : course.low, course.isEmpty ? 0 : course.high);
   const x = (/** @type {number} */ at_s) => width * (1 + at_s / (SPAN * STEP_S));
-  const y = (/** @type {number} */ value) => 48 - (44 * (value - low)) / (high - low || 1);
+  const y = (/** @type {number} */ value) => height - 4 - ((height - 8) * (value - low)) / (high - low || 1);
   hatch(g, course.gaps.map(([a, b]) => [x(a), Math.max(x(b) - x(a), 2)]), palette.hatch);
   line(g, palette.line, 1.5, [[0, y(Math.max(low, 0))], [width, y(Math.max(low, 0))]]);
   const limit = spec.limit === null ? null : store.limit(spec.limit);
@@ -56,6 +58,7 @@ export function drawSpark(canvas, spec, trends, store, palette) {
     else if ((course.lowest[i - 1] ?? null) === null && (course.lowest[i + 1] ?? null) === null) g.rect(x(at_s) - 0.5, y(a) - 0.5, 1, 1); // a single point
   });
   g.stroke();
+  return [low, high];
 }
 
 /** Draws diagonals where nothing is known. @param {CanvasRenderingContext2D} g @param {number[][]} bands x and width @param {string} colour */

@@ -36,7 +36,7 @@ export class Trends {
   #receive() {
     const { frame } = this.store;
     if (!frame?.trends) return;
-    const boot = `${frame.server.boot} ${frame.replay?.token} ${frame.replay?.seek}`; // after a seek the values before it do not belong to those after it
+    const boot = `${frame.server.boot} ${frame.vehicle} ${frame.replay?.token} ${frame.replay?.seek}`; // after a seek the values before it do not belong to those after it
     if (boot !== this.#boot) {
       this.minute.clear();
       this.#requested_ms = -Infinity;
@@ -68,6 +68,16 @@ export class Trends {
   }
 }
 
+/** @type {WeakMap<import('../core/store.js').Store, Trends>} */
+const kept = new WeakMap();
+
+/** The last minute of this page: one for all who draw it. @param {import('../core/store.js').Store} store */
+export function trendsOf(store) {
+  const trends = kept.get(store) ?? new Trends(store);
+  kept.set(store, trends);
+  return trends;
+}
+
 /**
  * The present value of a signal as text, with its freshness.
  * @param {Spec} spec
@@ -76,8 +86,8 @@ export class Trends {
 export function nowOf(spec, store) {
   const { ink } = store.ink(spec.name);
   if (ink === 'never' || ink === 'not_published') return { ink, text: ABSENT[ink], value: null };
-  const now = store.signal(spec.name)?.value;
-  const number = now?.['speed_mps'] ?? now?.['acceleration_mps2'] ?? now?.['distance_m'] ?? now?.['percent'];
+  const now = /** @type {Record<string, any> | null | undefined} */ (store.signal(spec.name)?.value);
+  const number = now?.['speed_mps'] ?? now?.['acceleration_mps2'] ?? now?.['distance_m'] ?? now?.['percent'] ?? now?.['value'];
   const { value } = shownIn(typeof number === 'number' ? number : null, spec.unit);
   const isNone = spec.name === 'distance' && now?.['none_in_range'];
   return { ink, value, text: isNone ? 'none' : (spec.isSigned ? signed : fixed)(value, spec.digits) };

@@ -8,11 +8,10 @@ const GAP_PERIODS = 3;
 const GAP_LEAST_S = 0.5;
 
 /**
- * @typedef {import('../core/protocol.js').Trends} Frame
- * @typedef {'speed' | 'acceleration' | 'distance' | 'steering' | 'brake' | 'accelerator'} Name
+ * @typedef {import('../core/protocol-types.js').Trends} Frame
  *
  * @typedef {object} Spec
- * @property {Name} name
+ * @property {string} name
  * @property {string} label short, for the small picture
  * @property {string} title
  * @property {string} unit of the wire
@@ -22,7 +21,7 @@ const GAP_LEAST_S = 0.5;
  * @property {(limits: Record<string, number>, low: number, high: number) => [number, number]} ends of the scale, in the wire's unit
  */
 
-/** Their places are fixed. @type {Spec[]} */
+/** Their places are fixed; what else the server keeps follows them. @type {Spec[]} */
 export const SPECS = [
   { name: 'speed', label: 'Speed', title: 'Speed', unit: 'm/s', digits: 1, isSigned: false, limit: 'speed_limit.max_mps',
     ends: (limits, low, high) => [low < 0 ? -upTo(-low, [1, 2, 5, 15, 60]) : 0, Math.max(limits['gauge.speed_max_mps'] ?? 15, high, limits['speed_limit.max_mps'] ?? 0)] },
@@ -35,6 +34,18 @@ export const SPECS = [
   { name: 'brake', label: 'Brake', title: 'Brake', unit: '%', digits: 0, isSigned: false, limit: null, ends: (_, low, high) => [Math.min(0, low), Math.max(100, high)] },
   { name: 'accelerator', label: 'Accelerator', title: 'Accelerator', unit: '%', digits: 0, isSigned: false, limit: null, ends: (_, low, high) => [Math.min(0, low), Math.max(100, high)] },
 ];
+
+/**
+ * How a signal is drawn that has no place of its own above.
+ * @param {string} name
+ * @param {{label: string, unit?: string}} signal
+ * @returns {Spec}
+ */
+export function specOf(name, { label, unit = '' }) {
+  const round = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
+  return { name, label, title: label, unit, digits: 1, isSigned: false, limit: null,
+    ends: (_, low, high) => [low < 0 ? -upTo(-low, round) : 0, upTo(Math.max(0, high), round)] };
+}
 
 /** @param {number} end @returns {[number, number]} */
 function both(end) {
@@ -62,7 +73,7 @@ export class Minute {
   /** The newest frame's moment, as a step and its part. */
   now = 0;
   /** @type {Record<string, {lowest: Float64Array, highest: Float64Array}>} */
-  #rings = Object.fromEntries(SPECS.map(({ name }) => [name, { lowest: new Float64Array(SPAN).fill(NaN), highest: new Float64Array(SPAN).fill(NaN) }]));
+  #rings = {};
 
   /** Forget everything: another run of the server counts anew. */
   clear() {
@@ -91,6 +102,7 @@ export class Minute {
       const from = Math.max(this.last, this.since - 1);
       if (frame.first > from + 1) this.missed = Math.min(this.missed ?? Infinity, from);
     }
+    for (const name of Object.keys(frame.lowest)) this.#rings[name] ??= { lowest: new Float64Array(SPAN).fill(NaN), highest: new Float64Array(SPAN).fill(NaN) };
     this.#open(end);
     for (const [name, ring] of Object.entries(this.#rings)) {
       for (let i = 0; i < count; i += 1) {
@@ -114,7 +126,7 @@ export class Minute {
 
   /**
    * One signal's minute up to a moment, cut into lines and gaps. Times are seconds before that moment, ≤ 0.
-   * @param {Name} name
+   * @param {string} name
    * @param {number} now as a step and its part
    * @param {number | null} period_s of the signal
    * @returns {Course}
@@ -170,43 +182,7 @@ function cut(course) {
   course.highest.push(null);
 }
 
-/** @param {import('../core/protocol.js').Step | undefined} step */
+/** @param {import('../core/protocol-types.js').Step | undefined} step */
 function numberOf(step) {
   return typeof step === 'number' ? step : step === 'none' ? NO_NUMBER : NaN;
-}
-
-/**
- * The lowest and highest of a course where it is looked at; NaN where it has no number there.
- * @param {Course} course
- * @param {number} from_s
- * @param {number} to_s
- */
-export function extent(course, from_s, to_s) {
-  let [low, high] = [NaN, NaN];
-  course.times_s.forEach((at_s, i) => {
-    const [a, b] = [course.lowest[i] ?? null, course.highest[i] ?? null];
-    if (at_s < from_s || at_s > to_s || a === null || b === null) return;
-    low = Number.isNaN(low) ? a : Math.min(low, a);
-    high = Number.isNaN(high) ? b : Math.max(high, b);
-  });
-  return { low, high };
-}
-
-/** How many seconds of a part of the minute nobody knows. @param {Course} course @param {number} from_s @param {number} to_s */
-export function unknown_s(course, from_s, to_s) {
-  return course.gaps.reduce((sum, [a, b]) => sum + Math.max(0, Math.min(b, to_s) - Math.max(a, from_s)), 0);
-}
-
-/**
- * The window of a chart after a step of zoom or pan, always within the minute. Seconds before now.
- * @param {[number, number]} view
- * @param {{zoom?: number, pan?: number, about?: number}} change zoom: the new width by the old; pan: by the width; about: what stays in place, 0 … 1
- * @returns {[number, number]}
- */
-export function viewAfter([from_s, to_s], { zoom = 1, pan = 0, about = 1 }) {
-  const whole_s = SPAN * STEP_S;
-  const width_s = Math.min(whole_s, Math.max(4, (to_s - from_s) * zoom));
-  const still_s = from_s + (to_s - from_s) * about;
-  const begin_s = Math.min(-width_s, Math.max(-whole_s, still_s - width_s * about + width_s * pan));
-  return [begin_s, begin_s + width_s];
 }

@@ -1,24 +1,30 @@
-// The last minute on Home: one sparkline for each signal, in fixed places; a press opens it as a chart.
+// The last minute on Home: one sparkline for each signal, in fixed places; a press opens the chart of the drive.
 
-import { field, html, listen, setAttribute, setText } from '../core/dom.js';
+import { field, html, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
+import { showInTrends } from './drive-choice.js';
 import { colours, drawSpark } from './spark.js';
-import { Trends, nowOf } from './trend-feed.js';
-import { SPECS } from './trends-layout.js';
+import { nowOf, trendsOf } from './trend-feed.js';
+import { SPECS, specOf } from './trends-layout.js';
+import { fixed } from '../core/format.js';
 import { shownIn } from '../core/units.js';
+import { floorQuery, isFloor } from '../shell/layout.js';
 
 /** A sparkline of 162 px a minute moves by about one pixel in this time [ms]. */
 const DRAW_EVERY_MS = 400;
+/** A pane of a wide screen that is as high has room for the chart itself [px]. */
+const CHART_PX = 240;
 
 /**
  * @param {HTMLElement} root
  * @param {import('../core/store.js').Store} store
+ * @param {(sentence: string, title?: string) => void} say
  */
-export function mount(root, store) {
-  const trends = new Trends(store);
+export function mount(root, store, say) {
+  const trends = trendsOf(store);
   const list = field(root, 'sparks');
-  const rows = SPECS.map(buildRow);
-  list.append(...rows.map(({ key }) => html('li', {}, key)));
+  /** @type {Map<string, ReturnType<typeof buildRow>>} */
+  const rows = new Map();
   /** @type {import('./spark.js').Palette} */
   let palette = colours(root);
   let isSeen = false;
@@ -41,21 +47,31 @@ export function mount(root, store) {
     listen(matchMedia('(prefers-color-scheme: light)'), 'change', redraw),
     listen(window, 'catgraph-units', redraw),
     listen(window, 'resize', redraw),
-    // The chart and its library are loaded by the first press: most drives need neither.
-    ...rows.map(({ spec, key }) => listen(key, 'click', () => {
-      import('./chart.js').then((chart) => {
-        setText(field(root, 'sparks-says'), 'now at the right');
-        return chart.open(spec, trends, store);
-      }).catch(() => setText(field(root, 'sparks-says'), 'the chart could not be fetched'));
-    })),
   ];
+  for (const spec of SPECS) add(spec);
+  stops.push(mountHere(root, list, store, say));
+
+  /** @param {import('./trends-layout.js').Spec} spec */
+  function add(spec) {
+    const row = buildRow(spec);
+    rows.set(spec.name, row);
+    list.append(html('li', {}, row.key));
+    stops.push(listen(row.key, 'click', () => showInTrends(spec.name)));
+  }
 
   function draw() {
     if (!isSeen || document.hidden) return;
-    for (const row of rows) drawText(row, store);
+    for (const name of Object.keys(store.frame?.trends?.lowest ?? {})) {
+      const signal = store.signal(name);
+      if (signal && !rows.has(name)) add(specOf(name, signal));
+    }
+    for (const row of rows.values()) drawText(row, store);
     if (store.now() - drew_ms < DRAW_EVERY_MS) return;
     drew_ms = store.now();
-    for (const { spec, canvas } of rows) drawSpark(canvas, spec, trends, store, palette);
+    for (const { spec, canvas, scale } of rows.values()) {
+      const ends = drawSpark(canvas, spec, trends, store, palette);
+      [ends?.[1], ends?.[0]].forEach((end, i) => setText(/** @type {Element} */ (scale[i]), endWords(end, spec)));
+    }
   }
 
   draw();
@@ -69,9 +85,10 @@ export function mount(root, store) {
 function buildRow(spec) {
   const value = html('span', { class: 'n' });
   const label = html('span', {});
+  const scale = [html('span', {}), html('span', {})];
   const canvas = /** @type {HTMLCanvasElement} */ (html('canvas', { class: 'spark', 'aria-hidden': 'true' }));
-  const key = html('button', { type: 'button', 'aria-haspopup': 'dialog', 'aria-label': `${spec.title}: open the chart of the last minute`, 'data-trend': spec.name }, html('span', { class: 'row' }, label, value), canvas);
-  return { spec, value, label, canvas, key };
+  const key = html('button', { type: 'button', 'aria-label': `${spec.title}: open the chart of the drive`, 'data-trend': spec.name }, html('span', { class: 'row' }, label, value), html('span', { class: 'scaled' }, html('span', { class: 'scale n', 'aria-hidden': 'true' }, ...scale), canvas));
+  return { spec, value, label, canvas, key, scale };
 }
 
 /** @param {ReturnType<typeof buildRow>} row @param {import('../core/store.js').Store} store */
@@ -80,5 +97,49 @@ function drawText({ spec, label, value, key }, store) {
   const { text, ink } = nowOf(spec, store);
   setText(label, spec.name === 'acceleration' ? spec.label : `${spec.label} ${unit}`); // its unit has no room beside it
   write(value, ink, text);
-  setAttribute(key, 'aria-label', `${spec.title}: ${ink === 'stale' ? 'stale, last ' : ''}${text} ${unit}; open the chart of the last minute`);
+  setAttribute(key, 'aria-label', `${spec.title}: ${ink === 'stale' ? 'stale, last ' : ''}${text} ${unit}; open the chart of the drive`);
+}
+
+/** An end of the scale; '': there is none. @param {number | undefined} end of the wire @param {import('./trends-layout.js').Spec} spec */
+function endWords(end, spec) {
+  if (end === undefined) return '';
+  const { value } = shownIn(end, spec.unit);
+  return fixed(value, Math.abs(value) < 10 && !Number.isInteger(value) ? 1 : 0);
+}
+
+/**
+ * On a wide screen the chart of the drive stands in the pane, in the place of the last minute.
+ * @param {HTMLElement} root
+ * @param {HTMLElement} list of the sparklines
+ * @param {import('../core/store.js').Store} store
+ * @param {(sentence: string, title?: string) => void} say
+ */
+function mountHere(root, list, store, say) {
+  const place = html('div', { class: 'trends-here', hidden: true });
+  root.append(place);
+  /** @type {(() => void) | null} */
+  let unmount = null;
+  let isHere = false;
+  const look = async () => {
+    const hasRoom = isFloor() && root.clientHeight >= CHART_PX;
+    if (hasRoom === isHere) return;
+    isHere = hasRoom;
+    unmount?.();
+    unmount = null;
+    const chart = hasRoom ? await import('./drive-chart.js').catch(() => null) : null;
+    if (isHere !== hasRoom) return; // turned meanwhile
+    show(place, chart !== null);
+    show(list, chart === null);
+    setWords(field(root, 'sparks-title'), chart ? 'Trends' : 'Last 60 s');
+    setText(field(root, 'sparks-says'), chart ? '' : 'now at the right');
+    if (chart) unmount = chart.mount(place, { store, say });
+  };
+  const resize = new ResizeObserver(() => void look());
+  resize.observe(root);
+  const stop = listen(floorQuery(), 'change', () => void look());
+  return () => {
+    stop();
+    resize.disconnect();
+    unmount?.();
+  };
 }

@@ -58,8 +58,8 @@ export function recipientsOf(typed) {
  * @param {string[]} addresses
  */
 export function recipientProblem(addresses) {
-  if (addresses.length === 0) return 'Type whom it goes to, such as ann@example.org.';
-  if (addresses.length > 20) return 'A mail goes to 20 at most.';
+  if (addresses.length === 0) return 'Enter a recipient, such as ann@example.org.';
+  if (addresses.length > 20) return 'A mail has at most 20 recipients.';
   const odd = addresses.find((one) => !/^[^@]+@[^@]+$/.test(one));
   return odd === undefined ? null : `“${odd.slice(0, 60)}” is not an address.`;
 }
@@ -73,10 +73,10 @@ export function recipientProblem(addresses) {
 export function sizeNote(bytes, limit_mb, tooLarge) {
   const limit = sizeWords(limit_mb * 1e6);
   const more = tooLarge === 'split' ? 'several mails, with a sentence on how to join them' : 'a link to this server';
-  if (bytes === null) return `It is compressed. More than ${limit} goes as ${more}.`;
+  if (bytes === null) return `It is compressed. Above ${limit} it is sent as ${more}.`;
   const recorded = `${sizeWords(bytes)} as recorded`;
   if (bytes <= limit_mb * 1e6) return `${recorded}, compressed: one mail.`;
-  return `${recorded}, compressed before it is sent. More than ${limit} goes as ${more}.`;
+  return `${recorded}, compressed before it is sent. Above ${limit} it is sent as ${more}.`;
 }
 
 /**

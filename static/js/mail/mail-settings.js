@@ -74,9 +74,9 @@ class MailForm {
       label('sender', 'Sender’s address'), this.sender,
       label('sender_name', 'Sender’s name'), this.senderName,
       label('allowed', 'Allowed recipients'), this.allowed, hint('allowed', 'Addresses, domains (example.org) or all below one (*.example.org). Empty: everyone.'),
-      label('limit_mb', 'Size limit of a mail, MB'), this.limit, hint('limit', 'Before it is encoded: 18 MB make a mail of 25 MB, which most providers take.'),
+      label('limit_mb', 'Size limit of a mail, MB'), this.limit, hint('limit', 'Before encoding: 18 MB make a mail of 25 MB, which most providers accept.'),
       label('link_base', 'This server’s address in links'), this.linkBase, hint('link', 'Address at which recipients reach this server. Empty: the address of this page.'),
-      label('ca', 'Certificate of the mail server’s own CA (PEM)'), this.ca, hint('ca', 'Where given, only servers it certifies are trusted. Empty: those this computer trusts.'),
+      label('ca', 'Certificate of the mail server’s own CA (PEM)'), this.ca, hint('ca', 'If set, only servers that it certifies are trusted. Empty: those that this computer trusts.'),
       this.bad, this.good, this.save,
       label('test', 'Send a test e-mail to'), this.to, hint('test', 'Empty: only the login is tested. The saved settings are tested.'),
       html('div', { class: 'pair' }, this.test, outbox));
@@ -100,8 +100,8 @@ class MailForm {
     this.limit.value = String(settings.limit_mb);
     this.linkBase.value = settings.link_base;
     this.ca.value = settings.ca;
-    this.password.placeholder = settings.has_password ? 'kept on the server' : 'none';
-    setText(this.passwordHelp, settings.has_password ? 'It is never shown. Leave it empty to keep it.' : 'It is kept on the server and never shown.');
+    this.password.placeholder = settings.has_password ? 'stored on the server' : 'none';
+    setText(this.passwordHelp, settings.has_password ? 'It is never shown. Leave empty to keep it.' : 'It is stored on the server and never shown.');
     this.#security = settings.security;
     this.#isChanged = false;
     this.#draw();
@@ -141,7 +141,7 @@ class MailForm {
       return;
     }
     if (!Number.isFinite(limit) || this.limit.value.trim() === '') {
-      this.#refuse('The size limit is a number of MB.', 'limit_mb');
+      this.#refuse('The size limit must be a number of MB.', 'limit_mb');
       return;
     }
     const user = this.user.value.trim();
@@ -167,7 +167,7 @@ class MailForm {
     const to = this.to.value.trim();
     try {
       const { sentence, said } = await request('/api/mail/test', { method: 'POST', body: to ? { to } : {} });
-      setWords(this.good, said ? `${sentence} It says: ${said}` : sentence);
+      setWords(this.good, said ? `${sentence} Server reply: ${said}` : sentence);
     } catch (error) {
       setText(this.good, '');
       setWords(this.bad, sentenceOf(error));

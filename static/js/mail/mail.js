@@ -135,7 +135,7 @@ class MailSheet {
     if (title) setText(this.about, title);
     this.#isSetUp = typeof settings === 'object' && settings.is_complete;
     if (typeof settings === 'object') this.#limit_mb = settings.limit_mb;
-    setWords(this.refused, typeof settings === 'string' ? settings : settings.is_complete ? '' : 'This server sends no mail yet: set it up under Settings, E-mail.');
+    setWords(this.refused, typeof settings === 'string' ? settings : settings.is_complete ? '' : 'E-mail is not set up on this server: see Settings, E-mail.');
     this.#draw();
   }
 
@@ -210,9 +210,9 @@ class MailSheet {
       if (address === null) return;
       setWords(this.told, 'Loading from the server…');
       const answer = await fetch(address);
-      if (!answer.ok) throw new Error('It could not be fetched from the server. Try again.');
+      if (!answer.ok) throw new Error('It could not be loaded from the server. Try again.');
       this.#file = new File([await answer.blob()], `${id}.${ending}`, { type });
-      setWords(this.told, 'Ready. Press once more: the phone opens the file only after a press.');
+      setWords(this.told, 'Ready. Press again: the phone opens the file only after a press.');
       setText(/** @type {HTMLElement} */ (this.own.lastElementChild), 'Open it in my mail app');
     } catch (error) {
       setText(this.told, '');
@@ -223,10 +223,10 @@ class MailSheet {
   /** Where the server has made it in the format; null: it was given up. @param {string} id */
   async #made(id) {
     this.#job?.giveUp();
-    const job = new FileJob(`/api/recordings/${encodeURIComponent(id)}/exports`, { format: this.#format }, ({ progress }) => setWords(this.told, `The server prepares it${progress === null ? '' : `: ${Math.round(progress * 100)} %`}.`));
+    const job = new FileJob(`/api/recordings/${encodeURIComponent(id)}/exports`, { format: this.#format }, ({ progress }) => setWords(this.told, `The server is preparing it${progress === null ? '' : `: ${Math.round(progress * 100)} %`}.`));
     this.#job = job;
     const told = await job.run();
-    if (told.state === 'failed') throw new Error(told.sentence ?? 'The server could not make it.');
+    if (told.state === 'failed') throw new Error(told.sentence ?? 'The server could not prepare it.');
     return told.state === 'done' ? job.address : null;
   }
 
@@ -244,7 +244,7 @@ class MailSheet {
   #mailto() {
     const links = this.#ids.map((id) => new URL(pathOf(id, this.#format), location.href).href);
     const link = html('a', { href: mailtoOf({ to: recipientsOf(this.to.value), subject: this.subject.value, text: this.text.value, links }) });
-    setWords(this.told, 'Your mail app gets links, because this phone cannot pass files to it. The links work for anyone who can reach this server.');
+    setWords(this.told, 'Your mail app gets links, because this phone cannot share files with it. The links work for anyone who can reach this server.');
     link.click();
   }
 }

@@ -39,7 +39,7 @@ class Outbox {
     this.say = say;
     this.state = html('p', { class: 'sub', role: 'status', id: 'outbox-state' });
     this.list = html('ul', { class: 'outbox', 'aria-label': 'Mails' });
-    this.none = html('p', { class: 'nothing', hidden: true }, 'Nothing was mailed from this server yet.');
+    this.none = html('p', { class: 'nothing', hidden: true }, 'No mail was sent from this server yet.');
     this.older = html('button', { type: 'button', class: 'key wide', hidden: true }, 'Older mails');
     this.sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed mail-sheet', id: 'sheet-outbox', 'aria-labelledby': 'outbox-title', 'aria-describedby': 'outbox-state' },
       html('div', { class: 'bd' }, html('h2', { id: 'outbox-title', tabindex: -1 }, icon('mail'), 'Outbox'), this.state),
@@ -55,7 +55,7 @@ class Outbox {
 
   open() {
     this.#shown = PAGE;
-    if (!this.list.firstChild) setText(this.state, 'The outbox is fetched from the server.');
+    if (!this.list.firstChild) setText(this.state, 'Loading the outbox…');
     openSheet(this.sheet);
     this.#ask();
   }
@@ -68,7 +68,7 @@ class Outbox {
       show(this.older, next !== null && this.#shown < 200);
       this.#draw(mails);
     } catch (error) {
-      setWords(this.state, `${sentenceOf(error)} What follows may be old.`);
+      setWords(this.state, `${sentenceOf(error)} The list below may be outdated.`);
     }
     clearTimeout(this.#next);
     if (this.sheet.open) this.#next = setTimeout(() => this.#ask(), ASK_MS);

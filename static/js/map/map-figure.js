@@ -182,9 +182,13 @@ export class Figure {
     const isCarAbove = !carAt || !phoneAt || phoneAt[1] >= carAt[1]; // the names stand away from each other
     const carRoom = Math.max(28, car.isLive && car.ellipse ? reachUp(car.ellipse, view) : 0);
     const phoneRoom = Math.max(18, phone.isLive ? (phone.accuracy_m ?? 0) / view.mpp : 0);
+    this.#scale_px = scaleBar_m(view.mpp) / view.mpp;
     this.#drawName(this.carName, size, carAt, car.label, isCarAbove, carRoom);
     this.#drawName(this.phoneName, size, phoneAt, phone.label, !isCarAbove, phoneRoom);
   }
+
+  /** How long the bar of the scale is. */
+  #scale_px = 0;
 
   /** @param {SVGElement} text @param {Size} size @param {Pixel | null} at @param {string} words @param {boolean} isAbove @param {number} room */
   #drawName(text, size, at, words, isAbove, room) {
@@ -194,7 +198,9 @@ export class Figure {
     if (text.textContent !== words) text.textContent = words;
     const half = (words.length * LETTER_PX) / 2 + 8;
     const y = isAbove ? at[1] - room - 10 : at[1] + room + 20;
-    place(text, Math.min(size.width - KEYS_PX - half, Math.max(half, at[0])), Math.min(size.height - 44, Math.max(20, y)));
+    const x = Math.min(size.width - KEYS_PX - half, Math.max(half, at[0]));
+    const isBesideScale = x - half > this.#scale_px + 24;
+    place(text, x, Math.min(size.height - (isBesideScale ? 8 : 44), Math.max(20, y)));
   }
 
   /** @param {View} view @param {Size} size */

@@ -19,7 +19,7 @@ export class MapPanel {
   draw({ car, phone, apart }, isTooFar) {
     const { at } = this;
     this.#drawFixes(car, phone);
-    const lines = { 'car-says': car.says, 'phone-says': phone.says, 'map-says': isTooFar ? 'Car and phone are too far apart for one picture.' : '' };
+    const lines = { 'car-says': car.says, 'phone-says': phone.says, 'map-says': isTooFar ? 'Car and phone are too far apart for one view.' : '' };
     for (const [name, says] of Object.entries(lines)) {
       setWords(at(name), says);
       show(at(name), says !== '');

@@ -7,8 +7,8 @@ import { age, fixed, heading } from '../core/format.js';
 
 /**
  * @typedef {import('../core/geodesy.js').Place} Place
- * @typedef {import('../core/protocol.js').State} State
- * @typedef {import('../core/protocol.js').Freshness} Freshness
+ * @typedef {import('../core/protocol-types.js').State} State
+ * @typedef {import('../core/protocol-types.js').SignalFreshness} Freshness
  * @typedef {object} CarShown
  * @property {Place | null} place where it was last known to be
  * @property {boolean} isLive the place may be shown as where it is
@@ -70,8 +70,8 @@ export function carOf(frame, freshnessStyle) {
 /** @param {Freshness} ink @param {number | null} age_s @param {boolean} isLost */
 function carSays(ink, age_s, isLost) {
   if (ink === 'not_published') return 'The car publishes no position.';
-  if (ink === 'never') return 'No position has come from the car yet.';
-  if (ink === 'stale') return `The car’s position is ${age(age_s)} s old: it may be elsewhere by now.`;
+  if (ink === 'never') return 'No position received from the car yet.';
+  if (ink === 'stale') return `The car’s position is ${age(age_s)} s old: the car may be elsewhere.`;
   if (isLost) return 'The car’s receiver has no fix: the car’s position is unknown.';
   return '';
 }
@@ -91,7 +91,7 @@ export function phoneOf(frame, lag_s, page = '') {
   // A coarse fix is one of now all the same; every other reason says that there is none of now.
   const isLive = place !== null && (phone.used || phone.why === 'coarse') && age_s !== null && age_s <= PHONE_LIVES_S;
   const name = phone.count > 1 ? nameOf(phone, page) : 'Phone'; // among several each has its own
-  const whose = phone.count > 1 && phone.label ? ` It is of ${phone.label}, one of ${phone.count} phones.` : '';
+  const whose = phone.count > 1 && phone.label ? ` It is the position of ${phone.label}, one of ${phone.count} phones.` : '';
   let says = '';
   if (phone.why_text) says = `${phone.why_text}.`;
   else if (place && !isLive) says = `The phone’s newest fix is ${age(age_s)} s old.`;
@@ -143,7 +143,7 @@ export function pictureWords(car, phone, apart) {
   if (apart) return `Map: the car is ${distanceWords(apart.distance_m).join(' ')} from the phone, at ${bearingWords(apart.bearing_deg)} of it`;
   const seen = [car.isLive ? 'the car' : '', phone.isLive ? 'the phone' : ''].filter(Boolean);
   if (seen.length) return `Map: ${seen.join(' and ')}`;
-  return car.place || phone.place ? 'Map: nothing that is of now' : 'Map: no position';
+  return car.place || phone.place ? 'Map: no current position' : 'Map: no position';
 }
 
 /** "5 m", "4.2 m", "120 m". @param {number} value_m */

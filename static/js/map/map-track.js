@@ -92,16 +92,12 @@ export class TrackFeed {
   #isAsking = false;
   #next_ms = 0;
 
-  /**
-   * @param {string} vehicle name, or ""
-   * @param {() => void} onChange
-   */
-  constructor(vehicle, onChange) {
-    this.query = vehicle ? `&vehicle=${encodeURIComponent(vehicle)}` : '';
+  /** @param {() => void} onChange */
+  constructor(onChange) {
     this.onChange = onChange;
   }
 
-  /** @param {import('../core/protocol.js').State} frame @param {number} now_ms */
+  /** @param {import('../core/protocol-types.js').State} frame @param {number} now_ms */
   look(frame, now_ms) {
     const { track } = frame.session;
     if (!track) return;
@@ -114,12 +110,12 @@ export class TrackFeed {
     if (after === null || this.#isAsking || now_ms < this.#next_ms) return;
     this.#isAsking = true;
     this.#next_ms = now_ms + EVERY_MS;
-    this.#ask(key, boot, after, replay ? `&replay=${replay.token}` : '').catch(() => { this.#next_ms = now_ms + AGAIN_MS; }).finally(() => { this.#isAsking = false; });
+    this.#ask(key, boot, after, `&vehicle=${encodeURIComponent(frame.vehicle)}${replay ? `&replay=${replay.token}` : ''}`).catch(() => { this.#next_ms = now_ms + AGAIN_MS; }).finally(() => { this.#isAsking = false; });
   }
 
-  /** @param {string} key @param {string} boot @param {number} after @param {string} replay */
-  async #ask(key, boot, after, replay) {
-    const answer = await fetch(`/api/track/points?after=${after}${this.query}${replay}`);
+  /** @param {string} key @param {string} boot @param {number} after @param {string} whose */
+  async #ask(key, boot, after, whose) {
+    const answer = await fetch(`/api/track/points?after=${after}${whose}`);
     if (!answer.ok) throw new Error(`status ${answer.status}`);
     const { number, points } = await answer.json();
     if (`${boot} ${number}` !== key) return; // another track began meanwhile: the next state says so

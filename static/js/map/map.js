@@ -6,7 +6,7 @@ import { mountGestures } from './map-gestures.js';
 import { Ground } from './map-layers.js';
 import { panned, zoomed } from './map-layout.js';
 import { MapPanel } from './map-panel.js';
-import { TrackFeed } from './map-track.js';
+import { Track, TrackFeed } from './map-track.js';
 import { MapView } from './map-view.js';
 import { apartOf, carOf, phoneOf, pictureWords } from './map-text.js';
 import { othersOn } from '../phone/phones-layout.js';
@@ -28,15 +28,14 @@ const RETRY_MS = 5000;
 
 /**
  * @param {HTMLElement} root
- * @param {import('../core/store.js').Store} store
- * @param {() => boolean} isShown
- * @param {(sentence: string, title?: string) => void} [say]
+ * @param {import('../shell/tab-contents.js').TabPage} page
  */
-export function mount(root, store, isShown, say = () => {}) {
+export function mount(root, { store, say, isFront }) {
   const at = (/** @type {string} */ name) => field(root, name);
   at('compass').replaceChildren(svg('path', { 'data-f': 'needle', d: 'M12 -1L17 13 12 9.8 7 13Z' }), svg('text', { 'data-f': 'needle-letter', 'text-anchor': 'middle' }, 'N'));
   setText(at('none-words'), 'no position yet');
-  const tab = new MapTab(at, new MapPanel(root, store), store, isShown);
+  setText(at('none-help'), 'Filled by the car’s GPS fix (NavSatFix), and by phones that share their position.');
+  const tab = new MapTab(at, new MapPanel(root, store), store, isFront);
   const { map } = tab;
   const sized = new ResizeObserver(() => {
     map.size = { width: at('box').clientWidth, height: at('box').clientHeight };
@@ -47,7 +46,7 @@ export function mount(root, store, isShown, say = () => {}) {
     () => sized.disconnect(),
     mountGestures(at('box'), { isFree: () => map.isFree, pan: (dx, dy) => tab.moveTo(panned(map.view, dx, dy)), zoom: (factor, dx, dy) => tab.zoom(factor, dx, dy) }),
     listen(at('phones'), 'click', () => {
-      import('../phone/phones-sheet.js').then(({ openPhones }) => openPhones(store, say)).catch(() => say('What shows the phones could not be fetched.', 'Not opened'));
+      import('../phone/phones-sheet.js').then(({ openPhones }) => openPhones(store, say)).catch(() => say('The list of phones could not be loaded.', 'Not opened'));
     }),
     listen(at('closer'), 'click', () => tab.zoom(KEY_ZOOM)),
     listen(at('wider'), 'click', () => tab.zoom(1 / KEY_ZOOM)),
@@ -56,10 +55,11 @@ export function mount(root, store, isShown, say = () => {}) {
     listen(at('north'), 'click', () => tab.choose(() => map.turnNorth(tab.known?.car))),
     store.on('move', () => tab.look()),
     store.on('draw', () => tab.read()),
+    store.on('switch', () => tab.forget()),
   ];
   tab.press();
   tab.read();
-  return () => stops.forEach((stop) => stop());
+  return { stop: () => stops.forEach((stop) => stop()) };
 }
 
 class MapTab {
@@ -87,7 +87,16 @@ class MapTab {
     const drawSoon = () => this.#drawSoon();
     this.figure = new Figure(at('under'), at('over'));
     this.ground = new Ground(at('ground'), drawSoon);
-    this.feed = new TrackFeed(document.documentElement.dataset['vehicle'] ?? '', drawSoon);
+    this.feed = new TrackFeed(drawSoon);
+  }
+
+  /** Another car is shown: a map that stood still follows it, for that place is of the other one. */
+  forget() {
+    this.known = this.#trackNumber = null;
+    this.feed.track = new Track();
+    this.map.isPlaced = false;
+    if (this.map.isFree) this.map.choose('follow');
+    this.press();
   }
 
   /** Reads the frame and moves the map to what it shows. */
@@ -101,7 +110,7 @@ class MapTab {
     this.#drawSoon();
   }
 
-  /** @param {import('../core/protocol.js').State} frame */
+  /** @param {import('../core/protocol-types.js').State} frame */
   #learn(frame) {
     const { store, feed } = this;
     const { lag_s } = store;

@@ -12,7 +12,7 @@ export class Admission {
   #shut = null;
 
   /**
-   * @param {string} address of the socket
+   * @param {() => string} address of the socket
    * @param {(why: Refusal) => void} onShut this device is not paired, or not any more
    */
   constructor(address, onShut) {
@@ -22,7 +22,7 @@ export class Admission {
 
   /** A socket that is connecting, as `new WebSocket` gives one. @returns {import('../core/socket.js').Socket} */
   dial() {
-    return new TicketSocket(this.address, (isWanted) => this.#ticket(isWanted));
+    return new TicketSocket(this.address(), (isWanted) => this.#ticket(isWanted));
   }
 
   /** The device was paired: what waits goes on. */

@@ -7,13 +7,7 @@ const HOUR_MS = 60 * MINUTE_MS;
 const DAY_MS = 24 * HOUR_MS;
 
 /**
- * @typedef {object} Device
- * @property {string} id
- * @property {string} name
- * @property {'viewer' | 'operator'} role
- * @property {number} paired_ms
- * @property {number} seen_ms
- * @property {number} sockets pages it has open now
+ * @typedef {import('../core/protocol-types.js').DeviceRow} Device
  */
 
 /** When it was last here. @param {Pick<Device, 'seen_ms' | 'sockets'>} device @param {number} now_ms by the server's clock */
@@ -36,8 +30,8 @@ export function seenWords({ seen_ms, sockets }, now_ms) {
 export function removalWords(device, you, all) {
   const isLast = device.role === 'operator' && all.filter(({ role }) => role === 'operator').length === 1;
   const last = isLast ? ' It is the last operator: only the server’s terminal can pair another.' : '';
-  if (device.id === you) return ['Remove this phone?', `This page ends now, and this phone must be paired again to come back.${last}`];
-  return [`Remove ${device.name}?`, `Its pages end now, and it must be paired again to come back.${last}`];
+  if (device.id === you) return ['Remove this phone?', `This page closes now, and this phone must be paired again.${last}`];
+  return [`Remove ${device.name}?`, `Its pages close now, and it must be paired again.${last}`];
 }
 
 /** How long an invitation still holds, "9:05". @param {number} left_s */

@@ -124,7 +124,7 @@ class Devices {
   async #remove(device) {
     try {
       await request(`/api/devices/${encodeURIComponent(device.id)}`, { method: 'DELETE' });
-      this.say('It may not come any more, and its pages have ended.', `${device.name} removed`);
+      this.say('It has no access now, and its pages are closed.', `${device.name} removed`);
     } catch (error) {
       this.say(sentenceOf(error), 'Not removed');
     }
@@ -219,10 +219,10 @@ class Invitation {
       clearInterval(this.#ticking);
       show(this.code, false);
       setText(this.pin, '');
-      setText(this.state, 'It is over: choose the role again for a new one.');
+      setText(this.state, 'Expired: choose the role again for a new code.');
       return;
     }
-    const does = this.#role === 'operator' ? 'It can then act as an operator' : 'It can then watch, but change nothing';
+    const does = this.#role === 'operator' ? 'It can then act as an operator' : 'It can then watch, but not make changes';
     setWords(this.state, `Scan the code with the other phone, or type the PIN there. For one phone, for ${leftWords(left_s)}. ${does}.`);
   }
 }

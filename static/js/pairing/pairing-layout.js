@@ -19,7 +19,7 @@ export function digitsOf(text) {
  * @param {{code?: string, detail?: string}} why
  */
 export function reasonWords({ code, detail }) {
-  return code === 'removed' ? detail ?? 'This device is not paired any more.' : '';
+  return code === 'removed' ? detail ?? 'This device is no longer paired.' : '';
 }
 
 /**
@@ -33,10 +33,10 @@ export function triedWords(status, { code, detail, wait_s }) {
   if (status === 0) return { sentence: 'The server does not answer. Try again.', wait_s: 0, isLinkOver: false };
   const sentence = {
     wrong: 'This PIN is wrong. Read it again from the server.',
-    expired: 'No PIN is valid now: it was used, or is older than 10 minutes. Ask for a new one.',
+    expired: 'No PIN is valid now: it was used, or is older than 10 minutes. Request a new one.',
     used: 'This link was used already, or is older than 10 minutes. Scan a new code, or type the PIN.',
     wait: 'Too many wrong PINs. Wait, or scan the QR code instead.',
-    origin: 'This page was opened under an address the server does not take. Open it from the server’s QR code.',
+    origin: 'The server does not accept the address of this page. Open it from the server’s QR code.',
   }[code ?? ''] ?? detail ?? `The server refused (${status}).`;
   return { sentence, wait_s: wait, isLinkOver: code === 'used' };
 }

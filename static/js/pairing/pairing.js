@@ -94,8 +94,8 @@ class PairingScreen {
     const left_s = this.#waiting_s;
     show(byPin, this.#token === null);
     setWords(where, this.#token === null
-      ? 'The server shows a PIN of 6 digits on its terminal, with a QR code that does the same. Who is paired as operator can show one too: Settings, Paired devices.'
-      : 'The code you scanned lets this phone in, once.');
+      ? 'The server’s terminal shows a PIN of 6 digits and a QR code. A paired operator can show one too: Settings, Paired devices.'
+      : 'The scanned code pairs this phone, once.');
     setAttribute(go, 'data-busy', this.#isBusy || left_s > 0);
     setWords(go, this.#isBusy ? 'Pairing' : left_s > 0 ? waitWords(left_s) : 'Pair this phone');
     if (left_s > 0) setTimeout(() => this.draw(), 250);

@@ -4,14 +4,14 @@ import { placeOf } from '../core/geodesy.js';
 import { age, fixed } from '../core/format.js';
 
 /**
- * @typedef {import('../core/protocol.js').PhonePlace} PhonePlace
- * @typedef {import('../core/protocol.js').State} State
+ * @typedef {import('../core/protocol-types.js').PhoneListed} PhonePlace
+ * @typedef {import('../core/protocol-types.js').State} State
  */
 
 /** A fix older than this tells where a phone was, not where it is; as the server has it [s]. */
 const LIVES_S = 5;
 
-/** How a phone is called here. @param {PhonePlace} phone @param {string} page this page */
+/** How a phone is called here. @param {Pick<PhonePlace, 'id' | 'label'>} phone @param {string} page this page */
 export function nameOf(phone, page) {
   return phone.id === page ? 'You' : (phone.label ?? 'A phone');
 }

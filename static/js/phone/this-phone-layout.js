@@ -29,11 +29,11 @@ const SLOW_S = 1;
 
 /** Whether an alarm would be heard from this phone now, and what is in the way. @param {PhoneFacts} facts */
 export function verdictOf(facts) {
-  if (!facts.isOnline) return { can: false, text: 'This phone is offline: no alarm reaches it.' };
-  if (facts.lag_s > 2) return { can: false, text: 'No data from the server: no alarm reaches this phone.' };
+  if (!facts.isOnline) return { can: false, text: 'This phone is offline and receives no alarms.' };
+  if (facts.lag_s > 2) return { can: false, text: 'No data from the server: this phone receives no alarms.' };
   if (facts.isReplaying) return { can: false, text: 'This page shows a recording, so it does not count as a page that can sound alarms.' };
-  if (facts.sound === 'ready') return { can: true, text: 'This phone sounds alarms while this page is in front.' };
-  const why = { refused: 'it was not allowed to sound', asks: 'it was not touched yet', missing: 'this browser has no sound', interrupted: 'a call or another app took its sound' }[facts.sound];
+  if (facts.sound === 'ready') return { can: true, text: 'This phone sounds alarms while this page is in the foreground.' };
+  const why = { refused: 'sound was not allowed', asks: 'the page was not touched yet', missing: 'this browser has no sound', interrupted: 'a call or another app uses the sound' }[facts.sound];
   return { can: false, text: `This phone cannot sound alarms: ${why}.` };
 }
 
@@ -45,12 +45,12 @@ export function rowsOf(facts) {
 /** @param {PhoneFacts} facts @returns {Row} */
 function soundRow({ sound, isApple }) {
   const row = { icon: sound === 'ready' ? 'sound' : 'bell-off', what: 'Alarm sound' };
-  const silent = isApple ? ' An iPhone’s silent switch may mute it: try it.' : '';
+  const silent = isApple ? ' An iPhone’s silent switch may mute it: test it.' : '';
   switch (sound) {
     case 'ready': return { ...row, tag: 'Ready', kind: 'plain', says: `Turn the media volume up.${silent}` };
-    case 'interrupted': return { ...row, tag: 'Interrupted', kind: 'warn', says: 'A call or another app took the sound: come back here and touch the page.' };
-    case 'missing': return { ...row, tag: 'Not available', kind: 'warn', says: 'This browser has no sound: alarms are seen, not heard.' };
-    case 'refused': return { ...row, tag: 'Refused', kind: 'warn', says: 'Alarms are seen, not heard. Touch the key below.' };
+    case 'interrupted': return { ...row, tag: 'Interrupted', kind: 'warn', says: 'A call or another app uses the sound: return here and touch the page.' };
+    case 'missing': return { ...row, tag: 'Not available', kind: 'warn', says: 'This browser has no sound: alarms are shown without sound.' };
+    case 'refused': return { ...row, tag: 'Refused', kind: 'warn', says: 'Alarms are shown without sound. Touch the key below.' };
     default: return { ...row, tag: 'Asks', kind: 'unk', says: 'Browsers allow sound only after a touch.' };
   }
 }
@@ -58,9 +58,9 @@ function soundRow({ sound, isApple }) {
 /** @param {PhoneFacts} facts @returns {Row} */
 function screenRow({ screen, isApple, isSecure }) {
   const row = { icon: 'awake', what: 'Screen stays awake' };
-  if (screen === 'ready') return { ...row, tag: 'Ready', kind: 'plain', says: 'The screen stays on while this page is in front.' };
-  if (screen === 'asks') return { ...row, tag: 'Asks', kind: 'unk', says: 'Asked with the first touch.' };
-  if (screen === 'refused') return { ...row, tag: 'Refused', kind: 'warn', says: 'The phone may fall asleep, and then it sounds no alarm. Turn battery saving off.' };
+  if (screen === 'ready') return { ...row, tag: 'Ready', kind: 'plain', says: 'The screen stays on while this page is in the foreground.' };
+  if (screen === 'asks') return { ...row, tag: 'Asks', kind: 'unk', says: 'Requested with the first touch.' };
+  if (screen === 'refused') return { ...row, tag: 'Refused', kind: 'warn', says: 'The phone may go to sleep, and then it sounds no alarm. Turn battery saving off.' };
   const why = !isSecure ? 'It needs HTTPS.' : isApple ? 'iPhones support it from iOS 16.4 on.' : 'This browser does not support it.';
   return { ...row, tag: 'Not available', kind: 'warn', says: `${why} Set the phone’s own screen time-out to never.` };
 }
@@ -75,10 +75,10 @@ function vibrationRow({ vibrates, isApple }) {
 /** @param {PhoneFacts} facts @returns {Row} */
 function batteryRow({ battery, charging, isApple }) {
   const row = { icon: 'rec', what: 'Battery' };
-  if (battery === null) return { ...row, tag: 'Not known', kind: 'unk', says: isApple ? 'An iPhone does not show its battery level to pages. Check it yourself.' : 'This browser does not show the battery level. Check it yourself.' };
+  if (battery === null) return { ...row, tag: 'Unknown', kind: 'unk', says: isApple ? 'An iPhone does not show its battery level to pages. Check it yourself.' : 'This browser does not show the battery level. Check it yourself.' };
   const percent = `${fixed(battery * 100, 0)} %`;
   if (charging) return { ...row, tag: percent, kind: 'plain', says: 'It is being charged.' };
-  return battery < LOW ? { ...row, tag: percent, kind: 'warn', says: 'Charge it: an empty phone alarms nobody.' } : { ...row, tag: percent, kind: 'plain', says: '' };
+  return battery < LOW ? { ...row, tag: percent, kind: 'warn', says: 'Charge it: with an empty battery it sounds no alarm.' } : { ...row, tag: percent, kind: 'plain', says: '' };
 }
 
 /** @param {PhoneFacts} facts @returns {Row} */
@@ -86,7 +86,7 @@ function networkRow({ isOnline, network, lag_s }) {
   const row = { icon: 'link', what: 'Network' };
   if (!isOnline) return { ...row, icon: 'link-off', tag: 'Offline', kind: 'warn', says: 'The phone has no network.' };
   const late = `The newest state is ${age(lag_s)} s old.`;
-  if (lag_s > SLOW_S) return { ...row, tag: 'Slow', kind: 'warn', says: `${late} Alarms are just as late.` };
+  if (lag_s > SLOW_S) return { ...row, tag: 'Slow', kind: 'warn', says: `${late} Alarms are late by the same time.` };
   const away = network === 'cellular' ? ' Over the mobile network: join the car’s Wi-Fi.' : '';
   return { ...row, tag: away ? 'Mobile' : 'Ready', kind: away ? 'warn' : 'plain', says: `${late}${away}` };
 }
@@ -97,6 +97,6 @@ function positionRow({ position, positionSays, isSecure, rides }) {
   const riding = rides ? ' This phone is in the car.' : '';
   if (position === 'missing') return { ...row, tag: 'Not available', kind: 'warn', says: `${isSecure ? 'This browser has no position.' : 'It needs HTTPS.'}${riding}` };
   if (position === 'refused') return { ...row, tag: 'Refused', kind: 'warn', says: `Allow it for this page in the browser’s settings.${riding}` };
-  if (position === 'asks') return { ...row, tag: 'Asks', kind: 'unk', says: `Asked with Connect.${riding}` };
+  if (position === 'asks') return { ...row, tag: 'Asks', kind: 'unk', says: `Requested with Connect.${riding}` };
   return positionSays ? { ...row, tag: 'No fix', kind: 'warn', says: `${positionSays}${riding}` } : { ...row, tag: 'Ready', kind: 'plain', says: riding.trim() };
 }

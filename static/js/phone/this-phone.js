@@ -4,7 +4,7 @@ import { html, icon, setWords, words } from '../core/dom.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
 import { rowsOf, verdictOf } from './this-phone-layout.js';
 
-const SAID = { sounding: 'That was an alarm’s sound. Not heard? Turn the media volume up.', missing: 'This browser has no sound.', blocked: 'The phone does not let this page sound: touch the page, then try again.', busy: 'An alarm sounds already.' };
+const SAID = { sounding: 'That was an alarm sound. If you did not hear it, turn the media volume up.', missing: 'This browser has no sound.', blocked: 'The phone blocks this page’s sound: touch the page, then try again.', busy: 'An alarm is already sounding.' };
 
 /**
  * @param {import('../core/store.js').Store} store
@@ -14,8 +14,8 @@ const SAID = { sounding: 'That was an alarm’s sound. Not heard? Turn the media
 export function openThisPhone(store, arming, deviceStatus) {
   const verdict = html('p', { class: 'sub', id: 'this-phone-words', role: 'status' });
   const list = html('ul', { class: 'arm' });
-  const arm = html('button', { type: 'button', class: 'key solid wide', 'data-f': 'arm' }, 'Arm this phone');
-  const test = html('button', { type: 'button', class: 'key wide', 'data-f': 'test' }, 'Try the sound');
+  const arm = html('button', { type: 'button', class: 'key solid wide', 'data-f': 'arm' }, 'Turn on alarms');
+  const test = html('button', { type: 'button', class: 'key wide', 'data-f': 'test' }, 'Test the sound');
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed tall', id: 'sheet-this-phone', 'aria-labelledby': 'this-phone-title', 'aria-describedby': 'this-phone-words' },
     html('div', { class: 'bd' }, html('h2', { id: 'this-phone-title' }, 'This phone'), verdict), html('div', { class: 'menu-list' }, list),
     html('div', { class: 'keys' }, html('div', { class: 'pair' }, test, arm), html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));

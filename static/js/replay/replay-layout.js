@@ -16,9 +16,9 @@ const BREAK_S = 3;
 const BEHIND_S = 1;
 
 /**
- * @typedef {import('../core/protocol.js').Timeline} Timeline
- * @typedef {import('../core/protocol.js').Mark} Mark
- * @typedef {{x: number, count: number, priority: import('../core/protocol.js').Priority, title: string, at_s: number}} Placed
+ * @typedef {import('../core/protocol-types.js').Timeline} Timeline
+ * @typedef {import('../core/protocol-types.js').Mark} Mark
+ * @typedef {{x: number, count: number, priority: import('../core/protocol-types.js').Priority, title: string, at_s: number}} Placed
  */
 
 const RANK = { critical: 3, warning: 2, advisory: 1 };
@@ -161,7 +161,7 @@ export function dateOf(at_ms) {
 }
 
 /**
- * @typedef {object} Told the line under the band
+ * @typedef {object} Moment the line of the band
  * @property {'crit' | 'warn' | 'gap' | ''} kind
  * @property {string} icon
  * @property {string} text
@@ -171,10 +171,10 @@ export function dateOf(at_ms) {
 /**
  * What is said of the moment that is shown: first what is wrong with the replay itself, then what was not recorded, then
  * the alarms.
- * @param {import('../core/protocol.js').State} frame a replay's
- * @returns {Told}
+ * @param {import('../core/protocol-types.js').State} frame a replay's
+ * @returns {Moment}
  */
-export function toldOf(frame) {
+export function momentOf(frame) {
   const { replay, alarms } = frame;
   if (!replay) return { kind: '', icon: 'unknown', text: '', end: '' };
   const end = replay.alarms_from === 'recording' ? 'original alarms' : 're-evaluated';
@@ -195,13 +195,55 @@ export function toldOf(frame) {
 }
 
 /**
+ * The time line as far as the catalog knows it; null: it knows no length.
+ * @param {import('../core/protocol-types.js').Recording} row that was asked for alone
+ * @returns {Timeline | null}
+ */
+export function sketchOf({ length_s, speed_mps = [], raised = [], started_ms }) {
+  if (length_s === null || !(length_s > 0)) return null;
+  const marks = raised.map(({ at_ms, alarm, title, priority, text }) => ({ at_s: Math.max(0, (at_ms - started_ms) / 1000), alarm, title, priority, text, duration_s: null }));
+  return { kind: 'timeline', length_s, done_s: 0, is_done: false, bucket_s: length_s / Math.max(1, speed_mps.length), speed_mps, gaps: [], marks, marks_left_out: 0, notes: [] };
+}
+
+/** How many alarms the recording has, as far as it was read. @param {Pick<Timeline, 'marks' | 'marks_left_out' | 'is_done'> | null} line */
+export function countWords(line) {
+  if (!line) return 'Alarms';
+  const count = line.marks.length + line.marks_left_out;
+  if (line.is_done) return counted(count, 'alarm');
+  return count ? `${count} so far` : 'Alarms';
+}
+
+/**
+ * What a live frame says for `asideOf` and `liveWords`, as a replay's frame has it.
+ * @param {import('../core/protocol-types.js').State} frame
+ * @returns {import('../core/protocol-types.js').LiveSummary}
+ */
+export function summaryOf({ session, link, recording, control, reach, decelerate, alarms }) {
+  return { phase: session.phase, name: session.name, paused: session.paused, cut: link.cut, problem: link.problem?.title ?? null, recording, control, reach, decelerate, alarms, alarms_in_all: alarms.length };
+}
+
+/**
+ * The live car in words, for one line: alarms that ask for nobody, and the recording.
+ * @param {import('../core/protocol-types.js').LiveSummary | null | undefined} live
+ * @returns {{text: string, recording: string}}
+ */
+export function liveWords(live) {
+  if (!live) return { text: 'alarms unknown', recording: 'recording unknown' };
+  const { state, for_s, reason } = live.recording;
+  const recording = state === 'recording' ? `recording ${duration(for_s ?? 0, true)}` : state === 'off' ? 'not recording' : state === 'stopped' ? `recording stopped${reason ? `: ${reason}` : ''}` : `recording ${state}`;
+  if (live.phase !== 'monitoring') return { text: 'no car is monitored', recording };
+  if (live.alarms_in_all === 0) return { text: 'no alarms', recording };
+  return { text: `no urgent alarm, ${counted(live.alarms_in_all, 'other', 'others')}`, recording };
+}
+
+/**
  * What somebody who looks at a recording must know of the live car; null: nothing.
- * @param {import('../core/protocol.js').LiveAside | null | undefined} live
- * @returns {{kind: 'crit' | 'warn', text: string, asking: import('../core/protocol.js').Alarm | null} | null} asking: a critical
+ * @param {import('../core/protocol-types.js').LiveSummary | null | undefined} live
+ * @returns {{kind: 'crit' | 'warn', text: string, asking: import('../core/protocol-types.js').StandingAlarm | null} | null} asking: a critical
  *   alarm that nobody has acknowledged
  */
 export function asideOf(live) {
-  if (!live) return { kind: 'warn', text: 'Live: not known', asking: null };
+  if (!live) return { kind: 'warn', text: 'Live: unknown', asking: null };
   if (live.phase === 'lost' || (live.phase === 'monitoring' && live.cut !== null)) {
     const asking = live.alarms.find((alarm) => alarm.priority === 'critical' && alarm.state === 'UNACKED') ?? null;
     return { kind: 'crit', text: `Live: ${live.phase === 'lost' || live.cut === 'server-bridge' ? 'connection lost' : 'the car fell silent'}`, asking };

@@ -1,11 +1,11 @@
-// The place of the rail in a replay: the time line under the thumb, keys to the alarms before and after, play, pace.
+// In the place of the rail: the time line under the thumb, keys to the alarms before and after, play, rate, leave.
 
 import { html, icon, listen, setAttribute, setIcon, setText, setWords, svg } from '../core/dom.js';
 import { BASE, HEIGHT, RATES, atByKey, atOf, clockOf, gapBands, markBeside, markPath, placed, rateWords, speedPath, spoken, xOf } from './replay-layout.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
- * @typedef {import('../core/protocol.js').Timeline} Timeline
+ * @typedef {import('../core/protocol-types.js').Timeline} Timeline
  */
 
 /** While a finger rests on the time line it leads; the moment sent last is waited for so long at most [ms]. */
@@ -45,17 +45,20 @@ export class Scrubber {
     this.picture = svg('svg', { height: HEIGHT, 'aria-hidden': 'true' },
       svg('defs', {}, svg('clipPath', { id: 'replay-past' }, this.clip)),
       this.gaps, this.base, this.all, this.past, this.marks, this.head);
-    this.slider = html('div', { class: 'time-line', role: 'slider', tabindex: 0, 'aria-label': 'Moment of the recording', 'aria-valuemin': 0, 'aria-valuemax': 0, 'aria-valuenow': 0 }, this.picture);
+    this.slider = html('div', { class: 'time-line', role: 'slider', tabindex: 0, 'aria-label': 'Position in the recording', 'aria-valuemin': 0, 'aria-valuemax': 0, 'aria-valuenow': 0 }, this.picture);
     this.before = html('button', { type: 'button', class: 'key', 'aria-label': 'Previous alarm' }, icon('back'), 'Alarm');
     this.play = html('button', { type: 'button', class: 'key' }, icon('play', 'fill'), html('span', {}, 'Play'));
     this.rate = /** @type {HTMLSelectElement} */ (html('select', { 'aria-label': 'Playback speed', class: 'n' }, ...RATES.map((rate) => html('option', { value: rate }, rateWords(rate)))));
     this.rateKey = html('label', { class: 'key' }, this.rate, html('span', { 'aria-hidden': 'true' }, 'Rate'));
     this.after = html('button', { type: 'button', class: 'key', 'aria-label': 'Next alarm' }, icon('next'), 'Alarm');
+    this.leave = html('button', { type: 'button', class: 'key leave' }, icon('close'), 'Leave');
     this.clock = html('b', { class: 'n' });
-    this.of = html('span', { class: 'sub' });
+    this.of = html('span', { class: 'sub' }, 'Opening…');
     this.note = html('p', { class: 'replay-note', hidden: true });
     this.element = html('footer', { class: 'scrub', 'aria-label': 'Replay' }, this.slider,
-      html('div', { class: 'keysrow' }, this.before, this.play, html('div', { class: 'clock' }, this.clock, this.of), this.rateKey, this.after), this.note);
+      html('div', { class: 'tape-keys' }, html('div', { class: 'legend clock' }, html('span', {}, this.clock, ' ', this.of)),
+        html('div', { class: 'keysrow' }, this.before, this.play, this.rateKey, this.after, this.leave)), this.note);
+    for (const part of this.#parts) setAttribute(part, 'inert', true); // until it is open
     const resize = new ResizeObserver(() => this.#resized());
     resize.observe(this.slider);
     this.stops = [
@@ -90,10 +93,11 @@ export class Scrubber {
     }
   }
 
-  /** @param {import('../core/protocol.js').State} frame */
+  /** @param {import('../core/protocol-types.js').State} frame */
   draw(frame) {
     const { replay } = frame;
     if (!replay) return;
+    if (this.slider.inert) for (const part of this.#parts) setAttribute(part, 'inert', null);
     this.#length_s = replay.length_s;
     const wanted = this.#wanted;
     if (wanted && (Math.abs(replay.at_s - wanted.at_s) < 0.05 || this.store.now() - wanted.since_ms > HOLD_MS) && !this.#isAsking) this.#wanted = null;
@@ -117,6 +121,16 @@ export class Scrubber {
     setAttribute(this.after, 'aria-disabled', markBeside(marks, this.#at_s, 1) === null ? 'true' : null);
   }
 
+  /** What acts on a replay that is open. */
+  get #parts() {
+    return [this.slider, this.before, this.play, this.rateKey, this.after];
+  }
+
+  /** To another moment. @param {number} at_s */
+  seek(at_s) {
+    this.#seek(at_s);
+  }
+
   /** Play or pause; what was pressed counts until the server's state says so too. */
   toggle() {
     this.#order({ do: this.#isPlaying ? 'pause' : 'play' });
@@ -128,7 +142,7 @@ export class Scrubber {
   /** Space and arrows anywhere on the page, where nothing else has them. @param {KeyboardEvent} event */
   key(event) {
     const at = /** @type {Element} */ (event.target);
-    if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || document.querySelector('dialog[open]')) return;
+    if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || document.querySelector('dialog[open]:not([data-docked])')) return;
     if (at instanceof Element && at.matches(OWN_KEYS)) return;
     if (event.key === ' ') {
       event.preventDefault();
@@ -233,7 +247,7 @@ export class Scrubber {
     }
   }
 
-  /** @param {Record<string, unknown>} order */
+  /** @param {import('../core/requests.js').FieldsOf<'replay'>} order */
   async #order(order) {
     const answer = await this.store.ask('replay', order);
     if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Replay not changed');

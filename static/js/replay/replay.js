@@ -1,10 +1,12 @@
 // Replay: the page turned to a recording, and back. Whatever draws live draws this; here are its band, its ways in and out,
 // and what must be heard of the live car meanwhile.
 
-import { field, html, icon, listen, need, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
-import { asideOf, dateOf, toldOf } from './replay-layout.js';
+import { field, html, icon, listen, need, setAttribute, setText, setWords } from '../core/dom.js';
+import { ReplayBand, liveSheet } from './replay-band.js';
+import { JumpList } from './replay-jumps.js';
+import { clockOf, sketchOf, summaryOf } from './replay-layout.js';
 import { Scrubber } from './replay-scrubber.js';
-import { timeOfDay } from '../core/format.js';
+import { addressOf, request } from '../files/files-model.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
@@ -15,6 +17,10 @@ import { timeOfDay } from '../core/format.js';
 const OPENS_MS = 25_000;
 /** A connection that breaks meanwhile is waited for so often. */
 const TRIES = 3;
+/** An id of the catalog. */
+const ID = /^[\w-]+$/;
+/** What is shown first. */
+const HOME = '#home';
 /** The address follows the moment so often; browsers allow no more [ms]. */
 const NOTE_MS = 2000;
 
@@ -22,29 +28,40 @@ const NOTE_MS = 2000;
 let current = null;
 
 /**
- * Show a recording in this page. What is live goes on until it is there.
+ * Show a recording in this page, Home first. What is live goes on, covered, until it is there.
  * @param {string} id
  * @param {Store} store
  * @param {Say} say
- * @param {number} [at_s] seconds since its beginning
+ * @param {{at_s?: number, staysOnTab?: boolean}} [where] at_s: seconds since its beginning; staysOnTab: the address named a tab
  * @returns {Promise<boolean>} whether it is shown
  */
-export async function openReplay(id, store, say, at_s = 0) {
+export async function openReplay(id, store, say, { at_s = 0, staysOnTab = false } = {}) {
   await styled();
-  say('Opening…');
+  const opening = store.replaying || current ? null : new Replay(id, store, say);
+  if (!opening) say('Opening…');
+  current ??= opening;
   let answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
   for (let tries = 1; !answer.ok && !store.socket.isOpen && tries < TRIES; tries += 1) {
     await opened(store); // the connection broke meanwhile: nobody refused
     answer = await store.ask('replay', { do: 'open', recording: id, at_s }, OPENS_MS);
   }
   if (!answer.ok) {
+    if (current === opening) opening?.giveUp();
     say(answer.reason ?? 'Refused.', 'Not replayed');
     return false;
   }
-  current?.unmount();
+  if (opening && current !== opening) {
+    void store.ask('replay', { do: 'leave' }); // the person left before it was open
+    return false;
+  }
+  if (!opening) {
+    current?.unmount();
+    current = new Replay(id, store, say);
+  }
   store.replaying = true;
-  current = new Replay(id, store, say);
+  current?.begin();
   for (const note of document.querySelectorAll('.snack.note')) note.remove();
+  if (!staysOnTab && location.hash !== HOME) location.hash = HOME;
   return true;
 }
 
@@ -67,13 +84,15 @@ function styled() {
     link.onload = () => resolve();
     link.onerror = () => {
       link.remove();
-      reject(new Error('The style sheet of the replay could not be fetched'));
+      reject(new Error('The style sheet of the replay could not be loaded'));
     };
     document.head.append(link);
   });
 }
 
 class Replay {
+  /** The server has not opened it yet: what is live goes on, covered. */
+  #isOpening = true;
   #noted_ms = -Infinity;
   #isLeaving = false;
   /** The occurrence of a live alarm that was seen and stayed away from. */
@@ -81,6 +100,10 @@ class Replay {
   /** How it ran, for a socket that breaks. */
   #ran = { is_playing: false, rate: 1, at_s: 0 };
   parts = build();
+  band = new ReplayBand();
+  sheet = liveSheet();
+  /** The time line as far as it is made. @type {import('../core/protocol-types.js').Timeline | null} */
+  #line = null;
 
   /**
    * @param {string} id
@@ -95,31 +118,59 @@ class Replay {
     this.root = document.documentElement;
     setAttribute(this.root, 'data-replay', 'opening');
     need(this.board, '.top').prepend(this.parts.top);
-    need(this.board, '.strip').after(this.parts.band);
-    this.board.append(this.parts.tape);
-    document.body.append(this.parts.sheet);
+    need(this.board, '.strip').after(this.band.element);
+    document.body.append(this.sheet);
     this.scrubber = new Scrubber(store, say);
+    this.jumps = new JumpList((at_s) => this.scrubber.seek(at_s));
     need(this.board, '.view').after(this.scrubber.element);
     this.stops = [
       store.on('draw', () => this.#draw()),
       store.on('tick', () => document.hidden && this.#aside()),
       store.on('beat', () => this.#beat()),
       store.on('open', () => this.#again()),
-      store.on('replay', (message) => this.#told(message)),
-      listen(this.parts.leave, 'click', () => this.leave()),
-      listen(this.parts.live, 'click', () => this.leave()),
-      listen(field(this.parts.sheet, 'back'), 'click', () => this.leave()),
-      listen(field(this.parts.sheet, 'stay'), 'click', () => this.parts.sheet.close()),
+      store.on('replay', (message) => this.#received(message)),
+      listen(this.scrubber.leave, 'click', () => this.leave()),
+      listen(this.band.live, 'click', () => this.leave()),
+      listen(this.parts.compare, 'click', () => this.#chooseSecond()),
+      listen(this.band.moment, 'click', () => this.#openJumps()),
+      listen(field(this.sheet, 'back'), 'click', () => this.leave()),
+      listen(field(this.sheet, 'stay'), 'click', () => this.sheet.close()),
       listen(document, 'keydown', (event) => this.scrubber.key(event)),
     ];
+    void this.#sketch();
+    this.#aside();
+  }
+
+  /** The server has opened it. */
+  begin() {
+    this.#isOpening = false;
     this.#note(true);
     this.#draw();
+  }
+
+  /** It is not shown after all. */
+  giveUp() {
+    this.unmount();
+    setAttribute(this.root, 'data-replay', null);
+  }
+
+  /** What the catalog knows of it stands until the server has read the recording. */
+  async #sketch() {
+    const row = ID.test(this.id) ? await request(addressOf(this.id)).catch(() => null) : null;
+    if (!row || !this.#isOpening || current !== this) return;
+    this.band.sketch(row);
+    const line = sketchOf(row);
+    if (line) this.#received(line);
   }
 
   /** Back to live, with one tap. @param {string} [why] said, where the replay ended by itself */
   async leave(why) {
     if (this.#isLeaving) return;
     this.#isLeaving = true;
+    if (this.#isOpening) {
+      this.giveUp();
+      return;
+    }
     if (why === undefined && this.store.socket.isOpen) {
       const answer = await this.store.ask('replay', { do: 'leave' });
       if (!answer.ok && this.store.socket.isOpen) {
@@ -145,14 +196,15 @@ class Replay {
   unmount() {
     for (const stop of this.stops) stop();
     this.scrubber.unmount();
-    const { top, band, tape, sheet } = this.parts;
-    if (sheet.open) sheet.close();
-    for (const part of [top, band, tape, sheet]) part.remove();
+    this.jumps.unmount();
+    if (this.sheet.open) this.sheet.close();
+    for (const part of [this.parts.top, this.band.element, this.sheet]) part.remove();
     if (current === this) current = null;
   }
 
   #beat() {
     const { replay } = this.store.frame ?? {};
+    if (this.#isOpening) this.#aside();
     if (!replay) return;
     setAttribute(this.root, 'data-replay', 'on');
     this.#ran = { is_playing: replay.is_playing, rate: replay.rate, at_s: replay.at_s };
@@ -162,6 +214,7 @@ class Replay {
 
   /** The socket is there again: back to the moment, and on as it ran. Until then nothing live is shown as recorded. */
   async #again() {
+    if (this.#isOpening) return;
     const { is_playing, rate, at_s } = this.#ran;
     const { store } = this;
     const answer = await store.ask('replay', { do: 'open', recording: this.id, at_s }, OPENS_MS);
@@ -174,9 +227,26 @@ class Replay {
   }
 
   /** @param {any} message */
-  #told(message) {
-    if (message.kind === 'replay') void this.leave(message.ended);
-    else this.scrubber.take(message);
+  #received(message) {
+    if (message.kind === 'replay') {
+      void this.leave(message.ended);
+      return;
+    }
+    if (message.kind !== 'timeline') return;
+    this.#line = message;
+    this.scrubber.take(message);
+    this.jumps.take(message);
+  }
+
+  /** A second recording is chosen among the files. */
+  #chooseSecond() {
+    location.hash = '#files';
+    this.say('Press the recording that is shown beside this one, then “Compare with the replay”.', 'Compare');
+  }
+
+  #openJumps() {
+    const replay = this.store.frame?.replay;
+    if (replay) this.jumps.open(replay);
   }
 
   /** The address leads back here. @param {boolean} [isNow] */
@@ -193,29 +263,18 @@ class Replay {
   #draw() {
     const { frame } = this.store;
     if (!frame?.replay) return;
-    const { date, time, line, mark, text, end } = this.parts;
-    setWords(date, `Recorded ${dateOf(frame.replay.at_ms)}`);
-    setText(time, timeOfDay(frame.replay.at_ms));
-    const told = toldOf(frame);
-    setAttribute(line, 'data-kind', told.kind || null);
-    setIcon(mark, told.icon);
-    setWords(text, told.text);
-    setWords(end, told.end);
+    this.band.draw(frame, this.#line);
+    setText(this.parts.length, clockOf(frame.replay.length_s));
     this.scrubber.draw(frame);
   }
 
   /** What is live and must be heard: a key on the band, and for what is critical and not acknowledged a dialog. */
   #aside() {
     const { frame } = this.store;
-    if (!frame?.replay) return;
-    const { live, liveText, sheet } = this.parts;
-    const aside = asideOf(frame.live);
-    show(live, aside !== null);
-    if (aside) {
-      setAttribute(live, 'data-kind', aside.kind);
-      setWords(liveText, aside.text);
-    }
-    const asking = aside?.asking ?? null;
+    if (!frame) return;
+    const { sheet } = this;
+    const asking = this.band.drawLive(frame.replay ? frame.live : summaryOf(frame));
+    if (!frame.replay) return; // then the live alarm has its own dialog
     const key = asking ? `${asking.id} ${asking.occurrence}` : '';
     if (!asking) {
       if (sheet.open) sheet.close();
@@ -231,25 +290,9 @@ class Replay {
   }
 }
 
-/** What a replay adds to the page: bar, band, edges, and the dialog of a live alarm. */
+/** What a replay puts into the bar. */
 function build() {
-  const leave = html('button', { type: 'button', class: 'key leave' }, icon('close'), 'Leave');
-  const date = html('span', { class: 'text' });
-  const time = html('span', { class: 'n end' });
-  const mark = icon('ok', 's');
-  const text = html('span', { class: 'text' });
-  const end = html('span', { class: 'end' });
-  const line = html('div', { class: 'replay-line' }, mark, text, end);
-  const liveText = html('b', { class: 'text' });
-  const live = html('button', { type: 'button', class: 'replay-live', hidden: true }, icon('bell', 's'), liveText, html('span', { class: 'end' }, 'Back to live'));
-  const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet crit', id: 'sheet-live', role: 'alertdialog', 'aria-labelledby': 'live-title', 'aria-describedby': 'live-words', 'data-priority': 'critical' },
-    html('h2', {}, icon('crit'), html('span', { id: 'live-title', 'data-f': 'title' })),
-    html('div', { class: 'bd', id: 'live-words' }, html('p', { 'data-f': 'text' }), html('p', { class: 'sub' }, 'This is happening now. The page behind shows a recording.')),
-    html('div', { class: 'keys' }, html('button', { type: 'button', class: 'main', 'data-f': 'back' }, 'Back to live'), html('button', { type: 'button', class: 'key', 'data-f': 'stay' }, 'Stay in the replay'))));
-  return {
-    leave, date, time, mark, text, end, line, live, liveText, sheet,
-    top: html('div', { class: 'replay-top' }, html('b', {}, icon('replay'), 'REPLAY'), leave),
-    band: html('section', { class: 'replay-band', 'aria-label': 'Replay of a recording' }, html('div', { class: 'replay-date' }, icon('files', 's'), date, time), line, live),
-    tape: html('div', { class: 'replay-tape', 'aria-hidden': 'true' }),
-  };
+  const length = html('span', { class: 'n' });
+  const compare = html('button', { type: 'button', class: 'key wide compare-key' }, 'Compare');
+  return { length, compare, top: html('div', { class: 'replay-top' }, html('b', {}, icon('replay'), 'REPLAY'), length, compare) };
 }

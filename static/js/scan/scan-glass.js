@@ -109,7 +109,7 @@ export class ScanGlass {
 
   /** The thread has the canvas for good: the page draws on another. @param {unknown} why */
   #takeOver(why) {
-    console.warn('The scan is drawn by the page itself from now on, not by a thread of its own:', why);
+    console.warn('The page now draws the scan itself, not a worker:', why);
     clearTimeout(this.#timer);
     this.#painter?.terminate();
     this.#painter = this.#drawing = null;

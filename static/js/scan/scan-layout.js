@@ -227,3 +227,18 @@ export function zoomed(reach_m, sign) {
 export function pinched(reach_m, apart_px, now_px) {
   return reachWithin((reach_m * Math.max(apart_px, 20)) / Math.max(now_px, 20));
 }
+
+/** @typedef {{left: number, top: number, width: number, height: number}} Box */
+
+/**
+ * The box moved by at most its height up or down, to where it covers none of these; null where it does everywhere.
+ * @param {Box[]} taken
+ * @param {Box} box
+ * @returns {Box | null}
+ */
+export function clearOf(taken, box) {
+  const covers = (/** @type {number} */ top) => taken.some((one) =>
+    box.left < one.left + one.width && one.left < box.left + box.width && top < one.top + one.height && one.top < top + box.height);
+  const by = [0, -0.5, 0.5, -1, 1].find((share) => !covers(box.top + share * box.height));
+  return by === undefined ? null : { ...box, top: box.top + by * box.height };
+}

@@ -2,7 +2,7 @@
 
 import { edgesOf, endOf } from './scan-corridor.js';
 import { bearingOf, rangeOf } from './scan-frame.js';
-import { codeWords, namedSectors, plotScale, pointsOf, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
+import { clearOf, codeWords, namedSectors, plotScale, pointsOf, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
 import { Hatching, ScanGrid, fit, penOf } from './scan-grid.js';
 import { fixed } from '../core/format.js';
 
@@ -13,6 +13,9 @@ const NAMES_SHOWN = 4;
  * @typedef {ReturnType<typeof plotScale>} Scale
  * @typedef {import('./scan-grid.js').Surface} Surface
  * @typedef {import('./scan-grid.js').Pen} Pen
+ * @typedef {import('./scan-layout.js').Box} Box
+ * @typedef {{x: number, y: number, way: number, text: string, where: Where}} Nearest
+ * @typedef {[x: number, y: number, align: CanvasTextAlign, size: number, weight: number]} Where of words
  *
  * @typedef {object} Around what is drawn beside the scan
  * @property {number} reach_m
@@ -38,6 +41,8 @@ export class ScanPlot {
   #colour = /** @type {any} */ ({});
   #font = '';
   #width = 0;
+  /** Where words stand already. @type {Box[]} */
+  #taken = [];
 
   /** @param {Surface} canvas */
   constructor(canvas) {
@@ -52,6 +57,7 @@ export class ScanPlot {
     if (!g) return;
     ({ colour: this.#colour, font: this.#font } = theme);
     this.#width = width;
+    this.#taken = [];
     const { reach_m } = around;
     g.setTransform(1, 0, 0, 1, 0, 0);
     g.drawImage(this.#grid.draw({ width, height, dpr, reach_m, theme }), 0, 0);
@@ -62,11 +68,12 @@ export class ScanPlot {
     const corridor = around.car ? { ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad } : null;
     if (corridor) this.#stoppingStrip(g, scale, corridor, scan.judged.stopping_m);
     this.#hatch(g, scale, sectors, width + height, dpr, theme.key);
+    const nearest = this.#nearestAt(g, scale, scan, reach_m); // its room is kept by all other words
     if (corridor) this.#corridor(g, scale, corridor, reach_m, scan.judged.stopping_m, around.limit_m);
-    this.#rings(g, scale, reach_m);
     this.#names(g, scale, reach_m, sectors, width);
+    this.#rings(g, scale, reach_m);
     this.#points(g, scale, pointsOf(scan, reach_m * 1.05, 1 / scale.k));
-    this.#nearest(g, scale, scan, reach_m);
+    if (nearest) this.#nearest(g, nearest);
     if (around.mark) this.#mark(g, scale, around.mark);
     this.#car(g, scale, height);
   }
@@ -172,20 +179,28 @@ export class ScanPlot {
     g.fill();
   }
 
-  /** What the obstacle check found. @param {Pen} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {number} reach_m */
-  #nearest(g, { at }, scan, reach_m) {
+  /** What the obstacle check found, and on which side its words stand. @param {Pen} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {number} reach_m @returns {Nearest | null} */
+  #nearestAt(g, { at }, scan, reach_m) {
     const { beam, gap_m } = scan.judged;
     const range_m = beam === null ? null : rangeOf(scan, beam);
-    if (beam === null || range_m === null || range_m > reach_m) return;
+    if (beam === null || range_m === null || range_m > reach_m) return null;
     const bearing_rad = bearingOf(scan, beam);
     const [x, y] = at(range_m * Math.cos(bearing_rad), range_m * Math.sin(bearing_rad));
-    this.#ring(g, x, y, this.#colour.ink);
     const way = x + 120 > this.#width ? -1 : 1;
+    const text = `${fixed(gap_m)} m`;
+    const where = /** @type {Where} */ ([x + 44 * way, y - 1, way > 0 ? 'left' : 'right', 22, 700]);
+    this.#taken.push(this.#plate(g, text, ...where));
+    return { x, y, way, text, where };
+  }
+
+  /** @param {Pen} g @param {Nearest} nearest */
+  #nearest(g, { x, y, way, text, where }) {
+    this.#ring(g, x, y, this.#colour.ink);
     g.beginPath();
     g.moveTo(x + 15 * way, y);
     g.lineTo(x + 36 * way, y);
     g.stroke();
-    this.#words(g, `${fixed(gap_m)} m`, x + 44 * way, y - 1, this.#colour.ink, way > 0 ? 'left' : 'right', 22, 700);
+    this.#write(g, text, this.#plate(g, text, ...where), this.#colour.ink);
   }
 
   /** Its words stand under the plot: here they would hide other returns. @param {Pen} g @param {Scale} scale @param {NonNullable<Around['mark']>} mark */
@@ -227,17 +242,30 @@ export class ScanPlot {
     g.stroke();
   }
 
-  /** Words on a plate of the panel's colour. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {string} css @param {CanvasTextAlign} [align] @param {number} [size] @param {number} [weight] */
+  /** Words where nothing else is written, a line higher or lower; else not. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {string} css @param {CanvasTextAlign} [align] @param {number} [size] @param {number} [weight] */
   #words(g, text, x, y, css, align = 'left', size = 14, weight = 400) {
+    const plate = clearOf(this.#taken, this.#plate(g, text, x, y, align, size, weight));
+    if (!plate) return;
+    this.#taken.push(plate);
+    this.#write(g, text, plate, css);
+  }
+
+  /** The plate of these words. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {CanvasTextAlign} align @param {number} size @param {number} weight @returns {Box} */
+  #plate(g, text, x, y, align, size, weight) {
     g.font = `${weight} ${size}px ${this.#font}`;
-    g.textAlign = align;
-    g.textBaseline = 'middle';
     const width = g.measureText(text).width + 8;
     const left = align === 'left' ? x - 4 : align === 'right' ? x - width + 4 : x - width / 2;
+    return { left, top: y - size * 0.72, width, height: size * 1.44 };
+  }
+
+  /** Words on their plate, which has the panel's colour, in the font that measured them. @param {Pen} g @param {string} text @param {Box} plate @param {string} css */
+  #write(g, text, { left, top, width, height }, css) {
+    g.textAlign = 'left';
+    g.textBaseline = 'middle';
     g.fillStyle = this.#colour.panel;
-    g.fillRect(left, y - size * 0.72, width, size * 1.44);
+    g.fillRect(left, top, width, height);
     g.fillStyle = css;
-    g.fillText(text, x, y);
+    g.fillText(text, left + 4, top + height / 2);
   }
 }
 

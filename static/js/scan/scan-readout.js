@@ -29,6 +29,7 @@ export class ScanReadout {
     const isThere = scan !== null && ink !== 'never' && ink !== 'not_published';
     const isNow = isThere && ink !== 'stale';
     show(at('none'), !isNow);
+    show(at('none-help'), ink === 'not_published');
     show(at('canvas'), isThere);
     show(at('aim'), isThere);
     show(at('late'), isNow && ink === 'ageing');
@@ -46,7 +47,7 @@ export class ScanReadout {
     this.#describe(isNow ? scan : null, missing);
   }
 
-  /** @param {Scan | null} scan null: there is none of now @param {import('../core/protocol.js').Freshness} ink */
+  /** @param {Scan | null} scan null: there is none of now @param {import('../core/protocol-types.js').SignalFreshness} ink */
   #drawNearest(scan, ink) {
     const { at } = this;
     const judged = scan?.judged ?? null;

@@ -12,9 +12,9 @@ const STORED = 'catgraph.range';
 
 /**
  * @param {HTMLElement} root
- * @param {import('../core/store.js').Store} store
+ * @param {import('../shell/tab-contents.js').TabPage} page
  */
-export function mount(root, store) {
+export function mount(root, { store, isFront }) {
   const tab = new ScanTab(root, store);
   const at = (/** @type {string} */ name) => field(root, name);
   const themed = () => {
@@ -43,13 +43,11 @@ export function mount(root, store) {
   document.fonts.load('700 20px "catgraph numerals"').then(() => tab.drawSoon(), () => {});
   tab.reach(tab.reach_m);
   tab.announceMark();
+  const look = () => tab.setFront(isFront()); // otherwise it is neither sent nor drawn, and costs nothing
+  look();
   return {
-    /**
-     * In front, the scan is sent and drawn; otherwise it costs nothing.
-     * @param {boolean} isNow
-     */
-    setFront: (isNow) => tab.setFront(isNow),
-    unmount() {
+    look,
+    stop() {
       for (const stop of stops) stop();
       tab.glass.stop();
     },

@@ -43,7 +43,7 @@ export class SettingsDevices {
   #load() {
     this.#loading ??= import('../pairing/devices.js').then(({ mount }) => mount(this.place, this.element, this.store, this.say, (words) => setText(this.state, words))).catch(() => {
       this.#loading = null;
-      this.place.replaceChildren(html('p', { class: 'state', role: 'status' }, 'It could not be fetched: the server does not answer. Close this group and open it again.'));
+      this.place.replaceChildren(html('p', { class: 'state', role: 'status' }, 'It could not be loaded: the server does not answer. Close this group and open it again.'));
     });
   }
 }

@@ -14,7 +14,7 @@ const MAX_BYTES = 64 * 1024;
  */
 export function fileProblem({ size, name }) {
   if (size === 0) return `“${name.slice(0, 60)}” is empty.`;
-  if (size > MAX_BYTES) return `“${name.slice(0, 60)}” is too large: a file of settings has at most 64 kB.`;
+  if (size > MAX_BYTES) return `“${name.slice(0, 60)}” is too large: a settings file has at most 64 kB.`;
   return null;
 }
 
@@ -32,7 +32,7 @@ export class SettingsFileKeys {
     const profile = html('button', { type: 'button', class: 'topic', 'data-part': 'profile' }, icon('car'), html('span', { class: 'p' }, 'Kind of car'), this.kind, html('span', { class: 'r' }, icon('next')));
     const save = html('button', { type: 'button', class: 'key wide', 'data-part': 'export' }, icon('download'), 'Export');
     const load = html('button', { type: 'button', class: 'key wide', 'data-part': 'import' }, icon('files'), 'Import');
-    this.picker = /** @type {HTMLInputElement} */ (html('input', { type: 'file', accept: '.toml,application/toml,text/plain', class: 'unseen', tabindex: -1, 'aria-label': 'File of settings' }));
+    this.picker = /** @type {HTMLInputElement} */ (html('input', { type: 'file', accept: '.toml,application/toml,text/plain', class: 'unseen', tabindex: -1, 'aria-label': 'Settings file' }));
     this.resetKey = html('button', { type: 'button', class: 'key wide', 'data-part': 'reset' }, icon('replay'), html('span', {}, 'Reset all'));
     this.car = html('section', { 'aria-label': 'Car' }, html('div', { class: 'sec' }, html('span', {}, 'Car')), profile);
     this.all = html('section', { 'aria-label': 'All settings' }, html('div', { class: 'sec' }, html('span', {}, 'All settings'), html('span', {}, 'as a TOML file')),
@@ -117,7 +117,7 @@ export class SettingsFileKeys {
     const outcome = await this.model.replace(text);
     if (!outcome.ok) this.say(`${outcome.reason} Nothing was changed.`, 'Not imported');
     else if (this.model.body?.version === before) this.say('It contains the settings already in force.', 'Imported');
-    else this.say(`${counted(this.model.undoLines.length, 'setting')} changed. Undo takes it back.`, 'Imported');
+    else this.say(`${counted(this.model.undoLines.length, 'setting')} changed. Undo reverts it.`, 'Imported');
   }
 
   #openReset() {

@@ -24,6 +24,7 @@ export class SettingsGroup {
     this.element = /** @type {HTMLDetailsElement} */ (html('details', { class: 'group', open: isOpen },
       html('summary', {}, html('span', { class: 'h' }, heading), this.count, icon('next')), ...this.rows.map((row) => row.element)));
     setText(this.count, counted(this.rows.length, 'limit'));
+    this.element.addEventListener('toggle', () => this.draw()); // not empty until the next state comes
   }
 
   /** Shows what a search asks for; how many there are. @param {string} query */

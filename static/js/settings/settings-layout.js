@@ -4,25 +4,8 @@ import { shownIn, wireOf } from '../core/units.js';
 import { fixed } from '../core/format.js';
 
 /**
- * @typedef {object} Field one threshold as the server declares it, in SI
- * @property {string} title
- * @property {string} heading
- * @property {string} unit
- * @property {number} default
- * @property {number} minimum
- * @property {number} maximum
- * @property {number} [step]
- * @property {string | null} [description]
- *
- * @typedef {object} Settings what GET /api/settings answers
- * @property {number} version
- * @property {{name: string, title: string, chosen: string, recognised: string}} profile
- * @property {{name: string, title: string}[]} profiles
- * @property {Record<string, number>} values
- * @property {Record<string, number>} defaults
- * @property {string[]} changed
- * @property {Record<string, string>} topics
- * @property {Record<string, Field>} schema
+ * @typedef {import('../core/protocol-types.js').SettingField} Field
+ * @typedef {import('../core/protocol-types.js').SettingsAnswer} Settings
  *
  * @typedef {{values?: Record<string, number | null>, topics?: Record<string, string | null>, profile?: string}} Change
  */
@@ -108,16 +91,16 @@ export function endText(value, field) {
 export function readNumber(typed, field) {
   const { low, high, unit } = scaleOf(field);
   const text = typed.replace(/[\s\u00a0\u202f]/g, '').replace('−', '-');
-  if (text === '') return { refused: `${field.title}: a number is needed.` };
+  if (text === '') return { refused: `${field.title}: a number is required.` };
   const bare = text.toLowerCase().endsWith(unit.toLowerCase()) ? text.slice(0, -unit.length) : text;
-  if (!/^[+-]?(\d+([.,]\d*)?|[.,]\d+)$/.test(bare)) return { refused: `${field.title}: “${typed.trim().slice(0, 20)}” is no number.` };
+  if (!/^[+-]?(\d+([.,]\d*)?|[.,]\d+)$/.test(bare)) return { refused: `${field.title}: “${typed.trim().slice(0, 20)}” is not a number.` };
   const number = Number(bare.replace(',', '.'));
   // An end that is not round in the unit of this phone can be typed as it is read.
   const near = unit === field.unit ? 0 : 0.005;
   if (Math.abs(number - low) <= near) return { value: field.minimum };
   if (Math.abs(number - high) <= near) return { value: field.maximum };
   if (!(number >= low && number <= high)) {
-    return { refused: `${field.title}: ${endText(field.minimum, field)} to ${endText(field.maximum, field)} ${unit} is possible.` };
+    return { refused: `${field.title}: ${endText(field.minimum, field)} to ${endText(field.maximum, field)} ${unit} is allowed.` };
   }
   return { value: toWire(number, field) };
 }

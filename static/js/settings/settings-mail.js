@@ -42,7 +42,7 @@ export class SettingsMail {
   #load() {
     this.#loading ??= import('../mail/mail-settings.js').then(({ mount }) => mount(this.place, this.say, (words) => setText(this.state, words))).catch(() => {
       this.#loading = null;
-      this.place.replaceChildren(html('p', { class: 'state', role: 'status' }, 'It could not be fetched: the server does not answer. Close this group and open it again.'));
+      this.place.replaceChildren(html('p', { class: 'state', role: 'status' }, 'It could not be loaded: the server does not answer. Close this group and open it again.'));
     });
   }
 }

@@ -7,7 +7,7 @@ import { DEFAULTS, changeLines, changeTo } from './settings-layout.js';
  * @typedef {import('./settings-layout.js').Settings} Settings
  * @typedef {import('./settings-layout.js').Change} Change
  * @typedef {{ok: boolean, reason?: string}} Outcome
- * @typedef {{topic: string, type: string}} Candidate
+ * @typedef {import('../core/protocol-types.js').TopicOffer} Candidate
  * @typedef {{value: number, version: number | null}} Pending version: which version confirms it; null: not answered yet
  */
 
@@ -53,6 +53,16 @@ export class SettingsModel {
   /** @param {Store} store */
   constructor(store) {
     this.store = store;
+    store.on('switch', () => this.#forget());
+  }
+
+  /** Another car is shown: nothing of the one before is asked of it, shown for it or taken back. */
+  #forget() {
+    this.body = this.problem = this.#undo = null;
+    this.#pending.clear();
+    this.#fetched = this.#boot = '';
+    this.#seen = 0;
+    this.#tried_ms = -Infinity;
   }
 
   /** May anything be changed now? */
@@ -96,10 +106,12 @@ export class SettingsModel {
     if (!frame) return;
     this.#tried_ms = this.store.now();
     const key = this.#key(frame.session.settings_version ?? 0, frame.session.profile ?? '');
+    const { vehicle } = this.store;
     try {
-      this.#adopt(await fetched(this.#path('/api/settings')), key);
+      const body = await fetched(this.#path('/api/settings'));
+      if (vehicle === this.store.vehicle) this.#adopt(body, key);
     } catch (error) {
-      this.problem = sentenceOf(error);
+      if (vehicle === this.store.vehicle) this.problem = sentenceOf(error);
     }
   }
 
@@ -118,7 +130,8 @@ export class SettingsModel {
     }
     for (const [name, wish] of wishes) this.#pending.set(name, wish);
     // One after the other: the next names the version that this one makes.
-    const outcome = this.#last.then(() => this.#set(change, of));
+    const { vehicle } = this.store;
+    const outcome = this.#last.then(() => this.#set(change, of, vehicle));
     this.#last = outcome.then(({ ok }) => {
       for (const [name, wish] of wishes) {
         wish.version = this.#seen;
@@ -128,9 +141,10 @@ export class SettingsModel {
     return this.#last.then(() => outcome);
   }
 
-  /** @param {Change} change @param {string} of @returns {Promise<Outcome>} */
-  async #set(change, of) {
+  /** @param {Change} change @param {string} of @param {string} vehicle whose settings were looked at @returns {Promise<Outcome>} */
+  async #set(change, of, vehicle) {
     const base = await this.#current();
+    if (vehicle !== this.store.vehicle) return { ok: false, reason: 'Not changed: another car is shown now.' };
     if (!base) return { ok: false, reason: GONE };
     const answer = await this.store.ask('set', { ...change, version: this.#seen });
     if (!answer.ok) {
@@ -191,7 +205,7 @@ export class SettingsModel {
     await this.#current();
     if (this.body.version < undo.version) return { ok: false, reason: this.problem ?? 'The server has not confirmed the change yet.' };
     this.#undo = null;
-    if (this.#seen !== undo.version) return { ok: false, reason: 'Somebody else has changed the settings since. Look at them again.' };
+    if (this.#seen !== undo.version) return { ok: false, reason: 'Somebody else changed the settings since. Check them again.' };
     const outcome = await this.set(changeTo(this.body, undo.base));
     this.#undo = outcome.ok ? null : undo;
     return outcome;
@@ -269,5 +283,5 @@ class Refusal extends Error {}
 
 /** @param {unknown} error */
 function sentenceOf(error) {
-  return error instanceof Refusal ? error.message : 'The server gave no answer in time.';
+  return error instanceof Refusal ? error.message : 'The server did not answer in time.';
 }

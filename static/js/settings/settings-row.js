@@ -2,7 +2,9 @@
 
 import { html, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
 import { POSITIONS, SWITCH, endText, readNumber, scaleOf, shareOf, stepped, textOf, valueAt } from './settings-layout.js';
+import { SettingsTrace } from './settings-trace.js';
 import { speedUnit } from '../core/units.js';
+import { SPECS } from '../home/trends-layout.js';
 
 /**
  * @typedef {import('./settings-layout.js').Field} Field
@@ -61,6 +63,9 @@ export class SettingsRow {
     this.element = html('div', { class: 'set', 'data-setting': name },
       html('div', { class: 'row' }, html('label', { class: 't', for: id }, field.title), ...(this.isSwitch ? [this.toggle] : [this.number, this.unit])),
       help, ...(this.isSwitch ? [] : [this.range]), this.yet, this.says);
+    const spec = SPECS.find(({ limit }) => limit === name);
+    this.trace = spec ? new SettingsTrace(model.store, spec) : null;
+    if (this.trace) this.range.before(this.trace.element);
     this.stops = this.#listen();
   }
 
@@ -116,7 +121,7 @@ export class SettingsRow {
 
   #typed() {
     const read = readNumber(this.number.value, this.field);
-    if ('refused' in read) this.#say(`${read.refused} It stays as it was.`);
+    if ('refused' in read) this.#say(`${read.refused} The value is unchanged.`);
     else if (textOf(read.value, this.field) !== textOf(this.#shown(), this.field)) void this.#send(read.value);
     else this.#say('');
     this.number.value = textOf(this.#shown(), this.field);
@@ -144,6 +149,7 @@ export class SettingsRow {
 
   draw() {
     const { model, name, field } = this;
+    this.trace?.draw();
     const inForce = model.inForce(name);
     if (this.#moving !== null && (!model.isOpen || (this.#from !== null && inForce !== null && inForce !== this.#from && inForce !== this.#sent))) {
       clearTimeout(this.#rest);
@@ -182,11 +188,12 @@ export class SettingsRow {
     this.range.style.setProperty('--usual', at.toFixed(4));
     setAttribute(this.range, 'data-usual', at < 0.17 ? 'low' : at > 0.83 ? 'high' : 'middle');
     setWords(/** @type {HTMLElement} */ (this.usual.lastChild), `default ${endText(usual, field)}`);
-    setAttribute(this.usual, 'aria-label', `${field.title}: default ${endText(usual, field)} ${unit}, press to go back to it`);
+    setAttribute(this.usual, 'aria-label', `${field.title}: default ${endText(usual, field)} ${unit}, press to reset`);
   }
 
   stop() {
     clearTimeout(this.#rest);
+    this.trace?.stop();
     for (const stop of this.stops) stop();
   }
 }

@@ -7,7 +7,7 @@ import { openTopicPicker } from './topic-picker.js';
 import { age, fixed, NOTHING } from '../core/format.js';
 
 /**
- * @typedef {import('../core/protocol.js').Signal} Signal
+ * @typedef {import('../core/protocol-types.js').SignalState<any>} Signal
  * @typedef {{topic: string, says: string, icon: 'ok' | 'warn' | 'unknown', rate: string}} Shown
  */
 
@@ -24,15 +24,15 @@ export function topicWords(signal, picked, isLive) {
   if (!signal.topic) {
     const source = typeof signal.value?.['source'] === 'string' ? `from ${signal.value['source']}` : 'not published';
     return picked
-      ? { topic: picked, says: `${label} · picked by you, and the car does not have it`, icon: 'warn', rate: NOTHING }
+      ? { topic: picked, says: `${label} · chosen by you, but not published`, icon: 'warn', rate: NOTHING }
       : { topic: signal.label, says: signal.value ? source : 'not published', icon: signal.value ? 'ok' : 'unknown', rate: NOTHING };
   }
   if (signal.freshness === 'not_published' && signal.note) {
-    const says = `${label} · ${picked ? `picked by you, ${signal.note}` : signal.note}`;
+    const says = `${label} · ${picked ? `chosen by you, ${signal.note}` : signal.note}`;
     return { topic: signal.topic, says, icon: picked ? 'warn' : 'unknown', rate: NOTHING };
   }
   const told = [
-    `${label} · ${kind ?? 'type unknown'}${picked ? ' · picked by you' : ''}`,
+    `${label} · ${kind ?? 'type unknown'}${picked ? ' · chosen by you' : ''}`,
     signal.note ?? '',
     signal.rejected ? `${signal.rejected} rejected: ${signal.rejected_why ?? 'no reason given'}` : '',
     signal.freshness === 'never' ? 'no message yet' : signal.freshness === 'stale' ? `silent for ${age(signal.age_s)} s` : '',
@@ -112,7 +112,7 @@ export class SettingsTopics {
     return hits;
   }
 
-  /** @param {import('../core/protocol.js').State} frame @param {boolean} isLive */
+  /** @param {import('../core/protocol-types.js').State} frame @param {boolean} isLive */
   #countThem(frame, isLive) {
     if (isLive && this.store.now() - this.#asked_ms > 5000) {
       this.#asked_ms = this.store.now();

@@ -16,15 +16,12 @@ const OPEN_AT_FIRST = 2;
 
 /**
  * @param {HTMLElement} panel
- * @param {import('../core/store.js').Store} store
- * @param {(sentence: string, title?: string) => void} say
- * @param {() => boolean} isShown whether any of it can be seen now
- * @returns {() => void}
+ * @param {import('../shell/tab-contents.js').TabPage} page
  */
-export function mount(panel, store, say, isShown) {
-  const tab = new SettingsTab(panel, store, say, isShown);
+export function mount(panel, { store, say, isFront }) {
+  const tab = new SettingsTab(panel, store, say, isFront);
   tab.draw();
-  return () => tab.stop();
+  return { stop: () => tab.stop() };
 }
 
 class SettingsTab {
@@ -64,7 +61,7 @@ class SettingsTab {
 
   #build() {
     const search = /** @type {HTMLInputElement} */ (html('input', {
-      type: 'search', placeholder: 'Search', 'aria-label': 'Search the settings', autocomplete: 'off', autocapitalize: 'off', spellcheck: 'false', enterkeyhint: 'search', maxlength: 60,
+      type: 'search', placeholder: 'Search', 'aria-label': 'Search settings', autocomplete: 'off', autocapitalize: 'off', spellcheck: 'false', enterkeyhint: 'search', maxlength: 60,
     }));
     const undo = html('button', { type: 'button', class: 'key wide undo', disabled: true }, icon('replay'), html('span', {}, 'Undo'));
     const state = html('p', { class: 'state', role: 'status' });
@@ -131,11 +128,11 @@ class SettingsTab {
   async #undo() {
     const lines = this.model.undoLines;
     const outcome = await this.model.undo();
-    this.say(outcome.ok ? `${lines.join('. ')}.` : (outcome.reason ?? 'Refused.'), outcome.ok ? 'Taken back' : 'Not taken back');
+    this.say(outcome.ok ? `${lines.join('. ')}.` : (outcome.reason ?? 'Refused.'), outcome.ok ? 'Taken back' : 'Not restored');
     this.draw();
   }
 
-  /** Shows changes by others while the tab is in front. @param {import('../core/protocol.js').AlarmEvent[]} events */
+  /** Shows changes by others while the tab is in front. @param {import('../core/protocol-types.js').LogEvent[]} events */
   #announce(events) {
     const others = events.filter(({ change, by }) => change === 'settings' && by !== null && by !== this.store.name);
     if (others.length && this.isShown()) this.say(others.map(({ text }) => text).join('; '), `Changed by ${others.at(-1)?.by}`);
@@ -148,7 +145,7 @@ class SettingsTab {
  * @param {import('./settings-model.js').SettingsModel} model
  */
 function stateWords(store, model) {
-  if (store.isSilent) return `The server does not answer: nothing can be changed. These were the settings at ${timeOfDay(store.heard_ms)}.`;
-  if (!model.body) return model.problem ?? 'The settings are being fetched from the server.';
-  return model.problem ? `${model.problem} What follows may be old.` : '';
+  if (store.isSilent) return `The server does not answer: nothing can be changed. These are the settings of ${timeOfDay(store.heard_ms)}.`;
+  if (!model.body) return model.problem ?? 'Loading the settings…';
+  return model.problem ? `${model.problem} The list below may be outdated.` : '';
 }

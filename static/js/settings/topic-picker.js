@@ -19,8 +19,8 @@ import { counted } from '../core/format.js';
 export function optionsOf(candidates, now, picked) {
   const gone = picked !== undefined && !candidates?.some(({ topic }) => topic === picked);
   return [
-    { topic: null, title: 'Choose automatically', says: picked === undefined ? (now ? `now ${now}` : 'now none fits') : 'by name, then by type', isChosen: picked === undefined },
-    ...(gone ? [{ topic: picked, title: picked, says: candidates ? 'picked, and the car does not have it with a fitting type' : 'picked', isChosen: true }] : []),
+    { topic: null, title: 'Choose automatically', says: picked === undefined ? (now ? `now ${now}` : 'no match now') : 'by name, then by type', isChosen: picked === undefined },
+    ...(gone ? [{ topic: picked, title: picked, says: candidates ? 'chosen, but not published with a matching type' : 'picked', isChosen: true }] : []),
     ...(candidates ?? []).map(({ topic, type }) => ({ topic, title: topic, says: topic === now ? `${type} · now` : type, isChosen: topic === picked })),
   ];
 }
@@ -47,8 +47,8 @@ export async function openTopicPicker(store, model, signal) {
     if (!model.body) await model.load();
     const known = (await model.candidates()).candidates;
     candidates = known?.[signal] ?? null;
-    words = candidates === null ? 'The bridge does not say which topics the car has.' : candidates.length
-      ? `${counted(candidates.length, 'topic')} of the car can be read as this signal.` : 'No topic of the car has a type that can be read as this signal.';
+    words = candidates === null ? 'The bridge does not list the car’s topics.' : candidates.length
+      ? `${counted(candidates.length, 'topic')} of the car match this signal.` : 'No topic of the car has a type that matches this signal.';
   } catch {
     words = 'The topics could not be loaded: the server does not answer.';
   }

@@ -18,20 +18,20 @@ async function ask() {
 
 /** @param {HTMLElement} root */
 export function mountLicense(root) {
-  const own = text('catgraph: Apache License 2.0', '/static/license.txt', 'The full text could not be fetched; it lies in the file LICENSE of the project.');
+  const own = text('catgraph: Apache License 2.0', '/static/license.txt', 'The full text could not be loaded; it is in the project’s file LICENSE.');
   const list = html('ul', { class: 'parts' });
-  const says = html('p', { role: 'status' }, 'The list is being fetched from the server.');
+  const says = html('p', { role: 'status' }, 'Loading the list…');
   root.replaceChildren(html('div', { class: 'prose' },
     html('p', {}, html('b', {}, 'catgraph is free software under the Apache License, version 2.0.'), ' It comes without any warranty.'),
-    html('p', {}, 'Its numerals and icons are its own drawing, under the same licence.')), own,
-  html('div', { class: 'sec' }, html('span', {}, 'Work of others in it')), html('div', { class: 'prose' }, says), list);
+    html('p', {}, 'Its numerals and icons have the same licence.')), own,
+  html('div', { class: 'sec' }, html('span', {}, 'Third-party parts')), html('div', { class: 'prose' }, says), list);
   let isShown = true;
   ask().then(({ parts }) => {
     if (!isShown) return;
     const [page, server] = ['page', 'server'].map((where) => parts.filter((part) => part.where === where).length);
     setText(says, `${page} in the page, ${server} in the server. Press one for its licence.`);
-    list.replaceChildren(...parts.map((part) => html('li', {}, text(`${part.name} ${part.version}: ${part.license}`, `/api/notices/${encodeURIComponent(part.name)}`, 'The text could not be fetched. Close and open it to try again.'))));
-  }, () => { if (isShown) setText(says, 'The server did not give the list. Go back and try again.'); });
+    list.replaceChildren(...parts.map((part) => html('li', {}, text(`${part.name} ${part.version}: ${part.license}`, `/api/notices/${encodeURIComponent(part.name)}`, 'The text could not be loaded. Close and open it to try again.'))));
+  }, () => { if (isShown) setText(says, 'The server did not send the list. Go back and try again.'); });
   return () => {
     isShown = false;
     root.replaceChildren();
@@ -50,7 +50,7 @@ function text(title, address, failed) {
   let has = false;
   details.addEventListener('toggle', () => {
     if (!details.open || has) return;
-    setText(pre, 'The text is being fetched from the server.');
+    setText(pre, 'Loading the text…');
     fetch(address).then((answer) => (answer.ok ? answer.text() : Promise.reject())).then(
       (found) => {
         has = true;
@@ -69,9 +69,9 @@ function text(title, address, failed) {
 export function mountAbout(root, store) {
   const facts = html('dl', { class: 'facts' });
   root.replaceChildren(html('div', { class: 'prose' },
-    html('p', {}, html('b', {}, 'catgraph watches an autonomous test car and tells you what is wrong.')),
-    html('p', {}, 'It is monitoring with an aid to slow down. It is not an emergency stop: the safety driver stops the car.'),
-    html('p', {}, 'The numbers are those of the car; a value that is old, unknown or not checked looks so.')), facts);
+    html('p', {}, html('b', {}, 'catgraph monitors an autonomous test car and raises alarms.')),
+    html('p', {}, 'It has an aid to slow the car down. It is not an emergency stop: the safety driver stops the car.'),
+    html('p', {}, 'The values are the car’s; an old, unknown or unchecked value is marked as such.')), facts);
   /** @type {About | null} */
   let about = null;
   let isShown = true;
@@ -88,7 +88,7 @@ export function mountAbout(root, store) {
       ['Version', frame.server.version], ['This page', document.documentElement.dataset['version'] ?? NOT_KNOWN], ['Server', location.host],
       ['Vehicle', frame.vehicle ?? '–'], ['Address', frame.session.address ?? 'none'],
       ['ROS', frame.session.ros_version === null ? 'unknown' : String(frame.session.ros_version)],
-      ['Taken for', frame.session.profile ?? 'unknown'], ['Pages', String(frame.server.pages)], ['Frames skipped', String(frame.server.frames_skipped)],
+      ['Vehicle profile', frame.session.profile ?? 'unknown'], ['Pages', String(frame.server.pages)], ['Frames skipped', String(frame.server.frames_skipped)],
       ['Server behind', `${fixed(frame.server.loop_lag_ms, 1)} ms`], ['Run', frame.server.boot.slice(0, 8)],
       ['Without the server', KEEPING[document.documentElement.dataset['shell'] ?? ''] ?? 'not known yet'],
       ['Python', about ? `${about.python}, ${about.system}` : NOT_KNOWN],
@@ -111,8 +111,8 @@ export function mountAbout(root, store) {
 const NOT_KNOWN = '–';
 /** What of this page the phone keeps; shell.js finds out. @type {Record<string, string>} */
 const KEEPING = {
-  kept: 'this phone says so itself: it keeps the page’s shell',
-  missing: 'the browser’s own error: it can keep nothing, or the page came without HTTPS',
-  refused: 'the browser’s own error: it keeps nothing, as while it does not trust the certificate',
-  off: 'the browser’s own error: this server lets phones keep nothing',
+  kept: 'this phone reports it: it stores the page’s shell',
+  missing: 'the browser’s own error: it cannot store the page, or the page has no HTTPS',
+  refused: 'the browser’s own error: it stored nothing, for example because it does not trust the certificate',
+  off: 'the browser’s own error: this server does not allow phones to store the page',
 };

@@ -9,7 +9,7 @@ const NAME = 'catgraph';
 
 /**
  * The worst first; what is not live is never called by its last alarm.
- * @param {import('../core/protocol.js').State | null} frame
+ * @param {import('../core/protocol-types.js').State | null} frame
  * @param {{isSilent: boolean, isMonitoring: boolean, word: string}} seen
  * @returns {Badge}
  */

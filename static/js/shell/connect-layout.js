@@ -18,9 +18,9 @@ export function armWords(what, state) {
   if (state === 'ready') return { tag: 'Ready', kind: 'plain', cost: '' };
   if (state === 'asks') return { tag: 'Asks', kind: 'unk', cost: '' };
   const cost = {
-    sound: 'alarms are seen, not heard',
-    screen: 'the phone may go dark and hide alarms',
-    position: 'phone–car will not be checked',
+    sound: 'alarms are shown without sound',
+    screen: 'the screen may turn off and hide alarms',
+    position: 'phone and car are not compared',
   }[what];
   if (state === 'refused') return { tag: 'Refused', kind: 'warn', cost: `Refused: ${cost}` };
   const why = what === 'sound' ? 'This browser has no sound' : 'Needs HTTPS';
@@ -50,13 +50,13 @@ export function foundIn(answer) {
 
 /**
  * What was pending when the server ended, and how to return to it.
- * @param {import('../core/protocol.js').Session['held']} held
+ * @param {import('../core/protocol-types.js').SessionState['held']} held
  */
 export function heldWords(held) {
   if (!held?.address || (!held.alarms && !held.paused)) return '';
-  const alarms = held.alarms ? `${held.alarms} ${held.alarms === 1 ? 'alarm stood' : 'alarms stood'}` : '';
+  const alarms = held.alarms ? `${held.alarms} ${held.alarms === 1 ? 'alarm was active' : 'alarms were active'}` : '';
   const what = [alarms, held.paused ? 'monitoring was paused' : ''].filter(Boolean).join(' and ');
-  return `The server was restarted while it watched ${bare(held.address)}: ${what}. Connect to it to go on.`;
+  return `The server was restarted while it monitored ${bare(held.address)}: ${what}. Connect to it to continue.`;
 }
 
 /** An address as an operator writes it: without the scheme. @param {string} address */

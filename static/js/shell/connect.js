@@ -115,7 +115,7 @@ class ConnectScreen {
 
   #drawComplaint() {
     const says = field(this.root, 'says');
-    const sentence = this.#complaint || heldWords(this.store.frame?.session.held);
+    const sentence = this.#complaint || heldWords(this.store.frame?.session.held ?? null);
     setWords(says, sentence);
     show(says, sentence !== '');
   }

@@ -2,18 +2,20 @@
 
 import { isAboutLink, layOut } from '../alarms/alarm-layout.js';
 import { drawBigChain } from './chain.js';
-import { field, html, listen, need, setIcon, setText, setWords, show, words } from '../core/dom.js';
+import { field, html, listen, need, setAttribute, setIcon, setText, setWords, show, words } from '../core/dom.js';
+import { areAlarmsInSight } from './layout.js';
 import { isAsked } from './sheet.js';
 import { shownIn } from '../core/units.js';
 import { dialogWords } from '../alarms/standing.js';
+import { keysOf, silentWords } from '../alarms/alarms-layout.js';
 import { age, counted, fixed, timeOfDay } from '../core/format.js';
 
 /** A silent server is covered by the veil at once; the dialog waits for what a change of radio cell takes [s]. */
 const LOST_AFTER_S = 4;
 
 /**
- * @typedef {import('../core/protocol.js').Alarm} Alarm
- * @typedef {import('../core/protocol.js').State} State
+ * @typedef {import('../core/protocol-types.js').StandingAlarm} Alarm
+ * @typedef {import('../core/protocol-types.js').State} State
  * @typedef {{kind: 'alarm', alarm: Alarm} | {kind: 'lost' | 'mute' | 'failed', alarm: Alarm | null}} Dialog
  */
 
@@ -67,6 +69,7 @@ export function mount(store, router) {
   const { alarm, lost, mute, failed } = dialogs.sheets;
   const keys = /** @type {[HTMLElement, string, () => void][]} */ ([
     [alarm, 'acknowledge', () => void dialogs.answer()],
+    [alarm, 'silence', () => void dialogs.silence()],
     [lost, 'retry', () => (store.chain.cut === 2 ? router.reconnect() : router.retry())],
     [lost, 'change', () => router.choose()],
     [lost, 'exit', () => router.exit()],
@@ -118,9 +121,18 @@ class Dialogs {
     this.draw();
   }
 
+  /** No sound for a while: the alarm stays, and waits. */
+  async silence() {
+    const { store } = this;
+    if (this.#standing?.kind !== 'alarm') return;
+    const { id, occurrence } = this.#standing.alarm;
+    const reply = await store.ask('silence', { alarm: id, occurrence });
+    if (!reply.ok) this.router.say(reply.reason ?? 'Refused.', 'Not silenced');
+  }
+
   /** Some browsers close a dialog without `cancel`; what is not acknowledged opens again with the next frame. @param {HTMLDialogElement} sheet */
   closed(sheet) {
-    if (!sheet.isConnected) return; // removed by a page that gave up: nobody acknowledged it
+    if (!sheet.isConnected || sheet.open) return; // removed by a page that gave up, or moved to another place: nobody acknowledged it
     if (this.#standing && this.sheets[this.#standing.kind] === sheet && !this.store.painter.drawing.isFailed) void this.answer();
   }
 
@@ -138,6 +150,9 @@ class Dialogs {
   draw() {
     const standing = this.judge();
     const wanted = standing ? this.sheets[standing.kind] : null;
+    setAttribute(document.body, 'data-asking', standing?.kind === 'alarm' && standing.alarm.priority === 'critical');
+    const place = standing ? placeOf(standing.kind) : document.body;
+    if (wanted?.open && wanted.parentElement !== place) wanted.close(); // the window has another size now
     if (wanted && !wanted.open) {
       for (const sheet of /** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog[open]'))) {
         if (isAsked(sheet)) sheet.close();
@@ -145,22 +160,56 @@ class Dialogs {
     }
     for (const sheet of Object.values(this.sheets)) if (sheet !== wanted && sheet.open) sheet.close();
     if (!standing || !wanted) return;
-    if (standing.kind === 'alarm') fillAlarm(wanted, standing.alarm);
+    if (standing.kind === 'alarm') fillAlarm(wanted, standing.alarm, { isPane: place !== document.body, mayAct: !this.store.isViewer });
     else fillLink(wanted, standing.kind, this.store);
     if (standing.kind === 'lost') setText(field(wanted, 'title'), standing.alarm?.title ?? 'Connection lost');
     if (standing.kind === 'failed') setWords(field(wanted, 'change'), this.router.suggestion ? `Use ${this.router.suggestion}` : 'Change the address');
-    if (!wanted.open) {
-      wanted.showModal();
-      need(wanted, 'button').focus();
-    }
+    if (!wanted.open) raise(wanted, place);
   }
+}
+
+/**
+ * Where a dialog stands: in its pane, where it covers nothing that is to be seen, or over the page.
+ * @param {Dialog['kind']} kind
+ * @returns {HTMLElement}
+ */
+function placeOf(kind) {
+  if (kind === 'failed' || !areAlarmsInSight()) return document.body;
+  return need(document, `#monitor [data-slot="${kind === 'alarm' ? 'alarm' : 'link'}"]`);
+}
+
+/** Which alarm of which occurrence. @param {Pick<Alarm, 'id' | 'occurrence'>} alarm */
+export function headKey({ id, occurrence }) {
+  return `${id} ${occurrence}`;
+}
+
+/** The alarm that stands in the head of its pane, as headKey says it; null: none does. @param {HTMLElement} monitor */
+export function alarmInHead(monitor) {
+  return /** @type {HTMLElement | null} */ (monitor.querySelector('[data-slot="alarm"] > [open]'))?.dataset['alarm'] ?? null;
+}
+
+/**
+ * In its pane it takes no focus: whoever types a number there must not acknowledge by the next key.
+ * @param {HTMLDialogElement} sheet
+ * @param {HTMLElement} place
+ */
+function raise(sheet, place) {
+  if (sheet.parentElement !== place) place.append(sheet);
+  if (place === document.body) {
+    sheet.showModal();
+    need(sheet, 'button').focus();
+  } else sheet.setAttribute('open', '');
 }
 
 /**
  * @param {HTMLElement} sheet
  * @param {Alarm} alarm
+ * @param {{isPane: boolean, mayAct: boolean}} where isPane: at the top of the list of alarms, in place of its row
  */
-function fillAlarm(sheet, alarm) {
+function fillAlarm(sheet, alarm, { isPane, mayAct }) {
+  sheet.dataset['alarm'] = headKey(alarm);
+  for (const name of /** @type {const} */ (['acknowledge', 'silence'])) setAttribute(field(sheet, name), 'aria-label', `${name === 'silence' ? 'Silence' : 'Acknowledge'}: ${alarm.title}`);
+  show(field(sheet, 'silence'), isPane && mayAct && keysOf(alarm).includes('silence'));
   sheet.dataset['priority'] = alarm.priority;
   setIcon(need(sheet, 'h2 .i'), alarm.priority === 'critical' ? 'crit' : 'warn');
   setText(field(sheet, 'title'), alarm.title);
@@ -173,7 +222,7 @@ function fillAlarm(sheet, alarm) {
       setText(field(sheet, `${name}-unit`), unit);
     }
   }
-  setWords(field(sheet, 'text'), dialogWords(alarm));
+  setWords(field(sheet, 'text'), [dialogWords(alarm), isPane ? silentWords(alarm) : ''].filter(Boolean).join(' '));
 }
 
 /**
@@ -210,13 +259,13 @@ export function linkWords(kind, view, frame) {
     return [view.sentence, heard, view.detail];
   }
   const isServer = view.cut === 0;
-  const again = view.cut !== 1 ? view.detail : `The server is there and dials again${link?.attempts ? `; ${counted(link.attempts, 'try', 'tries')} so far` : ''}.`;
+  const again = view.cut !== 1 ? view.detail : `The server is running and dials again${link?.attempts ? `; ${counted(link.attempts, 'try', 'tries')} so far` : ''}.`;
   return [view.sentence, again, `The car may still be moving: watch the car.${isServer || !frame ? '' : savedWords(frame.recording)}`];
 }
 
 /**
  * What became of the recording when the link was lost: said only once it is on the disk and in the list.
- * @param {import('../core/protocol.js').RecordingNow} recording
+ * @param {import('../core/protocol-types.js').RecordingState} recording
  */
 export function savedWords({ state, saved }) {
   if (state === 'saving') return ' The recording is being saved.';

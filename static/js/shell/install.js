@@ -41,7 +41,7 @@ export function mount(say) {
     offer = null; // it can be asked once
     draw();
     const { outcome } = (await asked?.prompt().catch(() => null)) ?? { outcome: 'failed' };
-    if (outcome === 'failed') say('The browser did not ask. Its own menu may offer “Install” too.', 'Not installed');
+    if (outcome === 'failed') say('The browser showed no prompt. Its menu may offer “Install” too.', 'Not installed');
   }
 
   draw();
@@ -66,6 +66,6 @@ function appleSheet() {
   return /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-install', 'aria-labelledby': 'install-title' },
     html('div', { class: 'bd' }, html('h2', { id: 'install-title' }, 'Install on this phone'),
       html('ol', { class: 'steps' }, step('Press Share: the square with the arrow.'), step('Choose “Add to Home Screen”.'), step('Press Add.')),
-      html('p', { class: 'sub' }, 'In Safari, and in other browsers that offer it. The installed page is a page of its own: it may ask anew for the position, and to be paired.')),
+      html('p', { class: 'sub' }, 'In Safari, and in other browsers that offer it. The installed page is separate: it may ask again for the position and for pairing.')),
     html('div', { class: 'keys' }, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
 }

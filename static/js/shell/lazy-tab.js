@@ -3,7 +3,7 @@
 import { field, setText, show } from '../core/dom.js';
 
 /**
- * @typedef {{look?: () => void}} Content what a module mounts; `look` is called whenever another tab or screen comes in front
+ * @typedef {{look?: () => void, stop?: () => void}} Content what a module mounts; `look` is called whenever another tab or screen comes in front
  */
 
 /**
@@ -14,7 +14,7 @@ import { field, setText, show } from '../core/dom.js';
  * @property {() => boolean} isShown
  * @property {() => Promise<Module>} fetch
  * @property {(module: Module) => Content} mount
- * @property {boolean} [isNear] fetch it as soon as an edge of it is seen, for example in a swipe
+ * @property {boolean | undefined} [isNear] fetch it as soon as an edge of it is seen, for example in a swipe
  */
 
 /** @template Module */
@@ -55,7 +55,7 @@ export class LazyTab {
       this.#content = mount(module);
     } catch (error) {
       console.warn(`${what} could not be fetched:`, error);
-      this.#say(`${what} could not be fetched: the server does not answer. Open this tab again.`);
+      this.#say(`${what} could not be loaded: the server does not answer. Open this tab again.`);
     } finally {
       this.#isLoading = false;
     }

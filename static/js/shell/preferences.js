@@ -23,8 +23,8 @@ export function openPreferences() {
  * @param {Loud} sound
  */
 export function trialWords(result, sound) {
-  if (result === 'missing') return 'This browser cannot sound: no alarm will be heard on this phone. Use another browser.';
-  if (result === 'blocked') return 'This phone does not let the page sound: no alarm will be heard. Allow sound for this page, then try again.';
+  if (result === 'missing') return 'This browser has no sound: this phone sounds no alarms. Use another browser.';
+  if (result === 'blocked') return 'This phone blocks the page’s sound: no alarm can be heard. Allow sound for this page, then try again.';
   if (result === 'busy') return 'An alarm sounds now: acknowledge it first.';
   return `Sounding now: ${PULSES[sound]}. If you hear nothing, turn the phone’s media volume up and silent mode off.`;
 }

@@ -25,6 +25,11 @@ export class Router {
   constructor(store, say) {
     this.store = store;
     this.say = say;
+    store.on('switch', () => {
+      this.#closed.clear();
+      this.isChoosing = false;
+      this.answered = this.suggestion = null;
+    });
     this.screens = ['pairing', 'start', 'connect', 'monitor'].map((name) => need(document, `#${name}`));
   }
 
@@ -37,12 +42,12 @@ export class Router {
     this.onShown();
   }
 
-  /** A viewer has seen this alarm: it stays on the strip, and leaves the dialog and the speaker of this phone. @param {import('../core/protocol.js').Alarm} alarm */
+  /** A viewer has seen this alarm: it stays on the strip, and leaves the dialog and the speaker of this phone. @param {import('../core/protocol-types.js').StandingAlarm} alarm */
   closeHere({ id, occurrence }) {
     this.#closed.add(`${id} ${occurrence}`);
   }
 
-  /** The frame without the alarms that were closed here. @template {{alarms: import('../core/protocol.js').Alarm[]} | null} Frame @param {Frame} frame @returns {Frame} */
+  /** The frame without the alarms that were closed here. @template {{alarms: import('../core/protocol-types.js').StandingAlarm[]} | null} Frame @param {Frame} frame @returns {Frame} */
   unclosed(frame) {
     if (!frame || this.#closed.size === 0) return frame;
     return { ...frame, alarms: frame.alarms.filter(({ id, occurrence }) => !this.#closed.has(`${id} ${occurrence}`)) };
@@ -74,7 +79,7 @@ export class Router {
   async retry() {
     if (this.store.isSilent) this.store.socket.hurry();
     else if (!this.store.frame?.session.address) this.choose(); // what was typed is no address: there is nothing to dial
-    else await this.#ask('retry', 'Not tried again');
+    else await this.#ask('retry', 'Not retried');
   }
 
   async reconnect() {
@@ -94,9 +99,10 @@ export class Router {
   }
 
   /**
-   * @param {string} kind
+   * @template {'retry' | 'connect' | 'disconnect'} Kind
+   * @param {Kind} kind
    * @param {string} title
-   * @param {object} [fields]
+   * @param {import('../core/requests.js').FieldsOf<Kind>} [fields]
    */
   async #ask(kind, title, fields) {
     const answer = await this.store.ask(kind, fields);

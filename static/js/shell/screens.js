@@ -1,29 +1,37 @@
 // The screens behind the menu: each slides over the tabs and keeps bar, strip and rail in their places.
 
+import { areAlarmsInSight, floorQuery, isFloor } from './layout.js';
 import { openPreferences } from './preferences.js';
 import { closeSheet, openSheet } from './sheet.js';
-import { field, html, listen, need, setText, show, words } from '../core/dom.js';
+import { field, html, listen, need, setAttribute, setText, show, words } from '../core/dom.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
- * @typedef {(root: HTMLElement, store: Store) => (() => void)} Mount
+ * @typedef {(root: HTMLElement, store: Store, where: {close: () => void, of?: string}) => (() => void)} Mount
  */
 
 // Each is fetched when it is first opened: a page that begins has enough to load.
-const SCREENS = /** @type {Record<string, {title: string, load: () => Promise<Mount>}>} */ ({
-  alarms: { title: 'Alarms', load: async () => (await import('../alarms/alarms.js')).mount },
+const SCREENS = /** @type {Record<string, {title: string, hasHead?: boolean, load: () => Promise<Mount>}>} */ ({
+  alarms: { title: 'Alarms', hasHead: true, load: async () => (await import('../alarms/alarms.js')).mount },
+  check: { title: 'Check', hasHead: true, load: async () => (await import('../alarms/check.js')).mount },
   log: { title: 'Alarm log', load: async () => (await import('../alarms/log.js')).mount },
+  trends: { title: 'Trends', load: async () => (await import('../home/drive-screen.js')).mount },
   signals: { title: 'Signals', load: async () => (await import('../home/signals.js')).mount },
   license: { title: 'License', load: async () => (await import('./about.js')).mountLicense },
   about: { title: 'About', load: async () => (await import('./about.js')).mountAbout },
 });
-const NOT_HERE = still(['This screen could not be fetched from the server. Go back and open it again.']);
+const NOT_HERE = still(['This screen could not be loaded from the server. Go back and open it again.']);
+
+/** Which screens one leads to, and back from. */
+const LEADS = /** @type {Record<string, string[]>} */ ({ alarms: ['check'], check: ['trends'] });
 
 export class Screens {
   /** @type {(() => void) | null} */
   #unmount = null;
   /** @type {string | null} */
   open = null;
+  /** What the open screen is of. @type {string | undefined} */
+  #of;
 
   /**
    * @param {HTMLElement} root the monitor's board
@@ -40,14 +48,28 @@ export class Screens {
       listen(field(root, 'back'), 'click', () => this.show(null)),
       listen(field(root, 'link'), 'click', () => this.show('signals')),
       listen(field(root, 'strip'), 'click', () => this.show(field(root, 'strip').dataset['opens'] ?? 'alarms')),
+      listen(need(root, '.tabs'), 'click', (event) => {
+        const tab = /** @type {HTMLElement | null} */ (event.target.closest('[data-tab]'))?.dataset['tab'];
+        if (!tab || this.open === null) return;
+        event.stopPropagation(); // the screen goes first, and the address of before with it
+        this.#tab(tab);
+      }, { capture: true }),
       listen(field(root, 'screen'), 'click', (event) => {
         const name = /** @type {HTMLElement | null} */ (event.target.closest('button[data-screen]'))?.dataset['screen'];
         if (name) this.show(name); // a key of one screen that leads to another
       }),
-      listen(window, 'popstate', () => this.#set(history.state?.screen ?? null)),
+      listen(floorQuery(), 'change', () => this.#showHead()),
+      listen(window, 'popstate', () => this.#set(history.state?.screen ?? null, history.state?.of)),
+      listen(window, 'catgraph-open', ({ detail: { screen, of } }) => this.show(screen, of)), // any part of the page opens one
+      store.on('switch', () => {
+        const off = store.on('beat', () => {
+          off();
+          this.#again();
+        });
+      }),
       listen(window, 'catgraph-units', () => this.#again()), // what it told stands there in the unit of before
       listen(document, 'keydown', (event) => {
-        if (event.key === 'Escape' && this.open && !document.querySelector('dialog[open]')) this.show(null);
+        if (event.key === 'Escape' && this.open && !document.querySelector('dialog:modal')) this.show(null);
       }),
       ...[.../** @type {NodeListOf<HTMLElement>} */ (this.menu.querySelectorAll('[data-screen]'))].map((key) => listen(key, 'click', () => {
         closeSheet(this.menu);
@@ -61,15 +83,22 @@ export class Screens {
   }
 
   /**
-   * Open a screen, or with null go back to the tabs. The phone's back key does the same.
+   * Open a screen, or with null go back to where it was opened. The phone's back key does the same.
+   * What is opened from the list of alarms or from a check leads back to it.
    * @param {string | null} name
+   * @param {string} [of]
    */
-  show(name) {
-    if (name === this.open) return;
-    if (name === null) history.back();
+  show(name, of) {
+    if (name === this.open && of === this.#of) return;
+    const stage = /** @type {HTMLElement | null} */ (this.root.querySelector('[data-part="trends"] .trends-stage')); // in its pane
+    if (name === 'alarms' && areAlarmsInSight()) field(this.root, 'pane-alarms').focus();
+    else if (name === 'trends' && areAlarmsInSight() && stage?.checkVisibility()) stage.focus();
+    else if (name === null) history.back();
     else {
-      history[this.open ? 'replaceState' : 'pushState']({ screen: name }, '');
-      this.#set(name);
+      const depth = history.state?.depth ?? 0;
+      const isDeeper = this.open === null || LEADS[this.open]?.includes(name) === true;
+      history[isDeeper ? 'pushState' : 'replaceState']({ screen: name, of, depth: isDeeper ? depth + 1 : depth }, '');
+      this.#set(name, of);
     }
   }
 
@@ -79,28 +108,37 @@ export class Screens {
     if (this.open === null) go();
     else {
       window.addEventListener('popstate', go, { once: true });
-      this.show(null);
+      history.go(-(history.state?.depth ?? 1));
     }
   }
 
-  /** @param {string | null} name */
-  #set(name) {
-    if (name === this.open) return;
+  /** @param {string | null} name @param {string} [of] */
+  #set(name, of) {
+    if (name === this.open && of === this.#of) return;
     this.#unmount?.();
     this.#unmount = null;
     const screen = name === null ? undefined : SCREENS[name];
     this.open = screen ? name : null;
+    this.#of = screen ? of : undefined;
     const place = field(this.root, 'screen');
     show(place, screen !== undefined);
-    show(need(this.root, '.titlebar'), screen !== undefined);
-    show(need(this.root, '.tabs'), screen === undefined);
+    this.#showHead();
     if (screen) {
       setText(field(this.root, 'title'), name === 'log' && this.store.replaying ? 'Alarm log of the live car' : screen.title);
       place.scrollTop = 0;
       this.#fill(place, screen.load);
-      field(this.root, 'title').focus();
+      if (!screen.hasHead) field(this.root, 'title').focus();
     }
     this.onChange(this.open);
+  }
+
+  /** One with a head of its own leaves the tabs in sight; so does any where it is a drawer among the panes. */
+  #showHead() {
+    const screen = this.open === null ? undefined : SCREENS[this.open];
+    const isTitled = screen !== undefined && !screen.hasHead;
+    setAttribute(this.root, 'data-over', screen === undefined ? null : isTitled ? 'titled' : 'headed');
+    show(need(this.root, '.titlebar'), isTitled);
+    show(need(this.root, '.tabs'), !isTitled || isFloor());
   }
 
   /** The open screen, written anew. */
@@ -117,10 +155,13 @@ export class Screens {
    * @param {() => Promise<Mount>} load
    */
   async #fill(place, load) {
-    const { open } = this;
+    const open = this.open;
+    const of = this.#of;
     place.replaceChildren();
     const mount = await load().catch(() => NOT_HERE);
-    if (this.open === open && !this.#unmount) this.#unmount = mount(place, this.store);
+    if (this.open !== open || this.#of !== of || this.#unmount) return;
+    this.#unmount = mount(place, this.store, { close: () => this.show(null), ...(of === undefined ? {} : { of }) });
+    if (SCREENS[open ?? '']?.hasHead) place.querySelector('h2')?.focus();
   }
 }
 

@@ -16,11 +16,11 @@ export function closeSheet(sheet) {
 }
 
 /** Sheets opened by the operator, which give way to an alarm. */
-const ASKED = ['sheet-menu', 'sheet-history', 'sheet-shelve', 'sheet-stop', 'sheet-preferences', 'sheet-topic', 'sheet-profile', 'sheet-reset', 'sheet-chart'];
+const ASKED = ['sheet-menu', 'sheet-history', 'sheet-shelve', 'sheet-stop', 'sheet-preferences', 'sheet-topic', 'sheet-profile', 'sheet-reset'];
 
 /** @param {HTMLDialogElement} sheet */
 export function isAsked(sheet) {
-  return sheet.dataset['asked'] !== undefined || ASKED.includes(sheet.id);
+  return (sheet.dataset['asked'] !== undefined || ASKED.includes(sheet.id)) && sheet.dataset['docked'] === undefined; // what is docked covers nothing
 }
 
 export function mountSheets() {

@@ -2,6 +2,7 @@
 
 import { layOut } from '../alarms/alarm-layout.js';
 import { html, icon, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
+import { areAlarmsInSight } from './layout.js';
 import { openShelve } from '../alarms/shelve.js';
 import { snackWords } from '../alarms/standing.js';
 
@@ -19,7 +20,7 @@ export function mount(root, store, say) {
   const bar = html('div', { class: 'snack', role: 'status', hidden: true, 'data-f': 'warning' }, html('div', { class: 'side' }, mark),
     html('div', { class: 'tx' }, title, text), html('div', { class: 'ac' }, shelve, acknowledge));
   root.append(bar);
-  /** @type {import('../core/protocol.js').Alarm | null} */
+  /** @type {import('../core/protocol-types.js').StandingAlarm | null} */
   let shown = null;
 
   acknowledge.addEventListener('click', async () => {
@@ -30,7 +31,7 @@ export function mount(root, store, say) {
   shelve.addEventListener('click', () => shown && openShelve(store, shown, say));
 
   function draw() {
-    const isListed = document.querySelector('.screen:not([hidden]) [data-f="alarms"]') !== null; // with keys of its own, which this would cover
+    const isListed = areAlarmsInSight() || document.querySelector('.screen:not([hidden]) [data-f="alarms"]') !== null; // with keys of its own, which this would cover
     const waiting = store.isSilent || !store.frame || store.replaying || isListed ? [] : layOut(store.frame.alarms).snackbars;
     shown = waiting[0] ?? null;
     show(bar, shown !== null);

@@ -21,6 +21,7 @@ export function mount(root, store) {
     });
     setAttribute(strip, 'data-kind', seen.kind || null);
     setAttribute(strip, 'data-returned', seen.hasReturned);
+    setAttribute(strip, 'data-known', seen.isKnown);
     setAttribute(strip, 'data-opens', seen.opens);
     setIcon(mark, seen.icon);
     setWords(text, seen.text);

@@ -1,44 +1,44 @@
-// The tabs whose content is fetched when they first come to the front.
+// What fills each tab when it first comes to the front; the tabs themselves are declared in server/web/tabs.py.
 
 import { need } from '../core/dom.js';
 import { LazyTab } from './lazy-tab.js';
 
 /**
+ * @typedef {object} TabPage what a tab is given
+ * @property {import('../core/store.js').Store} store
+ * @property {ReturnType<typeof import('./notice.js').notices>} say
+ * @property {() => boolean} isFront whether any of the tab can be seen now
+ *
+ * @typedef {object} TabModule
+ * @property {(panel: HTMLElement, page: TabPage) => import('./lazy-tab.js').Content} mount
+ *
+ * @typedef {object} Row
+ * @property {() => Promise<TabModule>} fetch
+ * @property {string} [state] the field that says that it could not be fetched, where it is not NAME-state
+ * @property {boolean} [isNear] fetch it as soon as an edge of it is seen, for example in a swipe
+ */
+
+/** Home is part of the page itself. @type {Record<string, Row>} */
+const CONTENTS = {
+  map: { fetch: () => import('../map/map.js'), state: 'none-words', isNear: true },
+  scan: { fetch: () => import('../scan/scan.js'), state: 'none-words' },
+  files: { fetch: () => import('../files/files.js') },
+  settings: { fetch: () => import('../settings/settings.js') },
+};
+
+/**
  * @param {HTMLElement} monitor
- * @param {import('../core/store.js').Store} store
- * @param {ReturnType<typeof import('./notice.js').notices>} say
+ * @param {TabPage['store']} store
+ * @param {TabPage['say']} say
  * @param {(name: string) => boolean} isFront
  */
 export function tabContents(monitor, store, say, isFront) {
-  const panel = (/** @type {string} */ name) => need(monitor, `[data-panel="${name}"]`);
-  const shown = (/** @type {string} */ name) => () => isFront(name);
-  return [
-    new LazyTab(panel('scan'), {
-      what: 'The scan', state: 'none-words', isShown: shown('scan'), fetch: () => import('../scan/scan.js'),
-      mount: ({ mount }) => {
-        const scan = mount(panel('scan'), store);
-        const look = () => scan.setFront(isFront('scan')); // sent and drawn only while it is in front
-        look();
-        return { look };
-      },
-    }),
-    new LazyTab(panel('map'), {
-      what: 'The map', state: 'none-words', isShown: shown('map'), isNear: true, fetch: () => import('../map/map.js'),
-      mount: ({ mount }) => {
-        mount(panel('map'), store, shown('map'), say);
-        return {};
-      },
-    }),
-    new LazyTab(panel('files'), {
-      what: 'The recordings', state: 'files-state', isShown: shown('files'), fetch: () => import('../files/files.js'),
-      mount: ({ mount }) => mount(panel('files'), store, say, shown('files')),
-    }),
-    new LazyTab(panel('settings'), {
-      what: 'The settings', state: 'settings-state', isShown: shown('settings'), fetch: () => import('../settings/settings.js'),
-      mount: ({ mount }) => {
-        mount(panel('settings'), store, say, shown('settings'));
-        return {};
-      },
-    }),
-  ];
+  return Object.entries(CONTENTS).map(([name, { fetch, state, isNear }]) => {
+    const panel = need(monitor, `[data-panel="${name}"]`);
+    const page = { store, say, isFront: () => isFront(name) };
+    return new LazyTab(panel, {
+      what: panel.dataset['what'] ?? name, state: state ?? `${name}-state`, isShown: page.isFront, isNear, fetch,
+      mount: ({ mount }) => mount(panel, page),
+    });
+  });
 }

@@ -1,11 +1,9 @@
-// The five tabs: swiped natively, pressed, reached by arrow keys or by a deep link, and remembered.
+// The tabs, which the server declares: swiped natively, pressed, reached by arrow keys or by a deep link, and remembered.
 
 import { field, listen, setAttribute } from '../core/dom.js';
+import { floorQuery, isFloor } from './layout.js';
 
-export const TABS = /** @type {const} */ (['home', 'map', 'scan', 'files', 'settings']);
 const REMEMBERED = 'catgraph.tab';
-/** From this width on tabs may stand side by side (wide.css): below it no size need be asked for, which has all laid out. */
-const SIDE_BY_SIDE = '(min-width: 760px)';
 /** So long after the last finger and the last movement the tabs are at rest [ms]. */
 const FOLD_AFTER_MS = 700;
 
@@ -13,9 +11,9 @@ const FOLD_AFTER_MS = 700;
  * Which tab a key leads to, or null where it is none of ours.
  * @param {string} key
  * @param {number} index of the tab in front
+ * @param {number} last index
  */
-export function tabByKey(key, index) {
-  const last = TABS.length - 1;
+export function tabByKey(key, index, last) {
   if (key === 'ArrowRight') return Math.min(last, index + 1);
   if (key === 'ArrowLeft') return Math.max(0, index - 1);
   if (key === 'Home') return 0;
@@ -26,9 +24,22 @@ export function tabByKey(key, index) {
 /**
  * The tab a link names: "#map" is 1; −1 where it names none.
  * @param {string} hash
+ * @param {string[]} names
  */
-export function tabByHash(hash) {
-  return TABS.findIndex((tab) => `#${tab}` === hash.toLowerCase());
+export function tabByHash(hash, names) {
+  return names.findIndex((tab) => `#${tab}` === hash.toLowerCase());
+}
+
+/**
+ * Which tabs can be seen: of panes all at once, unless a page takes their place or a drawer stands over those beside Home.
+ * @param {{name: string, wide: string}[]} tabs
+ * @param {number} index of the tab in front
+ * @param {boolean} hasPanes
+ */
+export function tabsInSight(tabs, index, hasPanes) {
+  const front = tabs[index];
+  if (!hasPanes || !front || front.wide === 'page') return front ? [front.name] : [];
+  return tabs.filter((tab, i) => i === index || (tab.wide === 'pane' && (front.wide === 'pane' || tab === tabs[0]))).map(({ name }) => name);
 }
 
 /** The tabs; `onFront` hears which is in front, from the start on. */
@@ -41,12 +52,15 @@ export class Tabs {
    * @param {() => void} onFront
    */
   constructor(root, onFront) {
+    this.root = root;
     this.pager = field(root, 'pager');
-    this.buttons = TABS.map((tab) => /** @type {HTMLElement} */ (root.querySelector(`[data-tab="${tab}"]`)));
-    this.panels = TABS.map((tab) => /** @type {HTMLElement} */ (root.querySelector(`[data-panel="${tab}"]`)));
+    this.buttons = [.../** @type {NodeListOf<HTMLElement>} */ (root.querySelectorAll('[data-tab]'))];
+    this.names = this.buttons.map((button) => button.dataset['tab'] ?? '');
+    this.tabs = this.buttons.map((button) => ({ name: button.dataset['tab'] ?? '', wide: button.dataset['wide'] ?? '' }));
+    this.panels = this.names.map((tab) => /** @type {HTMLElement} */ (root.querySelector(`[data-panel="${tab}"]`)));
     this.onFront = onFront;
-    const wanted = tabByHash(location.hash);
-    this.index = wanted >= 0 ? wanted : Math.max(0, TABS.indexOf(/** @type {any} */ (remembered())));
+    const wanted = tabByHash(location.hash, this.names);
+    this.index = wanted >= 0 ? wanted : Math.max(0, this.names.indexOf(remembered() ?? ''));
     this.stops = [
       ...this.buttons.map((button, i) => listen(button, 'click', () => this.go(i))),
       ...this.buttons.map((button) => listen(button, 'keydown', (event) => this.#key(event))),
@@ -54,9 +68,10 @@ export class Tabs {
       listen(this.pager, 'pointerdown', () => this.#unfold(), { passive: true }),
       listen(this.pager, 'wheel', () => this.#unfold(), { passive: true }),
       listen(window, 'hashchange', () => this.#linked()),
+      listen(floorQuery(), 'change', () => this.#relaid()),
       listen(window, 'resize', () => root.hidden || this.place()), // a page that begins is told of its size: nothing is shown yet
     ];
-    this.#bring(this.index);
+    this.#bring(this.#laid(this.index));
     this.#fold();
   }
 
@@ -68,22 +83,29 @@ export class Tabs {
 
   /** The pager has a size only once it is shown: put the tab in front where it belongs, without a movement. */
   place() {
-    const isFirst = this.index === 0 && !this.#isPlaced; // it is there already: no need to have it all laid out for that
-    if (!isFirst && !this.pager.clientWidth) return;
-    if (!isFirst) this.pager.scrollTo({ left: this.#leftOf(this.index), behavior: 'instant' });
+    const isThere = isFloor() || (this.index === 0 && !this.#isPlaced); // no need to have it all laid out for that
+    if (!isThere && !this.pager.clientWidth) return;
+    if (!isThere) this.pager.scrollTo({ left: this.#leftOf(this.index), behavior: 'instant' });
     this.#isPlaced = true;
     this.#still();
     this.#fold();
     this.onFront();
   }
 
-  /** What is out of sight is out of reach of keys and readers, and its tab is not marked. */
+  /** A pane has no tab of its own where all stand side by side: Home's stands for it. @param {number} index */
+  #laid(index) {
+    return isFloor() && this.tabs[index]?.wide === 'pane' ? 0 : index;
+  }
+
+  /** The window became a floor, or is one no more. */
+  #relaid() {
+    this.#bring(this.#laid(this.index));
+    this.place();
+  }
+
+  /** What is out of sight is out of reach of keys and readers. */
   #still() {
-    this.panels.forEach((panel, i) => {
-      const isShown = this.shows(TABS[i] ?? 'home');
-      setAttribute(panel, 'inert', !isShown);
-      setAttribute(this.buttons[i] ?? panel, 'data-shown', isShown); // on a wide screen several are
-    });
+    this.panels.forEach((panel, i) => setAttribute(panel, 'inert', !this.shows(this.names[i] ?? '')));
   }
 
   /** What is out of sight is neither laid out nor painted: half of what the page costs. @type {ReturnType<typeof setTimeout> | undefined} */
@@ -103,9 +125,15 @@ export class Tabs {
 
   /**
    * Show a tab.
-   * @param {number} index
+   * @param {number} wanted
    */
-  go(index) {
+  go(wanted) {
+    const index = this.#laid(wanted);
+    if (isFloor()) {
+      this.#bring(index);
+      this.#fold();
+      return;
+    }
     this.#unfold();
     this.#bring(index);
     const isStill = matchMedia('(prefers-reduced-motion: reduce)').matches;
@@ -113,18 +141,18 @@ export class Tabs {
     this.#aim = index;
   }
 
-  /** Is any of this tab to be seen? On a wide screen several stand side by side. @param {string} tab */
+  /** Is any of this tab to be seen? @param {string} tab */
   shows(tab) {
-    if (this.front === tab) return true;
-    if (!matchMedia(SIDE_BY_SIDE).matches) return false;
-    const panel = this.panels[TABS.indexOf(/** @type {any} */ (tab))];
-    if (!panel || !this.pager.clientWidth || panel.clientWidth > this.pager.clientWidth - 40) return false;
-    const left = this.#leftOf(this.panels.indexOf(panel)) - this.pager.scrollLeft;
-    return left > -panel.clientWidth + 40 && left < this.pager.clientWidth - 40;
+    return tabsInSight(this.tabs, this.index, isFloor()).includes(tab);
+  }
+
+  /** The tabs that have a key now, from the left. */
+  get order() {
+    return this.tabs.map((_, i) => i).filter((i) => this.#laid(i) === i);
   }
 
   get front() {
-    return TABS[this.index] ?? 'home';
+    return this.names[this.index] ?? '';
   }
 
   /** Where a press is scrolling to; what it passes on its way is not in front. @type {number | null} */
@@ -136,7 +164,7 @@ export class Tabs {
   }
 
   #scrolled() {
-    if (!this.#isPlaced || !this.pager.clientWidth) return;
+    if (!this.#isPlaced || isFloor() || !this.pager.clientWidth) return;
     const { scrollLeft } = this.pager;
     if (Math.abs(this.#leftOf(this.index) - scrollLeft) > 1) this.#unfold();
     const nearest = this.panels.reduce((best, _, i) =>
@@ -151,15 +179,17 @@ export class Tabs {
 
   /** @param {KeyboardEvent} event */
   #key(event) {
-    const index = tabByKey(event.key, this.index);
-    if (index === null) return;
+    const { order } = this;
+    const place = tabByKey(event.key, order.indexOf(this.index), order.length - 1);
+    if (place === null) return;
+    const index = order[place] ?? 0;
     event.preventDefault();
     this.go(index);
     this.buttons[index]?.focus();
   }
 
   #linked() {
-    const index = tabByHash(location.hash);
+    const index = tabByHash(location.hash, this.names);
     if (index >= 0 && index !== this.index) this.go(index);
   }
 
@@ -174,8 +204,10 @@ export class Tabs {
     this.index = index;
     if (index === this.#front) return;
     this.#front = index;
+    setAttribute(this.root, 'data-front', this.names[index] ?? '');
+    setAttribute(this.root, 'data-wide', this.tabs[index]?.wide ?? '');
     this.#still();
-    const tab = TABS[index] ?? 'home';
+    const tab = this.names[index] ?? '';
     this.buttons.forEach((button, i) => {
       setAttribute(button, 'aria-selected', String(i === index));
       setAttribute(button, 'tabindex', i === index ? 0 : -1);

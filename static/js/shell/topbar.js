@@ -1,23 +1,27 @@
-// The top bar: the chain with its word and age, the recorder and its key in the menu. Who is in control: control.js.
+// The top bar: the chain with its word and age, the recorder and its key in the menu. Which car, and who is in control: cars.js, control.js.
 
 import { drawChain } from './chain.js';
 import { field, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { closeSheet } from './sheet.js';
-import { age, duration } from '../core/format.js';
+import { age, duration, timeOfDay } from '../core/format.js';
+import { write } from '../core/ink.js';
+import { speedUnit, speedWords } from '../core/units.js';
 
 /**
  * What stands beside the recording dot, and what the menu's key orders: to record, to end it, or nothing now.
- * @param {import('../core/protocol.js').RecordingNow} recording
+ * @param {import('../core/protocol-types.js').RecordingState} recording
  * @param {boolean} isSilent the server is, so that nobody knows whether it records
  */
 export function recordingWords({ state, for_s, reason }, isSilent) {
-  if (isSilent) return { isOn: false, text: '?', title: 'The server does not answer: it is unknown whether it records.', order: null };
+  if (isSilent) return { isOn: false, text: '?', title: 'The server does not answer: the recording state is unknown.', order: null };
   const title = `Recording ${state === 'recording' ? 'now' : state}.${reason ? ` ${reason}` : ''}`;
   if (state === 'off') return { isOn: false, text: 'off', title, order: true };
   if (state === 'stopped') return { isOn: false, text: 'fault', title, order: true };
   if (state === 'saving') return { isOn: false, text: 'saving', title, order: null };
   if (state === 'held') return { isOn: false, text: 'held', title, order: false };
-  return { isOn: true, text: duration(for_s ?? 0, true), title, order: false };
+  const whole_s = for_s ?? 0;
+  const text = whole_s < 3600 ? duration(whole_s, true) : `${duration(whole_s).slice(0, -3)} h`;
+  return { isOn: true, text, title, order: false };
 }
 
 /**
@@ -32,7 +36,8 @@ export function mount(root, store, say) {
   let order = null;
   const chain = field(root, 'small-chain');
   const [link, word, wordAge, rec, recFor] = ['link', 'word', 'word-age', 'rec', 'rec-for'].map((name) => field(root, name));
-  if (!link || !word || !wordAge || !rec || !recFor) throw new Error('The template lacks the top bar');
+  const [clock, speed, speedU] = ['clock', 'bar-speed', 'bar-speed-unit'].map((name) => field(root, name));
+  if (!link || !word || !wordAge || !rec || !recFor || !clock || !speed || !speedU) throw new Error('The template lacks the top bar');
 
   function draw() {
     const view = store.chain;
@@ -41,6 +46,10 @@ export function mount(root, store, say) {
     const since = view.age_s === null ? '' : ` ${age(view.age_s)} s`;
     setWords(wordAge, since.trim());
     setAttribute(link, 'aria-label', `${view.word}${since}: the link to the car. ${view.sentence}`); // begins with what is seen
+    setText(clock, timeOfDay(Date.now()));
+    const speed_mps = store.signal('speed')?.value?.speed_mps;
+    const isKnown = typeof speed_mps === 'number';
+    write(speed, store.ink('speed').ink, isKnown ? speedWords(speed_mps)[0] ?? '–' : '–', speedU, isKnown ? speedUnit() : '');
     const { frame } = store;
     if (!frame) return;
     const recording = recordingWords((store.heeded ?? frame).recording, store.isSilent); // of the car now, whatever is replayed
@@ -54,8 +63,9 @@ export function mount(root, store, say) {
 
   async function obey() {
     closeSheet(menu);
+    if (order === null) return;
     const answer = await store.ask('record', { on: order });
-    if (!answer.ok) say(answer.reason ?? 'Refused.', order ? 'Not recording' : 'The recording goes on');
+    if (!answer.ok) say(answer.reason ?? 'Refused.', order ? 'Not recording' : 'Recording continues');
   }
 
   if (store.frame) draw(); // before the first frame it is not shown

@@ -2,7 +2,7 @@
 // 2 s after the last completed drawing (frame.css), whatever becomes of the scripts. This script is sooner and names the alarms.
 // It uses as little of the browser as it can, and of everything several kinds: each line must be expected to throw.
 
-/** @typedef {import('../core/protocol.js').State} State */
+/** @typedef {import('../core/protocol-types.js').State} State */
 
 const UNNAMED = 'Alarms may be missing here.';
 const MOST_NAMED = 3;

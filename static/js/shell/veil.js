@@ -12,7 +12,7 @@ const RECORDED = { recording: 'it was recording', held: 'saved', saving: 'it was
 
 /**
  * The last values, told as what they are.
- * @param {import('../core/protocol.js').State | null} frame
+ * @param {import('../core/protocol-types.js').State | null} frame
  */
 export function thenWords(frame) {
   const speed_mps = frame?.signals.speed?.value?.speed_mps;
@@ -49,7 +49,7 @@ export function mount(root, store) {
   mirror(veil, 'data-told', () => sheets.some((sheet) => sheet.hasAttribute('open')), sheets, { attributeFilter: ['open'] });
   const proof = new DrawProof();
   let beat = 0;
-  /** @type {import('../core/protocol.js').State | null} */
+  /** @type {import('../core/protocol-types.js').State | null} */
   let seen = null;
   let written = '';
   let isDrawn = false;
@@ -73,6 +73,7 @@ export function mount(root, store) {
   function draw() {
     const kind = veilOf(store);
     setAttribute(veil, 'data-on', kind);
+    setAttribute(need(root, '.view'), 'data-veil', kind);
     if (kind === null && plate.hidden && !isDrawn) {
       isDrawn = true; // the first values come before the texts of the veil: those are drawn with the next frame
       return;
@@ -84,7 +85,7 @@ export function mount(root, store) {
     show(chain, !isUnsaid);
     drawBigChain(chain, view);
     setWords(title, isUnsaid || view.age_s === null ? 'Stale' : `${view.word === 'Waking' ? 'Waking' : `Stale ${age(view.age_s)} s`}`);
-    const [bold, plain] = isUnsaid ? ['Nothing new has been drawn.', 'The page or the server has stopped. Watch the car.'] : [view.sentence, detailOf(view)];
+    const [bold, plain] = isUnsaid ? ['The display is not updating.', 'The page or the server has stopped. Watch the car.'] : [view.sentence, detailOf(view)];
     if (written !== `${bold}|${plain}`) {
       sentence.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
       written = `${bold}|${plain}`;
@@ -92,8 +93,7 @@ export function mount(root, store) {
     setWords(then, thenWords(store.frame));
     const recording = RECORDED[store.frame?.recording.state ?? 'off'] ?? '';
     setText(rec, recording);
-    show(recName, recording !== '');
-    show(rec, recording !== '');
+    for (const part of [recName, rec]) show(part, recording !== '');
   }
 
   if (store.frame) draw(); // before the first frame it is not shown

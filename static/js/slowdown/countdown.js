@@ -1,7 +1,7 @@
 // The banner of a slow-down that starts automatically: over everything, with a key that vetoes it.
 
 import { field, listen, need, setText, setWords, show } from '../core/dom.js';
-import { countdownOf } from './slow-layout.js';
+import { countdownOf, nameOf } from './slow-layout.js';
 import { ANSWER_MS } from './slow-slides.js';
 
 /** The banner may appear under a finger: a press this soon after is not meant for it [ms]. */
@@ -47,6 +47,8 @@ export class Countdown {
     setText(at('left'), coming.left_s.toFixed(1));
     at('bar').style.transform = `scaleX(${Math.min(1, coming.left_s / Math.max(0.1, this.#from_s)).toFixed(3)})`;
     this.veto.dataset['trigger'] = coming.trigger;
+    this.veto.dataset['vehicle'] = store.vehicle;
+    setText(at('car'), nameOf(store.vehicle) || 'the car');
     show(this.veto, !store.isViewer);
     show(at('viewer'), store.isViewer);
     this.#raise();
@@ -55,7 +57,7 @@ export class Countdown {
   /** Puts the banner above every dialog that opened since, an alarm's sheet included. */
   #raise() {
     const { banner } = this;
-    const others = document.querySelectorAll('dialog[open]:not(#sheet-countdown)');
+    const others = document.querySelectorAll('dialog[open]:not(#sheet-countdown, [data-docked])');
     const key = [...others].map(({ id }) => id).join();
     if (banner.open && banner.dataset['over'] === key) return;
     banner.dataset['over'] = key;
@@ -66,7 +68,7 @@ export class Countdown {
   async #veto() {
     if (performance.now() - this.#shown_ms < MEANT_MS) return;
     const trigger = this.veto.dataset['trigger'] ?? '';
-    const answer = await this.store.ask('veto', { trigger }, ANSWER_MS);
+    const answer = await this.store.ask('veto', { trigger, vehicle: this.veto.dataset['vehicle'] || null }, ANSWER_MS);
     if (answer.ok) {
       this.#vetoed = trigger;
       this.banner.close();

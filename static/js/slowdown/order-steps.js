@@ -3,7 +3,7 @@
 import { field, html, icon, need, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
 import { orderWords, stepsOf } from './slow-layout.js';
 
-/** @typedef {import('../core/protocol.js').SlowOrder} SlowOrder */
+/** @typedef {import('../core/protocol-types.js').SlowDownOrder} SlowOrder */
 
 const STEPS = 4;
 const MARKS = { ok: 'ok', wait: 'unknown', crit: 'crit' };
@@ -20,6 +20,7 @@ export class OrderSteps {
     this.live = field(root, 'order-said');
     this.rows = Array.from({ length: STEPS }, () => ({ mark: icon('unknown', 's'), label: html('span', { class: 'lab' }), value: html('b') }))
       .map((row) => ({ ...row, item: html('li', {}, row.mark, row.label, row.value) }));
+    store.on('switch', () => { this.#announced = ''; }); // the other car was not released
     need(this.steps, 'ol').append(...this.rows.map(({ item }) => item));
   }
 
@@ -38,7 +39,7 @@ export class OrderSteps {
     });
     const words = orderWords(order, this.store.isSilent ? 0 : this.store.lag_s);
     setAttribute(this.steps, 'data-kind', words.kind || null);
-    setWords(this.line, words.text);
+    setWords(this.line, this.store.vehicles.length > 1 ? `${this.store.vehicle}: ${words.text}` : words.text);
   }
 
   /** Announces each change of the order once. @param {SlowOrder | null} order */

@@ -1,7 +1,7 @@
 // The key that releases the car from a slow-down, and the sheet that confirms it.
 
 import { field, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
-import { holdOf, releaseOf, seenOf } from './slow-layout.js';
+import { holdOf, nameOf, releaseOf, seenOf } from './slow-layout.js';
 
 export class ReleaseKey {
   /**
@@ -30,7 +30,7 @@ export class ReleaseKey {
     show(this.key, hold !== null);
     setText(this.label, label);
     setAttribute(this.key, 'data-barred', !can || null);
-    if (this.sheet.open && (!hold || String(hold.number) !== this.sheet.dataset['order'] || !can)) this.sheet.close();
+    if (this.sheet.open && (!hold || String(hold.number) !== this.sheet.dataset['order'] || this.sheet.dataset['vehicle'] !== this.store.vehicle || !can)) this.sheet.close();
   }
 
   #confirm() {
@@ -38,17 +38,20 @@ export class ReleaseKey {
     const hold = holdOf(seen.now);
     const { can, why } = releaseOf(seen);
     if (!hold) return;
-    if (!can) return this.say(why, 'Not released', seen.isViewer ? undefined : { label: 'Ask for control', act: () => void this.control.order('request') });
+    if (!can) return this.say(why, 'Not released', seen.isViewer ? undefined : { label: 'Request control', act: () => void this.control.order('request') });
     this.sheet.dataset['order'] = String(hold.number);
+    this.sheet.dataset['vehicle'] = this.store.vehicle;
+    setText(field(this.sheet, 'release-title'), `Release ${nameOf(this.store.vehicle) || 'the car'}?`);
     const standing = this.store.frame?.alarms.filter((alarm) => alarm.priority === 'critical' && alarm.active) ?? [];
-    setWords(field(this.sheet, 'alarms'), standing.length ? `Still standing: ${standing.map(({ title }) => title).join(', ')}.` : '');
+    setWords(field(this.sheet, 'alarms'), standing.length ? `Still active: ${standing.map(({ title }) => title).join(', ')}.` : '');
     if (!this.sheet.open) this.sheet.showModal();
   }
 
   async #release() {
     const number = Number(this.sheet.dataset['order']);
+    const { vehicle = '' } = this.sheet.dataset;
     this.sheet.close();
-    const answer = await this.store.ask('release', { number });
+    const answer = await this.store.ask('release', { number, vehicle: vehicle || null });
     if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Not released');
   }
 }

@@ -9,7 +9,7 @@ const ENDS_PX = 8;
 const HINT_MS = 2500;
 const HINTS = /** @type {const} */ ({ tap: ['Do not tap:', 'slide it'], short: ['Slide it', 'to the end'] });
 
-/** @typedef {{kind: 'off' | 'armed' | 'go', title: string, why: string, label: string}} View */
+/** @typedef {{kind: 'off' | 'armed' | 'go', title: string, why: string, label: string, vehicle?: string}} View vehicle: the car whose name stands on it */
 
 export class SlideKey {
   /** @type {View} */
@@ -22,7 +22,7 @@ export class SlideKey {
 
   /**
    * @param {HTMLElement} slide
-   * @param {{press: () => void, order: (at_ms: number) => void}} on press: pressed while off; order: slid to the end, with the time of the release
+   * @param {{press: () => void, order: (at_ms: number, vehicle: string) => void}} on press: pressed while off; order: slid to the end, with the time of the release and the car that was named
    */
   constructor(slide, on) {
     this.gesture = new Slide();
@@ -42,7 +42,7 @@ export class SlideKey {
 
   /** @param {View} view */
   draw(view) {
-    if (view.kind !== this.#view.kind) this.#rest();
+    if (view.kind !== this.#view.kind || view.vehicle !== this.#view.vehicle) this.#rest(); // no gesture is carried over to another car
     if (view.kind !== 'armed') this.#hint = null;
     this.#view = view;
     setAttribute(this.slide, 'data-kind', view.kind);
@@ -77,7 +77,7 @@ export class SlideKey {
   /** @param {import('./slide-layout.js').Outcome} outcome @param {number} at_ms */
   #end(outcome, at_ms) {
     this.#place();
-    if (outcome === 'order') this.on.order(at_ms);
+    if (outcome === 'order') this.on.order(at_ms, this.#view.vehicle ?? '');
     else if (outcome) {
       this.#hint = HINTS[outcome];
       clearTimeout(this.#hinting);

@@ -4,9 +4,9 @@ import { speedWords } from '../core/units.js';
 import { age, fixed, timeOfDay } from '../core/format.js';
 
 /**
- * @typedef {import('../core/protocol.js').Decelerate} Decelerate
- * @typedef {import('../core/protocol.js').SlowOrder} SlowOrder
- * @typedef {import('../core/protocol.js').Guard} Guard
+ * @typedef {import('../core/protocol-types.js').SlowDownState} Decelerate
+ * @typedef {import('../core/protocol-types.js').SlowDownOrder} SlowOrder
+ * @typedef {import('../core/protocol-types.js').GuardState} Guard
  *
  * @typedef {object} Seen what decides how the slow-down looks on this page
  * @property {Decelerate | null} now
@@ -15,6 +15,8 @@ import { age, fixed, timeOfDay } from '../core/format.js';
  * @property {boolean} isReplay
  * @property {boolean} mayControl this page is in control, or nobody is
  * @property {string | null} holder who is in control
+ * @property {string} [vehicle] the name of the car; '' where it has none
+ * @property {string} [car] the same in at most 8 characters
  */
 
 /** The unmistakable sentence, the same wherever it stands. */
@@ -27,14 +29,18 @@ const BRIEF = 44;
 
 const STATES = /** @type {Record<string, string>} */ ({ not_available: 'NOT AVAILABLE', safe: 'NOT ARMED', armed: 'ARMED', ordered: 'SLOWING', holding: 'HOLDING' });
 
-/** The facts that decide how this page shows the slow-down now. @param {import('../core/store.js').Store} store @returns {Seen} */
-export function seenOf(store) {
+/** The facts that decide how this page shows the slow-down now. @param {import('../core/store.js').Store} store @param {string} [car] its short name @returns {Seen} */
+export function seenOf(store, car = store.vehicle) {
   const { frame, control } = store;
   return {
     now: frame?.decelerate ?? null, isSilent: store.isSilent, isViewer: store.isViewer, isReplay: frame?.replay !== undefined,
     mayControl: store.fence !== null || !control?.holder, holder: control?.holder ?? null,
+    vehicle: nameOf(store.vehicle), car: nameOf(car),
   };
 }
+
+/** A car's name in a sentence; '' where the operator gave it none, so that the server calls it "car". @param {string} name */
+export const nameOf = (name) => (name === 'car' ? '' : name);
 
 /** The one word of its state. @param {Seen} seen */
 export function stateWord({ now, isSilent }) {
@@ -79,7 +85,7 @@ export function slideOf(seen) {
   }
   if (now.state === 'armed') {
     if (isViewer) return off('Slow-down armed', 'not for viewers');
-    return { kind: 'armed', title: 'Slide to', why: 'slow down', label: 'Slide to slow down. With a keyboard hold Enter for 1 second' };
+    return { kind: 'armed', title: 'Slide to slow', why: seen.car || 'the car', label: `Slide to slow ${seen.vehicle || 'the car'}. With a keyboard hold Enter for 1 second` };
   }
   if (now.state === 'safe') return off('Slow-down off', isViewer ? 'not for viewers' : 'press to arm');
   const why = bare(now.why ?? 'not available');
@@ -152,10 +158,10 @@ export function stepsOf({ steps, confirmed, sending, why, stands }) {
  */
 export function orderWords(order, lag_s) {
   if (order.confirmed === false) return { text: NOT_CONFIRMED, kind: 'crit' };
-  if (!order.sending) return { text: 'Nothing goes out to the car: use the physical stop. It goes on by itself once the link is back.', kind: 'crit' };
+  if (!order.sending) return { text: 'Nothing is sent to the car: use the physical stop. Sending resumes when the link is back.', kind: 'crit' };
   if (order.stands) {
-    const text = order.stands === 'before' ? 'The car stood already: there is nothing to slow. Zero speed is commanded.'
-      : 'The car stands. Its speed does not show that the order stopped it. Zero speed is commanded.';
+    const text = order.stands === 'before' ? 'The car was already standing: nothing to slow. Zero speed is commanded.'
+      : 'The car stands. Its speed does not prove that the order stopped it. Zero speed is commanded.';
     return { text, kind: '' };
   }
   const who = order.why === 'by hand' ? `By ${order.by ?? 'hand'}` : `By itself: ${order.why}`;
@@ -183,12 +189,12 @@ export function countdownOf(now, lag_s) {
 export function guardWords(guard, lag_s = 0) {
   if (!guard) return { text: 'No guard on the car: link loss will NOT slow the car', isSafe: false };
   const age_s = guard.age_s === null ? Infinity : guard.age_s + lag_s;
-  if (age_s > GUARD_HEARD_S) return { text: `Guard not heard for ${age(age_s)} s: link loss may NOT slow the car`, isSafe: false };
+  if (age_s > GUARD_HEARD_S) return { text: `No message from the guard for ${age(age_s)} s: link loss may NOT slow the car`, isSafe: false };
   const why = guard.why ? `: ${bare(guard.why)}` : '';
   if (guard.state === 'slowing') return { text: `GUARDED: the guard slows the car by itself${why}`, isSafe: true };
   if (guard.state === 'holding') return { text: `GUARDED: the guard holds the car${why}`, isSafe: true };
   if (guard.state === 'guarded' || guard.state === 'operator') return { text: 'GUARDED: the guard on the car slows it when the link is lost', isSafe: true };
-  return { text: `UNGUARDED: the guard hears no heartbeat${why}: link loss will NOT slow the car`, isSafe: false };
+  return { text: `UNGUARDED: the guard receives no heartbeat${why}: link loss will NOT slow the car`, isSafe: false };
 }
 
 /**
@@ -196,10 +202,10 @@ export function guardWords(guard, lag_s = 0) {
  * @param {Seen} seen
  * @returns {{can: boolean, label: string, why: string}}
  */
-export function releaseOf({ isViewer, mayControl, holder }) {
+export function releaseOf({ isViewer, mayControl, holder, car }) {
   if (isViewer) return { can: false, label: 'Release: not by a viewer', why: 'A viewer cannot release the car. The operator in control can.' };
   if (!mayControl) return { can: false, label: `Only ${holder ?? 'another'} can release`, why: `${holder ?? 'Another'} is in control: only the operator in control can release the car.` };
-  return { can: true, label: 'Release the car', why: '' };
+  return { can: true, label: `Release ${car || 'the car'}`, why: '' };
 }
 
 /**
@@ -221,25 +227,26 @@ export function sheetOf(seen, lag_s) {
     rivalsOf(now.rivals),
   ] : [];
   if (isSilent || !now) return { ...plain, title: 'Slow-down off', text: 'The server does not answer: its state is unknown.', facts: [], act: null, says: '' };
-  if (isReplay) return { ...plain, title: 'As it was recorded', text: 'A recording is shown: nothing here goes to the car.', facts, act: null, says: '' };
-  if (now.state === 'not_available') return { ...plain, title: 'Slow-down not available', text: now.why ?? 'The server does not say why.', facts, act: null, says: '' };
+  if (isReplay) return { ...plain, title: 'As it was recorded', text: 'A recording is shown: nothing is sent to the car.', facts, act: null, says: '' };
+  if (now.state === 'not_available') return { ...plain, title: 'Slow-down not available', text: now.why ?? 'The server sent no reason.', facts, act: null, says: '' };
   const isArmed = now.state === 'armed' || order !== null;
   const by = now.armed_by ? `Armed by ${now.armed_by}.` : '';
-  const title = order ? 'The car is being slowed' : isArmed ? 'Slow-down armed' : 'Arm the slow-down?';
+  const car = seen.vehicle || 'The car';
+  const title = order ? `${car} is being slowed` : isArmed ? `Slow-down of ${car} armed` : seen.vehicle ? `Arm the slow-down of ${car}?` : 'Arm the slow-down?';
   const text = order ? orderWords(order, lag_s).text
     : isArmed ? `${by} Any operator can slow the car: slide to the end and let go.`.trim()
       : 'When armed, one slide slows the car. The steering angle is held, and speed 0 is commanded until the car is released.';
   if (order) return { ...plain, title, text, facts, act: null, says: '' };
-  if (isViewer) return { ...plain, title, text, facts, act: null, says: 'This phone is paired as a viewer: it can watch, but change nothing.' };
-  if (!mayControl) return { ...plain, title, text, facts, act: 'ask', says: `${holder ?? 'Another'} is in control, and ${isArmed ? 'disarms' : 'arms'} it.` };
+  if (isViewer) return { ...plain, title, text, facts, act: null, says: 'This phone is paired as a viewer: it can watch but not make changes.' };
+  if (!mayControl) return { ...plain, title, text, facts, act: 'ask', says: `${holder ?? 'Another'} is in control and can ${isArmed ? 'disarm' : 'arm'} it.` };
   return { ...plain, title, text, facts, act: isArmed ? 'disarm' : 'arm', says: '' };
 }
 
 /** @param {string[] | null | undefined} rivals @returns {[string, string, boolean]} */
 function rivalsOf(rivals) {
-  if (!rivals) return ['Others publish there', 'not known: the bridge does not say', true];
-  if (rivals.length === 0) return ['Others publish there', 'none', false];
-  return ['Others publish there', `${rivals.join(', ')}: the last message wins, so the car may not slow`, true];
+  if (!rivals) return ['Other publishers', 'unknown: the bridge does not list them', true];
+  if (rivals.length === 0) return ['Other publishers', 'none', false];
+  return ['Other publishers', `${rivals.join(', ')}: the last message wins, so the car may not slow`, true];
 }
 
 /**

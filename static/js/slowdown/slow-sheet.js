@@ -9,7 +9,7 @@ import { seenOf, sheetOf } from './slow-layout.js';
  * @typedef {import('../control/control.js').Control} Control
  */
 
-const KEYS = /** @type {const} */ ({ arm: ['Arm', 'main'], disarm: ['Disarm', 'key wide'], ask: ['Ask for control', 'main'] });
+const KEYS = /** @type {const} */ ({ arm: ['Arm', 'main'], disarm: ['Disarm', 'key wide'], ask: ['Request control', 'main'] });
 
 /** @param {Store} store @param {Control} control */
 export function openSlow(store, control) {
@@ -24,12 +24,13 @@ export function openSlow(store, control) {
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-slow', 'aria-labelledby': 'slow-title', 'aria-describedby': 'slow-words' },
     html('div', { class: 'bd' }, html('h2', { id: 'slow-title' }, mark, title), html('div', { id: 'slow-words' }, text, guard, aid)), facts, html('div', { class: 'bd' }, says), keys,
     html('div', { class: 'keys' }, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
+  const { vehicle } = store;
   let shown = '';
   let refused = '';
 
   /** @param {'arm' | 'disarm' | 'ask'} act */
   async function obey(act) {
-    const answer = act === 'ask' ? await store.ask('control', { do: 'request' }) : await store.ask(act);
+    const answer = act === 'ask' ? await store.ask('control', { do: 'request' }) : await store.ask(act, { vehicle: vehicle || null });
     refused = answer.ok ? '' : (answer.reason ?? 'Refused.');
     if (answer.ok && act === 'ask') refused = 'Requested: control is granted within 10 s unless it is refused. Then arm it.';
     else if (answer.ok) return sheet.close();

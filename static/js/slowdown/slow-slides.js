@@ -33,15 +33,15 @@ export class SlowSlides {
       if (says) sheet.addEventListener('close', () => show(says, false));
       return new SlideKey(slide, {
         press: () => (sheet ? tell(this.#whyOff(), 'Not slowed') : openSheet()),
-        order: (at_ms) => void this.#order(at_ms, tell),
+        order: (at_ms, vehicle) => void this.#order(at_ms, vehicle, tell),
       });
     });
-    this.stops = this.slides.map((slide) => () => slide.stop());
+    this.stops = [...this.slides.map((slide) => () => slide.stop()), store.on('switch', () => { this.#sending_ms = -Infinity; })];
   }
 
   /** @param {import('./slow-layout.js').Seen} seen */
   draw(seen) {
-    const view = this.store.now() < this.#sending_ms && !orderOf(seen.now) ? SENDING : slideOf(seen);
+    const view = { ...(this.store.now() < this.#sending_ms && !orderOf(seen.now) ? SENDING : slideOf(seen)), vehicle: this.store.vehicle };
     for (const slide of this.slides) slide.draw(view);
   }
 
@@ -56,14 +56,15 @@ export class SlowSlides {
     return `${because} Use the physical stop.`;
   }
 
-  /** @param {number} at_ms when the slide was released @param {Tell} tell */
-  async #order(at_ms, tell) {
+  /** @param {number} at_ms when the slide was released @param {string} vehicle the car whose name stood on it @param {Tell} tell */
+  async #order(at_ms, vehicle, tell) {
     const { store } = this;
     const { frame } = store;
     if (!frame) return;
     const ago_s = (performance.now() - at_ms) / 1000;
     this.#sending_ms = store.now() + ANSWER_MS;
     const asked = store.ask('slow_down', {
+      vehicle: vehicle || null,
       pressed_ago_s: ago_s >= 0 && ago_s < 60 ? ago_s : 0, // old browsers count the time of events from another moment
       heard_ms: frame.server.time_ms, held_s: (store.now() - store.deadMan.heard_ms) / 1000,
     }, ANSWER_MS);
@@ -71,7 +72,7 @@ export class SlowSlides {
     const answer = await asked;
     if (!answer.ok) {
       this.#sending_ms = -Infinity;
-      tell(`${answer.reason ?? 'Refused.'} Use the physical stop.`, 'NOT slowed');
+      tell(`${answer.reason ?? 'Refused.'} Use the physical stop.`, vehicle && vehicle !== store.vehicle ? `${vehicle} NOT slowed` : 'NOT slowed');
     }
     this.redraw();
   }

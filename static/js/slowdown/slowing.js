@@ -13,25 +13,28 @@ import { SlowSlides } from './slow-slides.js';
  * @param {import('../core/store.js').Store} store
  * @param {import('../control/control.js').Control} control
  * @param {import('../control/control.js').Say} say
+ * @param {(vehicle: string) => string} shortOf the car's name in at most 8 characters
  */
-export function mount(root, store, control, say) {
+export function mount(root, store, control, say, shortOf) {
   const home = need(root, '[data-part="slow"]');
+  const names = [...document.querySelectorAll('[data-f="legend-name"]')];
   const legends = [...document.querySelectorAll('[data-f="legend-car"]')];
   const openSheet = () => {
-    import('./slow-sheet.js').then(({ openSlow }) => openSlow(store, control)).catch(() => say('What shows the slow-down could not be fetched.', 'Not opened'));
+    import('./slow-sheet.js').then(({ openSlow }) => openSlow(store, control)).catch(() => say('The slow-down sheet could not be loaded.', 'Not opened'));
   };
   const slides = new SlowSlides(store, { say, openSheet, draw });
   const release = new ReleaseKey(root, store, control, say);
   const steps = new OrderSteps(root, store);
 
   function draw() {
-    const seen = seenOf(store);
+    const seen = seenOf(store, shortOf(store.vehicle));
     const { now } = seen;
+    for (const name of names) setText(name, seen.car ?? '');
     slides.draw(seen);
     const word = stateWord(seen);
     const state = word.toLowerCase();
     for (const legend of legends) {
-      setText(legend, `slow-down: ${state}`);
+      setText(field(legend, 'legend-state'), state);
       setAttribute(legend, 'data-state', state);
     }
     const hold = seen.isReplay ? null : holdOf(now);
@@ -41,6 +44,7 @@ export function mount(root, store, control, say) {
     release.draw(seen, hold);
     steps.draw(orderOf(now));
     const guard = guardWords(now?.guard, store.lag_s);
+    setWords(field(root, 'rail-guard'), seen.isReplay || seen.isSilent ? '' : `${guard.text}.`);
     setText(field(home, 'slow-state'), `Slow-down: ${state}`);
     setWords(field(home, 'slow-guard'), now?.state === 'not_available' && now.why && !seen.isSilent ? `${now.why} ${guard.text}.` : `${guard.text}.`);
     setAttribute(home, 'data-state', state);

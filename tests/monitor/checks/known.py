@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 from monitor.catalog import CHECKS, AnyCheck
 from monitor.check import Finding, unknown
 from monitor.link import LinkFacts
 from monitor.state import NotFresh, Reading, Snapshot
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """A snapshot for each answer of a check; `unknown` is a reason where there is none.
+
+    The test of a check names its own as `ANSWERS = {"its_id": Row(…)}`.
+    """
+
+    ok: Snapshot
+    fault: Snapshot
+    unknown: Snapshot | str
+    limits: dict[str, float] = field(default_factory=dict)
+
 
 LINK = LinkFacts(phase="monitoring", connected_s=0.0, bridge_answers=True)
 

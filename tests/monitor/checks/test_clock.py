@@ -66,8 +66,8 @@ def test_how_far_is_a_setting() -> None:
 
 
 def test_what_the_operator_reads_of_a_jump() -> None:
-    assert jumped(-30.0, 0.0).text == "The car's clock went back by 30.0 s (Laser, Position)"
-    assert jumped(7200.0, 0.0).text == "The car's clock went ahead by 2 h (Laser, Position)"
+    assert jumped(-30.0, 0.0).text == "The car's clock jumped back by 30.0 s (Laser, Position)"
+    assert jumped(7200.0, 0.0).text == "The car's clock jumped ahead by 2 h (Laser, Position)"
     assert jumped(-30.0, 0.0).causes == jumped(7200.0, 0.0).causes, "a second jump within the time is the same alarm"
 
 
@@ -116,7 +116,7 @@ def test_without_the_time_of_day_only_changes_are_judged(change_s: float, verdic
     found = ask("clock_offset", at(stamped(-60.0, change_s), wall=False))
     assert found.verdict is verdict
     if verdict is OK:
-        assert "time of day is not known" in found.text
+        assert "time of day is unknown" in found.text
 
 
 def test_what_the_operator_reads_of_an_offset() -> None:

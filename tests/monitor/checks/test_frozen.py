@@ -23,6 +23,7 @@ from monitor.values import (
     Heading,
     Level,
     MotionCommand,
+    Number,
     Odometry,
     Steering,
     Twist,
@@ -34,7 +35,7 @@ from tests.monitor.drive import sweep
 OK, FAULT, UNKNOWN = Verdict.OK, Verdict.FAULT, Verdict.UNKNOWN
 BEAMS = [5.0 + 0.01 * beam for beam in range(60)]
 
-RESTING: dict[str, Value] = {
+RESTING: dict[str, Value] = dict.fromkeys(SIGNALS, Number(value=12.0)) | {
     "speed": Twist(speed_mps=4.0),
     "acceleration": Acceleration(acceleration_mps2=0.1),
     "brake": Effort(percent=0.0),
@@ -87,7 +88,8 @@ class Ride:
         return ask(f"signal_frozen.{self.signal}", self.state.snapshot(0.05 * self.n), **limits)
 
 
-MAY_REST = ["brake", "accelerator", "steering", "distance", "bearing", "diagnostics", "command", "fuel"]
+NUMBERS = [name for name, value in RESTING.items() if isinstance(value, Number)]
+MAY_REST = ["brake", "accelerator", "steering", "distance", "bearing", "diagnostics", "command", "fuel", *NUMBERS]
 BY_MOTION = ["position", "odometry", "scan"]
 BY_NOISE = ["speed", "acceleration", "heading"]
 

@@ -111,7 +111,7 @@ def test_drift_is_not_checked_while_moving_and_the_anchor_is_taken_anew() -> Non
 
 def test_a_car_that_has_only_just_stopped_is_not_said_to_move() -> None:
     walk = Walk(sigma_m=0.2).go(5.0, speed_mps=3.0).go(1.0)
-    assert ask("gps_drift", walk.state.snapshot(walk.now_s)).text == "The car has only just come to rest"
+    assert ask("gps_drift", walk.state.snapshot(walk.now_s)).text == "The car has just stopped"
     walk.go(1.0, speed_mps=3.0)
     assert ask("gps_drift", walk.state.snapshot(walk.now_s)).text == "The car moves"
 
@@ -140,10 +140,13 @@ def test_not_published_and_silent(id: str) -> None:
     assert ask(id, known(age_s=2.0, position=moved(HERE, 0, 0, 1.0))).verdict == "unknown"
 
 
-def test_without_a_fix_nothing_else_is_judged() -> None:
-    fix = GpsFix(lat_deg=math.nan, lon_deg=math.nan, status=-1)
+@pytest.mark.parametrize(("status", "brief"), [(-1, "FAULT no fix"), (-2, "FAULT fix unset"), (-3, "FAULT no fix")])
+def test_without_a_fix_nothing_else_is_judged(status: int, brief: str) -> None:
+    """−2 is "status is not yet set" of ROS 2's NavSatStatus: nobody says that there is no fix."""
+    fix = GpsFix(lat_deg=math.nan, lon_deg=math.nan, status=status)
     snapshot = known(position=fix, speed=Twist(speed_mps=0.0, yaw_rate_radps=None))
-    assert ask("gps_fix", snapshot).verdict == "fault"
+    found = ask("gps_fix", snapshot)
+    assert (found.verdict, found.brief) == ("fault", brief)
     assert ask("gps_drift", snapshot).verdict == "unknown"
     assert ask("gps_jump", snapshot).verdict == "unknown"
 

@@ -144,5 +144,7 @@ def test_what_came_before_the_link_was_lost_does_not_count() -> None:
 
 
 def test_who_is_silent_is_said() -> None:
-    assert silent(3.4, 3.4, 3.4, bridge_s=99.5).text == "No message for 3.4 s: the bridge answers, the car says nothing"
+    assert (
+        silent(3.4, 3.4, 3.4, bridge_s=99.5).text == "No message for 3.4 s: the bridge answers, the car sends nothing"
+    )
     assert silent(3.4, 3.4, 3.4).text == "No message for 3.4 s: neither car nor bridge answers"

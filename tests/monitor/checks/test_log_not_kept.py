@@ -12,7 +12,7 @@ from monitor.runner import Monitor
 from monitor.state import Snapshot
 from tests.monitor.checks.known import ask
 
-WHY = "The alarm log is not kept: the disk is full. 3 events are in memory only."
+WHY = "The alarm log is not stored: the disk is full. 3 events are in memory only."
 
 
 @pytest.mark.parametrize("phase", ["connecting", "failed", "monitoring", "lost"])

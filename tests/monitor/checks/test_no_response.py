@@ -71,7 +71,7 @@ def test_both_limits_are_settings() -> None:
 
 def test_what_the_operator_reads_in_the_dialog() -> None:
     found = ask("no_response", driving(6.5, 0.0))
-    assert found.text == "0.0 m/s ordered, 6.5 m/s driven: braking is ordered, the car does not slow down"
+    assert found.text == "0.0 m/s ordered, 6.5 m/s driven: braking is commanded, the car does not slow down"
     spec = check_of("no_response").alarm
     assert (spec.place, spec.priority, spec.on_delay_s) == ("dialog", "critical", 1.0)
 

@@ -44,7 +44,7 @@ def test_verdict(for_s: float | None, verdict: Verdict, level: int) -> None:
 def test_it_is_told_with_and_without_a_link_and_although_it_is_paused(phase: Phase) -> None:
     monitor = Monitor()
     told = [t for t in monitor.step(paused(400.0, phase)) if t.announces and t.alarm_id == "paused_long"]
-    assert [t.text for t in told] == ["Monitoring paused for 7 min: no alarm comes"]
+    assert [t.text for t in told] == ["Monitoring paused for 7 min: no alarm is raised"]
 
 
 def test_how_long_is_a_setting() -> None:

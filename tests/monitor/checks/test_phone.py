@@ -37,7 +37,7 @@ def view(**more: Any) -> PhoneView:
         phone="one",
         count=1,
         is_handheld=True,
-        heard_s=NOW_S - 0.5,
+        received_s=NOW_S - 0.5,
         usable_s=NOW_S - 0.5,
         was_usable=True,
         fix=PhoneFix(lat_deg=32.23, lon_deg=-110.95, accuracy_m=5.0),
@@ -137,7 +137,7 @@ def test_tracks_are_judged_only_where_the_car_moved(of: Tracks | None, verdict: 
 def test_standing_is_said_and_not_taken_for_good() -> None:
     finding = asked("phone_tracks", view(tracks=tracks(0.1, car_spread_m=0.4)))
     assert finding.brief == "not checked: standing"
-    assert finding.text == "Standing: the car's track spreads 0.4 m, with this phone 10.5 m would tell"
+    assert finding.text == "Standing: the car's track spreads 0.4 m, with this phone 10.5 m is needed"
     assert asked("phone_tracks", view(tracks=tracks(pairs=3))).brief == "not checked: waiting"
 
 
@@ -216,7 +216,7 @@ def test_each_reason_is_said_after_10_s_and_nothing_is_compared_meanwhile(
 def test_a_fix_that_grew_old_and_a_phone_that_fell_silent() -> None:
     old = view(measured_s=NOW_S - 12.0, usable_s=NOW_S - 12.0)
     assert asked("phone_missing", old).text == "The newest fix of the phone is 12 s old"
-    silent = view(heard_s=NOW_S - 14.0, measured_s=NOW_S - 14.0, usable_s=NOW_S - 14.0)
+    silent = view(received_s=NOW_S - 14.0, measured_s=NOW_S - 14.0, usable_s=NOW_S - 14.0)
     assert asked("phone_missing", silent).text == "No position from the phone for 14 s"
     assert asked("phone_missing", silent).brief == "FAULT silent"
 
@@ -250,7 +250,7 @@ def test_a_refusal_is_told_even_from_a_desk() -> None:
 
 # -- nothing to check --------------------------------------------------------------------------------------------------
 
-GONE = view(heard_s=NOW_S - 61.0, measured_s=NOW_S - 61.0)
+GONE = view(received_s=NOW_S - 61.0, measured_s=NOW_S - 61.0)
 
 
 @pytest.mark.parametrize("check", CHECKS)

@@ -33,14 +33,14 @@ def at(facts: ReachFacts | None, speed_mps: float | None = 4.2, **more: Any) -> 
         (HEARD, None, False, OK, "2 of 3 operators can hear alarms"),
         (DEAF, 4.2, False, FAULT, "The car moves at 4.2 m/s and nobody can hear alarms: none of 3 (2 × sound off, not"),
         (DEAF, -1.0, False, FAULT, "moves at 1.0 m/s"),  # backwards
-        (ALONE, 4.2, False, FAULT, "nobody can hear alarms: no operator's phone is here"),
+        (ALONE, 4.2, False, FAULT, "nobody can hear alarms: no operator's phone is connected"),
         (ALONE, 0.31, False, FAULT, "moves at 0.3 m/s"),
         (ALONE, 0.29, False, OK, "the car stands"),
         (ALONE, 0.0, True, FAULT, "moves at 0.0 m/s"),  # it has only just stopped
         (ALONE, math.nan, False, OK, "the car stands"),
-        (ALONE, None, False, UNKNOWN, "whether the car moves is not known"),
-        (None, 4.2, False, UNKNOWN, "Nobody is asked whether alarms are heard"),
-        (None, 4.2, True, UNKNOWN, "Nobody is asked"),
+        (ALONE, None, False, UNKNOWN, "whether the car moves is unknown"),
+        (None, 4.2, False, UNKNOWN, "Alarm reach is not monitored here"),
+        (None, 4.2, True, UNKNOWN, "not monitored here"),
     ],
 )
 def test_who_hears(

@@ -58,16 +58,16 @@ def test_it_has_room(facts: dict[str, Any], was_active: bool, verdict: Verdict) 
     found = ask("disk_nearly_full", at(**facts), was_active=was_active)
     assert found.verdict is verdict
     if facts.get("limit"):
-        assert found.text == "Room for 0.00 GB more, then recording stops: 0.5 GB must stay free"
+        assert found.text == "Space for 0.00 GB more, then recording stops: 0.5 GB must stay free"
 
 
 @pytest.mark.parametrize(
     ("facts", "verdict", "text"),
     [
-        ({}, OK, "It is recorded"),
-        ({"state": "saving"}, OK, "It is recorded"),
+        ({}, OK, "Recording"),
+        ({"state": "saving"}, OK, "Recording"),
         ({"state": "held"}, OK, "What was recorded is saved"),
-        ({"state": "off"}, UNKNOWN, "Nothing is to be recorded"),
+        ({"state": "off"}, UNKNOWN, "Recording is off"),
         ({"state": "stopped", "trouble": "The disk is full."}, FAULT, "The disk is full."),
         ({"state": "stopped"}, FAULT, "Recording stopped by itself"),
     ],

@@ -74,8 +74,8 @@ JUST_OPENED = replace(OPEN, since_s=97.0)
         pytest.param("fuel", NOT_FOUND, UNKNOWN, False, "not published", id="event-like, not published"),
         pytest.param("speed", JUST_OPENED, UNKNOWN, True, "not checked: waiting", id="wanted, just connected"),
         pytest.param("speed", OPEN, FAULT, True, "FAULT Speed", id="wanted, published, never came"),
-        pytest.param("odometry", OPEN, UNKNOWN, False, "nothing came", id="optional, published, never came"),
-        pytest.param("command", OPEN, UNKNOWN, False, "nothing came", id="event-like, published, never came"),
+        pytest.param("odometry", OPEN, UNKNOWN, False, "nothing received", id="optional, published, never came"),
+        pytest.param("command", OPEN, UNKNOWN, False, "nothing received", id="event-like, published, never came"),
     ],
 )
 def test_never_came(signal: str, link: LinkFacts, verdict: Verdict, applies: bool, brief: str) -> None:

@@ -6,7 +6,9 @@ A check that cannot be in doubt says why.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -35,7 +37,7 @@ from monitor.values import (
     MotionCommand,
     Twist,
 )
-from tests.monitor.checks.known import LINK, ask, known
+from tests.monitor.checks.known import LINK, Row, ask, known
 from tests.monitor.checks.test_frozen import RESTING
 from tests.monitor.checks.test_phone import apart, tracks, view
 from tests.monitor.test_corridor import sweep
@@ -44,16 +46,6 @@ OK, FAULT, UNKNOWN = Verdict.OK, Verdict.FAULT, Verdict.UNKNOWN
 NOW_S = 100.0
 FIX = GpsFix(lat_deg=32.23, lon_deg=-110.95, sigma_m=1.0, covariance_type=2)
 STANDS, DRIVES = Twist(speed_mps=0.0), Twist(speed_mps=5.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Row:
-    """A snapshot for each answer; `unknown` is a reason where there is none."""
-
-    ok: Snapshot
-    fault: Snapshot
-    unknown: Snapshot | str
-    limits: dict[str, float] = field(default_factory=dict)
 
 
 def with_more(snapshot: Snapshot, **more: Any) -> Snapshot:
@@ -310,6 +302,10 @@ ROWS: dict[str, Row | Callable[[str], Row]] = {
         unknown="the server knows whether it is paused",
     ),
 }
+
+for _path in sorted(Path(__file__).parent.glob("test_*.py")):  # a check may have its row beside its table
+    if "\nANSWERS = " in _path.read_text(encoding="utf-8"):
+        ROWS |= import_module(f"tests.monitor.checks.{_path.stem}").ANSWERS
 
 
 def row_of(check_id: str) -> Row:

@@ -15,6 +15,7 @@ from server.access.identity import Role
 from server.access.keys import keys_of
 from server.app.app import create_app
 from server.app.config import Config, Tls
+from server.storage.storage_thread import StorageThread
 from tests.server.conftest import serving_app
 
 OPERATOR_KEY = "operator-key-of-the-tests"
@@ -78,6 +79,16 @@ async def paired_server(of: Config) -> AsyncIterator[Served]:
         yield Served(base, app.state.services.access)
 
 
-def access_of(config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Access:
+def access_of(
+    config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int], storage: StorageThread | None = None
+) -> Access:
     """As the app makes it."""
-    return Access(config.data, names=config.names, keys=config.keys, is_open=config.is_open, now=now, wall_ms=wall_ms)
+    return Access(
+        config.data,
+        names=config.names,
+        keys=config.keys,
+        is_open=config.is_open,
+        now=now,
+        wall_ms=wall_ms,
+        storage=storage,
+    )

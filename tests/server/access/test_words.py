@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 
 import pytest
 
 from server.access import pending_invitations, secret_file
 from server.access.cookie import Cookies
-from server.access.devices import FORGOTTEN_AFTER_MS, MOST, Devices
 from server.access.identity import Role
 from server.access.invitations import LASTS_S, MOST_STANDING, Invitations
 from server.access.keys import BadKey, keys_from, keys_of
 from server.access.names import Names
-from server.access.pin_throttle import FEW, MANY, Guesses
+from server.access.pin_throttle import FEW, MANY, PinThrottle
 from server.access.tickets import Tickets
 from server.app.config import Config
 from server.system.loopback import is_loopback
@@ -52,14 +50,14 @@ def test_few_pins_stand_at_once() -> None:
     assert all_of.standing(10.0) == made[3:]
 
 
-def test_the_terminal_shows_the_same_until_it_is_used_or_old() -> None:
+async def test_the_terminal_shows_the_same_until_it_is_used_or_old() -> None:
     now_s = 0.0
     access = access_of(config(), now=lambda: now_s, wall_ms=lambda: 0)
     told: list[tuple[str, Role]] = []
     access.on_paired = lambda name, role: told.append((name, role))
     first = access.invitation()
     assert (access.invite(), access.pin()) == (first.token, first.pin)
-    access.pair(token=first.token, pin=None, name="Pixel", peer="10.0.0.9")
+    await access.pair(token=first.token, pin=None, name="Pixel", peer="10.0.0.9")
     assert told == [("Pixel", Role.OPERATOR)]
     second = access.invitation()
     assert second.token != first.token
@@ -71,7 +69,7 @@ def test_the_terminal_shows_the_same_until_it_is_used_or_old() -> None:
 
 
 def test_waits_grow_for_who_guesses_and_are_forgiven() -> None:
-    guesses = Guesses()
+    guesses = PinThrottle()
     now_s, waits = 0.0, []
     for _ in range(12):
         guesses.wrong("10.0.0.9", now_s=now_s)
@@ -86,7 +84,7 @@ def test_waits_grow_for_who_guesses_and_are_forgiven() -> None:
 
 
 def test_many_peers_together_wait_as_one_and_get_thirty_tries_a_pin() -> None:
-    guesses, now_s, tries = Guesses(), 0.0, 0
+    guesses, now_s, tries = PinThrottle(), 0.0, 0
     while now_s < LASTS_S:
         peer = f"2001:db8:{tries:x}::"
         wait_s = guesses.wait_s(peer, now_s=now_s)
@@ -99,7 +97,7 @@ def test_many_peers_together_wait_as_one_and_get_thirty_tries_a_pin() -> None:
 
 
 def test_a_right_pin_forgives_its_peer_only() -> None:
-    guesses = Guesses()
+    guesses = PinThrottle()
     for _ in range(MANY + 2):
         guesses.wrong("10.0.0.9", now_s=0.0)
     guesses.right("10.0.0.9")
@@ -107,7 +105,7 @@ def test_a_right_pin_forgives_its_peer_only() -> None:
 
 
 def test_peers_are_forgotten_before_they_are_too_many() -> None:
-    guesses = Guesses()
+    guesses = PinThrottle()
     for n in range(1500):
         guesses.wrong(str(n), now_s=0.0)
     assert len(guesses._peers) == 1000
@@ -175,90 +173,6 @@ def test_under_tls_the_cookie_is_bound_to_this_host() -> None:
     assert given.startswith("__Host-catgraph-0badcafe=")
     assert {"Secure", "HttpOnly", "SameSite=Strict", "Path=/"} <= set(given.split("; "))
     assert "Domain" not in given
-
-
-# -- devices ---------------------------------------------------------------------------------------------------------
-
-
-def test_only_the_hash_of_a_secret_is_on_the_disk_and_only_for_the_servers_user(tmp_path: Path) -> None:
-    os.umask(0)
-    access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 1000)
-    device, secret = access.pair(token=access.invite(), pin=None, name="Pixel", peer="")
-    access.listens_at("http://192.168.4.1:8000/")
-    pending_invitations.lay(tmp_path / "access", Role.VIEWER, wall_ms=0)
-    files = [path for path in (tmp_path / "access").rglob("*") if path.is_file()]
-    assert {path.name for path in files} >= {"devices.json", "running.json"}
-    assert [oct(path.stat().st_mode & 0o777) for path in files] == ["0o600"] * len(files)
-    assert (tmp_path / "access").stat().st_mode & 0o077 == 0
-    assert all(secret not in path.read_text() for path in files)
-    again = Devices(tmp_path / "access")
-    assert again.known(device.id, secret, now_ms=2000) == device
-    assert again.known(device.id, secret[:-1], now_ms=2000) is None
-    assert again.known("other", secret, now_ms=2000) is None
-    assert again.known(device.id, secret, now_ms=1001 + FORGOTTEN_AFTER_MS) is None
-    assert (again.server, again.signing_key) == (access.devices.server, access.devices.signing_key)
-
-
-@pytest.mark.parametrize(
-    "content", ["", "null", "[]", "{", '{"server": "x"}', '{"server":"12345678","signing_key":"short","devices":[]}']
-)
-def test_a_damaged_list_lets_nobody_in_and_is_kept(tmp_path: Path, content: str) -> None:
-    (tmp_path / "devices.json").write_text(content)
-    devices = Devices(tmp_path)
-    assert devices.all() == []
-    assert len(devices.signing_key) == 64
-    if content != "null":
-        assert (tmp_path / "devices.damaged.json").read_text() == content
-
-
-def test_a_file_that_others_could_read_is_closed_and_a_link_is_not_followed(tmp_path: Path) -> None:
-    path = tmp_path / "a.json"
-    path.write_text("{}")
-    path.chmod(0o644)
-    assert secret_file.read(path) == {}
-    assert path.stat().st_mode & 0o777 == 0o600
-    (tmp_path / "link.json").symlink_to(path)
-    with pytest.raises(OSError, match="symbolic"):
-        secret_file.read(tmp_path / "link.json")
-
-
-def test_who_is_removed_is_not_written_back_by_a_list_of_before(tmp_path: Path) -> None:
-    devices = Devices(tmp_path)
-    device, _ = devices.add("Pixel", Role.VIEWER, now_ms=0)
-    late = devices.seen_on_disk(now_ms=100_000)  # on its way to a thread
-    devices.remove(device.id, now_ms=100_001)
-    late()
-    assert Devices(tmp_path).all() == []
-
-
-def test_when_it_was_last_seen_is_written_once_a_minute(tmp_path: Path) -> None:
-    devices = Devices(tmp_path)
-    device, _ = devices.add("Pixel", Role.VIEWER, now_ms=0)
-    assert devices.seen(device.id, now_ms=59_000) is None
-    write = devices.seen(device.id, now_ms=60_000)
-    assert write is not None
-    write()
-    assert Devices(tmp_path).all()[0].seen_ms == 60_000
-
-
-def test_names_are_told_apart_and_the_list_is_bounded(tmp_path: Path) -> None:
-    devices = Devices(None)
-    names = [devices.add("Pixel 7", Role.VIEWER, now_ms=n)[0].name for n in range(MOST + 5)]
-    assert names[:3] == ["Pixel 7", "Pixel 7 2", "Pixel 7 3"]
-    assert len(devices.all()) == MOST
-    assert len({one.name for one in devices.all()}) == MOST
-
-
-def test_a_device_that_cannot_be_kept_is_not_paired(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 0)
-    token = access.invite()
-    (tmp_path / "access" / "devices.json").unlink()
-    (tmp_path / "access" / "devices.json").mkdir()  # nothing can take its place
-    with pytest.raises(IsADirectoryError):
-        access.pair(token=token, pin=None, name="Pixel", peer="")
-    assert access.devices.all() == []
-    (tmp_path / "access" / "devices.json").rmdir()
-    access.pair(token=token, pin=None, name="Pixel", peer="")  # the invitation was not used up by that
 
 
 # -- invitations of another process ----------------------------------------------------------------------------------

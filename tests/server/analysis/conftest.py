@@ -14,7 +14,7 @@ from server.cli.main import main
 from server.simulator.car import SimulatedCar
 from tests.server.recording.bags import BEGIN_S, Drive, write_ros2
 
-SECONDS = 40.0
+SECONDS = 24.0
 
 
 def recorded(path: Path, seconds: float = SECONDS, **options: Any) -> Path:

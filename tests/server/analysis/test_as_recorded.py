@@ -51,3 +51,18 @@ def test_a_recorded_phone_is_compared_with_the_car(tmp_path: Path) -> None:
     row = {"by": "Anna", "fix": None, "why": "denied", "handheld": True, "phone": "page-7"}
     found = judged(record(tmp_path / "a.mcap", [(at_s, "phone", row) for at_s in range(1, 20)]))
     assert found.snapshot.phone.count == 1
+
+
+def test_a_recorded_choice_of_the_phone_counts(tmp_path: Path) -> None:
+    phone = {"by": "Anna", "fix": None, "why": "denied", "handheld": True}
+    rows = [(at_s, "phone", phone | {"phone": name}) for at_s in range(1, 20) for name in ("page-7", "page-8")]
+    choice = (5.0, "alarms", event(5.0, "ride", alarm=None, by="Anna", phone="page-8"))
+    assert judged(record(tmp_path / "a.mcap", rows)).snapshot.phone.phone == "page-7"
+    assert judged(record(tmp_path / "b.mcap", [*rows, choice])).snapshot.phone.phone == "page-8"
+
+
+def test_a_recorded_setting_that_is_unknown_costs_only_itself(tmp_path: Path) -> None:
+    """Another version of catgraph recorded it: everything else that the operator had set still counts."""
+    found = judged(record(tmp_path / "a.mcap", [], settings=toml(5.0) + "[limits.not_a_check]\nmax_mps = 1.0\n"))
+    assert found.tuning.limits.speed_limit.max_mps == 5.0
+    assert [note for note in found.notes if "cannot be used as they are" in note]

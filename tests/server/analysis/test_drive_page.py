@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from server.analysis.drive_page import write_drive_page
-from server.analysis.recorded_events import MOST_ENTRIES, Told, told_by
+from server.analysis.recorded_log import MOST_ENTRIES, RecordedLog, read_recorded_log
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1
 from tests.server.recording.export.ours import TOML, OurFile, Own, as_ours, event
@@ -29,9 +29,9 @@ def made(folder: Path, own: list[Own], **metadata: str) -> Path:
     return as_ours(write_ros1(folder / "in.bag", Drive(messages=ROWS)), folder / "ours.mcap", own, **metadata)
 
 
-def found(path: Path) -> Told:
+def found(path: Path) -> RecordedLog:
     with open_recording([path]) as recording:
-        told = told_by(recording)
+        told = read_recorded_log(recording)
     assert told is not None
     return told
 
@@ -61,7 +61,7 @@ def test_alarms_are_those_that_were_told(tmp_path: Path) -> None:
     told = found(made(tmp_path, STORY))
     speed, obstacle = told.episodes
     assert (speed.raised_s, speed.cleared_s, speed.trip_text) == (2.0, 9.0, "3.4 m/s, limit 3.0 m/s")
-    assert [(said.at_s, said.change) for said in speed.said] == [(2.0, "raised"), (7.0, "recaused")]
+    assert [(said.at_s, said.change) for said in speed.announcements] == [(2.0, "raised"), (7.0, "recaused")]
     assert speed.suppressed == ((5.0, 6.0),)
     assert (obstacle.cleared_s, obstacle.until_s, str(obstacle.priority)) == (None, 20.0, "advisory")
     assert (told.load.announced, told.load.most_in_10_min) == (3, 3)
@@ -111,7 +111,7 @@ def test_a_clip_s_page_says_what_stood_already(tmp_path: Path) -> None:
 def test_a_recording_of_others_is_judged_as_by_catgraph_check(tmp_path: Path) -> None:
     source = write_ros1(tmp_path / "in.bag", Drive(messages=ROWS))
     with open_recording([source]) as recording:
-        assert told_by(recording) is None
+        assert read_recorded_log(recording) is None
     text, _ = page(source, tmp_path)
     assert "catgraph check" in text
     assert "As they were told" not in text

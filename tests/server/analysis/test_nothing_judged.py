@@ -41,7 +41,7 @@ def test_nothing_judged_is_exit_2_and_said(check: Checking, tmp_path: Path, name
     recording = write_ros2(tmp_path / "drive", Drive(messages=messages))
     ending = check(recording, "--json", tmp_path / "out.json", "--html", tmp_path / "out.html")
     assert ending.code == 2
-    assert ending.err.startswith("catgraph check: Nothing could be judged: ")
+    assert ending.err.startswith("catgraph check: Nothing could be evaluated: ")
     found = orjson.loads((tmp_path / "out.json").read_bytes())
     assert found["judged"]["nothing_why"] == ending.err.removeprefix("catgraph check: ").strip()
     page = (tmp_path / "out.html").read_text()

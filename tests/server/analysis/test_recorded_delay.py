@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from server.analysis.own_events import read_recorded_events
 from server.analysis.rehearse import rehearse
 from server.app.config import Config
 from server.judge.drive import Drive
 from server.judge.offline import OfflineRun
 from server.recording.delay import DelayWriter, LinkDelay, RecordedDelay, recorded_delay
+from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import open_recording
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle

@@ -9,7 +9,7 @@ import segno
 
 from server.app.banner import Announcement, Pairing, addresses, code, fingerprint_lines, lines
 from server.app.config import Config, Tls
-from server.tls.setup import Whereabouts
+from server.tls.setup import SetupAddresses
 from server.vehicle.vehicle import Vehicle
 
 FINGERPRINT = ":".join(f"{n:02X}" for n in range(32))
@@ -84,7 +84,7 @@ def test_on_this_machine_alone_there_is_nothing_to_lack_and_nobody_to_pair() -> 
 def test_what_is_wrong_with_a_given_certificate_is_said() -> None:
     tls = Tls(mode="files", cert=Path("c"), key=Path("k"))
     said = Announcement(config=Config(host="0.0.0.0", tls=tls), url="https://x/", warning="it expires on 2027-05-30")
-    assert "Mind: it expires on 2027-05-30." in text(said)
+    assert "Warning: it expires on 2027-05-30." in text(said)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_what_is_wrong_with_a_given_certificate_is_said() -> None:
     ],
 )
 def test_addresses_that_another_device_may_try(hosts: tuple[str, ...], first: str, others: list[str]) -> None:
-    url, more = addresses(Whereabouts(hosts=hosts, port=8000, setup_port=8001))
+    url, more = addresses(SetupAddresses(hosts=hosts, port=8000, setup_port=8001))
     assert url == f"https://{first}:8000/"
     assert more == tuple(f"https://{host}:8000/" for host in others)
 

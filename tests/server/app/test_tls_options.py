@@ -39,7 +39,7 @@ def test_what_cannot_is_said(typed: tuple[str, ...]) -> None:
 
 
 def test_a_port_to_explain_needs_something_to_explain() -> None:
-    with pytest.raises(ValueError, match="no use with --tls off"):
+    with pytest.raises(ValueError, match="no effect with --tls off"):
         read("--tls", "off", "--setup-port", "80")
 
 

@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from server.bus.bus import SHOWN_AFTER_S, LocalBus
 from server.bus.journal import SLOW_DISK_S, Journal
+from server.bus.local import SHOWN_AFTER_S, LocalBus
 from server.storage.storage_thread import StorageThread
 from server.web.event_feed import EventFeed
 
@@ -160,7 +160,7 @@ async def test_older_events_are_read_while_the_page_gets_its_other_frames(tmp_pa
 KILLED = """
 import asyncio, os, signal, sys
 from pathlib import Path
-from server.bus.bus import LocalBus
+from server.bus.local import LocalBus
 from server.bus.journal import Journal
 from server.storage.storage_thread import StorageThread
 

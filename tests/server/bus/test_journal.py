@@ -86,7 +86,7 @@ def test_while_another_program_holds_the_file_events_wait_and_are_kept_afterward
     started_s = time.monotonic()
     journal.append("car", [event(2)])
     assert time.monotonic() - started_s < 0.2, "the loop was held up"
-    assert journal.trouble == "The alarm log is not kept: another program holds the file. 1 event is in memory only."
+    assert journal.trouble == "The alarm log is not stored: another program holds the file. 1 event is in memory only."
     journal.save()
     journal.append("car", [event(3)])
     assert "2 events are in memory only" in (journal.trouble or "")
@@ -117,7 +117,7 @@ def test_a_full_database_goes_on_in_memory_and_says_so(tmp_path: Path) -> None:
     journal._database.execute(f"PRAGMA max_page_count = {pages + 2}")
     for n in range(1, 101):
         journal.append("car", [event(n, text="x" * 300)])
-    assert (journal.trouble or "").startswith("The alarm log is not kept: the disk is full. ")
+    assert (journal.trouble or "").startswith("The alarm log is not stored: the disk is full. ")
     assert numbers(journal.after("car", 0)) == list(range(1, 101))
     journal._database.execute("PRAGMA max_page_count = 100000")
     journal.save()
@@ -136,7 +136,7 @@ def test_a_disk_that_takes_no_more_stops_nobody(tmp_path: Path) -> None:
     lines = done.stdout.splitlines()
     assert done.returncode == 0, done.stderr
     kept = [int(line.split()[0]) for line in lines if not line.split()[1:]]
-    assert "The alarm log is not kept: the disk " in lines[-1]
+    assert "The alarm log is not stored: the disk " in lines[-1]
     assert kept
     journal = Journal(path)
     found = journal.after("car", 0, 10**6)
@@ -222,7 +222,7 @@ def test_a_folder_that_is_none_leaves_the_log_in_memory(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "nowhere" / "events.sqlite")
     assert numbers(journal.append("car", [event(1), event(2)])) == [1, 2]
     assert numbers(journal.after("car", 0)) == [1, 2]
-    assert journal.trouble == ("The alarm log is not kept: the file cannot be opened. 2 events are in memory only.")
+    assert journal.trouble == ("The alarm log is not stored: the file cannot be opened. 2 events are in memory only.")
     journal.close()
 
 
@@ -234,7 +234,7 @@ def test_a_file_that_may_only_be_read_goes_on_with_its_numbers(tmp_path: Path) -
     assert journal._database is not None
     journal._database.execute("PRAGMA query_only = ON")
     assert numbers(journal.append("car", [event(2)])) == [2]
-    assert (journal.trouble or "").startswith("The alarm log is not kept: the file may not be written.")
+    assert (journal.trouble or "").startswith("The alarm log is not stored: the file may not be written.")
     assert numbers(journal.after("car", 0)) == [1, 2]
     journal.close()
 
@@ -244,7 +244,7 @@ def test_two_servers_on_one_log_are_told_and_nothing_is_overwritten(tmp_path: Pa
     one, other = Journal(path), Journal(path)
     one.append("car", [event(1, text="of one")])
     other.append("car", [event(1, text="of the other")])
-    assert (other.trouble or "").startswith("The alarm log is not kept: another server writes into the same file.")
+    assert (other.trouble or "").startswith("The alarm log is not stored: another server writes into the same file.")
     assert one.trouble is None
     assert [kept["text"] for kept in Journal(path).after("car", 0)] == ["of one"]
     one.close()
@@ -252,7 +252,7 @@ def test_two_servers_on_one_log_are_told_and_nothing_is_overwritten(tmp_path: Pa
 
 
 def test_one_alarm_is_found_by_an_index() -> None:
-    """A log of years is not read through for where an alarm stands."""
+    """A log of years is not read through for where an alarm is active."""
     journal = Journal(None)
     assert journal._database is not None
     asked: list[str] = []

@@ -36,13 +36,13 @@ def test_every_format_lands_beside_you_under_the_recording_s_name(
     drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], format: str
 ) -> None:
     assert main(["export", str(drive), "--format", format]) == 0
-    out = tmp_path / f"{ID}.{FORMATS[format].ending}"
+    out = tmp_path / f"{ID}.{FORMATS[format].extension}"
     assert out.stat().st_size > 500
     said = capsys.readouterr()
     assert said.out.startswith(f"{out.name} (")
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["in", out.name])
     assert main(["export", str(drive), "--format", format]) == 2
-    assert capsys.readouterr().err == f"catgraph export: {out.name} is there already: name the file with --out.\n"
+    assert capsys.readouterr().err == f"catgraph export: {out.name} exists already: choose another file with --out.\n"
     assert main(["export", str(drive), "--format", format, "--out", out.name]) == 0  # who names it means it
 
 
@@ -51,9 +51,7 @@ def test_a_ros_2_bag_is_made_of_a_drive_from_ros_2_and_of_no_other(
 ) -> None:
     assert main(["export", str(drive), "--format", "ros2"]) == 2
     said = capsys.readouterr().err
-    assert said == (
-        "catgraph export: This drive was recorded from ROS 1, and its messages are ROS 1's: take the ROS 1 bag.\n"
-    )
+    assert said == ("catgraph export: This drive was recorded from ROS 1: export a ROS 1 bag.\n")
     bag = write_ros2(tmp_path / "drive", Drive(messages=[(0.0, "/n", "std_msgs/msg/Int32", {"data": 7})]))
     assert main(["export", str(bag), "--format", "ros2"]) == 0
     assert zipfile.ZipFile(tmp_path / "drive.ros2.zip").namelist() == ["drive/drive.mcap", "drive/metadata.yaml"]
@@ -93,13 +91,13 @@ def test_a_clip_is_a_recording(drive: Path, tmp_path: Path) -> None:
         (["--format", "bag", "--at", "nan"], "--at nan: that is no moment."),
         (
             ["--format", "bag", "--at", "2026-09-21T14:13:25"],
-            "say which time that is, as 2026-09-21T14:13:25Z for UTC.",
+            "add the time zone, as 2026-09-21T14:13:25Z for UTC.",
         ),
         (
             ["--format", "bag", "--at", "1000"],
             "Nothing was recorded from 2026-09-21 14:29:30 to 2026-09-21 14:30:30 UTC.",
         ),
-        (["--format", "bag", "--out", "nowhere/x.bag"], "nowhere/x.bag cannot be written: nowhere is no directory."),
+        (["--format", "bag", "--out", "nowhere/x.bag"], "nowhere/x.bag cannot be written: nowhere is not a directory."),
         (["--format", "bag", "--out", f"in/{ID}.mcap"], "is the recording itself"),
     ],
 )

@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from monitor.reach import ReachFacts
-from server.control.alarm_reach import BLIND_S, FORGOTTEN_S, FRESH_S, MOST, MOST_SHOWN, Present, Reach, Why
+from server.control.alarm_reach import BLIND_S, FORGOTTEN_S, FRESH_S, MOST, MOST_SHOWN, AlarmReach, Present
 from server.control.lease import Operator
+from server.protocol.operator_state import ReaderEnded
 
 READY = Present(is_visible=True, sound="ready", awake="ready", vibrates=True, battery=0.5, is_charging=False, lag_s=0.1)
 
@@ -18,7 +19,7 @@ def one(name: str, page: str = "", who: str = "") -> Operator:
 
 
 def test_of_a_server_that_nobody_looks_at_nobody_hears_anything() -> None:
-    assert Reach().facts(0.0) == ReachFacts(can=0, of=0, why="")
+    assert AlarmReach().facts(0.0) == ReachFacts(can=0, of=0, why="")
 
 
 @pytest.mark.parametrize(
@@ -40,8 +41,8 @@ def test_of_a_server_that_nobody_looks_at_nobody_hears_anything() -> None:
         (replace(READY, awake="missing", vibrates=False, battery=None, is_charging=None), 0.0, None),
     ],
 )
-def test_what_keeps_a_phone_from_alarming(word: Present, age_s: float, why: Why | None) -> None:
-    reach = Reach()
+def test_what_keeps_a_phone_from_alarming(word: Present, age_s: float, why: ReaderEnded | None) -> None:
+    reach = AlarmReach()
     reach.hear(one("Ann"), word, 10.0)
     (page,) = reach.all(10.0 + age_s)
     assert page.why_not(10.0 + age_s) == why
@@ -49,7 +50,7 @@ def test_what_keeps_a_phone_from_alarming(word: Present, age_s: float, why: Why 
 
 
 def test_two_of_three_operators() -> None:
-    reach = Reach()
+    reach = AlarmReach()
     reach.hear(one("Ann"), READY, 0.0)
     reach.hear(one("Ben"), READY, 0.0)
     reach.hear(one("Cem"), replace(READY, sound="refused"), 0.0)
@@ -59,7 +60,7 @@ def test_two_of_three_operators() -> None:
 
 
 def test_two_pages_of_one_device_are_one_operator_who_hears_by_either() -> None:
-    reach = Reach()
+    reach = AlarmReach()
     reach.hear(one("Ann", "page-1"), replace(READY, is_visible=False), 0.0)
     reach.hear(one("Ann", "page-2"), READY, 0.0)
     assert reach.facts(0.0) == ReachFacts(can=1, of=1, why="")
@@ -70,7 +71,7 @@ def test_two_pages_of_one_device_are_one_operator_who_hears_by_either() -> None:
 
 
 def test_who_sleeps_counts_for_five_minutes_and_who_leaves_does_not() -> None:
-    reach = Reach()
+    reach = AlarmReach()
     reach.hear(one("Ann"), READY, 0.0)
     reach.hear(one("Ben"), READY, 0.0)
     reach.leave(one("Ben"))
@@ -79,7 +80,7 @@ def test_who_sleeps_counts_for_five_minutes_and_who_leaves_does_not() -> None:
 
 
 def test_no_more_than_so_many_pages_are_kept_and_those_heard_last_stay() -> None:
-    reach = Reach()
+    reach = AlarmReach()
     for number in range(MOST + 5):
         reach.hear(one(f"{number:03}"), READY, number / 100)
     assert len(reach.all(1.0)) == MOST
@@ -87,7 +88,7 @@ def test_no_more_than_so_many_pages_are_kept_and_those_heard_last_stay() -> None
 
 
 def test_the_state_shows_each_page_and_says_how_many_it_leaves_out() -> None:
-    reach = Reach()
+    reach = AlarmReach()
     reach.hear(one("Ann"), replace(READY, sound="refused"), 0.0)
     shown = reach.as_json(0.5)
     assert shown == {
@@ -102,8 +103,44 @@ def test_the_state_shows_each_page_and_says_how_many_it_leaves_out() -> None:
     assert (len(reach.as_json(0.0)["pages"]), reach.as_json(0.0)["left_out"]) == (MOST_SHOWN, 1)
 
 
+@pytest.mark.parametrize(
+    ("word", "age_s", "can"),
+    [
+        (READY, 0.0, 1),
+        (READY, FRESH_S, 1),
+        (READY, FRESH_S + 0.01, 0),
+        (replace(READY, is_visible=False), 0.0, 0),
+        (replace(READY, is_drawing=False), 0.0, 0),
+        (replace(READY, lag_s=BLIND_S + 0.1), 0.0, 0),
+        (replace(READY, is_replaying=True), 0.0, 0),
+        (replace(READY, sound="asks"), 0.0, 0),
+        (replace(READY, sound="interrupted"), 0.0, 0),
+    ],
+)
+def test_a_page_of_another_car_counts_only_while_it_would_sound(word: Present, age_s: float, can: int) -> None:
+    reach = AlarmReach()
+    reach.hear_elsewhere(one("Ann"), word, 10.0)
+    assert reach.facts(10.0 + age_s) == ReachFacts(can=can, of=can, why="")  # of one that cannot nothing is expected
+    assert (reach.all(10.0), reach.heard_s(), reach.is_here(one("Ann"), 10.0)) == ([], None, False)
+    assert reach.find("page-Ann", 10.0) is None
+    reach.hear(one("Ben"), replace(READY, sound="refused"), 10.0 + age_s)
+    assert reach.facts(10.0 + age_s) == ReachFacts(can=can, of=can + 1, why="sound off")
+
+
+def test_a_page_of_another_car_leaves_and_is_one_operator_with_a_page_that_is_here() -> None:
+    reach = AlarmReach()
+    reach.hear(one("Ann", "page-1"), replace(READY, sound="refused"), 0.0)
+    reach.hear_elsewhere(one("Ann", "page-2"), READY, 0.0)
+    assert reach.facts(0.0) == ReachFacts(can=1, of=1, why="")
+    reach.leave_elsewhere(one("Ann", "page-2"))
+    assert reach.facts(0.0) == ReachFacts(can=0, of=1, why="sound off")
+    for number in range(MOST + 5):
+        reach.hear_elsewhere(one(f"{number:03}"), READY, 1.0)
+    assert reach.facts(1.0).can == MOST
+
+
 def test_here_is_who_is_seen() -> None:
-    reach = Reach()
+    reach = AlarmReach()
     reach.hear(one("Ann"), READY, 0.0)
     reach.hear(one("Ben"), replace(READY, is_visible=False), 0.0)
     assert reach.is_here(one("Ann"), 1.0)

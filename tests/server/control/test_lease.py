@@ -47,7 +47,7 @@ def test_the_holder_s_order_counts(fence: int | None) -> None:
 
 @pytest.mark.parametrize("fence", [6, 8, 0])
 def test_an_order_of_another_lease_is_refused_even_the_holder_s_own(fence: int) -> None:
-    with pytest.raises(NotInControl, match="This was ordered while control was another: look, then order it again"):
+    with pytest.raises(NotInControl, match="Control changed since this command: check, then send it again"):
         held().admit(ANN, fence)
 
 
@@ -110,7 +110,7 @@ def test_the_former_holder_back_within_30_s_has_it_again_by_another_number(back_
     assert (act is not None) is again
     if act is not None:
         assert (act.change, act.holder, act.fence) == ("returned", ANN, 8)
-        assert act.text == f"Ann is back after {back_s + 3:.0f} s and in control again: nobody had taken it."
+        assert act.text == f"Ann is back after {back_s + 3:.0f} s and in control again: nobody else had taken it."
 
 
 def test_with_somebody_in_between_it_does_not_return() -> None:
@@ -134,7 +134,7 @@ def test_nobody_returns_to_what_was_given_up() -> None:
 
 def test_what_somebody_has_is_not_taken_but_taken_over() -> None:
     control = held()
-    with pytest.raises(NotInControl, match="Ann is in control: ask for it, or take it over"):
+    with pytest.raises(NotInControl, match="Ann is in control: request control, or take it over"):
         control.take(BEN, 1.0)
     act = control.take_over(BEN, 1.0)
     assert act is not None
@@ -177,7 +177,7 @@ def test_silence_grants_after_10_s_and_not_before() -> None:
     control = held()
     asked = control.request(BEN, 0.0)
     assert asked is not None
-    assert (asked.change, asked.text, asked.holder) == ("requested", "Ben asks Ann for control.", ANN)
+    assert (asked.change, asked.text, asked.holder) == ("requested", "Ben requests control from Ann.", ANN)
     assert control.request(BEN, 1.0) is None  # once
     assert kept_alive(control, ANSWER_S - 0.1) == []
     (act,) = control.advance(ANSWER_S, everybody)
@@ -189,9 +189,9 @@ def test_the_holder_keeps_it_and_the_request_is_over() -> None:
     control = held()
     control.request(BEN, 0.0)
     act = control.keep(ANN, 7, BEN.page)
-    assert (act.change, act.text) == ("kept", "Ann keeps control: Ben had asked for it.")
+    assert (act.change, act.text) == ("kept", "Ann keeps control; the request of Ben was declined.")
     assert kept_alive(control, 12.0) == []
-    with pytest.raises(Refused, match="Nobody asks for control any more"):
+    with pytest.raises(Refused, match="Nobody is requesting control now"):
         control.keep(ANN, 7, BEN.page)
 
 
@@ -214,7 +214,7 @@ def test_a_request_ends_with_the_page_that_made_it_or_when_it_is_taken_back() ->
     control.request(BEN, 1.0)
     act = control.withdraw(BEN)
     assert act is not None
-    assert act.text == "Ben does not ask for control any more."
+    assert act.text == "Ben cancelled the request for control."
     assert control.withdraw(BEN) is None
 
 
@@ -239,7 +239,7 @@ def test_so_many_ask_and_no_more() -> None:
     control = held()
     for number in range(MOST_REQUESTS):
         control.request(Operator(page=f"page-{number}", who="x", name="X"), 0.0)
-    with pytest.raises(NotInControl, match="8 operators ask Ann already"):
+    with pytest.raises(NotInControl, match="8 operators are already asking Ann"):
         control.request(BEN, 0.0)
 
 

@@ -61,7 +61,7 @@ async def test_two_pages_one_control_and_an_old_number_is_refused(server: str) -
         assert old["reason"] == "Ben is in control."
         assert (await ben.ask(kind="control", do="hand_over", to="page-ann"))["ok"]
         old = await ann.ask(kind="resume", fence=first["fence"])  # she is in control again, by another lease
-        assert old["reason"] == "This was ordered while control was another: look, then order it again."
+        assert old["reason"] == "Control changed since this command: check, then send it again."
         assert (await ann.ask(kind="resume"))["ok"]
         await ben.until(lambda: len(acts(ben)) == 3)
         assert acts(ben) == ["taken", "taken_over", "handed_over"]
@@ -133,7 +133,7 @@ async def test_nobody_hears_alarms_on_a_server_that_nobody_looks_at(bridge: RosB
                     break
                 await asyncio.sleep(0.5)
         (alarm,) = [one for one in found if one["id"] == "reach"]
-        assert alarm["text"] == "The car moves at 4.2 m/s and nobody can hear alarms: no operator's phone is here"
+        assert alarm["text"] == "The car moves at 4.2 m/s and nobody can hear alarms: no operator's phone is connected"
         log = (await program.get("/api/log.json", params={"alarm": "reach"})).json()
         assert [event["change"] for event in log] == ["raised"]
 

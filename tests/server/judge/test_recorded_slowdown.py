@@ -8,7 +8,7 @@ import pytest
 
 from monitor.checks.slow_down import SlowDownLimits
 from server.judge import recorded_slowdown
-from server.judge.recorded_slowdown import Slowed
+from server.judge.recorded_slowdown import RecordedSlowDown
 
 START_S = 1_790_000_000.0
 LIMITS = SlowDownLimits()
@@ -26,13 +26,13 @@ DRIVE: list[tuple[float, dict[str, Any]]] = [
 ]
 
 
-def at(now_s: float) -> Slowed:
-    state = Slowed()
+def at(now_s: float) -> RecordedSlowDown:
+    state = RecordedSlowDown()
     for at_s, event in DRIVE:
-        told = recorded_slowdown.read(event)
-        assert told is not None
+        recorded = recorded_slowdown.read(event)
+        assert recorded is not None
         if at_s <= now_s:
-            state = state.after(told, at_s)
+            state = state.after(recorded, at_s)
     return state
 
 
@@ -71,18 +71,18 @@ def test_each_moment_is_shown_as_it_was(
 def test_what_was_not_confirmed_says_so_until_the_car_slows() -> None:
     state = at(5.1)
     for step, confirmed in (("not_confirmed", False), ("slows", True)):
-        told = recorded_slowdown.read({"change": "slow_down", "step": step, "order": 7, "why": "by hand"})
-        assert told is not None
-        state = state.after(told, 6.5)
+        recorded = recorded_slowdown.read({"change": "slow_down", "step": step, "order": 7, "why": "by hand"})
+        assert recorded is not None
+        state = state.after(recorded, 6.5)
         assert state.as_json(6.5, START_S, LIMITS)["order"]["confirmed"] is confirmed
 
 
 def test_a_recording_that_begins_in_the_middle_of_an_order_knows_it_from_the_next_word() -> None:
-    told = recorded_slowdown.read(
+    recorded = recorded_slowdown.read(
         {"change": "slow_down", "step": "slows", "order": 3, "why": "by hand", "ordered_by": "Ann"}
     )
-    assert told is not None
-    shown = Slowed().after(told, 2.0).as_json(2.5, START_S, LIMITS)
+    assert recorded is not None
+    shown = RecordedSlowDown().after(recorded, 2.0).as_json(2.5, START_S, LIMITS)
     assert (shown["state"], shown["order"]["by"], shown["order"]["sending"]) == ("ordered", "Ann", False)
 
 
@@ -98,8 +98,8 @@ def test_a_recording_that_begins_in_the_middle_of_an_order_knows_it_from_the_nex
     ],
 )
 def test_events_that_make_no_sense_harm_nothing(event: dict[str, Any]) -> None:
-    told = recorded_slowdown.read(event)
-    state = Slowed() if told is None else Slowed().after(told, 1.0)
+    recorded = recorded_slowdown.read(event)
+    state = RecordedSlowDown() if recorded is None else RecordedSlowDown().after(recorded, 1.0)
     assert state.order is None
     state.facts(2.0, LIMITS)
     state.as_json(2.0, START_S, LIMITS)

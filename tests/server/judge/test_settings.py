@@ -352,12 +352,12 @@ async def test_of_two_pages_that_change_at_once_one_is_told_to_look_again(server
         lost = next(answer for answer in answers if not answer["ok"])
         assert won["version"] == version + 1
         assert lost["conflict"] is True
-        assert lost["reason"].endswith("Look at them again.")
+        assert lost["reason"].endswith("Check them again.")
         limit = 8.0 if answers[0]["ok"] else 7.0
         for page in (one, two):
             state = await page.state(lambda s: s["session"]["settings_version"] == version + 1)
             assert state["limits"][LIMIT] == limit
-        again = await two.ask(kind="set", values={LIMIT: 7.0}, version=version + 1)
+        again = await two.ask(kind="set", values={LIMIT: 6.0}, version=version + 1)
         assert (again["ok"], again["version"]) == (True, version + 2)
 
 

@@ -9,7 +9,6 @@ import email
 import email.policy
 import ipaddress
 import json
-import os
 import sys
 from collections.abc import AsyncIterator
 from email.message import EmailMessage
@@ -40,7 +39,6 @@ class Post:
             cwd=PROJECT,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
-            env={key: value for key, value in os.environ.items() if key != "PYTHONASYNCIODEBUG"},
         )
         assert self._process.stdout is not None
         async with asyncio.timeout(30):

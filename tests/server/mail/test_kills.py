@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
-import os
 import random
 import re
 import sys
@@ -26,7 +25,6 @@ async def sending(tmp_path: Path, port: int, orders: int) -> asyncio.subprocess.
         *(str(tmp_path / "mail"), str(tmp_path / "shelf"), str(port), str(orders)),
         cwd=PROJECT,
         stdout=asyncio.subprocess.PIPE,
-        env={key: value for key, value in os.environ.items() if key != "PYTHONASYNCIODEBUG"},
     )
 
 

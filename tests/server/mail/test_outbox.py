@@ -188,7 +188,7 @@ def test_cancelling_ends_what_waits_and_keeps_what_was_sent(outbox: Outbox) -> N
     assert (letter.state, letter.said) == ("cancelled", "1 of 2 mails were sent before.")
     assert outbox.queue.next_due(T, HOUR_MS) is None
     assert list(outbox.files.iterdir()) == []
-    with pytest.raises(WrongState, match="cancelled already"):
+    with pytest.raises(WrongState, match="already cancelled"):
         outbox.cancel(n)
 
 

@@ -104,7 +104,7 @@ def test_packing_can_be_broken_off(tmp_path: Path) -> None:
 
 def test_a_disk_that_would_be_filled_is_not(tmp_path: Path) -> None:
     need_room(tmp_path, 0)
-    with pytest.raises(NoRoom, match=r"The disk has \d+ MB left; \d+ MB are needed\."):
+    with pytest.raises(NoRoom, match=r"The disk has \d+ MB left; \d+ MB are required\."):
         need_room(tmp_path, shutil.disk_usage(tmp_path).free)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
-from server.analysis.recorded_events import told_by
+from server.analysis.recorded_log import read_recorded_log
 from server.app.config import Config
 from server.judge.active_settings import ActiveSettings
 from server.judge.settings import SettingsFile
@@ -92,7 +92,7 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         assert (await one.ask(kind="set", values={"speed_limit.max_mps": 12.0}))["ok"]
         assert (await one.ask(kind="pause"))["ok"]
         refused = await one.ask(kind="record", on=True)
-        assert refused == {**refused, "ok": False, "reason": "It is being recorded already."}
+        assert refused == {**refused, "ok": False, "reason": "It is already being recorded."}
         await one.ask(kind="position", phone="abcd-1", handheld=True, why="denied")
         assert (await one.ask(kind="disconnect"))["ok"]
         await one.state(recording_is("off"), SOON_S)
@@ -146,7 +146,7 @@ async def test_case_04_a_lost_link_saves_and_lists_what_was_recorded_and_its_ret
         assert files(tmp_path) == [f"{name}.mcap"]
         assert await listed(base) == [name]
         refused = await one.ask(kind="record", on=True)
-        assert refused["reason"] == "No car is connected: there is nothing to record."
+        assert refused["reason"] == "No car is connected, so there is nothing to record."
         await bridge.revive()
         state = await one.state(
             lambda s: s["recording"]["state"] == "recording" and s["recording"]["messages"] > 5, within_s=SOON_S
@@ -184,7 +184,7 @@ async def test_a_second_part_tells_which_alarms_stand_when_it_begins(bridge: Ros
         assert stood["speed_limit"]["occurrence"] == raised["occurrence"]
         numbers = {said["n"] for _, said in recording.own("/catgraph/alarms")}
         assert not numbers & {event["n"] for event in stood.values()}, "none is told twice"
-        told = told_by(recording)
+        told = read_recorded_log(recording)
         assert told is not None
         assert [e.raised_s for e in told.episodes if e.alarm_id == "speed_limit"] == [0.0]
 
@@ -247,7 +247,7 @@ async def test_by_hand_it_begins_and_ends_and_stays_ended(bridge: RosBridge, tmp
             answer = await client.post("/api/record", json={"on": True})
             assert answer.status_code == 200
             answer = await client.post("/api/record", json={"on": True})
-            assert (answer.status_code, answer.json()["detail"]) == (409, "It is being recorded already.")
+            assert (answer.status_code, answer.json()["detail"]) == (409, "It is already being recorded.")
         state = await one.state(lambda s: s["recording"]["messages"] > 5, within_s=SOON_S)
         assert state["recording"]["name"] != first
     with open_recording([RecordingsFolder(tmp_path / "recordings").path_of(first) or Path()]) as recording:
@@ -259,21 +259,21 @@ async def test_where_it_cannot_record_it_says_so_and_monitors_all_the_same(bridg
     (tmp_path / "recordings" / "car").write_text("in the way")
     async with watched(bridge, tmp_path) as (_, one), driving(bridge):
         state = await one.state(recording_is("stopped"), within_s=SOON_S)
-        assert state["recording"]["reason"] == "Recording cannot begin: the folder for recordings is no folder."
+        assert state["recording"]["reason"] == "Recording cannot begin: the folder for recordings is not a folder."
         state = await one.state(lambda s: any(a["id"] == "recording_stopped" for a in s["alarms"]), SOON_S)
         assert state["session"]["phase"] == "monitoring"
         assert state["signals"]["speed"]["freshness"] == "fresh"
         refused = await one.ask(kind="record", on=True)
         assert refused["ok"] is False
-        assert refused["reason"] == "Recording cannot begin: the folder for recordings is no folder."
+        assert refused["reason"] == "Recording cannot begin: the folder for recordings is not a folder."
 
 
 async def test_a_server_that_keeps_nothing_says_so(server: str, bridge: RosBridge) -> None:
     async with viewer(server) as one, driving(bridge):
         state = await one.state(lambda s: s["session"]["phase"] == "monitoring", within_s=SOON_S)
         assert state["recording"]["state"] == "off"
-        assert "keeps nothing" in state["recording"]["reason"]
-        assert "keeps nothing" in (await one.ask(kind="record", on=True))["reason"]
+        assert "stores nothing" in state["recording"]["reason"]
+        assert "stores nothing" in (await one.ask(kind="record", on=True))["reason"]
 
 
 async def test_what_a_killed_server_left_is_recovered_and_listed_at_the_next_start(
@@ -298,7 +298,7 @@ async def test_what_a_killed_server_left_is_recovered_and_listed_at_the_next_sta
     finally:
         await process.kill()
     assert files(tmp_path) == [f"{name}.mcap"]
-    assert log[0]["text"].startswith(f"{name} was cut off while it was recorded: ")
+    assert log[0]["text"].startswith(f"{name} is truncated: ")
     with open_recording([tmp_path / "recordings" / "car" / f"{name}.mcap"]) as recording:
         assert recording.count > 20
         assert recording.metadata["ended"] == "recovered"

@@ -65,10 +65,10 @@ def test_what_is_not_there_or_no_file(tmp_path: Path) -> None:
     assert why_unreadable(tmp_path / "a.bag") == f"{tmp_path}/a.bag does not exist"
     assert why_unreadable(tmp_path) == f"{tmp_path} is a directory without a recording in it"
     os.mkfifo(tmp_path / "pipe")
-    assert why_unreadable(tmp_path / "pipe") == f"{tmp_path}/pipe is no ordinary file"
+    assert why_unreadable(tmp_path / "pipe") == f"{tmp_path}/pipe is not a regular file"
     (tmp_path / "gone").symlink_to(tmp_path / "nothing")
     assert "does not exist" in why_unreadable(tmp_path / "gone")
-    assert why_unreadable() == "no recording was named"
+    assert why_unreadable() == "no recording was given"
     assert "cannot be read" in why_unreadable(tmp_path / ("x" * 256))
 
 

@@ -142,7 +142,7 @@ async def test_a_disk_that_can_only_be_read_is_said_and_monitoring_goes_on(disk:
         await asyncio.to_thread(remount, disk, "ro")
         try:
             refused = await one.ask(kind="record", on=True)
-            assert refused["reason"] == "Recording cannot begin: the folder for recordings can only be read."
+            assert refused["reason"] == "Recording cannot begin: the folder for recordings is read-only."
             state = await one.state(lambda s: any(a["id"] == "recording_stopped" for a in s["alarms"]))
             assert state["session"]["phase"] == "monitoring"
             assert state["signals"]["speed"]["freshness"] == "fresh"
@@ -164,6 +164,6 @@ def test_a_read_only_disk_keeps_what_was_left(disk: Path) -> None:
     (done,) = recover_all(RecordingsFolder(disk))
     assert done.is_settled is False
     assert done.sentence == (
-        "car_1 cannot be recovered now: the folder for recordings can only be read. It is kept as it is."
+        "car_1 cannot be recovered now: the folder for recordings is read-only. It is kept as it is."
     )
     assert (folder / "car_1.mcap.writing").exists()

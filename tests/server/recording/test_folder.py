@@ -61,7 +61,7 @@ def test_no_name_leads_out(tmp_path: Path, id: str) -> None:
     put(folder, "a.mcap")
     (tmp_path / "a.mcap").write_bytes(b"x")
     assert folder.path_of(id) is None
-    with pytest.raises(ValueError, match="no name"):
+    with pytest.raises(ValueError, match="not a valid name"):
         folder.place("car", id)
 
 

@@ -163,7 +163,7 @@ async def test_large_messages_fill_the_queue_by_their_bytes(tmp_path: Path, monk
     ("allowance", "why"),
     [
         (Allowance(quota=0, min_free=1 << 62), r"The disk has .* left, and recording stops at 4611686018 GB\."),
-        (Allowance(quota=1000, min_free=0), r"Recordings take 1\.5 kB, all of the 1\.0 kB they may have\."),
+        (Allowance(quota=1000, min_free=0), r"Recordings take 1\.5 kB, all of the 1\.0 kB that are allowed\."),
     ],
 )
 async def test_where_there_is_no_room_nothing_is_begun(tmp_path: Path, allowance: Allowance, why: str) -> None:
@@ -226,7 +226,7 @@ async def test_a_folder_that_is_none_is_said(tmp_path: Path) -> None:
     user = RecorderUser(tmp_path / "recordings")
     user.recorder.begin(replace(user.part(), path=tmp_path / "recordings" / "car" / "a.mcap"))
     await user.until(lambda: user.recorder.status.state == "stopped")
-    assert user.recorder.status.trouble == "Recording cannot begin: the folder for recordings is no folder."
+    assert user.recorder.status.trouble == "Recording cannot begin: the folder for recordings is not a folder."
     await user.stop()
 
 
@@ -240,7 +240,7 @@ async def test_a_file_that_is_taken_away_while_it_is_written_is_said(
     await user.until(lambda: user.recorder.status.state == "recording")
     part.path.with_name(f"{part.id}.mcap.writing").unlink()
     await user.until(lambda: user.recorder.status.state == "stopped")
-    assert user.recorder.status.trouble == "Recording stopped: the folder or the file was taken away."
+    assert user.recorder.status.trouble == "Recording stopped: the folder or the file was removed."
     assert user.finished == []
     await user.stop()
 

@@ -41,9 +41,7 @@ def test_what_was_flushed_is_all_there_and_the_file_is_as_good_as_any(tmp_path: 
     assert done.path == left.with_name("car_1.mcap")
     assert names(left.parent) == ["car_1.mcap"]
     assert done.messages == 24
-    assert done.sentence == (
-        "car_1 was cut off while it was recorded: 0.1 s with 24 messages are whole. Nothing was half written."
-    )
+    assert done.sentence == ("car_1 is truncated: 0.1 s with 24 messages are whole. Nothing was partly written.")
     with open_recording([done.path]) as recording:
         assert recording.ros_version == version
         assert recording.metadata == {"vehicle": "car", "part": "1", "ended": "recovered", "why": done.sentence}
@@ -109,7 +107,7 @@ def test_cut_at_every_byte_everything_before_the_cut_is_kept(tmp_path: Path) -> 
             settled.aside.unlink()
         else:
             assert names(left.parent) == [], size
-            assert settled.sentence == "car_1 had only begun: nothing was recorded in it."
+            assert settled.sentence == "car_1 had only started and is empty."
     assert folder.unfinished() == []
 
 
@@ -122,7 +120,7 @@ def test_one_that_had_only_begun_is_no_loss(tmp_path: Path) -> None:
         left.write_bytes(begun)
         done = recover(left)
         assert (done.path, done.aside) == (None, None)
-        assert done.sentence == "car_1 had only begun: nothing was recorded in it."
+        assert done.sentence == "car_1 had only started and is empty."
         assert names(left.parent) == []
 
 
@@ -146,7 +144,7 @@ def test_a_recovery_that_was_killed_is_done_again_or_ended(tmp_path: Path) -> No
     left.write_bytes(original)  # the new one had its name, and the original was still there
     (again,) = recover_all(RecordingsFolder(tmp_path / "recordings"))
     assert again.path == done.path
-    assert again.sentence == "car_1 had been recovered already."
+    assert again.sentence == "car_1 had already been recovered."
     assert names(left.parent) == ["car_1.mcap"]
     assert alarms(left.parent / "car_1.mcap") == list(range(6))
 
@@ -201,7 +199,7 @@ def test_what_a_loss_of_power_leaves_behind_the_last_part_is_no_part(tmp_path: P
     done = recover(left)
     assert done.path is not None
     assert done.messages == 24
-    assert "were only half written" in done.sentence
+    assert "were only partly written" in done.sentence
 
 
 def test_much_that_cannot_be_read_is_kept_aside(tmp_path: Path) -> None:

@@ -10,8 +10,14 @@ from typing import Any
 import orjson
 import pytest
 
+from monitor.alarm import Transition
+from server.protocol.check_state import CheckAnswer
+from server.recording.catalog.survey import survey
 from server.recording.read.read import open_recording
+from server.replay import alarm_history
+from server.replay.alarm_history import AlarmHistory
 from server.replay.playback import RATES, WARM_UP_S, Playback
+from tests.frames import check_shape
 from tests.page import drives
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
@@ -30,6 +36,13 @@ def shown(playback: Playback) -> dict[str, Any]:
     frame["session"]["track"].pop("number")
     track = playback.answer({"kind": "track_points", "after": 0})["points"]
     return frame | {"minute": playback.answer({"kind": "trends"}), "points": track, "scan": playback.scan_bytes()}
+
+
+def opened_check(playback: Playback, at_s: float, name: str = "speed_limit") -> dict[str, Any]:
+    """What a page gets of a check at a moment."""
+    playback.seek(at_s, 100.0)
+    reach(playback)
+    return dict(playback.answer({"kind": "check", "check": name}))
 
 
 def active(frame: dict[str, Any]) -> list[str]:
@@ -148,6 +161,49 @@ def test_the_time_line_has_the_speed_the_gap_and_the_alarms(playback: Playback) 
     orjson.dumps(line)
 
 
+def test_a_sketch_stands_until_the_time_line_is_made(street: Path) -> None:
+    recording = open_recording([street])
+    sketch = survey(street)["speed_mps"]
+    playback = Playback(recording, lambda: open_recording([street]), settings="", now_s=100.0, sketch=sketch)
+    first = playback.timeline()
+    assert (first["done_s"], first["is_done"]) == (0.0, False)
+    assert first["speed_mps"][85:115] == sketch[85:115]
+    assert max(speed or 0.0 for speed in first["speed_mps"]) == 12.5
+    playback.index.work(NEVER)
+    made = playback.timeline()
+    assert made["is_done"]
+    assert made["speed_mps"][100] == pytest.approx(sketch[100], abs=0.05)
+    assert made["speed_mps"] != sketch  # two decimals in place of one
+    assert made["speed_mps"][210] is None, "in the gap nothing is invented"
+    playback.close()
+
+
+def test_a_chart_of_a_recording_stands_before_it_is_read(street: Path) -> None:
+    sketch = survey(street)["trends"]
+    playback = Playback(
+        open_recording([street]), lambda: open_recording([street]), settings="", now_s=100.0, trends=sketch
+    )
+    asked = {"kind": "drive_trends", "signals": ["speed", "brake"], "buckets": 100}
+    first = playback.answer(asked)
+    assert (first["is_sketch"], first["known_s"]) == (True, 0.0)
+    assert max(high for high in first["signals"]["speed"]["highest"] if high is not None) == 12.5
+    assert first["signals"]["speed"]["limits"]
+    assert any(a <= 100.1 and b >= 107.9 for a, b in first["blind"])
+    playback.index.work(NEVER)
+    read = playback.answer(asked)
+    assert (read["is_sketch"], read["known_s"]) == (False, read["length_s"])
+    assert max(high for high in read["signals"]["speed"]["highest"] if high is not None) == 12.5
+    assert any(a <= 100.1 and b >= 107.9 for a, b in read["blind"])
+    assert [mark["alarm"] for mark in read["marks"]] == [mark["alarm"] for mark in playback.timeline()["marks"]]
+    playback.close()
+
+
+def test_a_mark_tells_how_long_its_alarm_was_active(indexed: Playback) -> None:
+    marks = indexed.timeline()["marks"]
+    fast = next(mark for mark in marks if mark["alarm"] == "speed_limit")
+    assert fast["duration_s"] == pytest.approx(22.0, abs=0.5)  # with the time after which it counts as over
+
+
 def test_the_keys_lead_to_the_alarms_before_and_after(indexed: Playback) -> None:
     playback = indexed
     playback.seek(0.0, 100.0)
@@ -216,7 +272,7 @@ def test_a_moment_beyond_an_end_is_that_end(playback: Playback, asked_s: float, 
 @pytest.mark.parametrize("asked_s", [math.nan, math.inf, -math.inf])
 def test_what_is_no_moment_is_refused_and_changes_nothing(playback: Playback, asked_s: float) -> None:
     before = playback.position()
-    with pytest.raises(ValueError, match="no moment"):
+    with pytest.raises(ValueError, match="outside the recording"):
         playback.seek(asked_s, 100.0)
     assert playback.position() == before
 
@@ -265,3 +321,38 @@ def test_the_real_drive(tmp_path: Path) -> None:
     assert "obstacle_nearest" in {alarm["id"] for alarm in playback.frame(**NAMES)["alarms"]}
     assert playback.position()["alarms_from"] == "judged"
     playback.close()
+
+
+def test_a_check_has_its_minute_and_its_alarms_up_to_the_moment_shown(street: Path, indexed: Playback) -> None:
+    for at_s, highest, changes in ((30.0, 9.0, []), (45.0, 12.5, ["raised"]), (99.0, 12.5, ["raised", "cleared"])):
+        found = opened_check(indexed, at_s)
+        check_shape(orjson.dumps(found), CheckAnswer)
+        values = [value for value in found["minute"]["values"] if value is not None]
+        assert len(found["minute"]["values"]) == min(300, round(at_s / 0.2) + 1)  # also right after a seek
+        assert max(values) == pytest.approx(highest, abs=0.05)
+        assert set(found["minute"]["limits"]) <= {11.0, None}
+        assert [event["change"] for event in found["history"]] == changes
+    raised, cleared = found["history"]
+    begun_ms = indexed.position()["start_ms"]
+    assert (raised["at_ms"] - begun_ms) / 1000 == pytest.approx(40.3, abs=0.2)
+    assert (cleared["n"], cleared["worst"]["value"], cleared["worst"]["side"]) == (2, 12.5, "above")
+    assert opened_check(indexed, 99.0, "laser_blind").get("history", []) == []
+    played = opened(street)
+    reach(played)
+    assert opened_check(played, 99.0)["history"] is None  # its own alarms are found by reading as far
+    played._work(100.0, NEVER)
+    played.index.work(NEVER)
+    played._put_right(100.0)
+    reach(played)
+    assert played.answer({"kind": "check", "check": "speed_limit"}) == opened_check(indexed, 99.0)
+    played.close()
+    assert opened_check(indexed, 1.0, "nothing")["ok"] is False
+
+
+def test_a_history_that_is_too_long_is_not_shown_as_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(alarm_history, "MOST", 2)
+    history = AlarmHistory()
+    for at_s in (1.0, 2.0, 3.0):
+        history.add(Transition(alarm_id="a", occurrence=1, change="raised", at_s=at_s, text=""), at_s)
+    assert [one.at_s for one in history.until("a", 2.9) or ()] == [1.0, 2.0]
+    assert (history.until("a", 3.0), history.until("b", 2.0)) == (None, [])

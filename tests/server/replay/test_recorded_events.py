@@ -155,7 +155,7 @@ def test_the_phone_is_where_it_was(tmp_path: Path) -> None:
     assert at(playback, 3.0)["phone"] is None
     shown = at(playback, 4.0)["phone"]
     assert (shown["lat_deg"], shown["label"]) == (32.23, "Anna's phone")
-    assert any("1 entries" in note or "1 entr" in note for note in playback.timeline()["notes"])
+    assert any("1 invalid entries" in note for note in playback.timeline()["notes"])
     playback.close()
 
 

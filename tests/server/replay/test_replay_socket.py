@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import hashlib
 import math
-import os
 import signal
-from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
@@ -17,48 +14,11 @@ import psutil
 import pytest
 import websockets
 
-from server.app.config import Config
 from server.replay import manager
 from server.rosbridge_server.server import RosBridge
-from server.vehicle.vehicle import Vehicle
-from tests.page import drives
 from tests.server.cars import driving
-from tests.server.conftest import serving
-from tests.server.recording import made
+from tests.server.replay.conftest import STREET
 from tests.server.viewer import Viewer, viewer
-
-STREET = f"street-{hashlib.sha256(b'car/street.bag').hexdigest()[:10]}"  # as the catalog calls what was copied there
-
-
-@pytest.fixture(scope="module")
-def street(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A minute: too fast from 20 s to 30 s."""
-
-    def speed(t: float) -> Any:
-        return drives.twist(12.5 if 20 <= t < 30 else 8.0 + math.sin(t / 9))
-
-    return drives.write(
-        tmp_path_factory.mktemp("street") / "street.bag", {"speed": speed, "scan": drives.street}, seconds=60.0
-    )
-
-
-@pytest.fixture
-def data(tmp_path: Path, street: Path) -> Path:
-    folder = tmp_path / "recordings" / "car"
-    folder.mkdir(parents=True)
-    os.link(street, folder / "street.bag")
-    made.record(folder / "car_20260921T142640Z.mcap", alarms=[(5.0, "critical"), (12.0, "warning")])
-    return tmp_path
-
-
-@pytest.fixture
-async def base(bridge: RosBridge, data: Path) -> AsyncIterator[str]:
-    config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=data)  # type: ignore[attr-defined]
-    async with serving(config) as address:
-        async with httpx.AsyncClient() as client, asyncio.timeout(20):
-            while len((await client.get(f"{address}/api/recordings")).json()["recordings"]) < 2:
-                await asyncio.sleep(0.1)
-        yield address
 
 
 async def order(one: Viewer, do: str, **fields: Any) -> dict[str, Any]:
@@ -132,10 +92,14 @@ async def test_the_time_line_the_track_and_the_minute_come_of_the_recording(brid
         async with httpx.AsyncClient() as client:
             points = (await client.get(f"{base}/api/track/points", params={"replay": token})).json()
             minute = (await client.get(f"{base}/api/trends", params={"replay": token})).json()
+            drive = (await client.get(f"{base}/api/trends/drive", params={"replay": token})).json()
             gone = await client.get(f"{base}/api/trends", params={"replay": "0000"})
         assert points["number"] == frame["session"]["track"]["number"]
         assert len(points["points"]) > 5
         assert minute["now"] == 75.0
+        assert drive["start_ms"] == frame["replay"]["start_ms"]
+        assert drive["known_s"] == drive["length_s"] == frame["replay"]["length_s"]
+        assert sum(low is not None for low in drive["signals"]["speed"]["lowest"]) > 30
         assert gone.status_code == 404
         assert gone.json()["detail"] == "This replay is over."
 
@@ -153,7 +117,7 @@ async def test_nothing_is_ordered_from_a_replay_but_a_position_is_told(bridge: R
         ):
             answer = await one.ask(**command)
             assert answer["ok"] is False
-            assert "replays a recording" in answer["reason"]
+            assert "shows a replay" in answer["reason"]
         assert (await one.ask(kind="position", phone="9c0f2b7d", handheld=True, why="denied"))["ok"]
         await order(one, "leave")
         assert (await one.ask(kind="pause"))["ok"]
@@ -252,7 +216,7 @@ async def test_so_many_replays_and_no_more(bridge: RosBridge, base: str, monkeyp
         pages = [await stack.enter_async_context(viewer(base)) for _ in range(3)]
         assert [(await order(page, "open", recording=STREET))["ok"] for page in pages] == [True, True, False]
         refusal = await order(pages[2], "open", recording=STREET)
-        assert refusal["reason"] == "2 replays run already: somebody has to leave one first."
+        assert refusal["reason"] == "2 replays are open already: close one first."
         assert (await order(pages[0], "leave"))["ok"]
         assert (await order(pages[2], "open", recording=STREET))["ok"]
 
@@ -297,7 +261,7 @@ async def test_a_process_that_dies_ends_the_replay_in_words_and_live_goes_on(bri
         [process] = replays()
         process.send_signal(signal.SIGKILL)
         said = await one.until(lambda: next((m for m in one.other if m["kind"] == "replay"), None))
-        assert said["ended"].startswith("The replay ended by itself")
+        assert said["ended"].startswith("The replay failed")
         await one.state(lambda s: "replay" not in s)
 
 

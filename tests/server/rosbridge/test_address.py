@@ -98,7 +98,7 @@ REFUSED = {
     "tcp": ("tcp://car", "scheme", "tcp", None),
     "file": ("file:///etc/passwd", "scheme", "file", None),
     "javascript": ("javascript://car", "scheme", "javascript", None),
-    "slashes alone": ("://car", "scheme", "not a way", None),
+    "slashes alone": ("://car", "scheme", "not a supported scheme", None),
     "one slash": ("ws:/car:9090", "scheme", "two slashes", "ws://car:9090"),
     "no slash": ("wss:car", "scheme", "two slashes", "wss://car"),
     "no slash and an ip": ("ws:10.0.0.1:9090", "scheme", "two slashes", "ws://10.0.0.1:9090"),

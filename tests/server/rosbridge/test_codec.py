@@ -81,8 +81,8 @@ BAD = {
     "too deep": (nested(MAX_DEPTH + 1), "a frame that nests too deep"),
     "1000 deep": (nested(1000), "a frame that nests too deep"),
     "1000 objects deep": (b'{"a":' * 1000 + b"1" + b"}" * 1000, "a frame that nests too deep"),
-    "100 000 deep": (nested(100_000), "a message of too many parts"),
-    "100 000 deep with a bare NaN": (b"[" * 100_000 + b"NaN" + b"]" * 100_000, "a message of too many parts"),
+    "100 000 deep": (nested(100_000), "a message with too many parts"),
+    "100 000 deep with a bare NaN": (b"[" * 100_000 + b"NaN" + b"]" * 100_000, "a message with too many parts"),
     "200 deep with a bare NaN": (b'{"a":NaN,"b":' + b"[" * 200 + b"]" * 200 + b"}", "a frame that nests too deep"),
 }
 

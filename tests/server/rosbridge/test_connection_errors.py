@@ -39,9 +39,9 @@ DIAL = {
     "refused": (system_error(errno.ECONNREFUSED), "refused", "nothing listens on port 9090"),
     "dial takes too long": (TimeoutError(), "timeout", "does not answer"),
     "system's own time-out": (system_error(errno.ETIMEDOUT), "timeout", "does not answer"),
-    "no route": (system_error(errno.EHOSTUNREACH), "unreachable", "No way leads"),
-    "no network": (system_error(errno.ENETUNREACH), "unreachable", "No way leads"),
-    "host down": (system_error(errno.EHOSTDOWN), "unreachable", "No way leads"),
+    "no route": (system_error(errno.EHOSTUNREACH), "unreachable", "There is no route"),
+    "no network": (system_error(errno.ENETUNREACH), "unreachable", "There is no route"),
+    "host down": (system_error(errno.EHOSTDOWN), "unreachable", "There is no route"),
     "firewall here": (system_error(errno.EPERM), "forbidden_here", "not allowed to dial"),
     "something else": (system_error(errno.EMFILE), "failed", "cannot be reached"),
     "something without words": (OSError(), "failed", "cannot be reached"),
@@ -63,7 +63,7 @@ HANDSHAKE = {
         "HTTP 404",
     ),
     "login": ("WebSocket connection upgrade failed [401]: ", b"HTTP/1.1 401", "not_rosbridge", "login"),
-    "full": ("WebSocket connection upgrade failed [503]: ", b"HTTP/1.1 503", "busy", "by itself"),
+    "full": ("WebSocket connection upgrade failed [503]: ", b"HTTP/1.1 503", "busy", "automatically"),
     "TLS alert": ("peer dropped", b"\x15\x03\x01\x00\x02\x02\x46", "wants_tls", "wss://car:9090"),
     "TLS, nginx": (
         "WebSocket connection upgrade failed [400]: Bad Request",
@@ -78,7 +78,7 @@ HANDSHAKE = {
         "not as a WebSocket",
     ),
     "bad answer": ("HTTP Upgrade header missing", b"HTTP/1.1 101\r\n\r\n", "not_rosbridge", "not as a WebSocket"),
-    "silent": ("opening handshake timeout", b"", "not_rosbridge", "says nothing"),
+    "silent": ("opening handshake timeout", b"", "not_rosbridge", "sends nothing"),
     "closes": ("peer dropped the TCP connection", b"", "not_rosbridge", "closes the connection"),
 }
 

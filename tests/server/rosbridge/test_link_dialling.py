@@ -74,7 +74,7 @@ OTHERS: dict[str, tuple[Handler, str, str]] = {
     "web server of old": (saying(b"HTTP/1.0 200 OK\r\n\r\n"), "not_rosbridge", "not as a WebSocket"),
     "one that sends elsewhere": (saying(b"HTTP/1.1 302 Found\r\nLocation: /\r\n\r\n"), "not_rosbridge", "HTTP 302"),
     "one that asks for a login": (saying(b"HTTP/1.1 401 Unauthorized\r\n\r\n"), "not_rosbridge", "login"),
-    "one that is full": (saying(b"HTTP/1.1 503 Service Unavailable\r\n\r\n"), "busy", "by itself"),
+    "one that is full": (saying(b"HTTP/1.1 503 Service Unavailable\r\n\r\n"), "busy", "automatically"),
     "a wrong key": (
         saying(b"HTTP/1.1 101 X\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: x\r\n\r\n"),
         "not_rosbridge",
@@ -91,7 +91,7 @@ OTHERS: dict[str, tuple[Handler, str, str]] = {
     "noise": (saying(bytes(range(256)) * 4), "not_rosbridge", "not as a WebSocket"),
     "ssh": (saying(b"SSH-2.0-OpenSSH_9.6\r\n", first=True), "not_rosbridge", "not as a WebSocket"),
     "one that talks without end": (say_without_end, "not_rosbridge", "not as a WebSocket"),
-    "one that is silent": (saying(b""), "not_rosbridge", "says nothing"),
+    "one that is silent": (saying(b""), "not_rosbridge", "sends nothing"),
     "one that hangs up at once": (hang_up, "not_rosbridge", "closes the connection"),
     "one that resets": (reset, "not_rosbridge", "closes the connection"),
     "TLS": (saying(b"\x15\x03\x01\x00\x02\x02\x46", hang_up=True), "wants_tls", "wss://127.0.0.1"),
@@ -131,7 +131,7 @@ async def test_a_handshake_that_comes_letter_by_letter_is_one() -> None:
         await accept(reader, writer)
         for letter in said + b'\x81\x0f{"op":"status"}':
             write(bytes([letter]))
-            await asyncio.sleep(0.0002)
+            await asyncio.sleep(0)
         await asyncio.sleep(5)
 
     async with answering(dribble) as port, linked(f"127.0.0.1:{port}", ear):

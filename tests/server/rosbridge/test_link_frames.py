@@ -30,7 +30,7 @@ JUNK: dict[str, tuple[bytes | str, str]] = {
     "an empty frame": ("", "text that is not JSON"),
     "a list": ("[]", "a frame that is not an object"),
     "a number": ("1", "a frame that is not an object"),
-    "100 000 deep": ("[" * 100_000 + "]" * 100_000, "a message of too many parts"),
+    "100 000 deep": ("[" * 100_000 + "]" * 100_000, "a message with too many parts"),
     "1000 deep": ('{"op":' + "[" * 1000 + "]" * 1000 + "}", "a frame that nests too deep"),
     "no operation": ("{}", "an operation that rosbridge does not have"),
     "an unknown operation": ('{"op":"explode"}', "an operation that rosbridge does not have"),
@@ -243,7 +243,7 @@ async def test_a_listener_that_stumbles_costs_one_message_and_is_told_once() -> 
                 await bridge.say({"op": "publish", "topic": "/bad", "msg": {}})
             await bridge.say(GOOD)
             await ear.hears("message")
-            assert ear.all("junk") == ["a message on which catgraph itself stumbled"] * 5
+            assert ear.all("junk") == ["a message that caused an internal error"] * 5
             assert ear.all("closed") == []
             assert len(told) == 1
     finally:

@@ -40,7 +40,7 @@ async def process() -> AsyncIterator[tuple[asyncio.subprocess.Process, int]]:
     running = await asyncio.create_subprocess_exec(sys.executable, "-c", A_BRIDGE, stdout=asyncio.subprocess.PIPE)
     assert running.stdout is not None
     try:
-        yield running, int(await asyncio.wait_for(running.stdout.readline(), 10))
+        yield running, int(await asyncio.wait_for(running.stdout.readline(), 60))
     finally:
         with contextlib.suppress(ProcessLookupError):
             running.send_signal(signal.SIGCONT)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from server.rosbridge_server.completion import Misfit, stamp
+from server.rosbridge_server.completion import TypeMismatch, stamp
 from server.rosbridge_server.types import MessageTypes
 
 ROS1, ROS2 = MessageTypes(1), MessageTypes(2)
@@ -66,7 +66,7 @@ def test_empty_messages_and_unknown_types_pass() -> None:
     ],
 )
 def test_what_does_not_fit_is_named(type: str, message: dict[str, Any], why: str) -> None:
-    with pytest.raises(Misfit, match=why):
+    with pytest.raises(TypeMismatch, match=why):
         ROS1.complete(type, message, 0.0)
 
 
@@ -76,7 +76,7 @@ def test_a_definition_of_the_topic_s_own_counts() -> None:
         "tank_msgs/Fuel", "float64 volume\ntank_msgs/Cap cap\n" + "=" * 80 + "\nMSG: tank_msgs/Cap\nbool open\n"
     )
     assert types.complete("tank_msgs/Fuel", {"volume": 3}, 0.0) == {"volume": 3.0, "cap": {"open": False}}
-    with pytest.raises(Misfit, match="no field colour"):
+    with pytest.raises(TypeMismatch, match="no field colour"):
         types.complete("tank_msgs/Fuel", {"colour": 3}, 0.0)
 
 

@@ -357,6 +357,6 @@ async def test_a_client_s_callback_that_fails_is_our_affair(
 
     vel.on_publish.append(fail)
     await probe.send(op="publish", topic="/vel", msg=TWIST, id="p")
-    assert "failed inside the bridge" in (await probe.hear())["msg"]
+    assert "internal error of the bridge" in (await probe.hear())["msg"]
     assert "a mistake of ours" in caplog.text
     assert (await probe.call("/rosapi/get_time"))["result"] is True

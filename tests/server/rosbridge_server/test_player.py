@@ -78,10 +78,11 @@ async def test_on_the_real_clock_it_takes_its_time(numbers: RosBridge) -> None:
 
 
 async def test_others_get_their_turn_while_it_hurries(numbers: RosBridge, probe: Probe) -> None:
-    playing = asyncio.ensure_future(play(drive(200_000, period_s=0.0), numbers))
-    began = time.monotonic()
+    """Long before it is at its end, however fast the machine."""
+    played: list[Message] = []
+    playing = asyncio.ensure_future(play(drive(200_000, period_s=0.0), numbers, on_message=played.append))
     assert (await probe.call("/rosapi/get_time"))["result"] is True
-    assert time.monotonic() - began < 0.2
+    assert 0 < len(played) < 20_000
     assert not playing.done()
     playing.cancel()
     await asyncio.wait({playing})

@@ -83,7 +83,7 @@ async def test_a_mistake_of_ours_is_answered_with_them() -> None:
     async with serving_app(app, config) as base, httpx.AsyncClient(base_url=base) as client:
         answer = await client.get("/api/mistake")
         assert answer.status_code == 500
-        assert answer.json()["detail"] == "The server made a mistake; it is in its log."
+        assert answer.json()["detail"] == "Internal server error; the server's log has the details."
         assert "secret words" not in answer.text
         _has_all(answer.headers, POLICY_OF_DATA)
 

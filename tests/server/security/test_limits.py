@@ -233,7 +233,7 @@ async def test_orders_that_run_away_are_refused_in_words_and_the_page_lives() ->
         await one.until(lambda: one.states)
         answers = [await one.ask(kind="retry") for _ in range(15)]
         words = [str(answer["reason"]) for answer in answers]
-        assert sum(word.startswith("Too many orders at once") for word in words) in (4, 5)
+        assert sum(word.startswith("Too many commands at once") for word in words) in (4, 5)
         assert not words[0].startswith("Too many")
         await asyncio.sleep(0.5)
         assert not str((await one.ask(kind="retry"))["reason"]).startswith("Too many")
@@ -259,7 +259,7 @@ async def test_a_message_that_nests_is_no_message(depth: int) -> None:
         deep = '{"kind":"pause","id":"a","x":' + "[" * depth + "]" * depth + "}"
         await one.socket.send(deep)
         complaint = await one.until(lambda: next((r for r in one.other if r["kind"] == "problem"), None))
-        assert complaint["reason"] in ("A message does not nest so deep.", "That was not JSON.")
+        assert complaint["reason"] in ("The message is nested too deeply.", "The message is not JSON.")
         assert "ok" in await one.ask(kind="pause")
 
 

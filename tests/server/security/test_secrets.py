@@ -34,12 +34,11 @@ class Life:
     def __init__(self, folder: Path) -> None:
         self.data, self.out = folder / "data", folder / "said"
         self._file = self.out.open("w")
-        environment = {name: value for name, value in os.environ.items() if name != "PYTHONASYNCIODEBUG"}
         self._process = subprocess.Popen(
             [sys.executable, "-m", "server", "serve", "--host", "0.0.0.0", "--tls", "off", "--port", "0",
              "--data", str(self.data)],
             cwd=PROJECT, stdout=self._file, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-            env=environment | {"CATGRAPH_KEY": OPERATOR_KEY, "CATGRAPH_VIEWER_KEY": VIEWER_KEY},
+            env=os.environ | {"CATGRAPH_KEY": OPERATOR_KEY, "CATGRAPH_VIEWER_KEY": VIEWER_KEY},
         )  # fmt: skip
 
     async def address(self) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 from server.app.config import Config
 from server.bus.event_table import safe_cell
-from server.protocol import commands, replies
+from server.protocol import commands, messages
 from server.rosbridge_server.server import RosBridge
 from server.system.clean_text import clean, cleaned
 from server.vehicle.vehicle import Vehicle
@@ -106,7 +106,8 @@ async def test_the_alarm_log_is_clean_whatever_the_car_and_a_page_say(bridge: Ro
 def test_the_kinds_of_a_page_are_a_table() -> None:
     assert commands.KINDS == {
         "acknowledge", "arm", "connect", "control", "disarm", "disconnect", "import", "pause", "position",
-        "present", "record", "release", "resume", "retry", "ride", "set", "shelve", "slow_down", "unshelve", "veto",
+        "present", "record", "release", "resume", "retry", "ride", "set", "shelve", "silence", "slow_down", "unshelve",
+        "veto",
     }  # fmt: skip
 
 
@@ -117,10 +118,10 @@ async def test_what_the_server_asks_of_a_session_is_refused_to_a_page(kind: obje
     async with serving(Config()) as base, viewer(base) as one:
         await one.until(lambda: one.states)
         answer = await one.ask(kind=kind)
-        assert answer == {"kind": "reply", "id": answer["id"], "ok": False, "reason": "There is no such command."}
+        assert answer == {"kind": "reply", "id": answer["id"], "ok": False, "reason": "Unknown command."}
 
 
 def test_no_key_of_an_answer_replaces_one_of_the_envelope() -> None:
     answer = {"kind": "state", "id": "8", "ok": True, "version": 3}
-    assert replies.reply("7", answer) == {"kind": "reply", "id": "7", "ok": True, "version": 3}
-    assert replies.reply("7", {"ok": "yes"})["ok"] is False, "only True is an agreement"
+    assert messages.reply("7", answer) == {"kind": "reply", "id": "7", "ok": True, "version": 3}
+    assert messages.reply("7", {"ok": "yes"})["ok"] is False, "only True is an agreement"

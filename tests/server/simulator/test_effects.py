@@ -25,7 +25,7 @@ from server.simulator.effects import (
 )
 from server.simulator.other_clock import OtherClock
 from server.simulator.scenarios import SCENARIOS, inject, planned
-from server.simulator.sensor_faults import CutScan, FrozenPosition, FrozenScan, NearObject, NoFix
+from server.simulator.sensor_faults import FrozenPosition, FrozenScan, NearObject, NoFix, TruncatedScan
 
 EVERY_EFFECT: list[Callable[[], Effect]] = [
     scenario.effect for scenario in SCENARIOS.values() if scenario.effect is not None
@@ -348,7 +348,7 @@ def test_a_frozen_scan_repeats_all_of_the_first() -> None:
 
 @pytest.mark.parametrize("ranges", [[1.0] * 181, np.ones(181, dtype=np.float32)], ids=["list", "array"])
 def test_a_short_scan_lacks_beams_and_keeps_its_angles(ranges: Any) -> None:
-    made = apply(CutScan(), "scan", {"angle_min": -1.5, "ranges": ranges})
+    made = apply(TruncatedScan(), "scan", {"angle_min": -1.5, "ranges": ranges})
     assert (len(made["ranges"]), made["angle_min"]) == (171, -1.5)
 
 

@@ -90,9 +90,11 @@ async def simulated(**how: Any) -> AsyncIterator[tuple[CarService, str]]:
 
 
 @contextlib.asynccontextmanager
-async def watching(service: CarService, address: str, data: Path | None = None) -> AsyncIterator[Field]:
+async def watching(
+    service: CarService, address: str, data: Path | None = None, *, name: str = "car"
+) -> AsyncIterator[Field]:
     """A server that watches it."""
-    config = Config(vehicles=(Vehicle(name="car", address=address),), data=data)
+    config = Config(vehicles=(Vehicle(name=name, address=address),), data=data)
     async with serving(config) as base, httpx.AsyncClient(base_url=base, timeout=10.0) as client:
         yield Field(service, client)
 

@@ -61,7 +61,7 @@ class Rig:
             number=0,
         )
         self.slowing.car.is_steering_known = True
-        self.slowing.link_opened(self.link)  # type: ignore[arg-type]
+        self.slowing.link_opened(self.link)
         self.pass_time(1.0)
 
     def _note(self, change: str, text: str, *, by: str | None = None, **more: Any) -> None:

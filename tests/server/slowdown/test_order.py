@@ -193,7 +193,7 @@ def test_only_the_order_that_is_named_is_released() -> None:
     assert life.order is not None
     assert life.order.number == 42
     for wrong in (0, 41, 43):
-        with pytest.raises(Refused, match="anew"):
+        with pytest.raises(Refused, match="newer slow-down order"):
             life.release(wrong)
     assert life.release(42).number == 42
     assert life.state(WAY, 0.0) == "armed"

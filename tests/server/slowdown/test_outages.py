@@ -121,7 +121,7 @@ async def test_a_bridge_that_talks_on_and_reads_no_command_is_doubted_and_dialle
             await car.until(lambda state: not state["decelerate"]["order"]["sending"], 1.0)
             assert time.monotonic() - began_s < 0.6  # though the car's speed came all the time
             cut = [event["text"].split(".")[0] for event in await car.events() if event["step"] == "cut"]
-            assert cut == ["No command goes out: the bridge does not answer"]
+            assert cut == ["No command is sent: the bridge does not answer"]
             before = len(car.speeds)
             await asyncio.sleep(1.0)
             assert len(car.speeds) == before

@@ -81,8 +81,9 @@ async def test_a_rival_is_named_and_the_order_not_confirmed() -> None:
         await car.armed()
         assert "slow_down_rivals" in [alarm["id"] for alarm in (await car.until(lambda s: s["alarms"]))["alarms"]]
         await car.post("order")
-        state = await car.until(lambda state: state["decelerate"]["order"]["confirmed"] is False, 6.0)
-        alarm = next(alarm for alarm in state["alarms"] if alarm["id"] == "slow_down_unconfirmed")
+        await car.until(lambda state: state["decelerate"]["order"]["confirmed"] is False, 6.0)
+        state = await car.until(lambda state: any(alarm["id"] == "slow_down_unconfirmed" for alarm in state["alarms"]))
+        (alarm,) = (alarm for alarm in state["alarms"] if alarm["id"] == "slow_down_unconfirmed")
         assert alarm["priority"] == "critical"
         assert "physical stop" in alarm["text"]
         assert "not_confirmed" in await car.steps()

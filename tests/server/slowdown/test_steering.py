@@ -116,7 +116,7 @@ def test_steering_that_falls_silent_before_or_in_an_order_is_held_as_it_was_last
     rig.obey("slow_down")
     rig.pass_time(0.5)
     assert set(rig.link.angles) == {0.1072}
-    assert any("not measured any more: the last known angle is held" in note for note in rig.notes)
+    assert any("no longer measured: the last known angle is held" in note for note in rig.notes)
     rig.slowing.link_closed()
     rig.pass_time(0.2)
     rig.slowing.link_opened(rig.link)  # type: ignore[arg-type]

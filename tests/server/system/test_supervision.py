@@ -108,15 +108,15 @@ def test_problems_follow_from_ages() -> None:
     ill = Vitals(
         tick_age_s=3.0,
         state_age_s=4.0,
-        log_trouble="The alarm log is not kept: the disk is full.",
+        log_trouble="The alarm log is not stored: the disk is full.",
         recorder=RecorderFacts(state="stopped", trouble="Recording stopped: the disk is full.", behind_s=2.5),
         task_problems=("The task “judge” is not running: it was cancelled.",),
     )
     assert problems(ill) == [
-        "No check was judged for 3.0 s.",
-        "The pages got no state for 4.0 s.",
+        "No check was evaluated for 3.0 s.",
+        "No state was sent to pages for 4.0 s.",
         "The task “judge” is not running: it was cancelled.",
-        "The alarm log is not kept: the disk is full.",
+        "The alarm log is not stored: the disk is full.",
         "Recording stopped: the disk is full.",
         "The recorder is 2.5 s behind.",
     ]
@@ -165,7 +165,7 @@ async def test_health_is_impaired_while_no_check_is_judged(
         await until(lambda: session.vitals().tick_age_s > 1.0)
         answer = await client.get("/api/health")
     assert answer.status_code == 503
-    assert answer.json()["problems"][0].startswith("car: No check was judged for 1.")
+    assert answer.json()["problems"][0].startswith("car: No check was evaluated for 1.")
 
 
 @pytest.mark.parametrize("part", ["watch_recording", "watch_slow_down", "watch_control"])

@@ -9,7 +9,7 @@ import pytest
 
 from server.app.config import Config, Tls
 from server.app.tls_process import secure
-from server.tls.host_addresses import EVERY_S, MOST, Outside
+from server.tls.host_addresses import EVERY_S, MOST, HostAddresses
 
 
 class Clock:
@@ -37,14 +37,14 @@ class Clock:
     ],
 )
 def test_only_private_addresses_are_learnt(host: str | None, is_learnt: bool) -> None:
-    outside = Outside([ipaddress.ip_address("10.0.0.1")], now=Clock())
+    outside = HostAddresses([ipaddress.ip_address("10.0.0.1")], now=Clock())
     assert outside.learn(host) is is_learnt
     assert (host in outside.addresses) is (is_learnt or host == "10.0.0.1")
 
 
 def test_many_in_a_hurry_do_not_make_a_certificate_each_and_the_oldest_go() -> None:
     clock = Clock()
-    outside = Outside([], now=clock)
+    outside = HostAddresses([], now=clock)
     assert [outside.learn(f"10.0.0.{n}") for n in range(5)] == [True, False, False, False, False]
     for n in range(100, 100 + MOST):
         clock.now_s += EVERY_S

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 
-from server.tls.certificate_renewal import GivenCertificate, OwnCertificate, keep
+from server.tls.certificate_renewal import OwnCertificate, ProvidedCertificateRenewal, keep
 from server.tls.context import LiveContext
 from server.tls.names import IpAddress, Names, names_of
 from tests.server.tls.certificates import pair
@@ -162,7 +162,7 @@ def test_what_cannot_be_renewed_stays_and_is_told_once(tmp_path: Path, machine: 
 async def test_another_kind_of_key_leaves_nothing_of_the_old_one(tmp_path: Path) -> None:
     """A context that is changed in place keeps an RSA certificate beside one of EC, and picks as it likes."""
     files = pair(tmp_path, start=NOW - dt.timedelta(days=1), is_rsa=True)
-    certificate = GivenCertificate(files.cert, files.key, now=NOW)
+    certificate = ProvidedCertificateRenewal(files.cert, files.key, now=NOW)
     listening = Listening(certificate.context)
     server = await listening.start()
     for is_rsa in (False, True):
@@ -194,5 +194,5 @@ async def test_looking_after_it_survives_a_bug_in_one_look(
         async with asyncio.timeout(5):
             await renewed.wait()
         task.cancel()
-    assert caplog.text.count("could not be looked after") == 1  # not at every look
+    assert caplog.text.count("the certificate could not be checked") == 1  # not at every look
     assert "a new certificate" in caplog.text

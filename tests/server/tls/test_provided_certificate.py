@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from server.tls.authority import TlsRefused
-from server.tls.certificate_renewal import GivenCertificate
+from server.tls.certificate_renewal import ProvidedCertificateRenewal
 from server.tls.provided_certificate import look
 from tests.server.tls.certificates import pair
 
@@ -86,7 +86,7 @@ def test_what_is_no_certificate_or_key_is_named(tmp_path: Path, which: str, cont
 
 def test_a_changed_pair_is_read_again(tmp_path: Path) -> None:
     files = pair(tmp_path, start=NOW)
-    served = GivenCertificate(files.cert, files.key, now=NOW)
+    served = ProvidedCertificateRenewal(files.cert, files.key, now=NOW)
     assert served.refresh(NOW) is None
     renewed = pair(tmp_path, start=NOW + days(60), is_rsa=True)
     assert "was read again, it ends on 2027-07-29" in str(served.refresh(NOW + days(60)))
@@ -96,7 +96,7 @@ def test_a_changed_pair_is_read_again(tmp_path: Path) -> None:
 
 def test_a_bad_one_leaves_the_one_of_before_and_is_told_once(tmp_path: Path) -> None:
     files = pair(tmp_path, start=NOW)
-    served = GivenCertificate(files.cert, files.key, now=NOW)
+    served = ProvidedCertificateRenewal(files.cert, files.key, now=NOW)
     before = files.key.read_bytes()
     renewed = pair(tmp_path, start=NOW + days(1))
     new_key = files.key.read_bytes()
@@ -112,7 +112,7 @@ def test_a_bad_one_leaves_the_one_of_before_and_is_told_once(tmp_path: Path) -> 
 
 def test_files_that_vanish_are_told_once_and_change_nothing(tmp_path: Path) -> None:
     files = pair(tmp_path, start=NOW)
-    served = GivenCertificate(files.cert, files.key, now=NOW)
+    served = ProvidedCertificateRenewal(files.cert, files.key, now=NOW)
     content = files.cert.read_bytes()
     files.cert.unlink()
     assert "No such file" in str(served.refresh(NOW))
@@ -123,7 +123,7 @@ def test_files_that_vanish_are_told_once_and_change_nothing(tmp_path: Path) -> N
 
 def test_one_that_grows_old_while_it_is_served_is_told_once(tmp_path: Path) -> None:
     files = pair(tmp_path, start=NOW)
-    served = GivenCertificate(files.cert, files.key, now=NOW)
+    served = ProvidedCertificateRenewal(files.cert, files.key, now=NOW)
     assert served.refresh(NOW + days(75)) is None
     assert "expires on 2027-05-30" in str(served.refresh(NOW + days(77)))
     assert served.refresh(NOW + days(78)) is None

@@ -13,12 +13,12 @@ import pytest
 
 from server.tls import authority, steps
 from server.tls.profile import mobileconfig
-from server.tls.setup import CERTIFICATE, Whereabouts, explaining, leading
+from server.tls.setup import CERTIFICATE, SetupAddresses, explaining, leading
 from server.tls.steps import PLATFORMS, platform_of
 
 NOW = dt.datetime(2027, 3, 1, tzinfo=dt.UTC)
 OURS = authority.make(host="pit", now=NOW)
-WHERE = Whereabouts(hosts=("192.168.4.1", "pit.local", "fd00::2"), port=8000, setup_port=8001)
+WHERE = SetupAddresses(hosts=("192.168.4.1", "pit.local", "fd00::2"), port=8000, setup_port=8001)
 
 
 def client(host: str = "192.168.4.1:8001") -> httpx.AsyncClient:

@@ -18,7 +18,6 @@ from server.app.config import Config
 from server.judge.pipeline import TICK_S
 from server.recording.read.read import open_recording
 from server.vehicle.vehicle import Vehicle
-from tests.environment import users_own
 from tests.server import scan_frames
 from tests.server.conftest import serving
 from tests.server.viewer import Viewer, viewer
@@ -47,7 +46,6 @@ async def replaying(path: Path, *options: str) -> AsyncIterator[str]:
         *(sys.executable, "-m", "server", "replay", str(path), "--port", "0", "--wait", "--stay", *options),
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
-        env=users_own(),
     )
     assert process.stdout is not None
     try:

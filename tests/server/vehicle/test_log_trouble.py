@@ -42,7 +42,7 @@ async def test_a_file_that_another_program_holds_stops_no_alarm_and_is_said(brid
             speeds["now"] = 12.6
             await raised(one, "speed_limit")
             state = await one.state(lambda s: stands(s, "log_not_kept"), within_s=8)
-            assert state["log_trouble"].startswith("The alarm log is not kept: another program holds the file.")
+            assert state["log_trouble"].startswith("The alarm log is not stored: another program holds the file.")
             assert 'catgraph_alarm_log_kept{vehicle="car"} 0' in (await client.get("/metrics")).text
             found = next(alarm for alarm in state["alarms"] if alarm["id"] == "speed_limit")
             assert (await one.ask(kind="acknowledge", alarm="speed_limit", occurrence=found["occurrence"]))["ok"]
@@ -82,4 +82,4 @@ async def test_a_data_folder_that_takes_no_log_stops_no_start(bridge: RosBridge,
     ):
         await raised(one, "speed_limit")
         state = await one.state(lambda s: stands(s, "log_not_kept"), within_s=8)
-        assert state["log_trouble"].startswith("The alarm log is not kept: the file cannot be opened.")
+        assert state["log_trouble"].startswith("The alarm log is not stored: the file cannot be opened.")

@@ -8,10 +8,11 @@ from typing import Any
 import httpx
 import pytest
 
-from monitor.phones import NO_PHONE, PhoneWord
+from monitor.phones import NO_PHONE, PhoneReport
 from monitor.state import State
 from monitor.values import GpsFix, PhoneFix
 from server.app.config import Config
+from server.judge.phone_report import phone_report
 from server.protocol import commands
 from server.rosbridge_server.server import RosBridge
 from server.simulator.scenarios import planned
@@ -68,8 +69,8 @@ def test_a_position_or_a_reason_is_understood(command: dict[str, Any]) -> None:
         (HERE | {"phone": "x"}, "phone: String should match pattern"),
         (HERE | {"phone": "<script>"}, "phone: String should match pattern"),
         (HERE | {"handheld": 1}, "handheld: Input should be a valid boolean."),
-        (HERE | {"fix": None}, "the command: it says either where the phone is or why it cannot tell."),
-        (HERE | {"why": "denied"}, "the command: it says either where the phone is or why it cannot tell."),
+        (HERE | {"fix": None}, "the command: it needs either a position or the reason for having none."),
+        (HERE | {"why": "denied"}, "the command: it needs either a position or the reason for having none."),
         (HERE | {"fix": None, "why": "silent"}, "why: Input should be 'denied', "),  # only the server can say that
     ],
 )
@@ -83,10 +84,10 @@ def test_anything_else_is_refused_with_a_sentence(command: dict[str, Any], sente
 # -- on whose clock it counts ------------------------------------------------------------------------------------------
 
 
-def heard(wall_ms: float, **more: Any) -> PhoneWord:
+def heard(wall_ms: float, **more: Any) -> PhoneReport:
     command = commands.read(with_fix(**more))
     assert isinstance(command, commands.Position)
-    return phone.word(command, now_s=1000.0, wall_ms=wall_ms)
+    return phone_report(command, now_s=1000.0, wall_ms=wall_ms)
 
 
 @pytest.mark.parametrize("at_ms", [0, 1_700_000_000_000, 1_790_000_000_000, 9_000_000_000_000])
@@ -117,7 +118,7 @@ def test_how_long_the_way_may_have_taken(wall_ms: float, held_s: float, uncertai
 def test_a_reason_needs_no_clock() -> None:
     command = commands.read(HERE | {"fix": None, "why": "insecure", "handheld": False})
     assert isinstance(command, commands.Position)
-    assert phone.word(command, 5.0, WALL_MS) == PhoneWord(phone="0a1b2c3d", is_handheld=False, why="insecure")
+    assert phone_report(command, 5.0, WALL_MS) == PhoneReport(phone="0a1b2c3d", is_handheld=False, why="insecure")
 
 
 # -- its part of the state ---------------------------------------------------------------------------------------------
@@ -126,7 +127,7 @@ def test_a_reason_needs_no_clock() -> None:
 def test_the_state_shows_it_without_a_number_that_is_none() -> None:
     assert phone.as_json(NO_PHONE, 100.0) is None
     state = State()
-    state.hear_phone(PhoneWord(phone="one-1", is_handheld=True, why="timeout"), 100.0)
+    state.receive_phone(PhoneReport(phone="one-1", is_handheld=True, why="timeout"), 100.0)
     shown = phone.as_json(state.snapshot(101.0).phone, 101.0)
     assert shown is not None
     assert (shown["used"], shown["why"], shown["why_text"]) == (
@@ -138,7 +139,7 @@ def test_the_state_shows_it_without_a_number_that_is_none() -> None:
     for i in range(20):
         state.receive("position", GpsFix(lat_deg=32.23, lon_deg=-110.95, sigma_m=1.0), 101.0 + i / 10)
     fix = PhoneFix(lat_deg=32.2301, lon_deg=-110.95, accuracy_m=30.2, at_ms=1_700_000_000_000)
-    state.hear_phone(PhoneWord(phone="one-1", is_handheld=True, label="Anna", fix=fix, measured_s=102.5), 102.9)
+    state.receive_phone(PhoneReport(phone="one-1", is_handheld=True, label="Anna", fix=fix, measured_s=102.5), 102.9)
     shown = phone.as_json(state.snapshot(103.0).phone, 103.0)
     assert shown == {
         "id": "one-1", "label": "Anna", "count": 1, "handheld": True, "lat_deg": 32.2301, "lon_deg": -110.95,
@@ -146,7 +147,7 @@ def test_the_state_shows_it_without_a_number_that_is_none() -> None:
         "at_ms": 1_700_000_000_000, "age_s": 0.5, "used": True, "why": None, "why_text": None,
         "apart_m": 11.1, "bearing_deg": 180.0, "compared_age_s": 0.5, "explained_m": 74.6, "correlation": None,
         "chosen": False, "choice": "only",
-        "choice_text": "No phone was chosen as the one in the car. The only phone is used.",
+        "choice_text": "No phone was chosen as the phone in the car. The only phone is used.",
     }  # fmt: skip
 
 

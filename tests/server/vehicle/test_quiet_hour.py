@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from monitor.phones import PhoneWord, Why
+from monitor.phones import PhoneReport, Why
 from monitor.state import State
-from server.control.alarm_reach import Present, Reach, Ready
+from server.control.alarm_reach import AlarmReach, Present, Ready
 from server.control.lease import Operator
 from tests.server.judged import Raised, judged
 
@@ -28,17 +28,17 @@ class Page:
     is_here: bool = False
     turns_s: float = 0.0
 
-    def step(self, state: State, reach: Reach, now_s: float) -> None:
+    def step(self, state: State, reach: AlarmReach, now_s: float) -> None:
         operator = Operator(who=f"device {self.number}", page=f"page {self.number}", name=f"Phone {self.number}")
         if now_s >= self.turns_s:
             self.is_here = not self.is_here
             self.turns_s = now_s + (self.rng.uniform(20.0, 90.0) if self.is_here else self.rng.uniform(5.0, 60.0))
             if not self.is_here and self.rng.random() < 0.5:
                 reach.leave(operator)
-                state.hear_phone(PhoneWord(phone=str(self.number), is_handheld=True, why="off"), now_s)
+                state.receive_phone(PhoneReport(phone=str(self.number), is_handheld=True, why="off"), now_s)
         if self.is_here:
             reach.hear(operator, Present(is_visible=True, sound=self.sound, awake="ready"), now_s)
-            state.hear_phone(PhoneWord(phone=str(self.number), is_handheld=True, why=self.why), now_s)
+            state.receive_phone(PhoneReport(phone=str(self.number), is_handheld=True, why=self.why), now_s)
 
 
 class Crew:
@@ -53,7 +53,7 @@ class Crew:
             ("refused", "denied"),
         ]
         self._pages = [Page(n, sound, why, rng, turns_s=rng.uniform(0, 10)) for n, (sound, why) in enumerate(kinds)]
-        self._reach = Reach()
+        self._reach = AlarmReach()
         self._due_s = 0.0
 
     def __call__(self, state: State, now_s: float) -> None:

@@ -86,7 +86,7 @@ async def test_alarms_survive_kill_9_as_they_stood(bridge: RosBridge, tmp_path: 
             log = await events(server.address)
             assert [e["n"] for e in log] == list(range(1, len(log) + 1))
             assert [e["change"] for e in log].count("started") == 3
-            assert sum("what happened meanwhile was not watched" in e["text"] for e in log) == 2
+            assert sum("nothing was monitored meanwhile" in e["text"] for e in log) == 2
 
 
 async def test_a_returned_alarm_and_a_shelf_survive_kill_9(bridge: RosBridge, tmp_path: Path) -> None:

@@ -14,8 +14,8 @@ from monitor.alarm import Alarm, Refused, Transition
 from monitor.alarm_spec import AlarmSpec
 from monitor.check import Quantity, fault
 from monitor.restoring import restore
-from server.bus.bus import LocalBus
 from server.bus.journal import Journal
+from server.bus.local import LocalBus
 from server.protocol import serialize
 from server.vehicle.restore import RestoredState, recall
 from tests.monitor.test_alarm import SPEC
@@ -157,7 +157,7 @@ def test_nothing_of_the_past_lies_in_the_future() -> None:
 @pytest.mark.parametrize(
     "event",
     [
-        {"change": "raised"},  # older than the word for where an alarm stands
+        {"change": "raised"},  # older than the word for where an alarm is active
         {"change": "raised", "state": "NO SUCH"},
         {"change": "exploded", "state": "UNACKED"},
         {"change": "raised", "state": None, "occurrence": "x", "causes": 7},

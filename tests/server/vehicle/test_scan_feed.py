@@ -8,8 +8,8 @@ import random
 import pytest
 
 from monitor.instruments import ObstacleLimits
-from server.bus.bus import LocalBus
 from server.bus.journal import Journal
+from server.bus.local import LocalBus
 from server.vehicle.scan_feed import ScanFeed
 from tests.monitor.checks.known import known
 from tests.monitor.test_corridor import sweep

@@ -33,5 +33,5 @@ async def test_a_server_that_stood_still_says_so_and_does_not_accuse_the_car(tmp
             after = (await log())[before:]
         said = [event["text"] for event in after if event["change"] == "stalled"]
         assert len(said) == 1, after
-        assert re.fullmatch(r"The server stood still for [23]\.\d s: nothing was judged meanwhile\.", said[0])
+        assert re.fullmatch(r"The server stalled for [23]\.\d s: nothing was evaluated meanwhile\.", said[0])
         assert [event["title"] for event in after if event["alarm"]] == []

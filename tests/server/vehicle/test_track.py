@@ -40,7 +40,7 @@ def test_only_what_is_new(after: int, numbers: list[int]) -> None:
 
 def test_a_point_tells_place_time_and_how_it_joins() -> None:
     rows = queries.track_points(SNAPSHOT, number=1, after=2)["points"]
-    assert rows[0] == [5, 37.0, -110.0, 50.0, 2]
+    assert rows[0] == (5, 37.0, -110.0, 50.0, 2)
     assert [row[4] for row in rows] == [2, 0, 1, 0, 0]
 
 

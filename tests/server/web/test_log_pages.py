@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from server.bus.bus import LocalBus
 from server.bus.journal import Journal
+from server.bus.local import LocalBus
 from server.web.routes.log import Which, _page
 
 EVENTS = 5200

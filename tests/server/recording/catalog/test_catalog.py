@@ -67,6 +67,28 @@ def ids(rows: list[dict[str, Any]]) -> list[str]:
     return [row["id"] for row in rows]
 
 
+async def test_a_drive_keeps_the_sketch_of_its_signals_until_it_is_destroyed(tmp_path: Path) -> None:
+    record(tmp_path / "recordings" / "blue" / "blue_20260921T141320Z.mcap")
+    async with catalog(tmp_path) as one:
+        (row,) = one.rows().rows
+        found = one.trends(row["id"])
+        assert found is not None
+        assert any(low is not None for low in found["signals"]["speed"]["lowest"])
+        assert found["length_s"] == row["length_s"]
+        assert one.trends("no_such") is None
+        assert "trends" not in (one._entries.by_id(row["id"]) or row).found  # a list reads every row
+        one.delete(row["id"])
+        one.restore(row["id"])
+        await one.settled()
+        assert one.trends(row["id"]) == found  # by its content, wherever it is
+    async with catalog(tmp_path) as one:
+        assert one.trends(row["id"]) == found
+        one.delete(row["id"])
+        one.destroy(None)
+    async with catalog(tmp_path) as one:
+        assert one._entries.trends(row["sha256"] or "") is None
+
+
 async def test_what_is_in_the_folder_is_listed_newest_first(tmp_path: Path) -> None:
     some(tmp_path)
     async with catalog(tmp_path) as one:
@@ -284,7 +306,7 @@ async def test_pages_follow_each_other_without_a_gap_or_a_double(tmp_path: Path)
         cursor = page.next
     assert len(found) == len(set(found)) == 100
     for bad in ("", "x", "1", "1.", "1.a b", "9" * 30 + ".a", "1.a; DROP TABLE recording"):
-        with pytest.raises(Refused, match="begin anew"):
+        with pytest.raises(Refused, match="start again"):
             one.rows(cursor=bad)
     await one.stop()
 
@@ -372,7 +394,7 @@ async def test_one_of_the_same_name_again_is_not_overwritten(tmp_path: Path) -> 
         one.delete(path.stem)
         record(path, seconds=3.0)
         one.add(path)
-        with pytest.raises(Refused, match="another recording of that name"):
+        with pytest.raises(Refused, match="recording of that name exists"):
             one.restore(path.stem)
         one.delete(path.stem)  # both at the same moment of the clock
         assert one.totals(Which(is_trashed=True))["count"] == 2
@@ -392,7 +414,7 @@ async def test_a_folder_that_may_not_be_written_says_so(tmp_path: Path, monkeypa
         monkeypatch.setattr("os.replace", refuse)
         with pytest.raises(Refused, match="It cannot be moved: read-only file system"):
             one.delete(id)
-        with pytest.raises(Refused, match="It cannot be kept: read-only file system"):
+        with pytest.raises(Refused, match="It cannot be stored: read-only file system"):
             one.annotate(id, title="New")
         assert one.row(id)["title"] == "Wet lot"  # type: ignore[index]
 
@@ -421,7 +443,7 @@ async def test_a_file_that_kills_its_reader_is_told_and_the_next_one_is_read(
             await one.settled()
         row = one.row("red_20260921T161320Z")
         assert row is not None
-        assert row["problem"] == "red_20260921T161320Z.mcap could not be read: it made the reader fail."
+        assert row["problem"] == "red_20260921T161320Z.mcap could not be read: the reader failed."
         assert one.row("blue_20260921T141320Z")["state"] == "read"  # type: ignore[index]
 
 

@@ -27,6 +27,7 @@ def test_a_drive(tmp_path: Path) -> None:
     assert found["length_s"] == pytest.approx(30.0, abs=0.01)
     assert found["distance_m"] == pytest.approx(150.0, rel=0.03)
     assert found["top_speed_mps"] == 5.0
+    assert found["speed_mps"] == [5.0] * 61  # two a second
     assert found["alarms"] == {"critical": 1, "warning": 1, "advisory": 1}
     assert [(one["at_ms"] - BEGAN_MS, one["priority"]) for one in found["raised"]] == [
         (5000, "warning"), (9000, "critical"), (9500, "advisory"),
@@ -70,6 +71,7 @@ def test_the_topics_of_the_drives_own_settings_count(tmp_path: Path) -> None:
     )
     found = survey(path)
     assert found["top_speed_mps"] is None
+    assert found["speed_mps"] == []
     assert (found["left_out"], found["left_out_count"]) == (["/camera", "/points"], 2)
     many = "\n".join(f"/camera_{n}" for n in range(500))
     found = survey(record(tmp_path / "car" / "car_3.mcap", left_out=many, left_out_count="700"))

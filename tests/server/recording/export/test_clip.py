@@ -8,8 +8,8 @@ from typing import Any
 import orjson
 import pytest
 
-from server.recording.export.bag import write_bag
 from server.recording.export.clip import Window, first_raised_ns, write_clip
+from server.recording.export.formats.bag import write_bag
 from server.recording.export.outcome import ExportRefused, Outcome
 from server.recording.folder import writing_path
 from server.recording.read.read import open_recording
@@ -131,7 +131,7 @@ def test_what_of_it_was_not_recorded_is_said(
     outcome = cut(drive, tmp_path / "clip.mcap", at_s)
     with open_recording([tmp_path / "clip.mcap"]) as clip:
         assert clip.topics["/n"].count == count
-    assert (outcome.notes, outcome.remarks) == ([], notes)
+    assert (outcome.notes, outcome.notices) == ([], notes)
 
 
 @pytest.mark.parametrize("at_s", [-3.1, 22.0, 1e6])

@@ -19,7 +19,7 @@ from xmlrpc.client import ServerProxy
 import pytest
 from rosbags.rosbag1 import Reader
 
-from server.recording.export.bag import write_bag
+from server.recording.export.formats.bag import write_bag
 from server.recording.read.read import open_recording
 from tests.server.recording.export.ours import Own, as_ours, event
 

@@ -11,8 +11,8 @@ from xml.etree import ElementTree
 import orjson
 import pytest
 
-from server.recording.export.geojson import write_geojson
-from server.recording.export.gpx import write_gpx
+from server.recording.export.formats.geojson import write_geojson
+from server.recording.export.formats.gpx import write_gpx
 from server.recording.export.outcome import ExportRefused, Outcome
 from server.recording.export.track import Track
 from server.recording.read.read import open_recording
@@ -163,9 +163,9 @@ def test_a_phone_alone_is_a_track_and_alarms_without_a_place_are_counted(tmp_pat
     drive: list[Row] = [(0.0, "/catvehicle/vel", TWIST, {"linear": {"x": 1.0}})]
     root, outcome = gpx(made(tmp_path, drive, TOLD), tmp_path)
     assert [t.findtext("g:type", namespaces=GPX) for t in root.findall("g:trk", GPX)] == ["phone"]
-    assert outcome.remarks == ["The car told no position: only that of the phone is in the file."]
+    assert outcome.notices == ["The car published no position: only that of the phone is in the file."]
     assert outcome.notes == [
-        "1 alarm was raised while the car's position was not known, and cannot be drawn.",
+        "1 alarm was raised while the car's position was unknown, and cannot be drawn.",
     ]
 
 

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from rosbags.interfaces import Nodetype
 
 from server.recording.read.decode import compile_decoder
-from server.recording.read.encode import Misfit, compile_encoder
+from server.recording.read.encode import TypeMismatch, compile_encoder
 from server.recording.read.errors import Undecodable
 from server.rosbridge.codec import _typed_array
 from server.rosbridge.message_bytes import cbor_bytes, json_bytes
@@ -130,7 +130,7 @@ def test_what_is_not_of_its_type_is_refused(version: int, type: str, message: An
         "my_msgs/msg/Pair": "float32[2] p\n",
     }
     store = typestore(version, more)
-    with pytest.raises(Misfit):
+    with pytest.raises(TypeMismatch):
         compile_encoder(type, store.fielddefs, version)(message)  # type: ignore[arg-type]
 
 

@@ -24,7 +24,6 @@ from server.version import catgraph_version
 from server.web.maps.map_options import MapUpstream, checked
 from server.web.maps.mbtiles import MapFile, MapRefused
 from server.web.maps.tile_cache import Kept, TileCache
-from tests.environment import users_own
 from tests.server.web.maps.tile_server import picture
 
 SERVER = Path(__file__).with_name("tile_server.py")
@@ -47,7 +46,7 @@ class Source:
 
     def start(self) -> None:
         command = [sys.executable, str(SERVER), str(self.folder), str(self.port)]
-        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=users_own())
+        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None
         self.port = int(self._process.stdout.readline())
 
@@ -244,19 +243,19 @@ async def test_a_tile_that_does_not_exist_is_not_asked_for_again_and_again(sourc
 
 
 BAD: dict[str, tuple[dict[str, Any], str, float]] = {
-    "asks for a pause": ({"status": 429, "headers": {"Retry-After": "120"}}, "asks for a pause", 120),
+    "asks for a pause": ({"status": 429, "headers": {"Retry-After": "120"}}, "requests a pause", 120),
     "asks for a pause, by a date": (
-        {"status": 503, "headers": {"Retry-After": "Mon, 21 Sep 2026 14:16:40 GMT"}}, "asks for a pause", 200
+        {"status": 503, "headers": {"Retry-After": "Mon, 21 Sep 2026 14:16:40 GMT"}}, "requests a pause", 200
     ),
-    "asks for a pause, of no length": ({"status": 429}, "asks for a pause", 5),
-    "refuses the key": ({"status": 403}, r"refuses \(403\): is the key right\?", 600),
+    "asks for a pause, of no length": ({"status": 429}, "requests a pause", 5),
+    "refuses the key": ({"status": 403}, r"refuses \(403\): check the key\.", 600),
     "fails": ({"status": 500}, "answers with status 500", 5),
     "points elsewhere": (
-        {"status": 302, "headers": {"Location": "http://169.254.169.254/latest"}}, "points elsewhere", 5
+        {"status": 302, "headers": {"Location": "http://169.254.169.254/latest"}}, "redirects", 5
     ),
-    "a page to log in": ({"body": "<html>log in</html>"}, "something that is no picture", 5),
-    "a drawing with a script": ({"body": "<svg onload='alert(1)'/>"}, "something that is no picture", 5),
-    "nothing": ({"body": ""}, "something that is no picture", 5),
+    "a page to log in": ({"body": "<html>log in</html>"}, "something that is not an image", 5),
+    "a drawing with a script": ({"body": "<svg onload='alert(1)'/>"}, "something that is not an image", 5),
+    "nothing": ({"body": ""}, "something that is not an image", 5),
     "too much": ({"body": "\x89PNG" + "x" * 1000, "times": 2200}, "larger than 2 MB", 5),
     "less than it says": ({"length": 100_000}, "does not answer", 5),
     "304 without being asked": ({"status": 304, "body": ""}, "answers with status 304", 5),
@@ -388,7 +387,7 @@ def test_the_longest_unseen_make_room_and_it_is_said(tmp_path: Path, caplog: pyt
         assert one.get((8, 0, 0), now_s=10_002.0) is not None
         assert one.get((8, 1, 0), now_s=10_002.0) is None
         size = one.size_bytes
-        assert "made room" in caplog.text
+        assert "map tiles deleted" in caplog.text
     with closing(cache(tmp_path / "a.mbtiles")) as again:
         assert again.size_bytes == size
     with closing(MapFile(tmp_path / "a.mbtiles")) as file:
@@ -405,7 +404,7 @@ def test_a_writer_that_is_killed_leaves_a_file_that_is_read(tmp_path: Path) -> N
         "one.put((5, 1, 2), Kept(data=data, until_s=9e9, etag=None, modified=None), 1.0)\n"
         "os.kill(os.getpid(), 9)\n"
     )
-    subprocess.run([sys.executable, "-c", program, str(path)], check=False, env=users_own())
+    subprocess.run([sys.executable, "-c", program, str(path)], check=False)
     with closing(cache(path)) as one:
         found = one.get((5, 1, 2), 2.0)
         assert found is not None
@@ -426,7 +425,7 @@ def test_what_cannot_be_written_is_said_and_not_waited_for(tmp_path: Path) -> No
         one.put((5, 1, 2), kept(), 1.0)
         one._rows.execute("PRAGMA max_page_count = 1")  # as on a disk that is full
         one.put((5, 1, 3), kept(500_000), 1.0)
-        assert one.problem == "Tiles cannot be kept: is the disk full?"
+        assert one.problem == "Tiles cannot be stored: check the disk space."
         assert one.get((5, 1, 2), 2.0) is not None
         assert one.get((5, 1, 3), 2.0) is None
     one.put((5, 1, 3), kept(), 1.0)  # after the end: nothing
@@ -444,7 +443,7 @@ GOOD = "https://tiles.example/{z}/{x}/{y}.png?key=1"
     [
         ("ftp://tiles.example/{z}/{x}/{y}", "©", "0-19", 500, "must begin with https"),
         ("https:///{z}/{x}/{y}", "©", "0-19", 500, "must begin with https"),
-        ("https://tiles.example:99999/{z}/{x}/{y}", "©", "0-19", 500, "no address|must begin"),
+        ("https://tiles.example:99999/{z}/{x}/{y}", "©", "0-19", 500, "not valid|must begin"),
         ("https://me:pw@tiles.example/{z}/{x}/{y}", "©", "0-19", 500, "name and password"),
         ("https://{s}.tiles.example/{z}/{x}/{y}", "©", "0-19", 500, "one host"),
         ("https://{x}.tiles.example/{z}/{y}", "©", "0-19", 500, "one host"),
@@ -452,7 +451,7 @@ GOOD = "https://tiles.example/{z}/{x}/{y}.png?key=1"
         ("https://tiles.example/{z}/{x}/{y}/{y}", "©", "0-19", 500, "once each"),
         ("https://tiles.example/{z}/{x}/{y}{r}", "©", "0-19", 500, "once each"),
         ("https://tiles.example/{z}/{x}/{y}#a", "©", "0-19", 500, "a #"),
-        ("https://tiles.example/{z}/{x}/{y}\r\nHost: evil", "©", "0-19", 500, "characters that no address has"),
+        ("https://tiles.example/{z}/{x}/{y}\r\nHost: evil", "©", "0-19", 500, "characters that are not allowed"),
         ("https://tiles.example/{z}/{x}/{y}?" + "k" * 600, "©", "0-19", 500, "too long"),
         (GOOD, " ", "0-19", 500, "--map-attribution"),
         (GOOD, "©", "9-3", 500, "two levels"),
@@ -493,7 +492,6 @@ def test_the_command_says_what_lacks(tmp_path: Path, command: str) -> None:
         text=True,
         timeout=60,
         check=False,
-        env=users_own(),
     )
     assert done.returncode == 2
-    assert done.stderr == "catgraph: --map-upstream needs --map-attribution: whose map it is must stand on the map.\n"
+    assert done.stderr == "catgraph: --map-upstream needs --map-attribution, which is shown on the map.\n"

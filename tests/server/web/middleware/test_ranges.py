@@ -120,7 +120,7 @@ async def test_an_empty_file_and_one_that_is_gone(client: httpx.AsyncClient, pat
     assert (await client.get("/file", headers={"range": "bytes=0-"})).status_code == 416
     path.unlink()
     answer = await client.get("/file")
-    assert (answer.status_code, answer.json()["detail"]) == (404, "The file is not there any more.")
+    assert (answer.status_code, answer.json()["detail"]) == (404, "The file no longer exists.")
 
 
 @pytest.mark.parametrize(

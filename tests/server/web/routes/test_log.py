@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import csv
 import io
 from typing import Any
@@ -71,6 +72,9 @@ async def test_whoever_gives_an_order_is_named_by_the_connection_not_by_the_orde
 ) -> None:
     async with driving(bridge), viewer(server, name="Ann\u202e") as ann, viewer(server) as nameless:
         await ann.state(lambda s: s["session"]["phase"] == "monitoring")
+        async with asyncio.timeout(20):
+            while await who(server, "settings") != [None]:  # what kind of car it is
+                await asyncio.sleep(0.05)
         assert (await ann.ask(kind="pause", by="somebody else"))["ok"]
         await ann.send({"kind": "hello", "name": "Ann B"})  # renamed while connected
         assert (await ann.ask(kind="resume"))["ok"]
@@ -84,7 +88,7 @@ async def test_whoever_gives_an_order_is_named_by_the_connection_not_by_the_orde
             await client.post("/api/disconnect")
         assert (await who(server, "resumed"))[0] == "test rig 7"
         assert (await who(server, "paused"))[0] == "api · curl"
-        assert await who(server, "settings") == ["api · python-httpx", None]  # before: what kind of car it is
+        assert await who(server, "settings") == ["api · python-httpx", None]
         assert await who(server, "stopped") == ["api · python-httpx"]
 
 

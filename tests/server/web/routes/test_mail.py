@@ -129,7 +129,7 @@ async def test_an_order_without_settings_is_refused(api: httpx.AsyncClient) -> N
     answer = await api.post("/api/mail", json=order())
     assert (answer.status_code, answer.json()["detail"]) == (
         409,
-        "Mail is not set up: give SMTP host and sender in Settings, E-mail.",
+        "Mail is not set up: enter SMTP host and sender in Settings, E-mail.",
     )
     assert (await api.post("/api/mail/test", json={})).status_code == 409
     for asked in (api.get("/api/mail/7"), api.post("/api/mail/7/cancel"), api.post("/api/mail/7/resend")):
@@ -172,7 +172,7 @@ async def test_the_settings_can_be_tried(api: httpx.AsyncClient, post: Post) -> 
     assert login["sentence"] == f"127.0.0.1:{post.port} answers, NOT encrypted."
     assert post.taken == []
     sent = (await api.post("/api/mail/test", json={"to": "ann@example.org"})).json()
-    assert sent["sentence"].endswith("It took a mail to ann@example.org.")
+    assert sent["sentence"].endswith("It accepted a mail to ann@example.org.")
     assert sent["said"].startswith("250 2.0.0 OK")
     assert sent["largest_bytes"] == 33_554_432
     for to, status, words in (
@@ -196,8 +196,8 @@ async def test_a_trial_over_tls_says_so_and_never_the_password(api: httpx.AsyncC
         given = settings(post, security="starttls", user="car", password="hunter2", ca=ca)
         (await api.put("/api/mail/settings", json=given)).raise_for_status()
         sentence = (await api.post("/api/mail/test", json={})).json()["sentence"]
-        assert "answers, encrypted, and takes the login of car." in sentence
-        assert sentence.endswith("It takes mails of at most 9.0 MB: set the limit to 6.4 MB.")
+        assert "answers, encrypted, and accepts the login of car." in sentence
+        assert sentence.endswith("It accepts mails of at most 9.0 MB: set the limit to 6.4 MB.")
         (await api.put("/api/mail/settings", json=given | {"password": "secret-wrong"})).raise_for_status()
         answer = await api.post("/api/mail/test", json={})
         assert answer.status_code == 502
@@ -213,7 +213,7 @@ async def test_cancel_and_resend(api: httpx.AsyncClient, post: Post) -> None:
     assert (await over(api, n))["state"] == "failed"
     assert (await api.post(f"/api/mail/{n}/cancel")).json()["state"] == "cancelled"
     twice = await api.post(f"/api/mail/{n}/cancel")
-    assert (twice.status_code, twice.json()["detail"]) == (409, "It is cancelled already.")
+    assert (twice.status_code, twice.json()["detail"]) == (409, "It is already cancelled.")
 
 
 async def test_the_outbox_is_told_page_by_page(api: httpx.AsyncClient, post: Post) -> None:
@@ -231,7 +231,7 @@ async def test_a_server_that_keeps_nothing_mails_nothing() -> None:
         answer = await client.get("/api/mail")
         assert (answer.status_code, answer.json()["detail"]) == (
             404,
-            "This server keeps nothing: start it with --data FOLDER to send mail.",
+            "This server stores nothing: start it with --data FOLDER to send mail.",
         )
 
 

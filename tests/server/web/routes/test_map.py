@@ -19,7 +19,6 @@ from server.app.config import Config
 from server.web.maps.image_type import media_type, plain_text
 from server.web.maps.mbtiles import MapFile, MapRefused
 from server.web.maps.site_image import site_image
-from tests.environment import users_own
 from tests.server.web import map_files as maps
 from tests.server.web.map_files import png
 
@@ -206,19 +205,19 @@ def drop_tiles(path: Path) -> None:
 BAD: dict[str, tuple[Callable[[Path], Any], str]] = {
     "not there": (lambda path: path.unlink(), "There is no map"),
     "a folder": (lambda path: (path.unlink(), path.mkdir()), "There is no map"),
-    "no database": (lambda path: path.write_text("tiles"), "is no MBTiles file, or is damaged"),
+    "no database": (lambda path: path.write_text("tiles"), "is not an MBTiles file, or is damaged"),
     "cut off": (cut, "damaged|cannot be read"),
     "overwritten": (overwrite, "damaged|cannot be read|holds tiles that are neither"),
     "empty": (lambda path: path.write_bytes(b""), "has no tiles"),
-    "another database": (drop_tiles, "is no MBTiles file: it has no tiles"),
+    "another database": (drop_tiles, "is not an MBTiles file: it has no tiles"),
     "vector by its word": (
-        lambda path: (path.unlink(), maps.write(path, [(0, 0, 0, b"\x1a\x02")], format="pbf")), "holds vector tiles"
+        lambda path: (path.unlink(), maps.write(path, [(0, 0, 0, b"\x1a\x02")], format="pbf")), "has vector tiles"
     ),
     "vector by its bytes": (
         lambda path: (path.unlink(), maps.write(path, [(0, 0, 0, gzip.compress(b"\x1a"))], format="png")),
-        "holds vector tiles",
+        "has vector tiles",
     ),
-    "no tile in it": (lambda path: (path.unlink(), maps.write(path, [], format="png")), "has no tile in it"),
+    "no tile in it": (lambda path: (path.unlink(), maps.write(path, [], format="png")), "has no tiles"),
     "no pictures": (
         lambda path: (path.unlink(), maps.write(path, [(0, 0, 0, b"<svg/>")], format="svg")), "neither png, nor jpg"
     ),
@@ -252,7 +251,7 @@ def test_a_file_damaged_later_has_no_tile_there_and_is_told_once(
         one._rows.execute("PRAGMA shrink_memory")  # else SQLite would answer out of what it has read
         found = [one.tile(1, 0, 0), one.tile(1, 0, 1)]
     assert None in found
-    assert len([record for record in caplog.records if "is damaged" in record.message]) == 1
+    assert len([record for record in caplog.records if "map damaged" in record.message]) == 1
 
 
 def test_a_file_whose_writer_left_it_in_wal_mode_is_read(halves: Path) -> None:
@@ -277,10 +276,9 @@ def test_the_command_ends_with_one_sentence(tmp_path: Path, command: str) -> Non
         text=True,
         timeout=60,
         check=False,
-        env=users_own(),
     )
     assert done.returncode == 2
-    assert done.stderr.startswith(f"catgraph: {wrong} is no MBTiles file, or is damaged")
+    assert done.stderr.startswith(f"catgraph: {wrong} is not an MBTiles file, or is damaged")
     assert done.stderr.count("\n") == 1
 
 
@@ -310,7 +308,7 @@ async def test_a_site_image_is_served_with_its_corners(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("beside", "sentence"),
     [
-        (None, "must stand in .*site.png.toml: No such file"),
+        (None, "must be in .*site.png.toml: No such file"),
         ("", "corners: Field required"),
         ("corners = 5", "corners"),
         ("[corners", "are not usable"),
@@ -318,9 +316,9 @@ async def test_a_site_image_is_served_with_its_corners(tmp_path: Path) -> None:
         (CORNERS.replace("32.24, -110.96", "nan, -110.96"), "corners.top_left.0"),
         (CORNERS.replace("32.24, -110.96", "32.24"), "corners.top_left"),
         (CORNERS.replace("bottom_left", "bottom"), "corners.bottom"),
-        (CORNERS.replace("-110.95]", "-110.96]"), "lie 0 m apart"),
+        (CORNERS.replace("-110.95]", "-110.96]"), "are 0 m apart"),
         (CORNERS.replace("-110.95]", "-100.95]"), "m apart"),
-        (CORNERS.replace("bottom_left = [32.23, -110.96]", "bottom_left = [32.24, -110.97]"), "lie on one line"),
+        (CORNERS.replace("bottom_left = [32.23, -110.96]", "bottom_left = [32.24, -110.97]"), "are on one line"),
         (CORNERS + "[more]\n", "more: Extra inputs"),
     ],
 )

@@ -1,0 +1,210 @@
+"""Offers the vehicles of a local bus to web nodes, through a NATS broker.
+
+The broker only carries: the agent judges, records and numbers its events without one, and nodes ask for what they
+missed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import Callable
+from typing import Any
+
+from nats.aio.client import Client
+from nats.aio.msg import Msg
+from nats.errors import Error as NatsError
+
+from server.bus import nats_wire as wire
+from server.bus.bus import ALL, Frame, NotServed
+from server.bus.local import LocalBus
+
+log = logging.getLogger("catgraph.bus")
+
+WANTED_FOR_S = 2.5  # after the last pull a node is taken to look no longer
+MOST_PULLS = 256  # that wait at once, of all nodes
+MOST_ASKED = 64  # requests at once; a flood is refused
+FILTERS = frozenset({"before", "alarm", "change", "since_ms", "until_ms"})
+
+
+class Looked:
+    """One kind of frame of one vehicle, while nodes pull it: counted as one viewer, and its newest frame awaited."""
+
+    def __init__(self, bus: LocalBus, vehicle: str, kind: str) -> None:
+        self._bus = bus
+        self._key = (ALL, vehicle) if kind == wire.SUMMARY else (vehicle, kind)
+        self._changed = asyncio.Event()
+        self._is_extra = kind not in ("state", wire.SUMMARY)
+        self._unwatch = bus.watch(self._key[0], self._on_new)
+        if self._is_extra:
+            bus.want(*self._key, +1)
+        self.until_s = 0.0
+
+    def close(self) -> None:
+        self._unwatch()
+        if self._is_extra:
+            self._bus.want(*self._key, -1)
+
+    @property
+    def newest(self) -> Frame | None:
+        return self._bus.newest(*self._key)
+
+    async def after(self, number: int, wait_s: float) -> Frame | None:
+        """The newest frame once it is another than `number`; None where none came in time."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(wait_s):
+                while (frame := self.newest) is None or frame.number == number:
+                    await self._changed.wait()
+                return frame
+        return None
+
+    def _on_new(self, kind: str) -> None:
+        if kind == self._key[1]:
+            self._changed.set()
+            self._changed = asyncio.Event()
+
+
+class NatsAgent:
+    """Answers nodes for the vehicles of `bus`, in this run of it. `now`: a monotonic clock in seconds, as the bus's."""
+
+    def __init__(self, bus: LocalBus, client: Client, *, run: str, now: Callable[[], float]) -> None:
+        self._bus = bus
+        self._client = client
+        self._run = run
+        self._now = now
+        self._looked: dict[tuple[str, str], Looked] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._pulls = self._asked = 0
+        self._told: dict[str, int] = {}  # the number of each vehicle's newest event that was published
+        self._stops: list[Callable[[], None]] = []
+        self.refused = 0  # what could not be read, or was too much
+
+    async def start(self) -> None:
+        for vehicle in self._bus.vehicles:
+            self._told[vehicle] = self._bus.last_event(vehicle)
+            for what, answer in (("pull.*", self._on_pull), ("ask", self._on_ask)):
+                await self._client.subscribe(wire.subject(vehicle, what), cb=answer)
+            self._stops.append(self._bus.watch_events(vehicle, lambda v=vehicle: self._spawn(self._tell(v))))  # type: ignore[misc]
+        await self._client.flush()  # from now on it is asked
+        self._spawn(self._be_here())
+
+    async def stop(self) -> None:
+        for stop in self._stops:
+            stop()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        for looked in self._looked.values():
+            looked.close()
+        self._looked.clear()
+
+    def _spawn(self, work: Any) -> None:
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    # -- frames --------------------------------------------------------------------------------------------------------
+
+    async def _on_pull(self, message: Msg) -> None:
+        kind = message.subject.rsplit(".", 1)[1]
+        try:
+            pull = wire.decode(wire.Pull, message.data)
+        except wire.Malformed:
+            self.refused += 1
+            return
+        if kind not in wire.KINDS or self._pulls >= MOST_PULLS:
+            self.refused += 1
+            return
+        self._spawn(self._answer_pull(message, wire.vehicle_of(message.subject), kind, pull))
+
+    async def _answer_pull(self, message: Msg, vehicle: str, kind: str, pull: wire.Pull) -> None:
+        came_s = self._now()
+        looked = self._looked.get((vehicle, kind))
+        if looked is None:
+            looked = self._looked[vehicle, kind] = Looked(self._bus, vehicle, kind)
+        looked.until_s = came_s + wire.PULL_WAITS_S + WANTED_FOR_S
+        self._pulls += 1
+        try:
+            frame = await looked.after(pull.have if pull.run == self._run else 0, wire.PULL_WAITS_S)
+        finally:
+            self._pulls -= 1
+        now_s = self._now()
+        head = wire.FrameHead(run=self._run, number=0, now_s=now_s, waited_s=now_s - came_s)
+        if frame is None:
+            return await self._respond(message, wire.encode_frame(head))
+        head = head.model_copy(
+            update={"number": frame.number, "age_s": now_s - frame.put_s, "is_text": isinstance(frame.payload, str)}
+        )
+        await self._respond(message, wire.encode_frame(head, frame.payload))
+
+    # -- events --------------------------------------------------------------------------------------------------------
+
+    async def _tell(self, vehicle: str) -> None:
+        """Publishes the events that pages may have since the last time; what is lost on the way is asked for."""
+        while (n := self._told[vehicle]) < self._bus.last_event(vehicle):
+            events = await self._bus.events_after(vehicle, n, wire.PORTION)
+            if not events or self._told[vehicle] != n:  # another task was faster
+                return
+            self._told[vehicle] = events[-1]["n"]
+            await self._publish(vehicle, "events", wire.Events(run=self._run, events=events))
+
+    async def _be_here(self) -> None:
+        while True:
+            for vehicle in self._told:
+                await self._publish(vehicle, "here", wire.Here(run=self._run, last=self._bus.last_event(vehicle)))
+            now_s = self._now()
+            for key in [key for key, looked in self._looked.items() if looked.until_s < now_s]:
+                self._looked.pop(key).close()
+            await asyncio.sleep(wire.HERE_EVERY_S)
+
+    # -- requests ------------------------------------------------------------------------------------------------------
+
+    async def _on_ask(self, message: Msg) -> None:
+        try:
+            asked = wire.decode(wire.Ask, message.data)
+        except wire.Malformed as why:
+            self.refused += 1
+            log.warning("request not read: subject=%s why=%s", message.subject, why)
+            return
+        if self._asked >= MOST_ASKED:
+            self.refused += 1
+            return
+        self._spawn(self._answer(message, wire.vehicle_of(message.subject), asked))
+
+    async def _answer(self, message: Msg, vehicle: str, asked: wire.Ask) -> None:
+        self._asked += 1
+        found: dict[str, Any] = {}
+        try:
+            if asked.do == "command":
+                found["answer"] = dict(await self._command(vehicle, asked))
+            elif asked.do == "after":
+                found["events"] = await self._bus.events_after(vehicle, asked.n, asked.limit)
+            elif asked.do == "find":
+                filters = {name: value for name, value in asked.filters.items() if name in FILTERS}
+                found["events"] = await self._bus.find_events(vehicle, **filters, limit=asked.limit)
+        except NotServed as why:
+            found["refused"] = str(why)
+        finally:
+            self._asked -= 1
+        body = wire.Answer(run=self._run, now_s=self._now(), last=self._bus.last_event(vehicle), **found)
+        await self._respond(message, wire.encode(body))
+
+    async def _command(self, vehicle: str, asked: wire.Ask) -> Any:
+        """Raises NotServed, also for a command that came too late or was meant for an earlier run."""
+        left_s = asked.not_after_s - self._now()
+        if asked.run != self._run:
+            raise NotServed(f"{vehicle} has started again since the command was given")
+        if left_s <= 0:
+            raise NotServed(f"the command reached {vehicle} too late and was not carried out")
+        return await self._bus.request(vehicle, asked.command, deadline_s=left_s)
+
+    async def _publish(self, vehicle: str, what: str, body: wire.Body) -> None:
+        with contextlib.suppress(NatsError):
+            if self._client.is_connected:  # else it would wait in the client and come late
+                await self._client.publish(wire.subject(vehicle, what), wire.encode(body))
+
+    async def _respond(self, message: Msg, data: bytes) -> None:
+        with contextlib.suppress(NatsError):
+            if self._client.is_connected and message.reply:
+                await message.respond(data)

@@ -1,0 +1,65 @@
+"""A web node pulls frames from agents: one after the other, and only what somebody looks at."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from nats.aio.client import Client
+from nats.errors import Error as NatsError
+
+from server.bus import nats_wire as wire
+from server.bus.nats_questions import ANSWER_S, Questions
+
+RETRY_S = 0.5  # after a pull that nobody answered
+Keep = Callable[[str, str, str | bytes, float], None]
+
+
+class Pulls:
+    """`keep` gets vehicle, kind, payload, and when it was put by our clock `now`, in seconds: at the latest then."""
+
+    def __init__(self, client: Client, questions: Questions, keep: Keep, *, now: Callable[[], float]) -> None:
+        self._client = client
+        self._questions = questions
+        self._keep = keep
+        self._now = now
+        self._tasks: dict[tuple[str, str], asyncio.Task[None]] = {}
+
+    def look(self, vehicle: str, kind: str, is_looked: bool) -> None:
+        """Begin or end to pull this kind of frame; nothing where it is so already."""
+        key = (vehicle, kind)
+        if is_looked and key not in self._tasks:
+            self._tasks[key] = asyncio.create_task(self._pull(vehicle, kind))
+        elif not is_looked and key in self._tasks:
+            self._tasks.pop(key).cancel()
+
+    async def stop(self) -> None:
+        for task in self._tasks.values():
+            task.cancel()
+        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
+
+    async def _pull(self, vehicle: str, kind: str) -> None:
+        """One frame after the other: the next is asked for when the last is here, so that none waits on the way."""
+        have, run = 0, ""
+        subject = wire.subject(vehicle, f"pull.{kind}")
+        while True:
+            asked_s = self._now()
+            try:
+                message = await self._client.request(
+                    subject, wire.encode(wire.Pull(have=have, run=run)), timeout=wire.PULL_WAITS_S + ANSWER_S
+                )
+                head, payload = wire.decode_frame(message.data)
+            except (NatsError, TimeoutError):
+                await asyncio.sleep(RETRY_S)
+                continue
+            except wire.Malformed as why:
+                self._questions.refuse(subject, why)
+                await asyncio.sleep(RETRY_S)
+                continue
+            self._questions.set_clock(vehicle, head.run, head.now_s)
+            if not head.number:
+                continue
+            have, run = head.number, head.run
+            # By our clock, and no later than it was: the pull was at the agent after `asked_s`.
+            put_s = min(asked_s + max(0.0, head.waited_s), self._now()) - max(0.0, head.age_s)
+            self._keep(vehicle, kind, payload, put_s)

@@ -1,0 +1,127 @@
+"""How frames, events and requests travel through a NATS broker: subjects `veh.<vehicle>.…`, bodies of JSON.
+
+| subject | direction | body |
+|---|---|---|
+| `pull.<kind>` | node asks, agent answers | `Pull`; a frame's head as a line of JSON, then the frame |
+| `ask` | node asks, agent answers | a request, or a question for events or the clock |
+| `events` | agent publishes | events in order, once pages may have them |
+| `here` | agent publishes every second | its run and the number of its newest event |
+
+A frame is pulled, never pushed: one is under way to a node at a time, so that a stalled hop finds nothing old. All
+times are of the agent's monotonic clock, in seconds.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, TypeVar
+
+import orjson
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+HERE_EVERY_S = 1.0
+PULL_WAITS_S = 1.0  # an agent without a newer frame answers after so long that there is none
+PORTION = 100  # events of one message: far below the broker's largest
+LARGEST = 900_000  # bytes of a body; the broker takes 1 MiB
+SUMMARY = "summary"  # what a session puts for the pages of other cars
+KINDS = frozenset({"state", "scan", SUMMARY})
+
+
+class Malformed(ValueError):
+    """What came is not what this subject carries."""
+
+
+class Body(BaseModel):
+    """One body; what it does not declare is ignored, so that neighbouring versions understand each other."""
+
+    model_config = ConfigDict(frozen=True, strict=True)
+
+
+B = TypeVar("B", bound=Body)
+Number = Annotated[int, Field(ge=0, lt=1 << 53)]
+Run = Annotated[str, Field(max_length=40)]
+
+
+class Pull(Body):
+    """A node asks for a frame newer than number `have` of the agent's run `run`."""
+
+    have: Number
+    run: Run
+
+
+class FrameHead(Body):
+    """The first line of a frame; `number` 0: there is no newer one, and no frame follows."""
+
+    run: Run
+    number: Number
+    now_s: float
+    waited_s: float = 0.0  # from the pull to this answer
+    age_s: float = 0.0  # of the frame when it was sent
+    is_text: bool = True
+
+
+class Here(Body):
+    run: Run
+    last: Number
+
+
+class Events(Body):
+    run: Run
+    events: list[dict[str, Any]]
+
+
+class Ask(Body):
+    """`command`: only until `not_after_s` of the agent's run `run`; `after` and `find`: events; `clock`: only that."""
+
+    do: Literal["command", "after", "find", "clock"]
+    command: dict[str, Any] = {}
+    not_after_s: float = 0.0
+    run: Run = ""
+    n: Number = 0
+    limit: Annotated[int, Field(ge=1, le=PORTION)] = PORTION
+    filters: dict[str, Any] = {}
+
+
+class Answer(Body):
+    run: Run
+    now_s: float
+    last: Number
+    answer: dict[str, Any] = {}
+    events: list[dict[str, Any]] = []
+    refused: str = ""  # not served; why, as a sentence
+
+
+def subject(vehicle: str, what: str) -> str:
+    return f"veh.{vehicle}.{what}"
+
+
+def vehicle_of(topic: str) -> str:
+    """The vehicle of a subject; only its agent may publish there."""
+    return topic.split(".")[1]
+
+
+def encode(body: Body) -> bytes:
+    return orjson.dumps(body.model_dump())
+
+
+def decode(kind: type[B], data: bytes) -> B:
+    """Raises Malformed."""
+    if len(data) > LARGEST:
+        raise Malformed(f"{len(data)} bytes")
+    try:
+        return kind.model_validate(orjson.loads(data))
+    except (orjson.JSONDecodeError, ValidationError) as error:
+        raise Malformed(str(error)[:200]) from None
+
+
+def encode_frame(head: FrameHead, payload: str | bytes = b"") -> bytes:
+    return encode(head) + b"\n" + (payload.encode() if isinstance(payload, str) else payload)
+
+
+def decode_frame(data: bytes) -> tuple[FrameHead, str | bytes]:
+    """Raises Malformed."""
+    line, _, payload = data.partition(b"\n")
+    head = decode(FrameHead, line)
+    try:
+        return head, payload.decode() if head.is_text else payload
+    except UnicodeDecodeError as error:
+        raise Malformed(str(error)) from None

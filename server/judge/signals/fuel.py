@@ -1,0 +1,35 @@
+"""Remaining fuel or charge."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from monitor.values import Level
+from server.judge.message_fields import Rejected, finite
+from server.judge.plausible import plausible_percent
+from server.judge.topic import Topic, floats
+
+
+def level(message: Any) -> Level:
+    return Level(value=_not_below_zero(finite(message, "data")), unit="%")
+
+
+def battery(message: Any) -> Level:
+    """`percentage` is 0 … 1 by definition, and 0 … 100 in many a driver."""
+    share = _not_below_zero(finite(message, "percentage"))
+    return Level(value=share * 100 if share <= 1.0 else share, unit="%")
+
+
+def _not_below_zero(value: float) -> float:
+    if value < 0:
+        raise Rejected("a level below zero")
+    return plausible_percent(value)
+
+
+TOPICS = (
+    Topic(
+        signal="fuel",
+        names=("/catvehicle/fuel", "/fuel", "/fuel_level", "/battery_state"),
+        types={**floats(level), "sensor_msgs/BatteryState": battery},
+    ),
+)

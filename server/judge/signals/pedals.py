@@ -1,0 +1,33 @@
+"""Brake and accelerator."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from monitor.values import Effort
+from server.judge.message_fields import finite
+from server.judge.plausible import plausible_percent
+from server.judge.topic import Topic, floats
+
+
+def effort(message: Any) -> Effort:
+    """Percent in force.x of a Wrench, as the car's pedals have it."""
+    return Effort(percent=plausible_percent(finite(message, "force", "x")))
+
+
+def effort_of_float(message: Any) -> Effort:
+    return Effort(percent=plausible_percent(finite(message, "data")))
+
+
+TOPICS = (
+    Topic(
+        signal="brake",
+        names=("/catvehicle/brake", "/vehicle/brake", "/brake"),
+        types={"geometry_msgs/Wrench": effort, **floats(effort_of_float)},
+    ),
+    Topic(
+        signal="accelerator",
+        names=("/catvehicle/accelerator", "/vehicle/accelerator", "/accelerator", "/throttle"),
+        types={"geometry_msgs/Wrench": effort, **floats(effort_of_float)},
+    ),
+)

@@ -1,0 +1,28 @@
+"""How far the steering is turned."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from monitor.values import Steering
+from server.judge.message_fields import finite
+from server.judge.plausible import plausible_percent
+from server.judge.topic import Topic, floats
+
+
+def steering(message: Any) -> Steering:
+    """Percent in torque.z of a Wrench, negative = left."""
+    return Steering(percent=plausible_percent(finite(message, "torque", "z")))
+
+
+def steering_of_float(message: Any) -> Steering:
+    return Steering(percent=plausible_percent(finite(message, "data")))
+
+
+TOPICS = (
+    Topic(
+        signal="steering",
+        names=("/catvehicle/steering", "/vehicle/steering", "/steering"),
+        types={"geometry_msgs/Wrench": steering, **floats(steering_of_float)},
+    ),
+)

@@ -1,0 +1,159 @@
+"""The alarms of a state, the tiles of the checks, and the events of the log."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NotRequired, Protocol
+
+from typing_extensions import TypedDict, Unpack
+
+from monitor.alarm import AlarmState
+from monitor.alarm_spec import Action, Place, Priority, Sound
+from monitor.check import Verdict
+from server.protocol.doc import doc
+
+
+class Tile(TypedDict):
+    """One tile of Home: a check, or several of one thing."""
+
+    id: str
+    label: str
+    verdict: Verdict
+    text: str
+    brief: Annotated[str, doc('at most 21 letters for the tile: "FAULT 12.6 m/s", "not checked: no link"')]
+    checks: Annotated[list[str], doc("ids of the checks behind this tile")]
+
+
+class Quantity(TypedDict):
+    label: str
+    value: float | None
+    unit: str
+
+
+class Worst(Quantity):
+    side: Literal["above", "below"]
+
+
+class StandingAlarm(TypedDict):
+    """An alarm that is active, or has ended and is not acknowledged."""
+
+    id: str
+    occurrence: Annotated[int, doc("counts announcements; below")]
+    title: str
+    priority: Priority
+    place: Annotated[Place, doc("where it is shown now")]
+    sound: Sound
+    state: AlarmState
+    active: bool
+    needs_ack: Annotated[bool, doc("it stays until it is acknowledged, although its condition has gone")]
+    raised_ms: int
+    for_s: float
+    verdict: Annotated[
+        Verdict,
+        doc("what its check finds now: ok: it clears after its delay; unknown: it stays active, and is not checked"),
+    ]
+    text: str
+    trip_text: Annotated[str, doc("as it was announced")]
+    measured: Quantity | None
+    limit: Quantity | None
+    worst: Annotated[Worst | None, doc("what was measured furthest beyond its limit since it was raised")]
+    causes: list[str]
+    actions: Annotated[
+        list[Action], doc("possible now: acknowledge while nobody has, also once it returned; unshelve while shelved")
+    ]
+    advice: str
+    acknowledged_by: str | None
+    shelved_until_ms: int | None
+    shelved_by: str | None
+    silenced_until_ms: Annotated[int | None, doc("no sound until then; null: it sounds while it is unacknowledged")]
+    silenced_by: str | None
+
+
+class SuppressedAlarm(TypedDict):
+    """Not announced, because others explain it."""
+
+    id: str
+    title: str
+    priority: Priority
+    by: Annotated[list[str], doc("titles of the alarms that explain it")]
+    raised_ms: int | None
+
+
+class AlarmLoad(TypedDict):
+    """What the alarms ask of the operator now."""
+
+    in_10_min: Annotated[int, doc("announced in the last 10 minutes")]
+    flood: bool
+    bearable: bool
+    chattering: Annotated[list[str], doc("titles of the alarms that come and go")]
+
+
+class EventDetails(TypedDict, total=False):
+    """What an event of no alarm may say besides."""
+
+    # Of control.
+    act: Annotated[str, doc("what happened to control; below")]
+    by_page: str | None
+    holder: Annotated[str | None, doc("who is in control now")]
+    page: str | None
+    before: Annotated[str | None, doc("who was in control until now")]
+    before_page: str | None
+    fence: int | None
+    # Of a slow-down, and of a slow link.
+    step: Annotated[str | int, doc("ordered · sent · slows · not_confirmed · released …; of reduced: how far")]
+    order: Annotated[int, doc("number of the order")]
+    why: str
+    ordered_by: str
+    commanded_mps: float | None
+    tyre_rad: float | None
+    topic: str
+    stands: Literal["before", "unproven"] | None
+    trigger: Annotated[str, doc("the rule that counts down")]
+    hold: Annotated[int, doc("number of the guard's hold")]
+    # Of the rest.
+    address: str
+    settings: Annotated[dict[str, Any], doc("all that are in force, as monitoring begins")]
+    changes: Annotated[dict[str, list[Any]], doc("name of a setting → from, to")]
+    recording: Annotated[str, doc("the recording that was recovered")]
+    phone: Annotated[str | None, doc("the phone that was chosen")]
+    since_ms: Annotated[int, doc("when the pause began")]
+
+
+class NotedEvent(EventDetails):
+    """An event of no alarm before the log numbers it."""
+
+    at_ms: int
+    alarm: Annotated[str | None, doc("null: of no alarm")]
+    change: Annotated[str, doc("what happened; below")]
+    text: str
+    by: Annotated[str | None, doc("who did it, where a person did")]
+    settings_version: int
+
+
+class NewEvent(NotedEvent):
+    """Any event before the log numbers it; what is of an alarm is active in addition."""
+
+    occurrence: NotRequired[int]
+    title: NotRequired[str]
+    priority: NotRequired[Priority]
+    place: NotRequired[Place]
+    sound: NotRequired[Sound]
+    announces: NotRequired[Annotated[bool, doc("the operator is to be alerted")]]
+    state: NotRequired[AlarmState]
+    causes: NotRequired[list[str]]
+    suppressed_by: NotRequired[list[str]]
+    shelved_until_ms: NotRequired[int | None]
+    measured: NotRequired[Quantity | None]
+    limit: NotRequired[Quantity | None]
+    worst: NotRequired[Annotated[Worst | None, doc("furthest beyond its limit since it was raised")]]
+
+
+class LogEvent(NewEvent):
+    """One event of the log."""
+
+    n: Annotated[int, doc("its number: grows by one, never given twice")]
+
+
+class Note(Protocol):
+    """Writes an event of no alarm into the log."""
+
+    def __call__(self, change: str, text: str, *, by: str | None = None, **more: Unpack[EventDetails]) -> None: ...

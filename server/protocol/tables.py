@@ -1,0 +1,128 @@
+"""The tables of docs/protocol.md, made from the types of the protocol.
+
+A page says where they stand: between `<!-- types: SessionState LinkState -->` and `<!-- end -->` is a table for each
+named type; `signals`, `commands` and `replay` are one table each.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, get_args
+
+from monitor.signals import SIGNALS
+from server.protocol.commands import BY_KIND
+from server.protocol.replay_commands import ReplayOrder
+from server.protocol.shapes import command_name, definitions
+
+_BLOCK = re.compile(r"(<!-- (types|signals|commands|replay): ([^>]*?)-->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def filled(page: str) -> str:
+    """The page with each of its blocks made anew."""
+    made: dict[str, Callable[[list[str]], Iterator[str]]] = {
+        "types": _types,
+        "signals": _signals,
+        "commands": _commands,
+        "replay": _replay,
+    }
+
+    def block(found: re.Match[str]) -> str:
+        return "\n".join([found[1].rstrip(), *made[found[2]](found[3].split()), "", found[4]])
+
+    return _BLOCK.sub(block, page)
+
+
+def _types(names: list[str]) -> Iterator[str]:
+    for name in names:
+        schema = definitions()[name]
+        yield ""
+        yield f"**{name}**{': ' + _line(schema['description']) if 'description' in schema else ''}"
+        yield ""
+        yield "| field | type | |"
+        yield "|---|---|---|"
+        required = schema.get("required", ())
+        for field, of in schema["properties"].items():
+            left_out = "" if field in required else " (may be left out)"
+            yield f"| {field} | {_type(of)}{left_out} | {_line(of.get('description', ''))} |"
+
+
+def _signals(_: list[str]) -> Iterator[str]:
+    """The fields of each signal's value."""
+    yield ""
+    yield "| signal | headline | field of `value` | type | |"
+    yield "|---|---|---|---|---|"
+    for signal, state in definitions()["Signals"]["properties"].items():
+        value = definitions()[_name(state)]["properties"]["value"]["anyOf"][0]
+        first = f"{signal} | {SIGNALS[signal].headline or '–'}"
+        for field, of in definitions()[_name(value)]["properties"].items():
+            yield f"| {first} | {field} | {_type(of)} | {_line(of.get('description', ''))} |"
+            first = " | "
+
+
+def _commands(_: list[str]) -> Iterator[str]:
+    """What may be ordered, by whom, and where over HTTP."""
+    yield ""
+    yield "| kind | fields | who may | over HTTP | |"
+    yield "|---|---|---|---|---|"
+    for kind, command in BY_KIND.items():
+        schema = definitions()[command_name(command)]
+        who = "who is in control" if command.needs == "control" else "any operator"
+        http = f"`POST {command.path or f'/api/{kind}'}`" if command.http else ""
+        yield f"| {kind} | {_fields(schema)} | {who} | {http} | {_line(schema['description'])} |"
+
+
+def _replay(_: list[str]) -> Iterator[str]:
+    """What may be ordered of the page's replay."""
+    yield ""
+    yield "| do | fields | |"
+    yield "|---|---|---|"
+    for order in get_args(ReplayOrder):
+        schema = definitions()[order.__name__]
+        yield f"| {schema['properties']['do']['const']} | {_fields(schema)} | {_line(schema['description'])} |"
+
+
+def _fields(schema: Mapping[str, Any]) -> str:
+    """The fields of an order, those that every order has left out."""
+    told = []
+    for name, of in schema["properties"].items():
+        if name in ("id", "kind", "do") and not (name == "do" and "enum" in of):
+            continue
+        most = f" ≤ {of['maximum']:g}" if of.get("maximum", math.inf) < 1000 else ""
+        left_out = "" if name in schema.get("required", ()) else ", may be left out"
+        about = f": {of['description']}" if "description" in of else ""
+        told.append(_line(f"**{name}** ({_type(of)}{most}{left_out}){about}"))
+    return "; ".join(told)
+
+
+def _name(schema: Mapping[str, Any]) -> str:
+    name: str = schema["$ref"].rpartition("/")[2]
+    return name
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
+
+
+def _type(schema: Mapping[str, Any]) -> str:
+    """A type as a person reads it; the names of small types are replaced by what they are."""
+    if "$ref" in schema:
+        name = _name(schema)
+        return name.partition("_")[0] if "properties" in definitions()[name] else _type(definitions()[name])
+    if "const" in schema or "enum" in schema:
+        return " · ".join(f"`{one}`" for one in schema.get("enum", [schema.get("const")]))
+    if any_of := schema.get("anyOf") or schema.get("oneOf"):
+        return " or ".join(dict.fromkeys(_type(one) for one in any_of))
+    match schema.get("type"):
+        case "array" if "prefixItems" in schema:
+            return f"[{', '.join(_type(one) for one in schema['prefixItems'])}]"
+        case "array":
+            return f"list of {_type(schema['items'])}"
+        case "object":
+            values = schema.get("additionalProperties")
+            return f"name → {_type(values) if isinstance(values, Mapping) else 'any'}"
+        case None:
+            return "any"
+        case kind:
+            return "number" if kind == "integer" else str(kind)

@@ -1,0 +1,16 @@
+"""The report page of a drive; `server.analysis` draws it."""
+
+from __future__ import annotations
+
+from server.recording.export.export_format import ExportFormat
+
+FORMAT = ExportFormat(
+    name="html",
+    label="HTML report",
+    use="plots and alarms in one page, works offline",
+    extension="html",
+    media_type="text/html; charset=utf-8",
+    writer="server.analysis.drive_page:write_drive_page",
+    options=("name",),
+    order=60,
+)

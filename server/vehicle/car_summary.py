@@ -1,0 +1,133 @@
+"""A car in a few numbers, for the pages that show another car of the same server."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable
+
+import orjson
+
+from monitor.alarm import Alarm
+from monitor.alarm_spec import Sound
+from monitor.state import Snapshot
+from server.bus.bus import ALL, SessionBus
+from server.protocol import serialize
+from server.protocol.cars_state import CarAlarm, CarSpeed, CarSummary
+from server.vehicle import facts
+from server.vehicle.session_parts import SessionParts
+from server.vehicle.state_frame import where_cut
+
+log = logging.getLogger("catgraph.session")
+
+EVERY_S = 0.5
+_RANK = {"critical": 3, "warning": 2, "advisory": 1}
+_ASKING = ("UNACKED", "RTN_UNACKED")
+
+
+class SummaryPublisher:
+    """Puts the summary of one vehicle on the bus, while a page of several cars is open.
+
+    `now` is a monotonic clock in seconds, `wall_ms` the time of day in ms since 1970.
+    """
+
+    def __init__(
+        self,
+        vehicle: str,
+        parts: SessionParts,
+        bus: SessionBus,
+        *,
+        now: Callable[[], float],
+        wall_ms: Callable[[], int],
+    ) -> None:
+        self._vehicle = vehicle
+        self._parts = parts
+        self._bus = bus
+        self._now = now
+        self._wall_ms = wall_ms
+        self._put_s = -EVERY_S
+        self._failure = ""  # why none can be made, as last logged
+
+    def tick(self, now_s: float) -> None:
+        """Time passed: one is put when it is due. All sessions put theirs at the same moments, so that none is old when
+        they are sent together."""
+        if now_s // EVERY_S != self._put_s // EVERY_S:
+            self.put()
+
+    def put(self) -> None:
+        """Never raises: a car whose summary cannot be made is shown as unknown on the pages of the other cars."""
+        if not self._bus.watched(ALL):
+            return
+        self._put_s = self._now()
+        try:
+            self._bus.put(ALL, self._vehicle, orjson.dumps(self._make()).decode())
+            self._failure = ""
+        except Exception as error:
+            if self._failure != (failure := f"{type(error).__name__}: {error}"):
+                self._failure = failure
+                log.exception("summary failed: vehicle=%s", self._vehicle)
+
+    def _make(self) -> CarSummary:
+        parts, now_s, wall_ms = self._parts, self._now(), self._wall_ms()
+        found = facts.frame_facts(
+            self._vehicle, parts, now_s, wall_ms=wall_ms, configured=None, held=None, log_trouble=None
+        )
+        snapshot = parts.judgement.state.snapshot(now_s)
+        cut, _, _ = where_cut(found, snapshot)
+        bridge_s = found.link.heard_s if found.link is not None else None
+        is_trying = found.phase in ("connecting", "failed", "lost")
+        standing = [alarm for alarm in parts.judgement.monitor.standing() if alarm.state != "SHELVED"]
+        control, slow_down = found.operators["control"], found.decelerate
+        return {
+            "phase": found.phase,
+            "paused": found.paused_since_s is not None,
+            "link": {
+                "cut": cut,
+                "bridge_age_s": _since(bridge_s, now_s),
+                "car_age_s": _since(found.last_message_s, now_s),
+                "trying_for_s": round(now_s - found.dialled_s, 1) if is_trying else 0.0,
+                "connected_for_s": _since(found.connected_s, now_s),
+            },
+            "worst": worst(standing, now_s, wall_ms),
+            "waiting": sum(alarm.state in _ASKING for alarm in standing),
+            "speed": _speed(snapshot, now_s),
+            "holder": control["holder"],
+            "page": control.get("page"),
+            "recording": found.recording["state"],
+            "recording_for_s": found.recording["for_s"],
+            "slow_down": slow_down["state"],
+        }
+
+
+def worst(standing: Iterable[Alarm], now_s: float, wall_ms: int) -> CarAlarm | None:
+    """The alarm that needs a person most: one that stands unanswered, then one that ended so, then the others."""
+    order = {"UNACKED": 2, "RTN_UNACKED": 1}
+    shown = [serialize.alarm(alarm, now_s, wall_ms) for alarm in standing]
+    if not shown:
+        return None
+    first = max(shown, key=lambda one: (order.get(one["state"], 0), _RANK[one["priority"]], one["raised_ms"]))
+    return {
+        "id": first["id"],
+        "occurrence": first["occurrence"],
+        "title": first["title"],
+        "priority": first["priority"],
+        "state": first["state"],
+        "active": first["active"],
+        "raised_ms": first["raised_ms"],
+        "sound": Sound.NONE if first["silenced_until_ms"] else first["sound"],
+    }
+
+
+def _speed(snapshot: Snapshot, now_s: float) -> CarSpeed:
+    reading = snapshot.readings.get("speed")
+    if reading is None:
+        return {"value_mps": None, "freshness": "never", "age_s": None, "horizon_s": None}
+    return {
+        "value_mps": serialize.plain(reading.value.speed_mps),
+        "freshness": reading.freshness(now_s),
+        "age_s": serialize.plain(reading.age_s(now_s), 3),
+        "horizon_s": serialize.plain(reading.horizon_s, 2),
+    }
+
+
+def _since(moment_s: float | None, now_s: float) -> float | None:
+    return None if moment_s is None else serialize.plain(now_s - moment_s, 2)

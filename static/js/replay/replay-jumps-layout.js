@@ -1,0 +1,50 @@
+// The list of what to jump to in a recording: pure functions, no DOM.
+
+import { duration, fixed } from '../core/format.js';
+
+/** A jump leads to so long before its alarm [s]: what led to it is seen. */
+export const LEAD_S = 5;
+
+/**
+ * @typedef {import('../core/protocol-types.js').Timeline} Timeline
+ * @typedef {{at_s: number, kind: import('../core/protocol-types.js').Priority | 'gap', icon: string, title: string, text: string, length_s: number | null}} Jump
+ *   length_s: how long it was active; null: not known, or to the end
+ */
+
+const ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
+
+/**
+ * Alarms of every priority, and where nothing was recorded, in the order of time.
+ * @param {Pick<Timeline, 'marks' | 'gaps'>} line
+ * @returns {Jump[]}
+ */
+export function jumpsOf({ marks, gaps }) {
+  const alarms = marks.map((mark) => ({ at_s: mark.at_s, kind: mark.priority, icon: ICONS[mark.priority], title: mark.title, text: mark.text, length_s: mark.duration_s }));
+  const holes = gaps.map(([from_s, to_s]) => ({ at_s: from_s, kind: /** @type {const} */ ('gap'), icon: 'unknown', title: 'Nothing recorded', text: '', length_s: to_s - from_s }));
+  return [...alarms, ...holes].sort((a, b) => a.at_s - b.at_s);
+}
+
+/** Where a jump leads [s]. @param {Pick<Jump, 'at_s'>} jump */
+export function jumpAt({ at_s }) {
+  return Math.max(0, at_s - LEAD_S);
+}
+
+/**
+ * "0.8 s", "12 s", "2:05 min"; what has no end yet is said so.
+ * @param {Pick<Jump, 'length_s'>} jump
+ * @param {boolean} isDone whether all of the recording was read
+ */
+export function lengthOfJump({ length_s }, isDone) {
+  if (length_s === null) return isDone ? 'to the end' : 'end not read yet';
+  if (length_s < 59.5) return `${fixed(length_s, length_s < 9.95 ? 1 : 0)} s`;
+  return `${duration(length_s)} ${length_s < 3600 ? 'min' : 'h'}`;
+}
+
+/**
+ * The place of the last one that has begun at a moment, or of the first; −1 where there is none.
+ * @param {number[]} begins in the order of time [s]
+ * @param {number} at_s
+ */
+export function nearestJump(begins, at_s) {
+  return begins.length === 0 ? -1 : Math.max(0, begins.filter((begin_s) => begin_s <= at_s + LEAD_S).length - 1);
+}

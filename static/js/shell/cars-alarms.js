@@ -1,0 +1,140 @@
+// The alarms of the other cars, on the page of one: on the strip, on a card over the rail, aloud and by name.
+
+import { announcedOf, askingOf, keyOf, louder } from './cars-layout.js';
+import { field, html, icon, listen, need, setAttribute, setIcon, setText, setWords } from '../core/dom.js';
+import { age, counted } from '../core/format.js';
+
+/** The card may appear under a finger: a press this soon after is not meant for it [ms]. */
+const MEANT_MS = 400;
+
+/**
+ * @typedef {import('./cars-layout.js').CarRow} CarRow
+ */
+
+export class CarsAlarms {
+  /** What was left on this phone: a car's alarm, and of it one occurrence. @type {Set<string>} */
+  #left = new Set();
+  /** What was named aloud. @type {Set<string>} */
+  #spoken = new Set();
+  /** @type {CarRow | null} */
+  #shown = null;
+  #shown_ms = -Infinity;
+
+  /**
+   * @param {HTMLElement} monitor
+   * @param {HTMLElement} snacks where the card stands: over the rail, and in no way of this car's slide
+   * @param {import('./cars.js').Cars} cars
+   */
+  constructor(monitor, snacks, cars) {
+    this.cars = cars;
+    this.store = cars.store;
+    this.snacks = snacks;
+    this.strip = field(monitor, 'strip');
+    this.open = html('button', { type: 'button', class: 'key solid' });
+    this.leave = html('button', { type: 'button', class: 'key' }, 'Leave it');
+    this.title = html('b', { id: 'other-title' });
+    this.text = html('span');
+    this.card = html('div', { class: 'snack asks other', role: 'alertdialog', 'aria-labelledby': 'other-title', 'data-f': 'other-car' },
+      html('div', { class: 'side' }, icon('crit')), html('div', { class: 'tx' }, this.title, this.text), html('div', { class: 'ac' }, this.leave, this.open));
+    const meant = (/** @type {(row: CarRow) => void} */ act) => () => {
+      if (this.#shown && performance.now() - this.#shown_ms > MEANT_MS) act(this.#shown);
+    };
+    this.stops = [
+      listen(this.open, 'click', meant((row) => cars.open(row.name))),
+      listen(this.leave, 'click', meant((row) => {
+        this.#left.add(keyOf(row));
+        this.draw();
+      })),
+      listen(this.strip, 'click', (event) => {
+        if (this.strip.dataset['opens'] !== 'cars') return;
+        event.stopImmediatePropagation();
+        cars.openList();
+      }, { capture: true }),
+      cars.store.on('draw', () => this.draw()),
+      cars.store.on('cars', () => this.draw()),
+    ];
+    cars.onListed = () => this.#seen();
+  }
+
+  /** The alarms of other cars that ask for a person on this phone; the worst first. */
+  get asking() {
+    const { cars, store } = this;
+    return store.cars && !store.isSilent ? askingOf(cars.rows(), store.vehicle, this.#left) : [];
+  }
+
+  /** The other cars whose next alarm this phone would announce. */
+  get announced() {
+    const { cars, store } = this;
+    return store.cars && !store.isSilent ? announcedOf(cars.rows(), store.vehicle, this.#left) : [];
+  }
+
+  /** The list of cars shows them all: what is no more than a warning need not sound any longer. */
+  #seen() {
+    for (const row of this.asking) if (row.worst?.priority !== 'critical') this.#left.add(keyOf(row));
+  }
+
+  /** @param {Parameters<typeof louder>[0]} own what this car's alarms need */
+  sound(own) {
+    return louder(own, this.asking);
+  }
+
+  draw() {
+    const { asking, store } = this;
+    this.#drawStrip(asking);
+    const critical = asking.find(({ worst }) => worst?.priority === 'critical') ?? null;
+    this.#drawCard(critical);
+    if (!store.painter.drawing.isFailed) for (const row of asking) this.#speak(row);
+  }
+
+  /** The strip names another car where this one has nothing worse; strip.js has drawn this car's. @param {CarRow[]} asking */
+  #drawStrip(asking) {
+    const { strip } = this;
+    const [first] = asking;
+    if (!first || !isLess(strip.dataset['kind'] ?? '', first.kind)) return;
+    setAttribute(strip, 'data-kind', first.kind || null);
+    setAttribute(strip, 'data-returned', false);
+    setAttribute(strip, 'data-known', false);
+    setAttribute(strip, 'data-opens', 'cars');
+    setIcon(need(strip, '.i'), first.icon);
+    setWords(field(strip, 'strip-text'), `${first.name}: ${first.worst?.title ?? ''}`);
+    setWords(field(strip, 'strip-end'), asking.length > 1 ? counted(asking.length, 'car') : '');
+  }
+
+  /** @param {CarRow | null} row */
+  #drawCard(row) {
+    const { card, snacks } = this;
+    if (!row?.worst) {
+      this.#shown = null;
+      card.remove();
+      return;
+    }
+    if (!this.#shown || keyOf(this.#shown) !== keyOf(row)) this.#shown_ms = performance.now();
+    this.#shown = row;
+    setText(this.title, `${row.name}: ${row.worst.title}`);
+    const for_s = ((this.store.cars?.time_ms ?? 0) - row.worst.raised_ms) / 1000 + this.store.carsLag_s;
+    setWords(this.text, `For ${age(Math.max(0, for_s))} s. In control: ${row.operator}.`);
+    setText(this.open, `Open ${row.name}`);
+    if (!card.isConnected) snacks.prepend(card);
+  }
+
+  /** Names a car and its alarm, once each occurrence, where the browser has a voice. @param {CarRow} row */
+  #speak(row) {
+    const key = keyOf(row);
+    if (this.#spoken.has(key) || !row.worst) return;
+    this.#spoken.add(key);
+    try {
+      const { speechSynthesis: voice } = window;
+      if (voice?.getVoices().length) voice.speak(new SpeechSynthesisUtterance(`${row.name}: ${row.worst.title}`));
+    } catch (error) {
+      console.warn('No voice:', error);
+    }
+  }
+}
+
+const WEIGHT = { '': 0, armed: 1, warn: 2, invert: 3, order: 4, crit: 5 };
+
+/** Whether what this car's strip shows is less than an alarm of another. @param {string} own @param {CarRow['kind']} other */
+export function isLess(own, other) {
+  const weight = WEIGHT[/** @type {keyof typeof WEIGHT} */ (own)] ?? 5;
+  return other === 'crit' ? weight < 3 : other === 'warn' && weight < 1;
+}

@@ -1,0 +1,24 @@
+// Whether all parts of a car stand in sight at once, as panes; below that size the tabs are turned like pages.
+
+/** A desktop, a tablet on its side, a tablet upright, as in watch.css. */
+const FLOOR = ['(min-width: 1000px) and (min-height: 600px)', '(min-width: 700px) and (min-height: 1060px)', '(min-width: 1200px) and (min-height: 480px)'];
+
+/** @type {MediaQueryList | null} */
+let query = null;
+
+/** @returns {MediaQueryList} */
+export function floorQuery() {
+  query ??= matchMedia(FLOOR.join(', '));
+  return query;
+}
+
+/** Are the panes laid out side by side? */
+export function isFloor() {
+  return floorQuery().matches;
+}
+
+/** Is the list of alarms in sight, with its keys? Nothing need then ask for it in another place. */
+export function areAlarmsInSight() {
+  const monitor = document.getElementById('monitor');
+  return isFloor() && monitor !== null && !monitor.hidden && monitor.dataset['wide'] !== 'page' && !monitor.querySelector('.compare')?.checkVisibility(); // it takes the place of all panes
+}

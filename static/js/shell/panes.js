@@ -1,0 +1,150 @@
+// The panes of a wide screen: their heads, the list of alarms and the log, mounted only while there is a place for them.
+
+import { countWords, rowsOf } from '../alarms/alarms-layout.js';
+import { field, html, icon, listen, setAttribute, setText, setWords, words } from '../core/dom.js';
+import { eventWords } from '../alarms/log-layout.js';
+import { fixed, timeOfDay } from '../core/format.js';
+import { gapWords } from '../core/event-log.js';
+import { alarmInHead } from './dialogs.js';
+import { areAlarmsInSight } from './layout.js';
+import { veilOf } from './veil.js';
+import { Lines, peopleLines, signalLines } from './wall-panes.js';
+
+/** @typedef {import('../core/store.js').Store} Store */
+
+/** Height of a line of the log [px], as in watch.css. */
+const LINE_PX = 24;
+
+/**
+ * What stands at the right of a pane's head.
+ * @param {import('../core/protocol-types.js').State} frame
+ */
+export function headsOf({ phone, signals, alarms, suppressed, replay }) {
+  const { apart_m, explained_m } = phone ?? {};
+  const beams = signals.scan?.value;
+  const rows = rowsOf(alarms, suppressed ?? [], false);
+  return {
+    map: apart_m == null ? '' : `Distance apart ${fixed(apart_m)}${explained_m == null ? '' : ` of ${fixed(explained_m)}`} m`,
+    scan: beams && signals.scan?.freshness !== 'stale' ? `${beams.usable} of ${beams.beams} beams` : signals.scan?.freshness === 'stale' ? 'stale' : '',
+    alarms: replay ? 'as recorded' : rows.length ? countWords(rows) : 'none active',
+  };
+}
+
+/**
+ * @param {HTMLElement} monitor
+ * @param {Store} store
+ */
+export function mount(monitor, store) {
+  const panes = new Panes(monitor, store);
+  panes.draw();
+  const stops = [store.on('draw', () => panes.draw()), listen(window, 'resize', () => panes.draw())];
+  return () => {
+    stops.forEach((stop) => stop());
+    panes.stop();
+  };
+}
+
+class Panes {
+  /** @param {HTMLElement} monitor @param {Store} store */
+  constructor(monitor, store) {
+    this.monitor = monitor;
+    this.store = store;
+    this.log = new LogPane(field(monitor, 'pane-log'), store);
+    this.signals = new Lines(field(monitor, 'pane-signals'));
+    this.people = new Lines(field(monitor, 'pane-people'));
+    this.heads = /** @type {const} */ (['map', 'scan', 'alarms']).map((name) => ({ name, element: field(monitor, `head-${name}`) }));
+    const alarms = field(monitor, 'pane-alarms');
+    this.list = new Lodger(alarms, 'The list of alarms', async () => {
+      const { mount: fill } = await import('../alarms/alarms.js');
+      return () => fill(alarms, store, { inHead: () => alarmInHead(monitor) });
+    });
+  }
+
+  /** Out of sight it is not there: it costs nothing, and an alarm that came meanwhile was not seen. */
+  draw() {
+    const { store } = this;
+    const { frame } = store;
+    const isInSight = frame !== null && areAlarmsInSight();
+    void this.list.want(isInSight);
+    if (!isInSight) return;
+    const heads = headsOf(frame);
+    const covered = veilOf(this.store);
+    for (const { name, element } of this.heads) setWords(element, covered === 'all' || (covered && name !== 'alarms') ? '' : heads[name]); // of a covered pane nothing is said
+    this.log.draw();
+    this.signals.draw(() => signalLines(frame.signals));
+    const { head, lines } = peopleLines(store.isSilent ? null : frame.replay ? frame.live?.reach : frame.reach, store.control, store.page);
+    setWords(field(this.monitor, 'head-people'), head);
+    this.people.draw(() => lines);
+  }
+
+  stop() {
+    this.signals.stop();
+    this.people.stop();
+    void this.list.want(false);
+  }
+}
+
+/** What fills a pane while it is wanted, fetched when it first is. */
+class Lodger {
+  #isWanted = false;
+  /** @type {(() => void) | null} */
+  #unmount = null;
+
+  /**
+   * @param {HTMLElement} place
+   * @param {string} what
+   * @param {() => Promise<() => () => void>} fetch resolves to what mounts it
+   */
+  constructor(place, what, fetch) {
+    this.place = place;
+    this.what = what;
+    this.fetch = fetch;
+  }
+
+  /** @param {boolean} isWanted */
+  async want(isWanted) {
+    if (isWanted === this.#isWanted) return;
+    this.#isWanted = isWanted;
+    if (!isWanted) {
+      this.#unmount?.();
+      this.#unmount = null;
+      return;
+    }
+    const fill = await this.fetch().catch(() => null);
+    if (!this.#isWanted || this.#unmount) return;
+    if (fill) this.#unmount = fill();
+    else setText(this.place, `${this.what} could not be loaded from the server. Reload the page.`);
+  }
+}
+
+/** The newest events, a line each, as many as are seen whole. */
+class LogPane {
+  #shown = '';
+  #lines = 0;
+
+  /** @param {HTMLElement} list @param {Store} store */
+  constructor(list, store) {
+    this.list = list;
+    this.store = store;
+    new ResizeObserver(([entry]) => {
+      this.#lines = Math.floor((entry?.contentRect.height ?? 0) / LINE_PX);
+      this.draw();
+    }).observe(list);
+  }
+
+  draw() {
+    const { rows, last } = this.store.log;
+    const key = `${last} ${rows.length} ${this.#lines}`;
+    if (key === this.#shown) return;
+    this.#shown = key;
+    this.list.replaceChildren(...rows.slice(0, this.#lines).map(lineOf));
+  }
+}
+
+/** @param {import('../core/event-log.js').Row} row */
+function lineOf({ event, gap }) {
+  const shown = event ? eventWords(event) : { icon: 'link-off', kind: '', title: gapWords(gap), text: '' };
+  const line = html('li', {}, html('span', { class: 'n' }, timeOfDay(event?.at_ms ?? gap?.at_ms ?? null)), icon(shown.icon, `s ${shown.kind}`), html('span', { class: 't' }, ...words(shown.title)), html('span', { class: 'm' }, ...words(shown.text)));
+  setAttribute(line, 'data-kind', event?.priority ?? null);
+  return line;
+}

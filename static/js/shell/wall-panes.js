@@ -1,0 +1,81 @@
+// The panes that only the widest screens have: rate and age of each signal, and who watches this car.
+
+import { html, setAttribute, setWords } from '../core/dom.js';
+import { age, counted, fixed, NOTHING } from '../core/format.js';
+
+/**
+ * @typedef {import('../core/protocol-types.js').State} State
+ * @typedef {import('../core/protocol-types.js').ReachState} Reach
+ * @typedef {import('../core/protocol-types.js').ControlState} Control
+ * @typedef {{key: string, cells: string[], ink?: string}} Line
+ */
+
+/** Height of a line [px], as in watch.css. */
+const LINE_PX = 26;
+
+/**
+ * Rate and age of each signal that is published: what is not fresh first, for the pane may not have room for all.
+ * @param {State['signals']} signals
+ * @returns {Line[]}
+ */
+export function signalLines(signals) {
+  const published = Object.entries(signals).filter(([, signal]) => signal.freshness !== 'not_published');
+  const isLate = (/** @type {string} */ freshness) => Number(freshness === 'fresh');
+  return published.sort(([, a], [, b]) => isLate(a.freshness) - isLate(b.freshness)).map(([name, { label, rate_hz, age_s, freshness }]) => ({
+    key: name, ink: freshness,
+    cells: [label, freshness === 'never' ? 'no message yet' : `${rate_hz === null || rate_hz === undefined ? NOTHING : fixed(rate_hz)} Hz`, age_s === null ? NOTHING : `${freshness === 'stale' ? 'STALE ' : ''}${age(age_s, 2)} s`],
+  }));
+}
+
+/**
+ * Who has this car on a page: who is in control first, then this page.
+ * @param {Reach | null | undefined} reach
+ * @param {Control | null} control
+ * @param {string} page of this screen
+ * @returns {{head: string, lines: Line[]}}
+ */
+export function peopleLines(reach, control, page) {
+  if (!reach) return { head: 'unknown', lines: [] };
+  const rank = (/** @type {string} */ one) => (one === control?.page ? 0 : one === page ? 1 : 2);
+  const lines = [...reach.pages].sort((a, b) => rank(a.page) - rank(b.page)).map((one) => ({
+    key: one.page,
+    cells: [`${one.name}${one.page === page ? ', you' : ''}`, one.page === control?.page ? 'in control' : 'watching', one.can ? 'hears alarms' : one.why_text ?? 'hears no alarm', one.heard_s === null ? NOTHING : `${age(one.heard_s)} s`],
+  }));
+  return { head: `${counted(reach.pages.length + reach.left_out, 'page')}, ${reach.can} can hear alarms`, lines };
+}
+
+/** A list of lines, as many as are seen whole. */
+export class Lines {
+  #lines = 0;
+  /** @type {Map<string, HTMLElement>} */
+  #drawn = new Map();
+
+  /** @param {HTMLElement} list */
+  constructor(list) {
+    this.list = list;
+    this.observer = new ResizeObserver(([entry]) => {
+      this.#lines = Math.floor((entry?.contentRect.height ?? 0) / LINE_PX);
+    });
+    this.observer.observe(list);
+  }
+
+  /** @param {() => Line[]} lines asked for only where there is room */
+  draw(lines) {
+    if (!this.#lines) return;
+    const shown = lines().slice(0, this.#lines);
+    const old = this.#drawn;
+    this.#drawn = new Map(shown.map(({ key, cells }) => [key, old.get(key) ?? html('li', {}, ...cells.map(() => html('span')))]));
+    const elements = [...this.#drawn.values()];
+    if (elements.length !== this.list.children.length || elements.some((one, i) => one !== this.list.children[i])) this.list.replaceChildren(...elements);
+    shown.forEach(({ cells, ink }, i) => {
+      const line = elements[i];
+      if (!line) return;
+      setAttribute(line, 'data-ink', ink ?? null);
+      cells.forEach((text, n) => setWords(/** @type {HTMLElement} */ (line.children[n]), text));
+    });
+  }
+
+  stop() {
+    this.observer.disconnect();
+  }
+}

@@ -1,0 +1,157 @@
+// The chart of a drive: views, cuts, what stands at the cursor, ticks and the table.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { brushPath, clockWords, csvOf, extentOf, foundAt, foundWords, limitAt, lineOf, placedMarks, roundEnds, specFor, valueTicks, viewAfter, within } from '../../static/js/home/drive-layout.js';
+import { DriveView, emptyWords, stateWords } from '../../static/js/home/drive-view.js';
+import { withFirst } from '../../static/js/home/drive-choice.js';
+
+const BUCKETS = { from_s: 10, step_s: 2 };
+
+/** @param {(number | null)[]} numbers @param {Partial<import('../../static/js/home/drive-layout.js').Trend>} [more] */
+function trend(numbers, more = {}) {
+  return { lowest: numbers, highest: numbers.map((one) => (one === null ? null : one + 1)), gaps: [], none: [], limits: [], ...more };
+}
+
+test('a view is zoomed about a place, moved, and never leaves the drive', () => {
+  assert.deepEqual(viewAfter([100, 200], { zoom: 0.5, about: 0.25 }, 1000), [112.5, 162.5]);
+  assert.deepEqual(viewAfter([100, 200], { zoom: 0.01, about: 1 }, 1000), [190, 200]); // ten seconds at least
+  assert.deepEqual(viewAfter([100, 200], { zoom: 99 }, 1000), [0, 1000]);
+  assert.deepEqual(viewAfter([100, 200], { pan: 0.5 }, 1000), [150, 250]);
+  assert.deepEqual(viewAfter([100, 200], { pan: -2 }, 1000), [0, 100]);
+  assert.deepEqual(viewAfter([900, 1000], { pan: 3 }, 1000), [900, 1000]);
+  assert.deepEqual(within([-20, 40], 30), [-30, 30]); // a drive that is shorter than its view ends at the right edge
+});
+
+test('a line passes over buckets without a message, and is cut where a gap or no number lies between', () => {
+  assert.deepEqual(lineOf(trend([1, null, 3]), BUCKETS), { times_s: [11, 15], lowest: [1, 3], highest: [2, 4] });
+  assert.deepEqual(lineOf(trend([1, null, 3], { gaps: [[11.5, 14]] }), BUCKETS).lowest, [1, null, 3]);
+  assert.deepEqual(lineOf(trend([1, 2, 3], { none: [[13.5, 13.6]] }), BUCKETS).lowest, [1, 2, null, 3]);
+  assert.deepEqual(lineOf(trend([1, 2, 3], { gaps: [[0, 10]], none: [[16, 20]] }), BUCKETS).lowest, [1, 2, 3]);
+  assert.deepEqual(lineOf(trend([null, null]), BUCKETS).times_s, []);
+});
+
+test('the extent is that of what is in view', () => {
+  assert.deepEqual(extentOf(trend([1, 9, 3, 20]), BUCKETS, [12.5, 15]), [3, 10]);
+  assert.equal(extentOf(trend([1, null, 3]), BUCKETS, [12.1, 13.9]), null);
+});
+
+test('a value is found at the cursor, and none across a gap', () => {
+  const silent = trend([1, 2, null, null, 5], { gaps: [[14.5, 18]] });
+  assert.deepEqual(foundAt(silent, BUCKETS, 12.5), { kind: 'value', low: 2, high: 3 });
+  assert.deepEqual(foundAt(silent, BUCKETS, 16), { kind: 'gap' });
+  assert.deepEqual(foundAt(trend([1, null, 3]), BUCKETS, 12.5), { kind: 'value', low: 1, high: 2 }); // of the bucket beside it
+  assert.deepEqual(foundAt(trend([1, null, null], { none: [[12, 16]] }), BUCKETS, 15), { kind: 'none' });
+  assert.deepEqual(foundAt(trend([1]), BUCKETS, 99), { kind: 'unknown' });
+});
+
+test('what is found in words, with its sign and both ends of a bucket', () => {
+  assert.equal(foundWords({ kind: 'value', low: 3.04, high: 3.04 }, specFor('speed', undefined)), '3.0');
+  assert.equal(foundWords({ kind: 'value', low: -4, high: 2 }, specFor('steering', undefined)), '−4 to +2');
+  assert.equal(foundWords({ kind: 'none' }, specFor('distance', undefined)), 'none in range');
+  assert.equal(foundWords({ kind: 'gap' }, specFor('speed', undefined)), 'no data');
+});
+
+test('a signal without a place on Home stands between round ends', () => {
+  const spec = specFor('position', { label: 'Altitude', unit: 'm' });
+  assert.equal(spec.label, 'Altitude');
+  assert.deepEqual(spec.ends({}, 746.4, 751.2), [746, 752]);
+  assert.deepEqual(roundEnds(5, 5), [5, 6]);
+  assert.deepEqual(roundEnds(-12, 340), [-100, 400]);
+});
+
+test('the limit at a moment', () => {
+  assert.equal(limitAt([[0, 11], [60, 9]], 59), 11);
+  assert.equal(limitAt([[0, 11], [60, 9]], 60), 9);
+  assert.equal(limitAt([], 60), null);
+});
+
+test('marks that would cover each other are one, the most urgent; advisories have none', () => {
+  const mark = (/** @type {number} */ at_s, /** @type {any} */ priority) => ({ at_s, priority, title: `${priority} ${at_s}`, alarm: 'x' });
+  const placed = placedMarks([mark(5, 'critical'), mark(20, 'warning'), mark(21, 'critical'), mark(50, 'advisory'), mark(80, 'warning')], [10, 110], 300);
+  assert.deepEqual(placed.map(({ x, count, priority }) => [x, count, priority]), [[30, 2, 'critical'], [210, 1, 'warning']]);
+});
+
+test('ticks have seconds where they are less than a minute apart', () => {
+  const at_s = new Date(2026, 10, 19, 14, 7, 30).getTime() / 1000;
+  assert.equal(clockWords(at_s, 30), '14:07:30');
+  assert.equal(clockWords(at_s, 60), '14:07');
+});
+
+test('values have round ticks, and in a low pane those of the ends', () => {
+  assert.deepEqual(valueTicks(-50, 50, 25, false), [-50, -25, 0, 25, 50]);
+  assert.deepEqual(valueTicks(1, 15, 5, false), [5, 10, 15]);
+  assert.deepEqual(valueTicks(-50, 47, 25, true), [-50, 47]);
+});
+
+test('the strip is cut at gaps', () => {
+  assert.equal(brushPath(trend([1, 2, null, 4], { gaps: [[14, 16]] }), { from_s: 0, step_s: 5 }, 20, 200, 0, 10).match(/M/g)?.length, 2);
+});
+
+test('a table has one line a bucket in view, and empty fields where there is no number', () => {
+  const answer = /** @type {any} */ ({ start_ms: Date.UTC(2026, 10, 19, 14), from_s: 10, step_s: 2, signals: { speed: trend([1, null, 3, 4]) } });
+  assert.equal(csvOf(answer, [specFor('speed', undefined)], [12.5, 15]), [
+    'time_utc,seconds,Speed lowest [m/s],Speed highest [m/s]', '2026-11-19T14:00:12.000Z,12.00,,', '2026-11-19T14:00:14.000Z,14.00,3,4', '',
+  ].join('\r\n'));
+  assert.match(csvOf(answer, [specFor('steering', undefined)], [0, 99]), /"Steering, negative is left lowest \[%\]"/);
+});
+
+test('a signal that is opened comes first, and the last gives way', () => {
+  assert.deepEqual(withFirst(['speed', 'brake', 'steering', 'distance'], 'heading'), ['heading', 'speed', 'brake', 'steering']);
+  assert.deepEqual(withFirst(['speed', 'brake'], 'brake'), ['brake', 'speed']);
+});
+
+test('a live chart goes on with the drive, and is held once it was moved away', () => {
+  const scope = new DriveView();
+  scope.keepUp(1000, undefined);
+  assert.deepEqual(scope.view, [640, 1000]);
+  scope.set([600, 960], 1000, false);
+  assert.equal(scope.follows, false);
+  scope.keepUp(1005, undefined);
+  assert.deepEqual(scope.view, [600, 960]);
+  scope.set([644, 1004], 1005, false); // the right edge is reached again, but for a pixel
+  assert.equal(scope.follows, true);
+  scope.follow(Infinity);
+  scope.keepUp(1010, undefined);
+  assert.deepEqual(scope.view, [0, 1010]);
+  scope.follow(60);
+  scope.keepUp(30, undefined);
+  assert.deepEqual(scope.view, [-30, 30]);
+});
+
+test('the chart of a replay stays where the moment is, and turns to it when it leaves', () => {
+  const scope = new DriveView();
+  scope.keepUp(3600, { at_s: 600 });
+  assert.deepEqual(scope.view, [420, 780]);
+  scope.keepUp(3600, { at_s: 779 });
+  assert.deepEqual(scope.view, [420, 780]);
+  scope.keepUp(3600, { at_s: 790 });
+  assert.deepEqual(scope.view, [610, 970]);
+  scope.keepUp(3600, { at_s: 3590 });
+  assert.deepEqual(scope.view, [3240, 3600]); // the right edge is the end of the recording
+  scope.set([0, 100], 3600, true);
+  scope.keepUp(3600, { at_s: 3590 });
+  assert.deepEqual(scope.view, [0, 100]);
+});
+
+test('what is not live, or not all of it, is said', () => {
+  const answer = /** @type {any} */ ({ start_ms: new Date(2026, 10, 19, 14).getTime(), known_s: 90, length_s: 90, is_sketch: false, signals: {}, offered: {} });
+  const words = (/** @type {any} */ feed, /** @type {boolean} */ follows, /** @type {boolean} */ isReplay) => stateWords({ answer, isLate: false, ...feed }, [0, 60], follows, isReplay);
+  assert.equal(words({}, true, false), '');
+  assert.equal(words({}, false, false), 'Held at 14:01:00: not live');
+  assert.equal(words({ isLate: true }, true, false), 'No answer since 14:01:30');
+  assert.equal(words({ isLate: true }, false, true), '');
+  assert.equal(words({ answer: { ...answer, length_s: 900 } }, true, true), 'Read up to 14:01:30');
+  assert.match(words({ answer: { ...answer, is_sketch: true } }, true, true), /^Sketch/);
+  assert.equal(words({ answer: null }, true, false), 'Loading…');
+});
+
+test('an empty chart says what would fill it', () => {
+  const of = (/** @type {boolean[]} */ ...has) => /** @type {any} */ ({
+    signals: Object.fromEntries(has.map((_, i) => [`s${i}`, {}])), offered: Object.fromEntries(has.map((one, i) => [`s${i}`, { label: `S${i}`, unit: '', has_data: one }])),
+  });
+  assert.equal(emptyWords(of(false, false), false), 'No S0, S1 yet. The first message draws it; Settings has its topic.');
+  assert.equal(emptyWords(of(false), true), 'The recording holds no S0. Choose another signal.');
+  assert.equal(emptyWords(of(false, true), false), '');
+  assert.equal(emptyWords(of(), false), '');
+});

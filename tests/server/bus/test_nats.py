@@ -1,0 +1,171 @@
+"""What only a broker can do wrong: bytes that come late, an end on either side, and whoever else is on it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+
+import pytest
+
+from server.bus import nats_wire as wire
+from server.bus.bus import FRAME_LIVES_S, NotServed
+from tests.page.radio import Radio
+from tests.server.bus.broker import Broker, connected, running_broker
+from tests.server.bus.buses import Buses, event, local_buses, nats_buses, node, numbers, offering, until
+
+LATE_S = 1.2
+
+
+@contextlib.asynccontextmanager
+async def over_radio() -> AsyncIterator[tuple[Broker, Radio, Buses]]:
+    """The node hears the broker through a radio that can be cut."""
+    async with running_broker() as broker:
+        radio = Radio(broker.port)
+        async with radio.on_air() as air, nats_buses(broker.address, air.replace("http", "nats")) as both:
+            yield broker, radio, both
+
+
+async def test_a_frame_that_hung_in_the_air_is_as_old_as_it_is() -> None:
+    async with over_radio() as (_, radio, both):
+        both.page.watch("ocelot", lambda _: None)
+        await until(lambda: both.session.watched("ocelot"))
+        put_s: dict[str, float] = {}
+        younger: list[tuple[str, float]] = []
+
+        def put(text: str) -> None:
+            put_s[text] = both.clock()
+            both.session.put("ocelot", "state", text)
+
+        def note(_: str) -> None:
+            frame = both.page.newest("ocelot", "state")
+            if frame is not None:
+                younger.append((str(frame.payload), frame.put_s - put_s[str(frame.payload)]))
+
+        both.page.watch("ocelot", note)
+        for number in range(8):
+            put(f"before {number}")
+            await asyncio.sleep(0.03)
+        await until(lambda: younger and younger[-1][0].startswith("before"))
+        radio.cut()
+        for number in range(round(LATE_S / 0.1)):
+            put(f"cut {number}")
+            await asyncio.sleep(0.1)
+        hung = len(younger)
+        radio.mend()
+        put("after")
+        await until(lambda: younger[-1][0] == "after")
+        assert all(by_s < 0.02 for _, by_s in younger), younger
+        came_late = {text for text, _ in younger[hung:]}
+        assert len(came_late) <= 2, f"at most the one that was under way, then the newest: {came_late}"
+
+
+async def test_frames_that_hang_for_longer_than_they_live_are_never_shown() -> None:
+    async with over_radio() as (_, radio, both):
+        both.page.watch("ocelot", lambda _: None)
+        await until(lambda: both.session.watched("ocelot"))
+        radio.cut()
+        both.session.put("ocelot", "state", "old")
+        await asyncio.sleep(0.1)
+        both.clock.ahead_s += FRAME_LIVES_S
+        shown: list[object] = []
+        both.page.watch("ocelot", lambda kind: shown.append(both.page.newest("ocelot", kind)))
+        radio.mend()
+        await until(lambda: shown)
+        assert shown[0] is None
+
+
+async def test_a_command_that_comes_late_is_not_carried_out() -> None:
+    async with over_radio() as (_, radio, both):
+        assert await both.page.request("ocelot", {"what": 1}) == {"ok": True, "got": 1}
+        radio.cut()
+        with pytest.raises(NotServed, match="did not answer within"):
+            await both.page.request("ocelot", {"what": 2}, deadline_s=0.4)
+        radio.mend()
+        assert (await both.page.request("ocelot", {"what": 3}, deadline_s=10.0))["got"] == 3
+        assert [one["what"] for one in both.commands] == [1, 3]
+
+
+async def test_a_command_for_an_earlier_run_is_refused() -> None:
+    async with running_broker() as broker, local_buses() as both, node(broker.address, both.clock) as page:
+        async with offering(both.session, broker.address, "run-1", both.clock):
+            await until(lambda: page.vehicles)
+            assert (await page.request("ocelot", {"what": 1}))["got"] == 1
+        async with connected(broker.address) as client, offering(both.session, broker.address, "run-2", both.clock):
+            stale = wire.Ask(do="command", command={"what": 2}, not_after_s=both.clock() + 60, run="run-1")
+            answer = wire.decode(
+                wire.Answer, (await client.request(wire.subject("ocelot", "ask"), wire.encode(stale), timeout=5)).data
+            )
+            assert answer.refused == "ocelot has started again since the command was given"
+            assert (await page.request("ocelot", {"what": 3}))["got"] == 3
+        assert [one["what"] for one in both.commands] == [1, 3]
+
+
+async def test_an_answer_waits_for_events_whose_publication_was_lost() -> None:
+    async with running_broker() as broker, local_buses() as both, node(broker.address, both.clock) as page:
+        both.session.watch_events = lambda *_: lambda: None  # type: ignore[method-assign]
+        async with offering(both.session, broker.address, "run-1", both.clock):
+            await until(lambda: page.vehicles)
+            await page.request("ocelot", {"vehicle": "ocelot", "notes": "done"})
+            assert [one["text"] for one in page.recent_events("ocelot", 0) or []] == ["done"]
+
+
+async def test_without_its_agent_a_vehicle_is_not_served_and_stays_known() -> None:
+    async with running_broker() as broker, local_buses() as both, node(broker.address, both.clock) as page:
+        async with offering(both.session, broker.address, "run-1", both.clock):
+            await until(lambda: page.vehicles)
+        with pytest.raises(NotServed, match="ocelot is not connected to the broker"):
+            await page.request("ocelot", {}, deadline_s=0.3)
+        both.clock.ahead_s += 4.0
+        with pytest.raises(NotServed, match="nothing from ocelot for 4 s"):
+            await page.request("ocelot", {})
+        assert "ocelot" in page.vehicles
+
+
+async def test_a_broker_that_is_killed_loses_and_doubles_no_event() -> None:
+    async with running_broker() as broker, nats_buses(broker.address, broker.address) as both:
+        came: list[int] = []
+
+        def read(kind: str) -> None:
+            if kind == "events":
+                came.extend(numbers(both.page.recent_events("ocelot", came[-1] if came else 0, 1000) or []))
+
+        both.page.watch("ocelot", read)
+        for _ in range(3):
+            both.session.append("ocelot", [event()])
+            await broker.kill()
+            both.session.append("ocelot", [event()] * 70)
+            with pytest.raises(NotServed):
+                await both.page.request("ocelot", {"what": "lost"}, deadline_s=0.3)
+            await broker.start()
+            both.session.append("ocelot", [event()])
+            last = both.session.last_event("ocelot")
+            await until(lambda n=last: both.page.last_event("ocelot") == n)  # type: ignore[misc]
+            assert (await both.page.request("ocelot", {"what": "again"}, deadline_s=10.0))["got"] == "again"
+        assert came == list(range(1, 3 * 72 + 1))
+        both.session.put("ocelot", "state", "drives")
+        await until(lambda: both.page.newest("ocelot", "state"))
+        assert {one["what"] for one in both.commands} == {"again"}
+
+
+@pytest.mark.parametrize("body", [b"", b"\xff\xfe", b"[]", b'{"run": 1}', b"{" * 100_000, b'{"events": [{"n": "x"}]}'])
+async def test_nonsense_harms_neither_side(body: bytes) -> None:
+    async with running_broker() as broker, nats_buses(broker.address, broker.address) as both:
+        async with connected(broker.address) as stranger:
+            for what in ("pull.state", "pull.nothing", "ask", "events", "here"):
+                await stranger.publish(wire.subject("ocelot", what), body, reply="nowhere")
+            await stranger.flush()
+        both.session.append("ocelot", [event()])
+        await until(lambda: both.page.last_event("ocelot") == 1)
+        assert (await both.page.request("ocelot", {"what": 1}))["got"] == 1
+        assert both.page.vehicles == ("margay", "ocelot")
+
+
+async def test_a_flood_of_pulls_is_bounded() -> None:
+    async with running_broker() as broker, nats_buses(broker.address, broker.address) as both:
+        async with connected(broker.address) as stranger:
+            pull = wire.encode(wire.Pull(have=0, run=""))
+            for _ in range(2000):
+                await stranger.publish(wire.subject("ocelot", "pull.state"), pull, reply="nowhere")
+            await stranger.flush()
+            assert (await both.page.request("ocelot", {"what": 1}, deadline_s=10.0))["got"] == 1

@@ -1,0 +1,75 @@
+"""Each command is declared once: who may send it, what handles it, and where it is served over HTTP."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+
+from server.app.app import create_app
+from server.app.config import Config
+from server.bus.journal import Journal
+from server.bus.local import LocalBus
+from server.protocol.commands import BY_KIND
+from server.vehicle.session import Session
+from server.vehicle.vehicle import Vehicle
+
+# What changes the car's monitoring for everybody. Slowing the car is not among it, letting it go is.
+NEEDS_CONTROL = {
+    "connect", "retry", "disconnect", "pause", "resume", "record", "set", "import", "ride", "arm", "disarm", "release",
+}  # fmt: skip
+FIELDS = {  # of the commands whose required fields alone are no command
+    "connect": {"address": "http://no.bridge"},
+    "control": {"do": "withdraw"},
+    "position": {"phone": "phone-1", "handheld": True, "why": "denied"},
+}
+OF_TYPE = {"string": "text", "integer": 1, "number": 1.0, "boolean": True}
+PHONE_A = {"by": "Ann", "who": "a", "page": "page-a"}
+PHONE_B = {"by": "Ben", "who": "b", "page": "page-b"}
+
+
+@pytest.fixture
+async def bus() -> AsyncIterator[LocalBus]:
+    """Serves a session without a car, of which Ann is in control; Ben's page is seen as well."""
+    bus = LocalBus(Journal(None), now=time.monotonic)
+    session = Session(
+        Vehicle(name="car"), bus, now=time.monotonic, wall_ms=lambda: time.time_ns() // 1_000_000, server=dict
+    )
+    await session.start()
+    for sender in (PHONE_A, PHONE_B):
+        await bus.request("car", example("present") | sender)
+    assert (await bus.request("car", {"kind": "control", "do": "take", **PHONE_A}))["ok"]
+    yield bus
+    await session.stop()
+
+
+def example(kind: str) -> dict[str, Any]:
+    """A message of a kind, which a session without a car may obey or refuse."""
+    schema = BY_KIND[kind].model_json_schema()
+    fields = {name: schema["properties"][name] for name in schema.get("required", ()) if name != "kind"}
+    made = {name: of["enum"][0] if "enum" in of else OF_TYPE.get(of.get("type")) for name, of in fields.items()}
+    return {"kind": kind, **made, **FIELDS.get(kind, {})}
+
+
+@pytest.mark.parametrize("kind", BY_KIND)
+async def test_a_command_is_handled_and_needs_what_it_declares(bus: LocalBus, kind: str) -> None:
+    if kind in NEEDS_CONTROL:
+        assert BY_KIND[kind].needs == "control"
+    refused = await bus.request("car", example(kind) | PHONE_B)
+    assert (refused.get("held_by") == "Ann") is (BY_KIND[kind].needs == "control"), refused
+    answer = await bus.request("car", example(kind) | PHONE_A)
+    assert answer["ok"] or answer["reason"]  # what no case handles raises instead
+    assert "held_by" not in answer
+
+
+def test_a_command_is_served_over_http_where_it_says_so() -> None:
+    paths = create_app(Config()).openapi()["paths"]
+    served = {kind: command.path or f"/api/{kind}" for kind, command in BY_KIND.items() if command.http}
+    assert len(set(served.values())) == len(served) >= 11
+    for kind, path in served.items():
+        request = paths[path]["post"]
+        named = {name for name in BY_KIND[kind].model_fields if name not in ("kind", "id", "vehicle")}  # in the query
+        in_path = {one["name"] for one in request.get("parameters", ()) if one["in"] == "path"}
+        assert ("requestBody" in request) is (bool(named - in_path) and kind != "slow_down"), kind
