@@ -10,6 +10,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Iterator, Sequence
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
@@ -37,6 +38,9 @@ def check_each(
     """
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([__name__])
+    resource_tracker.ensure_running()  # which unblocks Ctrl-C for itself
+    with _ctrl_c_later():
+        forkserver.ensure_running()
     workers = min(cores(), len(recordings))
     running: dict[Any, tuple[int, ForkServerProcess]] = {}  # by our end of its pipe
     found: dict[int, Checked] = {}
@@ -50,9 +54,10 @@ def check_each(
                 process = context.Process(
                     target=_work, args=(theirs, recordings[begun], options, 1.0 / workers), daemon=True
                 )
-                process.start()
+                with _ctrl_c_later():
+                    process.start()
+                    running[ours] = (begun, process)
                 theirs.close()
-                running[ours] = (begun, process)
                 begun += 1
             ready: list[Any] = wait(list(running))
             for end in ready:
@@ -79,6 +84,16 @@ def check_each(
             process.terminate()
         for _, process in running.values():
             process.join()
+
+
+@contextlib.contextmanager
+def _ctrl_c_later() -> Iterator[None]:
+    """Ctrl-C waits: a process that is started in here is started whole, and does not see the signal itself."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _size(path: Path) -> int:
