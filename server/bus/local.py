@@ -180,8 +180,8 @@ class LocalBus:
         for watcher in tuple(self._watchers.get(vehicle, {}).values()):
             watcher(kind)
         if kind == "events":
-            for told in tuple(self._event_watchers.get(vehicle, ())):
-                told()
+            for notify in tuple(self._event_watchers.get(vehicle, ())):
+                notify()
 
 
 def _call_soon(loop: asyncio.AbstractEventLoop, callback: Callable[[], None]) -> None:

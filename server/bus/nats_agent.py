@@ -14,11 +14,13 @@ from typing import Any
 
 from nats.aio.client import Client
 from nats.aio.msg import Msg
+from nats.aio.subscription import Subscription
 from nats.errors import Error as NatsError
 
 from server.bus import nats_wire as wire
 from server.bus.bus import ALL, Frame, NotServed
 from server.bus.local import LocalBus
+from server.bus.nats_sync import processed
 
 log = logging.getLogger("catgraph.bus")
 
@@ -76,20 +78,25 @@ class NatsAgent:
         self._looked: dict[tuple[str, str], Looked] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._pulls = self._asked = 0
-        self._told: dict[str, int] = {}  # the number of each vehicle's newest event that was published
+        self._published: dict[str, int] = {}  # the number of each vehicle's newest event that was published
         self._stops: list[Callable[[], None]] = []
+        self._subscriptions: list[Subscription] = []
         self.refused = 0  # what could not be read, or was too much
 
     async def start(self) -> None:
         for vehicle in self._bus.vehicles:
-            self._told[vehicle] = self._bus.last_event(vehicle)
+            self._published[vehicle] = self._bus.last_event(vehicle)
             for what, answer in (("pull.*", self._on_pull), ("ask", self._on_ask)):
-                await self._client.subscribe(wire.subject(vehicle, what), cb=answer)
+                self._subscriptions.append(await self._client.subscribe(wire.subject(vehicle, what), cb=answer))
             self._stops.append(self._bus.watch_events(vehicle, lambda v=vehicle: self._spawn(self._tell(v))))  # type: ignore[misc]
-        await self._client.flush()  # from now on it is asked
+        await processed(self._client)  # from now on it is asked
         self._spawn(self._be_here())
 
     async def stop(self) -> None:
+        with contextlib.suppress(NatsError, TimeoutError):  # without a broker nothing is routed to it
+            for subscription in self._subscriptions:
+                await subscription.unsubscribe()
+            await processed(self._client, within_s=1)  # from now on it is not asked
         for stop in self._stops:
             stop()
         for task in self._tasks:
@@ -142,16 +149,16 @@ class NatsAgent:
 
     async def _tell(self, vehicle: str) -> None:
         """Publishes the events that pages may have since the last time; what is lost on the way is asked for."""
-        while (n := self._told[vehicle]) < self._bus.last_event(vehicle):
+        while (n := self._published[vehicle]) < self._bus.last_event(vehicle):
             events = await self._bus.events_after(vehicle, n, wire.PORTION)
-            if not events or self._told[vehicle] != n:  # another task was faster
+            if not events or self._published[vehicle] != n:  # another task was faster
                 return
-            self._told[vehicle] = events[-1]["n"]
+            self._published[vehicle] = events[-1]["n"]
             await self._publish(vehicle, "events", wire.Events(run=self._run, events=events))
 
     async def _be_here(self) -> None:
         while True:
-            for vehicle in self._told:
+            for vehicle in self._published:
                 await self._publish(vehicle, "here", wire.Here(run=self._run, last=self._bus.last_event(vehicle)))
             now_s = self._now()
             for key in [key for key, looked in self._looked.items() if looked.until_s < now_s]:

@@ -15,6 +15,7 @@ from server.bus.bus import ALL, FRAME_LIVES_S, Frame, NotServed, Watcher
 from server.bus.nats_events import EventCache
 from server.bus.nats_pulls import Pulls
 from server.bus.nats_questions import Questions
+from server.bus.nats_sync import processed
 
 GONE_AFTER_S = 3.0  # an agent that has not been heard for so long is not served
 
@@ -39,7 +40,7 @@ class NatsBus:
     async def start(self) -> None:
         await self._client.subscribe(wire.subject("*", "events"), cb=self._on_events)
         await self._client.subscribe(wire.subject("*", "here"), cb=self._on_here)
-        await self._client.flush()
+        await processed(self._client)
 
     async def stop(self) -> None:
         await self._pulls.stop()
@@ -142,40 +143,41 @@ class NatsBus:
         recent = self.recent_events(vehicle, n, limit)
         if recent is not None:
             return recent
-        found: list[dict[str, Any]] = []
-        while len(found) < limit:
-            portion = min(limit - len(found), wire.PORTION)
-            answer = await self._questions.ask(vehicle, wire.Ask(do="after", n=n, limit=portion))
-            found += answer.events
-            if len(answer.events) < portion:
-                break
-            n = found[-1]["n"]
-        return found
+        return await self._read(
+            vehicle, limit, lambda last, portion: wire.Ask(do="after", n=n if last is None else last, limit=portion)
+        )
 
     async def find_events(self, vehicle: str, **filters: Any) -> list[dict[str, Any]]:
         """Raises NotServed, as `events_after`."""
-        limit = filters.pop("limit", wire.PORTION)
+
+        def ask(last: int | None, portion: int) -> wire.Ask:
+            before = {} if last is None else {"before": last}
+            return wire.Ask(do="find", filters={**filters, **before}, limit=portion)
+
+        return await self._read(vehicle, filters.pop("limit", wire.PORTION), ask)
+
+    async def _read(self, vehicle: str, limit: int, ask: Callable[[int | None, int], wire.Ask]) -> list[dict[str, Any]]:
+        """In portions: `ask` is given the number of the last event that was read and how many to ask for."""
         found: list[dict[str, Any]] = []
         while len(found) < limit:
             portion = min(limit - len(found), wire.PORTION)
-            answer = await self._questions.ask(vehicle, wire.Ask(do="find", filters=filters, limit=portion))
+            answer = await self._questions.ask(vehicle, ask(found[-1]["n"] if found else None, portion))
             found += answer.events
             if len(answer.events) < portion:
                 break
-            filters["before"] = found[-1]["n"]
         return found
 
     async def _on_events(self, message: Msg) -> None:
         try:
-            told = wire.decode(wire.Events, message.data)
+            news = wire.decode(wire.Events, message.data)
         except wire.Malformed as why:
             return self._questions.refuse(message.subject, why)
         vehicle = wire.vehicle_of(message.subject)
-        if not told.events or type(first := told.events[0].get("n")) is not int:
+        if not news.events or type(first := news.events[0].get("n")) is not int:
             return None
         if vehicle not in self._events:
-            self._meet(vehicle, told.run, first - 1)
-        return self._take(vehicle, told.events)
+            self._meet(vehicle, news.run, first - 1)
+        return self._take(vehicle, news.events)
 
     def _take(self, vehicle: str, events: list[dict[str, Any]]) -> None:
         cache = self._events[vehicle]
@@ -204,7 +206,7 @@ class NatsBus:
     # -- requests ------------------------------------------------------------------------------------------------------
 
     async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> Mapping[str, Any]:
-        """The agent carries it out within `deadline_s` or not at all: the deadline is told by its own clock."""
+        """The agent carries it out within `deadline_s` or not at all: the deadline is a time of its own clock."""
         ends_s = self._now() + deadline_s
         heard_s = self._heard_s.get(vehicle)
         if heard_s is None:
@@ -225,7 +227,7 @@ class NatsBus:
     async def _caught_up(self, vehicle: str, last: int, ends_s: float) -> None:
         """What the command caused may be shown before it is answered; the answer does not wait longer than it may."""
         cache = self._events[vehicle]
-        cache.told = max(cache.told, last)
+        cache.newest = max(cache.newest, last)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(max(0.0, ends_s - self._now())):
                 while cache.last < last:

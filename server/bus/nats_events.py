@@ -15,20 +15,20 @@ class EventCache:
     def __init__(self) -> None:
         self.run = ""
         self.last = 0  # every event up to this number was there
-        self.told = 0  # the newest that the agent has, as far as is known
+        self.newest = 0  # the newest that the agent has, as far as is known
         self._recent: deque[dict[str, Any]] = deque(maxlen=RECENT)
 
     @property
     def is_behind(self) -> bool:
-        return self.told > self.last
+        return self.newest > self.last
 
     def begin(self, run: str, last: int) -> None:
         """The agent is there, in this run of it; the first time older events are left where they are."""
         if not self.run or last < self.last:  # its log was begun anew
-            self.last = self.told = last
+            self.last = self.newest = last
             self._recent.clear()
         self.run = run
-        self.told = max(self.told, last)
+        self.newest = max(self.newest, last)
 
     def take(self, events: Sequence[dict[str, Any]]) -> bool:
         """Events in order; those that were there are left out. True where there are new ones; see `is_behind`."""
@@ -37,7 +37,7 @@ class EventCache:
             n = event.get("n")
             if type(n) is not int:
                 return self.last != before
-            self.told = max(self.told, n)
+            self.newest = max(self.newest, n)
             if n == self.last + 1:
                 self._recent.append(event)
                 self.last = n

@@ -20,7 +20,7 @@ ANSWER_S = 2.0  # for a question; a command has its own deadline
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AgentClock:
-    """The agent's clock as it was told: `now_s` of its run, read by us at `heard_s` of our own clock."""
+    """The agent's clock as it answered: `now_s` of its run, read by us at `heard_s` of our own clock."""
 
     run: str
     now_s: float

@@ -99,10 +99,9 @@ class PageCommands:
         if not self._principal.is_operator:
             return
         self._is_counted = True
-        try:
-            answer: Mapping[str, Any] = await self._bus.request(self._vehicle, {**message, **self._sender})
-        except NotServed:
-            return
+        answer: Mapping[str, Any] = {"ok": True}
+        with contextlib.suppress(NotServed):  # the other cars may be served
+            answer = await self._bus.request(self._vehicle, {**message, **self._sender})
         if answer.get("ok") is not True:
             self._complain(str(answer.get("reason")))
             return

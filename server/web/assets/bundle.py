@@ -30,6 +30,7 @@ STYLES = (
     "slowing",
     "wide",
     "watch",
+    "wall",
 )  # in this order
 ENTRY = "main.js"
 EARLY = "boot/early.js"  # inline in the page

@@ -52,7 +52,7 @@ export function drawRow(row, now_ms, onPress) {
   const third = row.state === 'unreadable' ? [html('span', {}, ...words(`${sizeWords(row.size_bytes)} · ${row.problem ?? ''}`))]
     : row.state === 'waiting' ? [html('span', {}, ...words(sizeWords(row.size_bytes))), html('span', {}, 'being read')]
       : [html('span', {}, ...words(lengthWords(row.length_s))), html('span', {}, ...words(sizeWords(row.size_bytes))), html('span', { class: 'counts' }, ...counts(row))];
-  const tags = row.tags.length ? [html('div', { class: 'm tags' }, ...row.tags.map((tag) => html('bdi', { class: 'chip' }, tag)))] : [];
+  const tags = row.tags.length ? [html('div', { class: 'm tags' }, ...row.tags.map((tag) => html('bdi', { class: 'file-tag' }, tag)))] : [];
   const item = html('li', { class: 'file', 'data-id': row.id, 'data-state': row.state }, thumbnail(row),
     html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm' }, originWords(row, now_ms)), html('div', { class: 'm facts-line' }, ...third), ...tags),
     more);

@@ -101,7 +101,7 @@ export class FileSheet {
       html('p', {}, ...words(factWords(row))),
       ...warningWords(row).map((sentence) => html('p', { class: 'bad' }, ...words(sentence))),
       ...(row.note ? [html('p', { class: 'note-text', dir: 'auto' }, row.note)] : []),
-      ...(row.tags.length ? [html('p', {}, ...row.tags.map((tag) => html('bdi', { class: 'chip' }, tag)))] : []),
+      ...(row.tags.length ? [html('p', {}, ...row.tags.map((tag) => html('bdi', { class: 'file-tag' }, tag)))] : []),
     ];
   }
 

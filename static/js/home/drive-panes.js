@@ -5,15 +5,10 @@ import { html, setAttribute, setText, setWords } from '../core/dom.js';
 import { fixed } from '../core/format.js';
 import { shownIn } from '../core/units.js';
 import { clockWords, extentOf, lineOf, valueTicks } from './drive-layout.js';
-import { colours } from './spark.js';
+import { AXIS_PX, axisOf, BARE, INCRS_S, LOW_PX, PaneStack, plotSize } from './pane-stack.js';
 
-/** Height of the clock axis below the last pane, width of the value axes [px]. */
-export const AXIS_PX = 26;
+/** Width of the value axes [px]. */
 const VALUES_PX = 38;
-/** A lower pane has room for the ends of its scale only [px]. */
-const LOW_PX = 84;
-/** Times between two ticks of the clock [s]. */
-const INCRS_S = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10_800, 21_600, 43_200, 86_400];
 
 /**
  * @typedef {import('./drive-layout.js').Answer} Answer
@@ -29,35 +24,17 @@ const INCRS_S = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 
  * @property {Record<string, number>} limits of now, for the scales
  */
 
-export class Panes {
-  /** @type {Pane[]} */
-  panes = [];
-
+/** @extends {PaneStack<Pane>} */
+export class Panes extends PaneStack {
   /** @param {HTMLElement} root @param {() => Scene} sceneOf */
   constructor(root, sceneOf) {
-    this.root = root;
+    super(root);
     this.sceneOf = sceneOf;
-    this.palette = colours(root);
-  }
-
-  /** The drawing area of the first pane: all have the same left and right edge. */
-  get box() {
-    return this.panes[0]?.box ?? new DOMRect(0, 0, 1, 1);
   }
 
   /** Builds a pane for each signal. @param {Spec[]} specs */
   build(specs) {
-    this.clear();
-    this.palette = colours(this.root);
-    this.panes = specs.map((spec, i) => new Pane(spec, this, i === specs.length - 1));
-    this.root.replaceChildren(...this.panes.map(({ element }) => element));
-    for (const pane of this.panes) pane.begin();
-  }
-
-  clear() {
-    for (const { plot } of this.panes) plot.destroy();
-    this.panes = [];
-    this.root.replaceChildren();
+    this.stack(specs, (spec, isLast) => new Pane(spec, this, isLast));
   }
 
   /** New numbers. */
@@ -68,10 +45,6 @@ export class Panes {
   /** The same numbers in another view. */
   move() {
     for (const { plot } of this.panes) plot.redraw(true, true);
-  }
-
-  resize() {
-    for (const pane of this.panes) pane.resize();
   }
 
   /** Everything that is seen, as one picture. @returns {HTMLCanvasElement} */
@@ -125,11 +98,6 @@ class Pane {
     return /** @type {uPlot} */ (this.#plot); // since it has begun
   }
 
-  /** Its drawing area; null: it has none yet. */
-  get box() {
-    return this.#plot?.over.getBoundingClientRect() ?? null;
-  }
-
   fill() {
     const { answer } = this.panes.sceneOf();
     const trend = answer?.signals[this.spec.name];
@@ -140,7 +108,7 @@ class Pane {
   }
 
   resize() {
-    const size = this.#size();
+    const size = plotSize(this.host);
     if (size.width !== this.plot.width || size.height !== this.plot.height) this.plot.setSize(size);
   }
 
@@ -153,28 +121,21 @@ class Pane {
     setText(this.unit, isNumber ? shownIn(0, this.spec.unit).unit : '');
   }
 
-  #size() {
-    return { width: Math.max(60, this.host.clientWidth), height: Math.max(24, this.host.clientHeight) };
-  }
-
   #build() {
     const { palette } = this.panes;
-    const face = `13px ${getComputedStyle(document.documentElement).getPropertyValue('--digits').trim()}`;
-    const axis = { stroke: palette.ink2, font: face, grid: { stroke: palette.line, width: 1, dash: [2, 6] }, ticks: { show: false }, gap: 6 };
+    const axis = axisOf(palette);
     const begin_s = () => (this.panes.sceneOf().answer?.start_ms ?? 0) / 1000;
     return new uPlot({
-      ...this.#size(),
+      ...plotSize(this.host),
       padding: [9, 12, this.isLast ? 0 : 9, 0],
-      legend: { show: false },
-      cursor: { show: false },
-      select: { show: false, left: 0, top: 0, width: 0, height: 0 },
+      ...BARE,
       scales: {
         x: { time: true, range: () => /** @type {[number, number]} */ (this.panes.sceneOf().view.map((at_s) => begin_s() + at_s)) },
         y: { range: () => this.#ends() },
       },
       axes: [
         { ...axis, size: this.isLast ? AXIS_PX : 0, space: 64, incrs: INCRS_S, values: (_, splits, _axis, _space, apart_s) => splits.map((at_s) => (this.isLast ? clockWords(at_s, apart_s) : '')) },
-        { ...axis, size: VALUES_PX, space: 22, grid: { show: false }, splits: (_, _axis, low, high, apart) => valueTicks(low, high, apart, this.#size().height < LOW_PX), values: (_, splits) => splits.map((value) => fixed(value, splits.some((one) => Math.abs(one % 1) > 1e-6 && Math.abs(one) < 100) ? 1 : 0)) },
+        { ...axis, size: VALUES_PX, space: 22, grid: { show: false }, splits: (_, _axis, low, high, apart) => valueTicks(low, high, apart, plotSize(this.host).height < LOW_PX), values: (_, splits) => splits.map((value) => fixed(value, splits.some((one) => Math.abs(one % 1) > 1e-6 && Math.abs(one) < 100) ? 1 : 0)) },
       ],
       series: [{}, ...[0, 1].map(() => ({ stroke: palette.ink, width: 2, spanGaps: false, points: { show: false } }))],
       bands: [{ series: [2, 1], fill: palette.ink }],

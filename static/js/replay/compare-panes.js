@@ -4,16 +4,12 @@ import uPlot from '../../vendor/uPlot.esm.js';
 import { html, setText, setWords } from '../core/dom.js';
 import { duration, fixed, signed } from '../core/format.js';
 import { shownIn } from '../core/units.js';
-import { AXIS_PX } from '../home/drive-panes.js';
 import { extentOf, foundAt, foundWords, valueTicks } from '../home/drive-layout.js';
-import { colours } from '../home/spark.js';
+import { AXIS_PX, axisOf, BARE, INCRS_S, LOW_PX, PaneStack, plotSize } from '../home/pane-stack.js';
 import { drawMarks, hatch } from './compare-draw.js';
 import { courseOf, holesOf } from './compare-layout.js';
 
 const VALUES_PX = 44;
-/** A lower pane has room for the ends of its scale only [px]. */
-const LOW_PX = 84;
-const INCRS_S = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10_800, 21_600, 43_200, 86_400];
 const NAMES = /** @type {const} */ (['a', 'b']);
 
 /**
@@ -29,15 +25,12 @@ const NAMES = /** @type {const} */ (['a', 'b']);
  * @property {{at_s: number, side: Name, priority: string}[]} marks alarms in view
  */
 
-export class ComparePanes {
-  /** @type {Pane[]} */
-  panes = [];
-
+/** @extends {PaneStack<Pane>} */
+export class ComparePanes extends PaneStack {
   /** @param {HTMLElement} root @param {() => Scene | null} sceneOf */
   constructor(root, sceneOf) {
-    this.root = root;
+    super(root);
     this.sceneOf = sceneOf;
-    this.palette = colours(root);
   }
 
   /** The colour of a warning, which no line has. */
@@ -45,32 +38,13 @@ export class ComparePanes {
     return getComputedStyle(document.documentElement).getPropertyValue('--warn').trim();
   }
 
-  /** The drawing area of the first pane. */
-  get box() {
-    return this.panes[0]?.plot.over.getBoundingClientRect() ?? new DOMRect(0, 0, 1, 1);
-  }
-
   /** @param {Spec[]} specs */
   build(specs) {
-    this.clear();
-    this.palette = colours(this.root);
-    this.panes = specs.map((spec, i) => new Pane(spec, this, i === specs.length - 1));
-    this.root.replaceChildren(...this.panes.map(({ element }) => element));
-    for (const pane of this.panes) pane.begin();
-  }
-
-  clear() {
-    for (const { plot } of this.panes) plot.destroy();
-    this.panes = [];
-    this.root.replaceChildren();
+    this.stack(specs, (spec, isLast) => new Pane(spec, this, isLast));
   }
 
   draw() {
     for (const pane of this.panes) pane.draw();
-  }
-
-  resize() {
-    for (const pane of this.panes) pane.resize();
   }
 }
 
@@ -101,7 +75,7 @@ class Pane {
   }
 
   resize() {
-    this.plot.setSize(this.#size());
+    this.plot.setSize(plotSize(this.host));
   }
 
   draw() {
@@ -127,24 +101,17 @@ class Pane {
     setText(this.apart, a === null || b === null ? '' : `B − A ${signed(shownIn(b - a, this.spec.unit).value, this.spec.digits)}`);
   }
 
-  #size() {
-    return { width: Math.max(60, this.host.clientWidth), height: Math.max(24, this.host.clientHeight) };
-  }
-
   #build() {
     const { palette } = this.panes;
-    const face = `13px ${getComputedStyle(document.documentElement).getPropertyValue('--digits').trim()}`;
-    const axis = { stroke: palette.ink2, font: face, grid: { stroke: palette.line, width: 1, dash: [2, 6] }, ticks: { show: false }, gap: 6 };
+    const axis = axisOf(palette);
     return new uPlot({
-      ...this.#size(),
+      ...plotSize(this.host),
       padding: [12, 12, this.isLast ? 0 : 8, 0],
-      legend: { show: false },
-      cursor: { show: false },
-      select: { show: false, left: 0, top: 0, width: 0, height: 0 },
+      ...BARE,
       scales: { x: { time: false, range: () => this.panes.sceneOf()?.view ?? [0, 1] }, y: { range: () => this.#ends() } },
       axes: [
         { ...axis, size: this.isLast ? AXIS_PX : 0, space: 64, incrs: INCRS_S, values: (_, splits) => splits.map((at_s) => (this.isLast ? `${at_s < 0 ? '−' : ''}${duration(Math.abs(at_s))}` : '')) },
-        { ...axis, size: VALUES_PX, space: 22, grid: { show: false }, splits: (_, _axis, low, high, apart) => valueTicks(low, high, apart, this.#size().height < LOW_PX), values: (_, splits) => splits.map((value) => fixed(value, splits.some((one) => Math.abs(one % 1) > 1e-6 && Math.abs(one) < 100) ? 1 : 0)) },
+        { ...axis, size: VALUES_PX, space: 22, grid: { show: false }, splits: (_, _axis, low, high, apart) => valueTicks(low, high, apart, plotSize(this.host).height < LOW_PX), values: (_, splits) => splits.map((value) => fixed(value, splits.some((one) => Math.abs(one % 1) > 1e-6 && Math.abs(one) < 100) ? 1 : 0)) },
       ],
       series: [{}, { show: true, stroke: palette.ink, points: { show: false } }],
       hooks: { drawAxes: [(plot) => this.#under(plot)], draw: [(plot) => this.#over(plot)] },

@@ -29,7 +29,7 @@ export function drawChain(root, view) {
 const NODE_X = [27, 128, 230, 331]; // left edges of the nodes, 22 wide
 
 /**
- * The large chain with names and ages, viewBox 380×84.
+ * The large chain with names and ages, viewBox −10…390 × 84.
  * @param {Element} root
  * @param {ChainView} view
  */

@@ -10,7 +10,7 @@ import { age, counted, fixed, NOTHING } from '../core/format.js';
  * @typedef {{key: string, cells: string[], ink?: string}} Line
  */
 
-/** Height of a line [px], as in watch.css. */
+/** Height of a line [px], as in wall.css. */
 const LINE_PX = 26;
 
 /**

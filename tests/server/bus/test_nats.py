@@ -10,6 +10,7 @@ import pytest
 
 from server.bus import nats_wire as wire
 from server.bus.bus import FRAME_LIVES_S, NotServed
+from server.bus.nats_sync import processed
 from tests.page.radio import Radio
 from tests.server.bus.broker import Broker, connected, running_broker
 from tests.server.bus.buses import Buses, event, local_buses, nats_buses, node, numbers, offering, until
@@ -154,7 +155,7 @@ async def test_nonsense_harms_neither_side(body: bytes) -> None:
         async with connected(broker.address) as stranger:
             for what in ("pull.state", "pull.nothing", "ask", "events", "here"):
                 await stranger.publish(wire.subject("ocelot", what), body, reply="nowhere")
-            await stranger.flush()
+            await processed(stranger)
         both.session.append("ocelot", [event()])
         await until(lambda: both.page.last_event("ocelot") == 1)
         assert (await both.page.request("ocelot", {"what": 1}))["got"] == 1
@@ -167,5 +168,5 @@ async def test_a_flood_of_pulls_is_bounded() -> None:
             pull = wire.encode(wire.Pull(have=0, run=""))
             for _ in range(2000):
                 await stranger.publish(wire.subject("ocelot", "pull.state"), pull, reply="nowhere")
-            await stranger.flush()
+            await processed(stranger)
             assert (await both.page.request("ocelot", {"what": 1}, deadline_s=10.0))["got"] == 1
