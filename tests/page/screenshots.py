@@ -119,7 +119,11 @@ async def chart(server: Canned, page: Page) -> None:
 
 @scene("home-fault")
 async def home_fault(server: Canned, page: Page) -> None:
-    state = live()
+    server.state = too_fast(live())
+
+
+def too_fast(state: dict[str, Any]) -> dict[str, Any]:
+    """A state with its critical alarm that asks."""
     state["signals"]["speed"]["value"]["speed_mps"] = 12.6
     state["signals"]["acceleration"]["value"]["acceleration_mps2"] = 1.1
     state["signals"]["accelerator"]["value"]["percent"] = 38
@@ -137,7 +141,7 @@ async def home_fault(server: Canned, page: Page) -> None:
             advice="The safety driver must slow the car.", raised_ms=at("14:07:31"),
         )
     ]  # fmt: skip
-    server.state = state
+    return state
 
 
 @scene("home-warning")
@@ -255,11 +259,16 @@ def _cut(state: dict[str, Any], cut: str, **link: Any) -> dict[str, Any]:
 
 @scene("home-stale")
 async def home_stale(server: Canned, page: Page) -> None:
+    server.state = silent_car(live())
+
+
+def silent_car(state: dict[str, Any]) -> dict[str, Any]:
+    """A state whose car fell silent."""
     problem = {
         "code": "car_silent", "title": "The car fell silent.", "mark": "silent",
         "hint": "Server and bridge answer; no message comes from the car.",
     }  # fmt: skip
-    server.state = _cut(live(), "bridge-car", car_age_s=3.35, problem=problem)
+    return _cut(state, "bridge-car", car_age_s=3.35, problem=problem)
 
 
 @scene("server-silent")
@@ -590,7 +599,14 @@ async def files_menu(server: Canned, page: Page) -> None:
 @scene("replay")
 async def replay(server: Canned, page: Page) -> None:
     """The speed above its limit, four minutes into a recording that is paused there."""
-    state = live()
+    server.state, server.timeline = replayed(live()), replayed_timeline()
+    await page.goto(f"{server.address}/?replay=car_0&t=246#home")
+    await page.wait_for_selector("#monitor:not([hidden])")
+    await page.tap(".gauge")  # any touch lets the page sound
+
+
+def replayed(state: dict[str, Any]) -> dict[str, Any]:
+    """A state of a recording."""
     start_ms, at_s, length_s = at("14:05:05"), 246.0, 512.0
     for name, value in (
         ("speed", {"speed_mps": 12.1}),
@@ -615,9 +631,18 @@ async def replay(server: Canned, page: Page) -> None:
         "reached_rate": None, "is_seeking": False, "is_settled": True, "silent_s": 0.0, "seek": 1,
         "alarms_from": "recording", "settings_from": "recording", "hangs_s": None,
     }  # fmt: skip
+    state["alarms"] = [
+        alarm("Speed", "Speed above limit", priority="critical", state="ACKED", text="12.1 m/s, limit 11.0 m/s")
+    ]
+    return state
+
+
+def replayed_timeline() -> dict[str, Any]:
+    """The whole of that recording: speed, alarms."""
+    length_s = 512.0
     marks = ((237.0, "critical", "Speed above limit"), (368.0, "warning", "GPS drift"), (446.0, "critical", "Obstacle"))
     speeds = [max(0.0, 6.0 + 5.5 * math.sin(n / 19.0) + 1.2 * math.sin(n / 5.0)) for n in range(128)]
-    server.timeline = {
+    return {
         "kind": "timeline", "length_s": length_s, "done_s": length_s, "is_done": True, "bucket_s": 4.0,
         "speed_mps": speeds, "gaps": [], "marks_left_out": 0, "notes": [],
         "marks": [
@@ -625,13 +650,6 @@ async def replay(server: Canned, page: Page) -> None:
             for at_s, priority, title in marks
         ],
     }  # fmt: skip
-    state["alarms"] = [
-        alarm("Speed", "Speed above limit", priority="critical", state="ACKED", text="12.1 m/s, limit 11.0 m/s")
-    ]
-    server.state = state
-    await page.goto(f"{server.address}/?replay=car_0&t={at_s:.0f}#home")
-    await page.wait_for_selector("#monitor:not([hidden])")
-    await page.tap(".gauge")  # any touch lets the page sound
 
 
 @scene("mail")

@@ -7,7 +7,7 @@ import pytest
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.canned import Canned
 from tests.page.conftest import Phone
-from tests.page.screenshots import show
+from tests.page.screenshots import replayed, replayed_timeline, show, silent_car, too_fast
 
 STATES = {
     "home": ("home-lower", "chart", "home-fault", "home-warning", "paused"),
@@ -29,3 +29,32 @@ async def test_nothing_keeps_anybody_out(phone: Phone, canned: Canned, states: s
         await show(canned, phone.page, name)
         await no_barrier(phone.page, name)
         await fits_all(phone.page, name)
+
+
+SCREENS = (
+    "home", "chart", "map-tiles", "scan", "files", "files-menu", "mail", "outbox", "settings", "topic", "preferences",
+    "alarms", "check", "check-unknown", "menu", "signals", "alarm-log",
+)  # fmt: skip
+AS = {"live": lambda state: state, "stale": silent_car, "critical": too_fast, "replay": replayed}
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("state", AS)
+@pytest.mark.parametrize("size", [(412, 915), (1440, 900)], ids=str)
+async def test_no_screen_in_any_state_keeps_anybody_out(
+    phone: Phone, canned: Canned, state: str, size: tuple[int, int]
+) -> None:
+    """Every screen, theme and state: what is open stays open while the car falls silent, speeds, or is replayed."""
+    broken = []
+    for screen in SCREENS:
+        await phone.page.set_viewport_size({"width": 412, "height": 915})  # its keys are where the scene presses them
+        await show(canned, phone.page, screen)
+        canned.timeline = replayed_timeline()
+        canned.state = AS[state](canned.state)
+        await phone.page.set_viewport_size({"width": size[0], "height": size[1]})
+        await phone.page.wait_for_timeout(700)
+        try:
+            await no_barrier(phone.page, f"{screen}, {state}")
+        except AssertionError as found:
+            broken.append(str(found).splitlines()[0])
+    assert broken == []

@@ -18,6 +18,7 @@ from server.analysis.check_recording import CANNOT, CRITICAL, NO_CRITICAL, Check
 from server.analysis.rehearse import Extract
 from server.recording.read.by_recording import by_recording
 from server.simulator.scenarios import planned
+from tests.interrupted import INTERRUPTED
 from tests.server.analysis.conftest import Checking, recorded
 from tests.server.recording.made import record
 from tests.tree import PROJECT
@@ -97,7 +98,7 @@ def test_ctrl_c_ends_all_of_it(healthy: Path) -> None:
     assert int(blocked[0], 16) & 1 << signal.SIGINT - 1, "the signal would end one in the middle of its imports"
     os.killpg(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=30)
-    assert process.returncode == 130
+    assert process.returncode in INTERRUPTED
     assert errors == b""
     _, alive = psutil.wait_procs(children, timeout=10)
     assert alive == []
