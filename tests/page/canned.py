@@ -320,7 +320,7 @@ class Canned:
         @self.app.get("/")
         def page(request: Request) -> Response:
             built = find(files.static)
-            context = {"version": "0.1.0", "vehicle": "car", "access": "open"}
+            context = {"version": "0.1.0", "vehicle": self.vehicle, "access": "open"}
             return files.response(files.render("page.html", request, built, **context), request, built)
 
         @self.app.get("/api/vehicles")
@@ -424,13 +424,16 @@ class Canned:
         self.checks: dict[str, Json] = {}  # the answer for each check that is requested by its id
         self.timeline: Json | None = None  # of the recording that a page asks to replay
         self.mails: list[Json] = []
+        self.vehicle = "car"
+        self.cars: list[Json] = []  # summaries of all cars, by their name
         self.tile: Callable[[int, int, int], bytes] = lambda z, x, y: b""
         self.drive = CannedDrive()
         begin = int(time.monotonic() * 5)
         self._trends = lambda steps: trends(time.monotonic() * 5, begin, steps)
 
     async def _serve(self, socket: WebSocket) -> None:
-        hello = {"kind": "hello", "version": "0.1.0", "boot": "9f00", "vehicle": "car", "vehicles": ["car"]}
+        names = [one["name"] for one in self.cars] or [self.vehicle]
+        hello = {"kind": "hello", "version": "0.1.0", "boot": "9f00", "vehicle": self.vehicle, "vehicles": names}
         who = {"id": "local", "name": "Pixel 7", "role": self.role}
         more = {"build": "", "time_ms": _now_ms(), "last_event": 117, "veil_after_s": 2.0, "who": who}
         await socket.send_json(hello | more)
@@ -463,7 +466,9 @@ class Canned:
                 if state["control"]["holder"] == "You":
                     state["control"] |= {"page": self._page, "fence": 1}
                 await socket.send_json({"kind": "offer", "seq": number, "of": ["state"]})
-                await socket.send_json(state)
+                await socket.send_json(state | {"vehicle": self.vehicle})
+                if self.cars:
+                    await socket.send_json({"kind": "cars", "time_ms": _now_ms(), "cars": self.cars})
                 if self._watching:
                     await socket.send_bytes(scan(number))
             await asyncio.sleep(0.1)

@@ -7,6 +7,7 @@ import math
 import os
 import sys
 import tempfile
+import time
 from collections.abc import Awaitable, Callable
 from datetime import datetime
 from pathlib import Path
@@ -45,15 +46,20 @@ WATCH: dict[str, tuple[str, int, int, str]] = {
     "watch-tablet-replay": ("replay", 820, 1180, "dark"),
     "watch-land": ("home", 915, 412, "dark"),
     "watch-crit-land": ("home-fault", 915, 412, "dark"),
-    "watch-crit-412": ("home-fault", 412, 915, "dark"),
+    "watch-crit-412": ("home-fault", 412, 915, "light"),
     "watch-crit-320": ("home-fault", 320, 568, "light"),
     "watch-phone-home": ("home", 412, 915, "dark"),
-    "watch-phone-home-360": ("home", 360, 800, "dark"),
+    "watch-phone-home-360": ("home", 360, 800, "light"),
     "watch-phone-home-320": ("home", 320, 568, "dark"),
     "watch-phone-alarms": ("alarms", 412, 915, "dark"),
+    "watch-phone-alarms-ended": ("alarms-ended", 412, 915, "light"),
+    "watch-phone-cars": ("cars", 412, 915, "dark"),
+    "watch-bars-412": ("cars-bar", 412, 915, "dark"),
+    "watch-bars-360": ("cars-bar", 360, 800, "dark"),
+    "watch-bars-320": ("cars-bar", 320, 568, "dark"),
     "watch-phone-chart": ("chart", 412, 915, "dark"),
     "watch-phone-check": ("check", 412, 915, "dark"),
-    "watch-phone-check-unknown": ("check-unknown", 412, 915, "dark"),
+    "watch-phone-check-unknown": ("check-unknown", 412, 915, "light"),
 }
 Scene = Callable[[Canned, Page], Awaitable[None]]
 SCENES: dict[str, Scene] = {}
@@ -438,6 +444,69 @@ async def alarms(server: Canned, page: Page) -> None:
     await page.wait_for_timeout(1200)  # until what is in sight can be acknowledged together
 
 
+@scene("alarms-ended")
+async def alarms_ended(server: Canned, page: Page) -> None:
+    state = several()
+    gone: dict[str, Any] = {"state": "RTN_UNACKED", "active": False, "place": "list"}
+    state["signals"]["speed"]["value"]["speed_mps"] = 4.2
+    state["checks"][0] |= {"verdict": "ok", "brief": "OK"}
+    lost = next(one for one in state["alarms"] if one["id"] == "link_lost")
+    missing = next(one for one in state["alarms"] if one["id"] == "phone_missing") | gone
+    shelved = next(one for one in state["alarms"] if one["state"] == "SHELVED")
+    state["alarms"] = [lost, missing, shelved]
+    server.state = state
+    await page.tap("[data-f=strip]")
+    await page.wait_for_selector("ul[data-f=alarms] li")
+    await page.wait_for_timeout(1200)
+
+
+def _car(name: str, speed_mps: float, *, holder: str | None = None, cut: str | None = None, **worst: Any) -> Any:
+    """One car of several, with its worst alarm."""
+    age_s, waiting = 41.0 if cut else 0.1, int(worst.get("state") == "UNACKED")
+    raised_ms = time.time_ns() // 1_000_000 - 7000
+    summary = {
+        "phase": "lost" if cut else "monitoring", "paused": False, "waiting": waiting,
+        "link": {"cut": cut, "bridge_age_s": age_s, "car_age_s": age_s, "trying_for_s": 0.0, "connected_for_s": 252.3},
+        "worst": {"id": "a", "occurrence": 1, "active": True, "sound": "none", "raised_ms": raised_ms, **worst}
+        if worst else None,
+        "speed": {"value_mps": speed_mps, "freshness": "stale" if cut else "fresh", "age_s": age_s, "horizon_s": 1.0},
+        "holder": holder, "page": None, "recording": "held" if cut else "recording", "recording_for_s": 252.0,
+        "slow_down": "not_available",
+    }  # fmt: skip
+    return {"name": name, "age_s": 0.1, "summary": summary}
+
+
+async def _several_cars(server: Canned, page: Page, *others: Any) -> None:
+    server.vehicle = "Ocelot"
+    server.cars = [_car("Ocelot", 4.2, holder="You"), *others]
+    server.state = live() | {"decelerate": slow("safe")}
+    await page.goto("about:blank")
+    await page.goto(f"{server.address}/#home")
+    await page.wait_for_selector("#monitor:not([hidden])")
+    await page.tap("#monitor .top .rec")
+    await page.wait_for_selector("#monitor [data-f=car-badge]:not([hidden])")
+
+
+@scene("cars-bar")
+async def cars_bar(server: Canned, page: Page) -> None:
+    """The bar with a badge: the name, who is in control, the chain, the recording, the menu."""
+    drift: dict[str, Any] = {"title": "GPS drift", "priority": "warning", "state": "UNACKED"}
+    await _several_cars(server, page, _car("Caracal", 0.0, **drift))
+
+
+@scene("cars")
+async def cars(server: Canned, page: Page) -> None:
+    await _several_cars(
+        server, page,
+        _car("Serval", 12.6, title="Speed above limit", priority="critical", state="UNACKED"),
+        _car("Margay", 3.1, cut="bridge-car", title="Car silent", priority="critical", state="UNACKED"),
+        _car("Caracal", 0.0, holder="Desk 2", title="GPS drift", priority="warning", state="ACKED"),
+        _car("Kodkod", 8.0),
+    )  # fmt: skip
+    await page.tap("#monitor [data-f=who]")
+    await page.wait_for_selector("#sheet-cars[open]")
+
+
 @scene("check")
 async def one_check(server: Canned, page: Page) -> None:
     server.state = several()
@@ -450,6 +519,11 @@ async def one_check(server: Canned, page: Page) -> None:
     )  # fmt: skip
     await page.tap("[data-f=tiles] li button")
     await page.wait_for_selector(".check-view canvas:not([hidden])")
+
+
+@scene("check-change")
+async def check_change(server: Canned, page: Page) -> None:
+    await one_check(server, page)
     await page.tap("[data-f=check-change]")
 
 
