@@ -36,7 +36,7 @@ async def no_barrier(page: Page, where: str, context: str | None = None) -> None
         await page.wait_for_timeout(150)  # what moves comes to rest
         found = await Axe().run(page, context=context, options={"resultTypes": ["violations"]} | rules)
         broken = [(one["id"], [node["html"] for node in one["nodes"]]) for one in found.response["violations"]]
-        assert broken == [], f"{where}, {theme}"
+        assert broken == [], f"{where}, {theme}: {broken}"
 
 
 async def fits(page: Page, where: str) -> None:

@@ -10,7 +10,7 @@ from playwright.async_api import Page, expect
 from tests.page.barriers import fits, no_barrier
 from tests.page.canned import Canned, Json, alarm, live
 from tests.page.conftest import Phone
-from tests.page.screenshots import show
+from tests.page.screenshots import show, silent_car
 
 EDGES = (346, 380, 700, 760, 1000, 1200, 1800)  # where the layout changes, as the style sheets have it
 WIDTHS = sorted({*range(320, 2561, 40), *(edge + by for edge in EDGES for by in (-1, 0, 1))})
@@ -177,6 +177,29 @@ async def test_no_layout_keeps_anybody_out(phone: Phone, canned: Canned) -> None
             await phone.page.set_viewport_size({"width": width, "height": height})
             await no_barrier(phone.page, f"{name} of {width} × {height}")
             await fits(phone.page, f"{name} of {width} × {height}")
+
+
+async def test_no_old_speed_stands_in_the_bar_of_a_page(phone: Phone, canned: Canned) -> None:
+    """Files of a silent car stay usable: only the speed is covered, and a server that falls silent covers all of it."""
+    page = phone.page
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await phone.open(f"{canned.address}/#files")
+    await phone.live()
+    cover, veil = page.locator(".bar-speed > .cover"), page.locator("#monitor > .view > .veil")
+    await expect(cover).to_have_css("opacity", "0")
+    canned.state = silent_car(live())
+    await expect(cover).to_have_css("opacity", "1")
+    await expect(veil).to_have_css("opacity", "0")
+    await page.locator("#panel-files .list .file[data-id]").nth(1).click()  # it is not in the way
+    await expect(page.locator("#panel-files .file-dock h2")).not_to_be_empty()
+    await expect(page.locator(".file .file-tag").first).to_have_css("border-top-width", "1px")
+    await expect(page.locator("#monitor .top > .chip")).to_have_css("border-top-width", "0px")  # of the bar, not of a tag
+    canned.silent = True
+    await expect(veil).to_have_css("opacity", "1")
+    await expect(cover).to_have_css("opacity", "1")
+    box = await veil.bounding_box()
+    assert box is not None
+    assert box["width"] == 1440
 
 
 async def test_files_of_a_desktop_show_the_chosen_recording_beside_the_list(phone: Phone, canned: Canned) -> None:
