@@ -41,6 +41,7 @@ export function mount(root, store, { close, inHead = () => null } = {}) {
 class AlarmList {
   /** @type {Map<string, Drawn>} */
   #drawn = new Map();
+  #said = '';
   #order = '';
   /** @type {Row[]} */
   #rows = [];
@@ -139,8 +140,10 @@ class AlarmList {
       setWords(at.words, row.words);
       setWords(at.state, row.state);
     }
+    const said = this.#rows.map(({ words, state }) => `${words} ${state}`).join('|').replace(/[0-9]/g, '0'); // all digits have one width
     if (isOther) this.pager.lay();
-    else this.pager.look();
+    else if (said !== this.#said) this.pager.look();
+    this.#said = said;
   }
 
   /** @param {Row} row @returns {Drawn} */

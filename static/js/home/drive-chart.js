@@ -74,7 +74,7 @@ class DriveChart {
     this.resize.observe(plots);
     const anew = () => this.#rebuild();
     this.stops = [
-      store.on('draw', () => this.#look()),
+      store.on('draw', () => store.painter.picture(() => this.#look())), // with the next picture: what is drawn now takes one long enough
       ...ranges.map((key, i) => listen(key, 'click', () => this.#follow(RANGES[i]?.[1]))),
       listen(signals, 'click', () => void pick({ store, say, seen: () => ({ answer: this.feed.answer, specs: this.#specs, view: this.view }), picture: () => this.panes.picture() })),
       listen(now, 'click', () => this.#follow()),

@@ -54,7 +54,7 @@ export function mount(root, { store, say, isFront }) {
     listen(at('follow'), 'click', () => tab.choose(() => map.choose(map.mode === 'follow' ? 'free' : 'follow'))),
     listen(at('north'), 'click', () => tab.choose(() => map.turnNorth(tab.known?.car))),
     store.on('move', () => tab.look()),
-    store.on('draw', () => tab.read()),
+    store.on('draw', () => store.painter.picture(() => tab.read())), // with the next picture, as the chart
     store.on('switch', () => tab.forget()),
   ];
   tab.press();
