@@ -165,7 +165,7 @@ async def test_a_name_a_note_and_tags_are_kept_and_found(opened: Phone) -> None:
     opened.complaints.clear()
     await opened.page.locator("#file-tags").fill("fog, night")
     await sheet(opened).get_by_role("button", name="Save").tap()
-    await expect(item.locator(".chip")).to_have_text(["fog", "night"])
+    await expect(item.locator(".file-tag")).to_have_text(["fog", "night"])
     rows = opened.page.locator("#panel-files [data-f=recordings] .file")
     await opened.page.get_by_label("Search recordings").fill("LIGHTS on")
     await expect(rows).to_have_count(1)
