@@ -36,6 +36,12 @@ SCREENS = (
     "alarms", "check", "check-unknown", "menu", "signals", "alarm-log",
 )  # fmt: skip
 AS = {"live": lambda state: state, "stale": silent_car, "critical": too_fast, "replay": replayed}
+SHOWS = {  # what tells that the page shows it
+    "live": ":root:not([data-replay]) #monitor",
+    "stale": '.view[data-veil="values"]',
+    "critical": "#sheet-alarm[open]",
+    "replay": ":root[data-replay]",
+}
 
 
 @pytest.mark.soak
@@ -52,6 +58,7 @@ async def test_no_screen_in_any_state_keeps_anybody_out(
         canned.timeline = replayed_timeline()
         canned.state = AS[state](canned.state)
         await phone.page.set_viewport_size({"width": size[0], "height": size[1]})
+        await phone.page.wait_for_selector(SHOWS[state], state="attached", timeout=5000)
         await phone.page.wait_for_timeout(700)
         try:
             await no_barrier(phone.page, f"{screen}, {state}")

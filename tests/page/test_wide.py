@@ -193,7 +193,9 @@ async def test_no_old_speed_stands_in_the_bar_of_a_page(phone: Phone, canned: Ca
     await page.locator("#panel-files .list .file[data-id]").nth(1).click()  # it is not in the way
     await expect(page.locator("#panel-files .file-dock h2")).not_to_be_empty()
     await expect(page.locator(".file .file-tag").first).to_have_css("border-top-width", "1px")
-    await expect(page.locator("#monitor .top > .chip")).to_have_css("border-top-width", "0px")  # of the bar, not of a tag
+    await expect(page.locator("#monitor .top > .chip")).to_have_css(
+        "border-top-width", "0px"
+    )  # of the bar, not of a tag
     canned.silent = True
     await expect(veil).to_have_css("opacity", "1")
     await expect(cover).to_have_css("opacity", "1")
