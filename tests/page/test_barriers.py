@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tests.page.barriers import fits_all, no_barrier
-from tests.page.canned import Canned
+from tests.page.canned import Canned, check
 from tests.page.conftest import Phone
-from tests.page.screenshots import replayed, replayed_timeline, show, silent_car, too_fast
+from tests.page.screenshots import show, silent_car, too_fast
 
 STATES = {
     "home": ("home-lower", "chart", "home-fault", "home-warning", "paused"),
@@ -35,12 +35,11 @@ SCREENS = (
     "home", "chart", "map-tiles", "scan", "files", "files-menu", "mail", "outbox", "settings", "topic", "preferences",
     "alarms", "check", "check-unknown", "menu", "signals", "alarm-log",
 )  # fmt: skip
-AS = {"live": lambda state: state, "stale": silent_car, "critical": too_fast, "replay": replayed}
+AS = {"live": lambda state: state, "stale": silent_car, "critical": too_fast}
 SHOWS = {  # what tells that the page shows it
     "live": ":root:not([data-replay]) #monitor",
     "stale": '.view[data-veil="values"]',
     "critical": "#sheet-alarm[open]",
-    "replay": ":root[data-replay]",
 }
 
 
@@ -50,18 +49,56 @@ SHOWS = {  # what tells that the page shows it
 async def test_no_screen_in_any_state_keeps_anybody_out(
     phone: Phone, canned: Canned, state: str, size: tuple[int, int]
 ) -> None:
-    """Every screen, theme and state: what is open stays open while the car falls silent, speeds, or is replayed."""
+    """Every screen, theme and state: what is open stays open while the car falls silent or speeds."""
     broken = []
     for screen in SCREENS:
         await phone.page.set_viewport_size({"width": 412, "height": 915})  # its keys are where the scene presses them
         await show(canned, phone.page, screen)
-        canned.timeline = replayed_timeline()
         canned.state = AS[state](canned.state)
         await phone.page.set_viewport_size({"width": size[0], "height": size[1]})
         await phone.page.wait_for_selector(SHOWS[state], state="attached", timeout=5000)
         await phone.page.wait_for_timeout(700)
         try:
             await no_barrier(phone.page, f"{screen}, {state}")
+        except AssertionError as found:
+            broken.append(str(found).splitlines()[0])
+    assert broken == []
+
+
+MENU = "#monitor [data-f=menu]"
+REPLAYED = {  # what is pressed one after the other
+    "home": (),
+    "map": ("#tab-map",),
+    "scan": ("#tab-scan",),
+    "files": ("#tab-files",),
+    "settings": ("#tab-settings",),
+    "alarms": ("[data-f=strip]",),
+    "check": ("[data-f=tiles] li button",),
+    "chart": ("[data-trend=speed]",),
+    "menu": (MENU,),
+    "signals": (MENU, "[data-screen=signals]"),
+    "log": (MENU, "[data-screen=log]"),
+    "preferences": (MENU, "[data-screen=preferences]"),
+}
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("size", [(412, 915), (1440, 900)], ids=str)
+async def test_no_screen_of_a_replay_keeps_anybody_out(phone: Phone, canned: Canned, size: tuple[int, int]) -> None:
+    broken = []
+    page = phone.page
+    for screen, keys in REPLAYED.items():
+        await page.set_viewport_size({"width": 412, "height": 915})
+        await show(canned, page, "replay")
+        await page.wait_for_selector(":root[data-replay]")
+        canned.checks["Speed"] = check("Speed", "Speed", verdict="fault", text="12.1 m/s, limit 11.0 m/s")
+        for key in keys:
+            await page.locator(key).first.evaluate("key => key.click()")
+            await page.wait_for_timeout(300)
+        await page.set_viewport_size({"width": size[0], "height": size[1]})
+        await page.wait_for_timeout(700)
+        try:
+            await no_barrier(page, f"{screen} of a replay")
         except AssertionError as found:
             broken.append(str(found).splitlines()[0])
     assert broken == []
