@@ -10,7 +10,7 @@ from playwright.async_api import Page, expect
 from tests.page.barriers import fits, no_barrier
 from tests.page.canned import Canned, Json, alarm, live
 from tests.page.conftest import Phone
-from tests.page.screenshots import show, silent_car
+from tests.page.screenshots import several, show, silent_car
 
 EDGES = (346, 380, 700, 760, 1000, 1200, 1800)  # where the layout changes, as the style sheets have it
 WIDTHS = sorted({*range(320, 2561, 40), *(edge + by for edge in EDGES for by in (-1, 0, 1))})
@@ -177,6 +177,31 @@ async def test_no_layout_keeps_anybody_out(phone: Phone, canned: Canned) -> None
             await phone.page.set_viewport_size({"width": width, "height": height})
             await no_barrier(phone.page, f"{name} of {width} × {height}")
             await fits(phone.page, f"{name} of {width} × {height}")
+
+
+async def test_what_asks_in_the_pane_leaves_room_for_the_list(phone: Phone, canned: Canned) -> None:
+    """A long sentence, the banner of the sound and a chattering alarm at once: no row and no key is cut."""
+    page = phone.page
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    canned.state = several()
+    canned.state["alarms"][0] |= {
+        "place": "dialog", "actions": ["acknowledge"], "needs_ack": True,
+        "trip_text": "Obstacle 4.98 m ahead, 5.0 m needed", "text": "Obstacle 8.8 m ahead, 4° right, 5.0 m needed",
+        "advice": "The safety driver must brake or steer clear.",
+    }  # fmt: skip
+    canned.state["alarm_load"] |= {"chattering": ["Speed above limit"]}
+    await phone.page.goto(f"{canned.address}/#home")
+    await expect(page.locator(".alarms-pane #sheet-alarm")).to_be_visible()
+    await expect(phone.f("sound-off", "#monitor")).to_be_visible()
+    pane, foot, rows = (page.locator(f".alarms-pane{one}") for one in ("", " .alarms-foot", " .alarms > li:visible"))
+    await expect(rows.first).to_be_visible()
+    await page.wait_for_timeout(500)
+    inside, low, row = [await one.bounding_box() for one in (pane, foot, rows.last)]
+    assert inside is not None
+    assert low is not None
+    assert row is not None
+    assert low["y"] + low["height"] <= inside["y"] + inside["height"] + 1
+    assert row["y"] + row["height"] <= low["y"] + 1
 
 
 async def test_no_old_speed_stands_in_the_bar_of_a_page(phone: Phone, canned: Canned) -> None:
