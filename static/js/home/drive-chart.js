@@ -53,6 +53,7 @@ class DriveChart {
   #context = '';
   /** What of the picture was drawn last. */
   #drawn = '';
+  #isOver = false;
   /** @type {import('./trends-layout.js').Spec[]} */
   #specs = [];
 
@@ -74,7 +75,7 @@ class DriveChart {
     this.resize.observe(plots);
     const anew = () => this.#rebuild();
     this.stops = [
-      store.on('draw', () => store.painter.picture(() => this.#look())), // with the next picture: what is drawn now takes one long enough
+      store.on('draw', () => store.painter.picture(() => this.#isOver || this.#look())), // with the next picture: what is drawn now takes one long enough
       ...ranges.map((key, i) => listen(key, 'click', () => this.#follow(RANGES[i]?.[1]))),
       listen(signals, 'click', () => void pick({ store, say, seen: () => ({ answer: this.feed.answer, specs: this.#specs, view: this.view }), picture: () => this.panes.picture() })),
       listen(now, 'click', () => this.#follow()),
@@ -97,6 +98,7 @@ class DriveChart {
   }
 
   unmount() {
+    this.#isOver = true;
     for (const stop of this.stops) stop();
     this.resize.disconnect();
     this.brush.unmount();
