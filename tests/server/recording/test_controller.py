@@ -74,9 +74,9 @@ async def test_it_begins_with_monitoring_and_holds_what_the_car_and_the_operator
         assert state["recording"]["reason"] is None
         assert state["link"]["topics_subscribed"] == 2, "what is heard for the recorder alone counts for nobody else"
         received = state["session"]["received"]
-        custom = bridge.graph.find("/custom")
+        recorded_only = [bridge.graph.find(topic) for topic in ("/custom", "/rosout_like")]
         async with asyncio.timeout(10):  # definitions are asked for first
-            while custom is None or not custom.subscribers:
+            while not all(topic is not None and topic.subscribers for topic in recorded_only):
                 await asyncio.sleep(0.02)
         for n in range(5):
             bridge.publish("/rosout_like", {"data": f"line {n}"})
