@@ -9,7 +9,7 @@ FROM python:3.11-slim-bookworm AS build
 WORKDIR /src
 COPY . .
 RUN python -m venv /opt/catgraph \
- && /opt/catgraph/bin/python -m pip install --no-cache-dir -c constraints.txt .
+ && /opt/catgraph/bin/python -m pip install --no-cache-dir -c constraints.txt '.[fleet,store]'
 
 FROM python:3.11-slim-bookworm
 RUN useradd --system --uid 10001 --create-home catgraph \

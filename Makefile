@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo test check world format lint types imports tsc node bench soak mutation sbom screenshots clean vendor-missing
+.PHONY: help demo fleet test check world format lint types imports tsc node bench soak mutation sbom screenshots clean vendor-missing
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -22,6 +22,9 @@ help: ## this list
 
 demo: $(VENV)/.ready static/built/built.json ## a simulated car, its bridge and the server: open the address it prints
 	$(PY) -m server demo
+
+fleet: $(VENV)/.ready-test static/built/built.json ## a broker, five simulated cars with faults, their agents and two web nodes
+	$(PY) -m tests.fleet
 
 test: $(VENV)/.ready-test static/built/built.json ## all of the tests: what must pass before a change goes in
 	$(PY) -m tests.chromium

@@ -109,7 +109,7 @@ class _Step:
         if by != self._alarm.suppressed_by:
             self._set["suppressed_by"] = by
         if before != self._suppressed and (self._active or not self._acknowledged):
-            self._tell("suppressed" if self._suppressed else "unsuppressed")
+            self._add_transition("suppressed" if self._suppressed else "unsuppressed")
 
     def unshelve_when_due(self) -> None:
         until_s = self._alarm.shelved_until_s
@@ -120,7 +120,7 @@ class _Step:
         if self._active:
             self._announce("unshelved")
         else:
-            self._tell("unshelved")
+            self._add_transition("unshelved")
 
     def unsilence_when_due(self) -> None:
         until_s = self._alarm.silenced_until_s
@@ -128,7 +128,7 @@ class _Step:
             return
         self._set |= {"silenced_until_s": None, "silenced_by": None}
         if self._active and not self._acknowledged:
-            self._tell("unsilenced")
+            self._add_transition("unsilenced")
 
     def judge(self) -> None:
         match self._finding.verdict:
@@ -167,7 +167,7 @@ class _Step:
                 "causes": tuple(Cause(name=name) for name in _names(self._finding)),
             }
             if self._was_announced(_names(self._finding)):
-                self._tell("raised")
+                self._add_transition("raised")
             else:
                 self._announce("raised")
 
@@ -210,7 +210,7 @@ class _Step:
         self._set |= {"silenced_until_s": None, "silenced_by": None}
         if not self._alarm.spec.needs_ack:
             self._acknowledged = True
-        self._tell("cleared")
+        self._add_transition("cleared")
 
     def _announce(self, change: Change) -> None:
         self._occurrence += 1
@@ -223,8 +223,8 @@ class _Step:
             names = _names(self._finding)
             older = [(name, at_s) for name, at_s in self._alarm.announced if name not in names]
             self._set["announced"] = (*older, *((name, self._now_s) for name in names))
-        self._tell(change, announces=not (self._shelved or self._suppressed))
+        self._add_transition(change, announces=not (self._shelved or self._suppressed))
 
-    def _tell(self, change: Change, *, announces: bool = False) -> None:
+    def _add_transition(self, change: Change, *, announces: bool = False) -> None:
         alarm, _ = self.result()
         self._transitions.append(transition(alarm, change, self._now_s, text=self._finding.text, announces=announces))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -34,6 +35,7 @@ __all__ = [
     "unknown",
 ]
 
+KEPT_FINDINGS = 1024  # half of all findings are that a signal is absent, in a few dozen texts
 BRIEF_LETTERS = 21  # what fits a tile of the home tab beside its mark: "not checked: standing"
 
 
@@ -95,12 +97,14 @@ def fault(
     )
 
 
+@lru_cache(maxsize=KEPT_FINDINGS)
 def unknown(why: str, *, short: str = "") -> Finding:
     """The verdict UNKNOWN. `short` (at most 8 letters: "no link", "stale") follows "not checked:" on the tile."""
     brief = f"not checked: {short}" if short else "not checked"
     return Finding(verdict=Verdict.UNKNOWN, text=why, brief=brief if len(brief) <= BRIEF_LETTERS else "not checked")
 
 
+@lru_cache(maxsize=KEPT_FINDINGS)
 def absent(why: str, *, brief: str = "not published") -> Finding:
     """There is nothing to check: unknown, but no reason to call the tile unknown."""
     return Finding(verdict=Verdict.UNKNOWN, text=why, brief=brief, applies=False)

@@ -1,10 +1,10 @@
-"""Settings that the page draws by: the ends of the gauges, and of the obstacle checks the stopping distance."""
+"""Settings beside those of single checks: gauges, stopping distance, attention queue, uploads into the store."""
 
 from __future__ import annotations
 
 from monitor.check import EXPERT, Limits, threshold
 
-GAUGE, VEHICLE = "Gauge", "Vehicle"  # headings of Settings
+GAUGE, VEHICLE, FLEET, STORE, DRIVING = "Gauge", "Vehicle", "Fleet", "Store", "Driving mode"  # headings of Settings
 
 
 class GaugeLimits(Limits):
@@ -75,8 +75,166 @@ class ObstacleLimits(Limits):
     )
 
 
+class AttentionLimits(Limits):
+    """Of the item of a car that needs a person."""
+
+    escalates_s: float = threshold(
+        30.0,
+        "Escalation of a critical alarm",
+        unit="s",
+        low=10.0,
+        high=300.0,
+        step=5.0,
+        help="A car with a critical alarm that is unassigned for so long is escalated to the supervisor.",
+        heading=FLEET,
+    )
+    unheard_s: float = threshold(
+        10.0,
+        "Unassigned without a page",
+        unit="s",
+        low=5.0,
+        high=120.0,
+        step=1.0,
+        help="The car is unassigned again when the page of its person is silent for so long.",
+        heading=FLEET,
+    )
+
+
+class StoreLimits(Limits):
+    """What of a car's recordings is uploaded into the store, if the server has one."""
+
+    whole_files: float = threshold(
+        1.0,
+        "Upload whole recordings",
+        unit="of 3",
+        low=0.0,
+        high=3.0,
+        step=1.0,
+        help="0: never. 1: on request. 2: always. 3: in the depot. List, alarms and track are uploaded in any case.",
+        heading=STORE,
+    )
+    clips: float = threshold(
+        1.0,
+        "Upload the minute around alarms",
+        unit="0/1",
+        low=0.0,
+        high=1.0,
+        step=1.0,
+        help="1: of critical alarms and warnings, at most 10 clips of a recording.",
+        heading=STORE,
+    )
+    delete_stored: float = threshold(
+        0.0,
+        "Delete uploaded recordings on the car",
+        unit="0/1",
+        low=0.0,
+        high=1.0,
+        step=1.0,
+        help="1: a recording is deleted here, for good, once its copy was read back and is the same.",
+        heading=STORE,
+    )
+    rate_mb_s: float = threshold(
+        1.0,
+        "Upload at most",
+        unit="MB/s",
+        low=0.05,
+        high=1000.0,
+        step=0.05,
+        help="Also for reading back. What is live uses the same link.",
+        heading=STORE,
+    )
+    depot_radius_m: float = threshold(
+        0.0,
+        "Radius of the depot",
+        unit="m",
+        low=0.0,
+        high=5000.0,
+        step=10.0,
+        help="The car is in the depot when it stands within this circle. 0: no circle.",
+        heading=STORE,
+    )
+    depot_lat_deg: float = threshold(
+        0.0, "Latitude of the depot", unit="°", low=-90.0, high=90.0, step=0.0001, heading=STORE
+    )
+    depot_lon_deg: float = threshold(
+        0.0, "Longitude of the depot", unit="°", low=-180.0, high=180.0, step=0.0001, heading=STORE
+    )
+
+
+class DrivingLimits(Limits):
+    """Who drives, and what counts as an intervention."""
+
+    by_rule: float = threshold(
+        0.0,
+        "Mode from the commands",
+        unit="0/1",
+        low=0.0,
+        high=1.0,
+        step=1.0,
+        help="1: autonomous while commands come and the speed follows them. Only of a car without a mode topic.",
+        heading=DRIVING,
+    )
+    autonomous_number: float = threshold(
+        1.0,
+        "Number that means autonomous",
+        unit="of 255",
+        low=0.0,
+        high=255.0,
+        step=1.0,
+        help="Of a mode topic that is a plain number.",
+        heading=DRIVING,
+    )
+    manual_number: float = threshold(
+        0.0,
+        "Number that means manual",
+        unit="of 255",
+        low=0.0,
+        high=255.0,
+        step=1.0,
+        help="Every other number is unknown.",
+        heading=DRIVING,
+    )
+    holds_s: float = threshold(
+        0.0,
+        "Mode counts for",
+        unit="s",
+        low=0.0,
+        high=3600.0,
+        step=1.0,
+        help="Of a car that sends its mode only when it changes. 0: while messages come at their rate.",
+        heading=DRIVING,
+    )
+    brake_percent: float = threshold(
+        15.0,
+        "Brake against the command",
+        unit="%",
+        low=1.0,
+        high=100.0,
+        step=1.0,
+        help="More than this while no braking is commanded is an intervention.",
+        heading=DRIVING,
+    )
+    steer_rad: float = threshold(
+        0.15,
+        "Steering against the command",
+        unit="rad",
+        low=0.02,
+        high=1.0,
+        step=0.01,
+        help="Tyre angle so far from the commanded one is an intervention.",
+        heading=DRIVING,
+    )
+
+
 # By the name of the group; a check that judges by one of them names the same class.
-GROUPS: dict[str, type[Limits]] = {"steering": SteeringLimits, "gauge": GaugeLimits, "obstacle": ObstacleLimits}
+GROUPS: dict[str, type[Limits]] = {
+    "steering": SteeringLimits,
+    "attention": AttentionLimits,
+    "store": StoreLimits,
+    "driving": DrivingLimits,
+    "gauge": GaugeLimits,
+    "obstacle": ObstacleLimits,
+}
 
 
 def stopping_m(speed_mps: float, limits: ObstacleLimits) -> float:

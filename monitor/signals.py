@@ -182,6 +182,16 @@ SIGNALS: dict[str, Signal] = _declare(
         about="Remaining fuel or charge.",
         chart=Charted(field="value", label="Fuel", unit=""),
     ),
+    Signal(
+        name="mode",
+        label="Driving mode",
+        unit="",
+        expected_hz=None,
+        headline=None,
+        optional=True,
+        event_like=True,
+        about="Who drives, as the car says: autonomous, manual or unknown.",
+    ),
 )
 
 # The field of each signal's value that is drawn over the drive.

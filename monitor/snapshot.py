@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, overload
 
 from monitor.gps_watch import GpsWatch
+from monitor.heard_modes import HeardMode
 from monitor.link import LinkFacts
 from monitor.phones import NO_PHONE, PhoneView
 from monitor.rates import Rate
@@ -24,6 +25,7 @@ from monitor.values import (
     Bearing,
     Diagnostics,
     Distance,
+    DriveMode,
     Effort,
     GpsFix,
     Heading,
@@ -72,6 +74,7 @@ class Snapshot:
     reach: ReachFacts | None = None  # operators that can hear an alarm; None: not applicable, as in a recording
     slowing: SlowingFacts = field(default_factory=SlowingFacts)
     slow_proof: SlowProof = NOTHING_SHOWN  # what the car's speed shows of the order
+    modes_heard: tuple[HeardMode, ...] = ()  # the newest changes of what the car says of who drives, oldest first
 
     @overload
     def get(self, signal: Literal["speed"]) -> Reading[Twist] | None: ...
@@ -99,6 +102,8 @@ class Snapshot:
     def get(self, signal: Literal["command"]) -> Reading[MotionCommand] | None: ...
     @overload
     def get(self, signal: Literal["fuel"]) -> Reading[Level] | None: ...
+    @overload
+    def get(self, signal: Literal["mode"]) -> Reading[DriveMode] | None: ...
     @overload
     def get(self, signal: str) -> Reading[Any] | None: ...
     def get(self, signal: str) -> Reading[Any] | None:

@@ -10,6 +10,7 @@ from typing import Any
 from monitor.components import Components
 from monitor.derived_signals import SOURCES, DerivedSignals
 from monitor.freeze_detection import Wheels
+from monitor.heard_modes import HeardModes
 from monitor.link import LinkFacts, Phase
 from monitor.phones import PhoneReport, Phones
 from monitor.rates import Rate
@@ -26,7 +27,7 @@ from monitor.snapshot import NotFresh, Snapshot
 from monitor.stamps import MANY_WRITERS, ClockJump, merged
 from monitor.tracks import TrackPoint
 from monitor.unusable import Unusable, refused, without
-from monitor.values import Diagnostics, GpsFix, Twist, Value
+from monitor.values import Diagnostics, DriveMode, GpsFix, Twist, Value
 
 __all__ = ["Extent", "Freshness", "LinkFacts", "NotFresh", "Phase", "Reading", "Snapshot", "State", "TrackPoint"]
 
@@ -69,6 +70,7 @@ class State:
         self._reach: ReachFacts | None = None
         self._slowing = SlowingFacts()
         self._slow_proof = ProofFollower()
+        self._modes = HeardModes()
         self._paused_since_s: float | None = None
 
     def expect(self, expected_hz: Mapping[str, float]) -> None:
@@ -97,6 +99,8 @@ class State:
             self._slow_proof.add(received_s, value.speed_mps)  # type: ignore[union-attr, arg-type]
         elif kind is Diagnostics:
             value = self._components.merge(value, received_s)  # type: ignore[arg-type]
+        elif kind is DriveMode:
+            self._modes.add(received_s, value)  # type: ignore[arg-type]
         stats = self._stats[signal]
         reading = stats.read(value, received_s, stamp_s, delay_s, self._wheels)
         if stats.jump_s is not None:
@@ -171,6 +175,11 @@ class State:
         self.paused = paused
         self._paused_since_s = since_s if paused else None
 
+    @property
+    def track_m(self) -> float | None:
+        """Distance driven until now, from positions [m]; None: never had one."""
+        return self._derived.track.distance_m
+
     def snapshot(self, now_s: float) -> Snapshot:
         """What is known at `now_s`, which later messages do not change."""
         self._follow_clock(now_s)
@@ -201,6 +210,7 @@ class State:
             reach=self._reach,
             slowing=self._slowing,
             slow_proof=self._slow_proof.proof,
+            modes_heard=self._modes.changes,
         )
 
     def glance(self, now_s: float) -> Snapshot:
@@ -221,6 +231,7 @@ class State:
             return  # a message waited a moment between its arrival and here
         self._latest_s = at_s
         self._slow_proof.forget()
+        self._modes.forget()
         self._fix_s = -math.inf
         self._phones = Phones()  # they report again within seconds
         self._phones.ride(self._rides, at_s)

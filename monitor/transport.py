@@ -73,7 +73,7 @@ class _Topic:
         self.by_clock = StampedDelay()
         self.at_s: float | None = None
         self.delay_s = 0.0
-        self.excess_s: float | None = None  # later by the clock of ROS than by the pings; None: it cannot tell
+        self.excess_s: float | None = None  # later by the clock of ROS than by the pings; None: it is not known
 
     def restart(self) -> None:
         """What came over another connection says nothing of this one, but for how often it comes."""
@@ -111,6 +111,7 @@ class TransportDelay:
         self.clock = CarClock()
         self._unanswered: deque[float] = deque(maxlen=MOST_UNANSWERED)
         self._trips: deque[tuple[float, float]] = deque()  # (answered, round trip)
+        self._answers: deque[tuple[float, float]] = deque(maxlen=MOST_UNANSWERED)  # (sent, answered)
         self._trip_s = self._least_trip_s = self._longest_trip_s = 0.0
         self._is_measured = False
         self._usual_trip_s = self._usual_before_s = float("inf")
@@ -127,6 +128,7 @@ class TransportDelay:
         self._mark_s, self._is_measured = sent_s, True
         while self._unanswered and self._unanswered[0] <= sent_s:
             self._unanswered.popleft()
+        self._answers.append((sent_s, at_s))
         trip_s = self._trip_s = at_s - sent_s
         trips = self._trips
         trips.append((at_s, trip_s))
@@ -183,7 +185,7 @@ class TransportDelay:
         return min(queued_s, since_mark_s + places * shut_s + topic.held_s)
 
     def _excess_s(self, at_s: float) -> float:
-        """How much later the stamped neighbours are than the pings tell: all of them, and more than one."""
+        """How much later the stamped neighbours are than the pings indicate: all of them, and more than one."""
         found = list(self._excesses(at_s))
         least_s = min(found, default=0.0)
         return least_s if len(found) >= NEIGHBOURS and least_s > EXCESS_S else 0.0
@@ -214,3 +216,8 @@ class TransportDelay:
     def waiting_s(self, now_s: float) -> float:
         """Since the oldest ping was sent that is not answered yet."""
         return now_s - self._unanswered[0] if self._unanswered else 0.0
+
+    def read_s(self, sent_s: float) -> float | None:
+        """When the bridge was known to have read what was sent then: the first answer to a ping behind it, of those
+        that are kept. None: not yet."""
+        return next((answered_s for ping_s, answered_s in self._answers if ping_s >= sent_s), None)

@@ -177,6 +177,18 @@ class Level:
     unit: str  # "%" or "l"
 
 
+Mode = Literal["autonomous", "manual", "unknown"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveMode:
+    """Who drives, as the car says."""
+
+    mode: Mode  # unknown: it says something of which the meaning is not known
+    said: str  # in the car's own words, short
+    number: int | None = None  # of a plain number, whose meaning is a setting
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Number:
     """A signal that is one number, in the unit of its row in `monitor.signals`."""
@@ -198,5 +210,6 @@ Value = (
     | Diagnostics
     | MotionCommand
     | Level
+    | DriveMode
     | Number
 )

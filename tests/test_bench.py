@@ -17,6 +17,8 @@ from websockets.sync.server import serve
 
 from tests.bench.__main__ import main
 from tests.bench.child import Child, Failed
+from tests.bench.line import fitted
+from tests.bench.program import Program, used
 from tests.bench.rig import QUICK, Rig
 from tests.bench.rows.latency import latencies_ms
 from tests.bench.rows.memory import growth_mb_an_hour
@@ -67,6 +69,58 @@ def test_the_stalls_of_the_event_loop_have_a_row(tmp_path: Path) -> None:
     p99, longest, *_, lost = group["rows"]
     assert (p99["unit"], p99["reach"], lost["reach"]) == ("ms", 20.0, 0)
     assert 0 < p99["catgraph"] <= longest["catgraph"]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)  # it starts ten processes, one after the other
+def test_cars_and_pages_of_a_fleet_have_rows_and_nothing_is_left_running(tmp_path: Path) -> None:
+    found, before = tmp_path / "found.json", psutil.Process().children()
+    assert main(["--quick", "--only", "many", "--json", str(found)]) == 0
+    assert started_since(before) == []
+    (group,) = orjson.loads(found.read_bytes())["groups"]
+    rows = {(row["what"], row["unit"]): row for row in group["rows"]}
+    for kind, hz in (("6 pages, Home, 1 of 1 cars", 10.0), ("6 pages, all cars, 2 cars", 2.0)):
+        assert 0.2 * hz < rows[f"node, {kind}: each got", "frames/s"]["catgraph"] < 4 * hz
+        assert 0 < rows[f"node, {kind}", "% of a core"]["catgraph"] < 200
+    for part in ("broker, 2 cars, 1 page of all", "node, 2 cars, 1 page of all", "agent, each of 1"):
+        assert 0 < rows[part, "% of a core"]["catgraph"] < 200
+        assert 2 < rows[part, "MB"]["catgraph"] < 300
+    assert rows["node, each page on Home", "kB"]["reach"] == 150.0
+    assert any("extrapolated to 1000 cars" in note for note in group["notes"])
+
+
+def test_a_line_goes_through_points_of_several_counts_and_tells_how_far_it_is_off() -> None:
+    points = [
+        ((cars, pages), 5.0 + 2.0 * cars + 0.25 * pages) for cars, pages in ((1, 10), (1, 100), (10, 10), (3, 40))
+    ]
+    line = fitted(points)
+    assert (line.base, *line.each) == pytest.approx((5.0, 2.0, 0.25))
+    assert line.residual == pytest.approx(0.0, abs=1e-9)
+    assert line.at(1000, 10_000) == pytest.approx(4505.0)
+    assert fitted([((x,), y) for x, y in ((0.0, 1.0), (1.0, 3.0), (2.0, 1.0), (3.0, 3.0))]).residual > 0.5
+
+
+def test_a_process_is_measured_by_its_own_work() -> None:
+    busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+    idle = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    try:
+        time.sleep(0.3)
+        found = used({"busy": busy.pid, "idle": idle.pid}, 0.5)
+    finally:
+        for one in (busy, idle):
+            one.kill()
+            one.wait()
+    assert found["idle"].share < 5 < found["busy"].share < 110
+    assert 1 < found["idle"].memory_mb < 30
+    with pytest.raises(Failed, match="cannot be measured"):
+        used({"gone": busy.pid}, 0.0)
+
+
+def test_a_program_that_does_not_start_says_why_and_leaves_nothing() -> None:
+    before = psutil.Process().children()
+    with pytest.raises(Failed, match="no address of a broker"):
+        Program("web", "--broker", "elsewhere")
+    assert started_since(before) == []
 
 
 async def test_a_stall_of_the_event_loop_is_seen() -> None:

@@ -77,8 +77,8 @@ def test_the_container_runs_commands_that_exist(capsys: pytest.CaptureFixture[st
         with pytest.raises(SystemExit) as ended:
             main([command, "--help"])
         assert ended.value.code == 0
-        told = capsys.readouterr().out
-        assert [option for option in options if option.startswith("--") and option not in told] == []
+        printed = capsys.readouterr().out
+        assert [option for option in options if option.startswith("--") and option not in printed] == []
 
 
 def test_the_container_gets_every_file_that_the_build_reads() -> None:

@@ -35,11 +35,11 @@ def test_it_keeps_the_schema(bill: str) -> None:
 
 
 def test_every_part_has_a_version_that_is_pinned_and_an_address(bill: str) -> None:
-    told: dict[str, Any] = json.loads(bill)
+    document: dict[str, Any] = json.loads(bill)
     pinned = (PROJECT / "constraints.txt").read_text(encoding="utf-8").split()
     pins = {canonicalize_name(line.partition("==")[0]): line.partition("==")[2] for line in pinned}
     lock = json.loads((PROJECT / "package-lock.json").read_text(encoding="utf-8"))["packages"]
-    for part in told["components"]:
+    for part in document["components"]:
         kind = part["purl"].partition(":")[2].partition("/")[0]
         if kind == "pypi":
             assert part["version"] == pins[part["name"]]
@@ -52,8 +52,8 @@ def test_every_part_has_a_version_that_is_pinned_and_an_address(bill: str) -> No
 
 
 def test_it_lists_what_is_required_what_is_copied_and_what_the_page_tells(bill: str) -> None:
-    told = json.loads(bill)
-    names = {part["name"] for part in told["components"]}
+    document = json.loads(bill)
+    names = {part["name"] for part in document["components"]}
     about = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert {canonicalize_name(Requirement(text).name) for text in about["dependencies"]} <= names
     package = json.loads((PROJECT / "package.json").read_text(encoding="utf-8"))
@@ -61,5 +61,5 @@ def test_it_lists_what_is_required_what_is_copied_and_what_the_page_tells(bill: 
     shown = {canonicalize_name(part.name) for part in parts(PROJECT / "static" / "vendor")}
     assert shown <= names, "About lists a part that the list lacks"
     assert not {"pytest", "mypy", "playwright", "typescript", "schemathesis"} & names, "what only tests is not shipped"
-    refs = {one["ref"] for one in told["dependencies"]}
-    assert {part["bom-ref"] for part in told["components"]} <= refs
+    refs = {one["ref"] for one in document["dependencies"]}
+    assert {part["bom-ref"] for part in document["components"]} <= refs

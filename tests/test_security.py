@@ -39,7 +39,7 @@ def test_each_names_a_test_that_exists(number: str, how: str, test: str) -> None
 
 def test_the_limits_are_those_in_force() -> None:
     limits = Limits()
-    for told in (
+    for stated in (
         f"{limits.body_bytes // 1024} kB, 64 kB for settings; {limits.body_s:g} s until",
         f"{limits.head_bytes // 1024} kB; {limits.head_s:g} s until",
         f"{limits.requests.per_s:g} a second, {limits.requests.at_once} at once (on an open server all of this "
@@ -49,7 +49,7 @@ def test_the_limits_are_those_in_force() -> None:
         f"{limits.messages.per_s:g} a second, {limits.messages.at_once} at once",
         f"{limits.commands.per_s:g} a second, {limits.commands.at_once} at once",
     ):
-        assert told in SAID
+        assert stated in SAID
 
 
 def test_the_times_for_other_peoples_parts_are_written_down() -> None:

@@ -30,7 +30,7 @@ from monitor.signals import SIGNALS
 from monitor.snapshot import Snapshot
 from monitor.stamps import JUMP_S
 
-TOLD_S = 10.0  # a jump is instantaneous; it is reported for this time
+REPORTED_S = 10.0  # a jump is instantaneous; it is reported for this time
 ANOTHER_TIME_S = 86_400.0
 STUCK_AFTER = 3  # equal stamps: a constant stamp has its own alarm and says nothing about the clock
 
@@ -65,7 +65,7 @@ def jumps(snapshot: Snapshot, limits: ClockLimits, was_active: bool) -> Finding:
         return ok("The car's clock has not jumped since connecting")
     ago_s = max(0.0, snapshot.now_s - jump.at_s)
     how = f"{'ahead' if jump.by_s > 0 else 'back'} by {_words(abs(jump.by_s))}"
-    if abs(jump.by_s) <= limits.jump_s or ago_s > TOLD_S:
+    if abs(jump.by_s) <= limits.jump_s or ago_s > REPORTED_S:
         return ok(f"It jumped {how} {_words(ago_s)} ago and is steady since then")
     labels = ", ".join(SIGNALS[name].label for name in jump.signals)
     return fault(

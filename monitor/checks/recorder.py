@@ -23,7 +23,7 @@ from monitor.check import (
 from monitor.snapshot import Snapshot
 
 RECORDING = "Recording"
-TOLD_S = 10.0  # a drop is spoken of so long: the disk may refuse again at once
+REPORTED_S = 10.0  # a drop is reported for so long: the disk may refuse again at once
 
 
 class RecordingLimits(Limits):
@@ -116,7 +116,7 @@ def keeps_up(snapshot: Snapshot, limits: RecordingLimits, was_active: bool) -> F
     if facts.state not in ("recording", "saving"):
         return absent("Nothing is recorded now", brief="not recording")
     dropped_ago_s = snapshot.now_s - facts.dropped_s if facts.dropped_s is not None else None
-    if dropped_ago_s is not None and dropped_ago_s < TOLD_S:
+    if dropped_ago_s is not None and dropped_ago_s < REPORTED_S:
         many = f"{facts.dropped} message{' was' if facts.dropped == 1 else 's were'} not recorded"
         return fault(f"The disk is too slow: {many}", brief="lost some", causes=("dropped",))
     measured = Quantity(label="Behind", value=round(facts.behind_s, 1), unit="s")

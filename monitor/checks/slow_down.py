@@ -35,7 +35,7 @@ STANDS_ALREADY = "The car was already standing: nothing to slow"
 STANDS_UNPROVEN = "The car stands; its speed does not prove that the order stopped it"
 WITHIN_S = 1.0  # of the first command
 FOLLOWS_WITHIN_MPS = 0.5  # once it is shown to slow, a car so near the commanded speed follows it
-ENDED_TOLD_S = 30.0
+ENDED_REPORTED_S = 30.0
 
 
 def _switch(label: str, help: str) -> Any:
@@ -178,7 +178,7 @@ def is_alone(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Fi
 def goes_on(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Finding:
     facts = snapshot.slowing
     ended_s = facts.ended_at_longest_s
-    if ended_s is not None and snapshot.now_s - ended_s < ENDED_TOLD_S:
+    if ended_s is not None and snapshot.now_s - ended_s < ENDED_REPORTED_S:
         return fault(f"The order ended after {limits.longest_s:.0f} s: the car is no longer held", brief="hold ended")
     if facts.ordered_s is None:
         return absent("The car is not held", brief="not ordered")

@@ -83,10 +83,14 @@ class Access:
         self._printed: dict[Role, Invitation] = {}  # the one shown on the terminal
         self._guesses = PinThrottle()
         self._tickets = Tickets()
-        self._cookies = Cookies(self.devices.signing_key, self.devices.server, wall_ms=wall_ms)
-        self._removed: dict[str, str] = {}  # devices that were removed in this run: why
+        self.use_identity()
+        self.removed: dict[str, str] = {}  # devices that were removed in this run: why
         self.address: str | None = None  # where phones reach this server, as it was announced
         self.on_paired: Callable[[str, Role], None] = lambda name, role: None  # a device came in: its name and role
+
+    def use_identity(self) -> None:
+        """From now on cookies are signed with the key of the list of devices."""
+        self._cookies = Cookies(self.devices.signing_key, self.devices.server, wall_ms=self._wall_ms)
 
     # -- invitations -------------------------------------------------------------------------------------------------
 
@@ -185,9 +189,9 @@ class Access:
 
         Raises OSError where the list cannot be kept: it is out now, and would be in again after a restart.
         """
-        device = self.devices.remove(id)
-        self._removed[id] = f"This device was removed by {by}."
-        self.visits.end(id, self._removed[id], but=but)
+        device = self.devices.remove(id, now_ms=self._wall_ms())
+        self.removed[id] = f"This device was removed by {by}."
+        self.visits.end(id, self.removed[id], but=but)
         if device is not None:
             await _to_its_end(self.devices.save(now_ms=self._wall_ms()))
         return device
@@ -198,7 +202,9 @@ class Access:
         Raises OSError if the list cannot be stored: nothing changed then.
         """
         before = self.devices.get(id)
-        device = self.devices.change(id, role=role, name=None if name is None else display_name.clean(name))
+        device = self.devices.change(
+            id, role=role, name=None if name is None else display_name.clean(name), now_ms=self._wall_ms()
+        )
         if device is not None and before is not None and (device.role, device.name) != (before.role, before.name):
             await _to_its_end(self._keep_changed(before, device, but))
         return device
@@ -209,7 +215,7 @@ class Access:
         try:
             await self.devices.save(now_ms=self._wall_ms())
         except OSError:
-            self.devices.change(device.id, role=before.role, name=before.name)
+            self.devices.put(before)
             self.visits.end(device.id, because, only_sockets=only_sockets, but=but)
             raise
 
@@ -245,7 +251,7 @@ class Access:
         read = self._read_cookie(headers, scheme)
         if read is None:
             return "unpaired", "This device is not paired with the server."
-        return "removed", self._removed.get(read[0], "This device is no longer paired.")
+        return "removed", self.removed.get(read[0], "This device is no longer paired.")
 
     def is_secure(self, scheme: str, host: str) -> bool:
         """Whether the browser at the other end has TLS."""

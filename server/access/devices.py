@@ -9,7 +9,7 @@ import hashlib
 import hmac
 import logging
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -38,6 +38,7 @@ class Device:
     role: Role
     secret_sha256: str
     paired_ms: int
+    changed_ms: int  # its name or role
     seen_ms: int
 
 
@@ -58,6 +59,8 @@ class Devices:
         self._devices: dict[str, Device] = {}
         self.server = secrets.token_hex(4)  # distinguishes the cookies of two servers on one host
         self.signing_key = secrets.token_hex(32)
+        self.removed: dict[str, int] = {}  # when [ms]: nobody brings them back
+        self.on_kept: Callable[[], None] = lambda: None  # called with each list that is written
         self._saved_ms = 0
         if self._path is not None:
             self._load(self._path)
@@ -87,31 +90,49 @@ class Devices:
             role=role,
             secret_sha256=_hash(secret),
             paired_ms=now_ms,
+            changed_ms=now_ms,
             seen_ms=now_ms,
         )
         before = dict(self._devices)
         self._devices[device.id] = device
         self._drop_oldest(now_ms)
         dropped = {id: one for id, one in before.items() if id not in self._devices}
+        for id in dropped:
+            self._note_removed(id, now_ms)
         try:
             await self.save(now_ms=now_ms)
         except OSError:
             self._devices.pop(device.id, None)
             self._devices |= dropped
+            for id in dropped:
+                self.removed.pop(id, None)
             raise
         return device, secret
 
-    def change(self, id: str, *, role: Role | None = None, name: str | None = None) -> Device | None:
+    def change(self, id: str, *, role: Role | None, name: str | None, now_ms: int) -> Device | None:
         """The device with another role or name, which `save` keeps; None: there is none."""
         device = self._devices.get(id)
         if device is None:
             return None
-        changed = self._devices[id] = replace(device, role=role or device.role, name=name or device.name)
+        changed = self._devices[id] = replace(
+            device, role=role or device.role, name=name or device.name, changed_ms=now_ms
+        )
         return changed
 
-    def remove(self, id: str) -> Device | None:
+    def remove(self, id: str, *, now_ms: int) -> Device | None:
         """Remove the device; `save` stores the change."""
-        return self._devices.pop(id, None)
+        device = self._devices.pop(id, None)
+        if device is not None:
+            self._note_removed(id, now_ms)
+        return device
+
+    def _note_removed(self, id: str, now_ms: int) -> None:
+        self.removed[id] = now_ms
+        self.removed = dict(sorted(self.removed.items(), key=lambda one: one[1])[-MOST:])
+
+    def put(self, device: Device) -> None:
+        """A device as another server has it; `save` or `save_seen` stores it."""
+        self._devices[device.id] = device
 
     async def save(self, *, now_ms: int) -> None:
         """Returns once the disk has the list. Raises OSError: a restart brings back the one before."""
@@ -121,6 +142,7 @@ class Devices:
             write()
         else:
             await self._storage.run(write)
+        self.on_kept()
 
     def seen(self, id: str, *, now_ms: int) -> None:
         """Record a visit. It is written once a minute, in the background; errors are logged only."""
@@ -146,6 +168,7 @@ class Devices:
             write()
         else:
             self._storage.submit(write)
+        self.on_kept()
 
     def _own_name(self, name: str) -> str:
         taken = {one.name for one in self._devices.values()}
@@ -159,7 +182,12 @@ class Devices:
 
     def _content(self) -> Mapping[str, Any]:
         devices = [asdict(one) for one in self._devices.values()]
-        return {"server": self.server, "signing_key": self.signing_key, "devices": devices}
+        return {
+            "server": self.server,
+            "signing_key": self.signing_key,
+            "devices": devices,
+            "removed": dict(self.removed),
+        }
 
     def _write(self, content: Mapping[str, Any]) -> None:
         if self._path is not None:
@@ -172,19 +200,22 @@ class Devices:
                 self._write(self._content())
                 return
             server, key = str(found["server"]), str(found["signing_key"])
-            devices = [_device(one) for one in found["devices"]]
+            devices = [device_of(one) for one in found["devices"]]
+            removed = {str(id): int(at_ms) for id, at_ms in found.get("removed", {}).items()}
             if len(server) != 8 or len(key) < 64:
                 raise ValueError("its keys are too short")
-        except (ValueError, KeyError, TypeError) as why:
+        except (ValueError, KeyError, TypeError, AttributeError) as why:
             aside = set_aside(path, "damaged")
             log.error("the list of paired devices cannot be read (%s): all pair anew; it is kept as %s", why, aside)
             self._write(self._content())
             return
         self.server, self.signing_key = server, key
         self._devices = {one.id: one for one in devices}
+        self.removed = removed
 
 
-def _device(found: Mapping[str, Any]) -> Device:
+def device_of(found: Mapping[str, Any]) -> Device:
+    """Raises ValueError, KeyError or TypeError where it is none."""
     digest = str(found["secret_sha256"])
     if len(digest) != 64:
         raise ValueError("a hash is not one")
@@ -194,6 +225,7 @@ def _device(found: Mapping[str, Any]) -> Device:
         role=Role(found["role"]),
         secret_sha256=digest,
         paired_ms=int(found["paired_ms"]),
+        changed_ms=int(found.get("changed_ms", found["paired_ms"])),
         seen_ms=int(found["seen_ms"]),
     )
 

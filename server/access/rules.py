@@ -26,19 +26,23 @@ _SHELL = "manifest.webmanifest worker.js offline favicon.ico apple-touch-icon.pn
 
 RULES: tuple[tuple[str, str, Needs], ...] = (  # methods, pattern of the whole path, who; the first that fits holds
     (_READS, r"/", Needs.NOBODY),  # the page's shell, which contains no data of the car
+    (_READS, r"/fleet", Needs.NOBODY),  # as "/"
     (_READS, r"/static/.+", Needs.NOBODY),
     (_READS, "/(" + "|".join(map(re.escape, _SHELL)) + ")", Needs.NOBODY),
     (_READS, r"/api/health", Needs.NOBODY),  # status and version, for who is not known
     ("POST", r"/api/pair", Needs.NOBODY),
     ("POST", r"/api/ticket", Needs.VIEWER),  # the socket has further checks
     (_ANY_METHOD, r"/api/devices(/.*)?", Needs.OPERATOR),  # who else is paired
+    (_ANY_METHOD, r"/api/(people|duty)(/.*)?", Needs.OPERATOR),  # names of people
     (_ANY_METHOD, r"/api/mail(/.*)?", Needs.OPERATOR),  # addresses of people, the login of the mail server
 )
+_AT_AGENT = re.compile(r"/agents/[^/]+(?=/api/)")  # before the path at a car's agent, at a web node
 _COMPILED = tuple((methods.split(), re.compile(pattern), needs) for methods, pattern, needs in RULES)
 
 
 def needs_of(method: str, path: str) -> Needs:
     """Who may send such a request; `path` as the router reads it, decoded."""
+    path = _AT_AGENT.sub("", path, count=1) if path.startswith("/agents/") else path
     for methods, pattern, needs in _COMPILED:
         if (method in methods or methods == [_ANY_METHOD]) and pattern.fullmatch(path):
             return needs

@@ -51,6 +51,7 @@ def _recording(report: Report) -> dict[str, Any]:
         "complete": run.broke_off is None and not run.damage,
         "broke_off": run.broke_off,
         "damage": list(run.damage),
+        "verified": [{"file": one.path.name, **one.as_json()} for one in report.verified],
     }
 
 

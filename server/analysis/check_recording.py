@@ -20,6 +20,7 @@ from server.analysis.report import Report
 from server.judge.settings import BadSetting
 from server.judge.settings_override import SettingsOverride
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
+from server.recording.verification import of_files
 from server.simulator.scenarios import planned
 from server.system.memory_limit import TOO_LARGE, bounded_memory
 from server.system.page_files import AssetsMissing
@@ -126,7 +127,14 @@ def _report(
         before = run(options.overrides[0], 0.0, with_faults=len(options.overrides) == 2, with_traces=False)
     done_s = length_s if is_compared else 0.0
     found = run(options.overrides[-1], done_s, with_faults=True, with_traces=options.with_page)
-    return Report(files=[str(path) for path in files], recording=recording, run=found, before=before, open_s=open_s)
+    return Report(
+        files=[str(path) for path in files],
+        recording=recording,
+        run=found,
+        before=before,
+        open_s=open_s,
+        verified=of_files(recording),
+    )
 
 
 def _demand_extract(recording: Recording, options: CheckOptions) -> None:

@@ -50,7 +50,7 @@ class Ribbons:
             if spans:
                 from_s, _, verdict, before = spans[-1]
                 if verdict is tile.verdict and (before == text or verdict is Verdict.FAULT):
-                    continue  # its end is told when something else begins
+                    continue  # its end is reported when something else begins
                 spans[-1] = (from_s, now_s, verdict, before)
             spans.append((now_s, now_s, tile.verdict, text))
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from monitor.link import LinkFacts
 from server.judge.message import Message
 from server.simulator.effects import Effect, Silence
-from server.simulator.scenarios import Planned, Scenario, inject
+from server.simulator.scenario import Scenario
+from server.simulator.scenarios import Planned, inject
 
 # How a session learns that a bridge stopped: the link is dropped after this long without any sign of life.
 FROZEN_FOUND_AFTER_S = 2.0

@@ -9,7 +9,7 @@ import re
 from datetime import UTC, datetime
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Any, Protocol
 
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
@@ -22,13 +22,16 @@ from server.system.page_files import check_vendor, static_dir
 from server.version import catgraph_version
 
 _SCRIPTS = ("layout", "elements", "view", "alarms", "plots", "track", "overview")  # each imports earlier ones only
-_RIBBON_TEXTS = 400  # reasons in one file; more tell nobody anything
+_RIBBON_TEXTS = 400  # reasons in one file; more would not be read
 
 
-def page(report: Report) -> str:
-    """The whole document. Raises AssetsMissing where the page's third-party files are not there."""
+def page(report: Report, drive: FirstPart | None = None) -> str:
+    """The whole document; `drive`: what comes first, and is all that is printed.
+
+    Raises AssetsMissing where the page's third-party files are not there.
+    """
     check_vendor()
-    script, style = _script(), _style()
+    script, style = _script(), _style() + ("" if drive is None else _page_foot(drive.foot))
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters |= {
         "clock": report_text.clock,
@@ -44,13 +47,34 @@ def page(report: Report) -> str:
         script=Markup(script),
         data=Markup(_json(_data(report))),
         policy=_policy(script, style),
+        drive=Markup("") if drive is None else drive.sheet(environment, _text("drive.html")),
     )
+
+
+class FirstPart(Protocol):
+    """What stands before the analysis: the drive's report."""
+
+    @property
+    def foot(self) -> str:
+        """At the foot of each printed page."""
+        ...
+
+    def sheet(self, environment: Environment, template: str) -> Markup:
+        """As HTML."""
+        ...
+
+
+def _page_foot(words: str) -> str:
+    """A style of plain letters only: nothing in them can end the text."""
+    plain = re.sub(r"[^A-Za-z0-9 .,·]", "", words)
+    return f'\n@page {{ @bottom-left {{ content: "{plain}"; font: 12px system-ui, sans-serif; }} }}\n'
 
 
 def _policy(script: str, style: str) -> str:
     """What the page may do: run this script, look like this, and nothing from anywhere."""
     return (
         f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; font-src data:; "
+        "img-src data:; media-src data:; "
         "base-uri 'none'; form-action 'none'"
     )
 
@@ -179,7 +203,7 @@ def _style() -> str:
 
     tokens = re.sub(r'url\("\.\./fonts/([\w.-]+)"\)', inlined, tokens)
     plot = (static / "vendor" / "uPlot.min.css").read_text(encoding="utf-8")
-    return _no_end(f"{tokens}\n{plot}\n{_text('report.css')}")
+    return _no_end(f"{tokens}\n{plot}\n{_text('report.css')}\n{_text('drive.css')}")
 
 
 def _no_end(text: str) -> str:

@@ -245,7 +245,9 @@ class _Rehearsal(Observer):
 
     def _note_rejected(self) -> None:
         for topic, count in sorted(self._recording.rejected.items()):
-            self.notes.append(f"{count} messages on {topic} left out: {self._recording.why_rejected[topic]}.")
+            self.notes.append(
+                f"{count} messages on {topic} left out: {self._recording.why_rejected.get(topic, 'not JSON')}."
+            )
         self.notes += [f"{sentence}." for sentence in self._recording.damage]
         for crash in self._crashes.values():
             self.notes.append(f"The check {crash.check_id} fails: {crash.error}.")

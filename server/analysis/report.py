@@ -14,6 +14,7 @@ from server.analysis.recorded_log import RecordedLog
 from server.analysis.rehearse import Rehearsed
 from server.judge.settings_override import SettingsOverride
 from server.recording.read.read import Recording
+from server.recording.verification import Verification
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +47,7 @@ class Report:
     before: Rehearsed | None = None  # with the first settings of two, or without the injected faults
     open_s: float = 0.0  # what opening the files took
     recorded_log: RecordedLog | None = None  # of the page of a drive
+    verified: Sequence[Verification] = ()  # the hash chain of each file that is ours
 
     @property
     def changes(self) -> list[Change]:
@@ -75,6 +77,15 @@ class Report:
             return datetime.fromtimestamp(self.recording.start_s, UTC) if self.recording.count else None
         except (OverflowError, ValueError, OSError):
             return None
+
+    @property
+    def event_log(self) -> list[tuple[str, str, bool]]:
+        """Whether each file is as it was recorded: a few words, all of it, and whether it is not."""
+        several = len(self.verified) > 1
+        return [
+            (f"{one.path.name}: {one.short}" if several else one.short, one.sentence, one.is_broken)
+            for one in self.verified
+        ]
 
     def signals(self) -> list[SignalRow]:
         return [_row(self.run, name) for name in SIGNALS]

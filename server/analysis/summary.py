@@ -38,6 +38,9 @@ def _head(report: Report) -> Iterator[str]:
     yield f"  Vehicle profile: {run.tuning.profile.title}. Settings: {by}"
     for _, label, value, unit in settings:
         yield f"    {label} {value:g} {unit}".rstrip()
+    for short, sentence, _ in report.event_log:
+        yield f"  Event log: {printable(short)}"
+        yield f"    {printable(sentence, 600)}"
     for laid in run.faults:
         yield f"  Injected: {laid.name} from {clock(laid.from_s)} to {clock(laid.to_s)}, {_touched(laid.touched)}"
     if report.took_s > 0 and run.judged_s > 0:

@@ -24,14 +24,20 @@ from server.web.routes import (
     docs,
     exports,
     log,
+    logbook,
     mail,
     map,
+    marks,
     metrics,
+    off_vehicles,
     page_socket,
     pages,
+    people,
+    recorded_marks,
     recordings,
     settings,
     state,
+    stored,
     third_party,
 )
 
@@ -40,14 +46,20 @@ ROUTERS = tuple(
     module.router
     for module in (
         state,
+        off_vehicles,
         commands,
         alarms,
+        marks,
         settings,
         page_socket,
         devices,
+        people,
         log,
         exports,
+        logbook,
         recordings,
+        recorded_marks,
+        stored,
         mail,
         metrics,
         map,
@@ -80,6 +92,10 @@ def create_app(
     )
     app.state.services = running
     app.state.strict_transport = config.tls is not None and config.tls.mode == "files"
+    if running.agents is not None:
+        from server.web.agents.to_agents import ToAgents  # only here: without a broker nats-py need not be installed
+
+        app.add_middleware(ToAgents, node=running.agents, vehicles=lambda: running.vehicles)
     app.add_middleware(Throttle, limits=config.limits, now=now)
     app.add_middleware(Guard, access=running.access)
     errors.install(app)

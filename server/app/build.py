@@ -6,11 +6,19 @@ import secrets
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from monitor.catalog import AnyCheck
+from server.access.access import FOLDER as ACCESS_FOLDER
 from server.access.access import Access
+from server.access.order_keys import KnownDevices, OrderKeys
+from server.access.people import People
+from server.access.shared_devices import SharedDevices
+from server.access.shared_people import SharedPeople
+from server.access.signed_orders import SignedOrders
+from server.app import store
 from server.app.config import Config
-from server.bus.bus import SessionBus
+from server.bus.bus import PageBus, SessionBus
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.judge.settings import SettingsFile
@@ -19,60 +27,204 @@ from server.mail.recorded import Recorded
 from server.recording.catalog.catalog import Catalog
 from server.recording.export.jobs import Exports
 from server.recording.folder import RecordingsFolder
+from server.recording.marks.keeper import MarkKeeper
+from server.recording.marks.pending import PendingMedia
 from server.replay.manager import ReplayManager, ReplaySource
 from server.storage.data_folder import DataFolder
 from server.storage.storage_thread import StorageThread
 from server.system.page_files import static_dir
+from server.vehicle.marks import MarksPlace
 from server.vehicle.session import Session
 from server.vehicle.vehicle import Vehicle
 from server.version import catgraph_version
+from server.web.agents.at_agent import AtAgent, scope_of
 from server.web.assets.bundle import find
 from server.web.assets.service_worker import build_of
 from server.web.hub import Hub
 from server.web.maps.layers import MapLayers
 from server.web.maps.tile_proxy import Upstream
-from server.web.services import Services
+from server.web.off_vehicles import OffVehicles
+from server.web.services import Link, Services
+
+if TYPE_CHECKING:  # without a broker nats-py need not be installed
+    from server.bus.nats_http_node import HttpNode
 
 
 def build(
     config: Config, *, now: Callable[[], float], wall_ms: Callable[[], int], checks: Sequence[AnyCheck] | None
 ) -> tuple[Services, Journal, StorageThread]:
     """What the routes use, the journal below its bus, and the thread that writes it. Raises as `create_app` does."""
+    boot = secrets.token_hex(8)
     ground = MapLayers(config.maps, config.site_image, _upstream(config, now=now, wall_ms=wall_ms))
-    folder = DataFolder(config.data) if config.data is not None else None
+    folder = None if config.data is None else DataFolder(config.data)
     storage = StorageThread()
-    journal = Journal(config.data / "events.sqlite" if config.data is not None else None, thread=storage)
+    kept = None if config.is_node else config.data  # what belongs to the cars is kept at their agents
+    journal = Journal(kept / "events.sqlite" if kept else None, thread=storage)
     bus = LocalBus(journal, now=now, storage=storage)
-    replays = ReplayManager(lambda id: _replay_source(running, id), now=now)
+    access = _access(config, storage, now=now, wall_ms=wall_ms)
+    orders = _orders(config, storage, lambda name, by, text: _note_device(running, name, by, text), now, wall_ms)
+    off = OffVehicles(config.data if config.is_node else None, storage, wall_ms=wall_ms)
+    people = People(config.data, wall_ms=wall_ms, storage=storage)
+    page_bus, link, agents = _fleet(
+        config, bus, access, people, boot, storage, orders, off, AtAgent(lambda: running), now=now, wall_ms=wall_ms
+    )
+    replays = _replays(agents, lambda id: _replay_source(running, id), now=now)
     running = Services(
         is_open=config.is_open,
         keeps_shell=config.worker,
         found=config.found,
         folder=folder,
         storage=storage,
-        bus=bus,
+        bus=page_bus,
         unwritten_events=lambda: bus.unwritten_events,
-        hub=Hub(
-            bus, replays=replays, server=lambda: running.server_facts(), limits=config.limits, now=now, wall_ms=wall_ms
-        ),
-        access=_access(config, storage, now=now, wall_ms=wall_ms),
+        hub=_hub(lambda: running, page_bus, replays, config, off, people, now=now, wall_ms=wall_ms),
+        access=access,
+        people=people,
         sessions={},
         now=now,
         wall_ms=wall_ms,
-        boot=secrets.token_hex(8),
+        boot=boot,
         version=catgraph_version(),
         build=build_of(find(static_dir())),
         started_s=now(),
         ground=ground,
-        mailer=_mailer(config.data, lambda id: _recording(running, id), wall_ms=wall_ms),
+        off=off,
+        mailer=_mailer(kept, lambda id: _recording(running, id), wall_ms=wall_ms),
         replays=replays,
-        recordings=_catalog(config.data, now=now, wall_ms=wall_ms),
+        recordings=_catalog(kept, now=now, wall_ms=wall_ms),
+        link=link,
+        agents=agents,
+        challenge=None if orders is None else orders.challenge,
     )
-    if running.recordings is not None and config.data is not None:
-        running.exports = _exports(config.data, running.recordings, now=now, wall_ms=wall_ms)
+    _add_to_recordings(running, bus, kept, now=now, wall_ms=wall_ms)
+    store.add(running, config.store, kept)
     for vehicle in config.vehicles:
         running.sessions[vehicle.name] = _session(vehicle, running, bus, config, checks, storage)
     return running, journal, storage
+
+
+def _add_to_recordings(
+    running: Services, bus: LocalBus, kept: Path | None, *, now: Callable[[], float], wall_ms: Callable[[], int]
+) -> None:
+    """Exports and late marks."""
+    running.exports = _exports(kept, running.recordings, now=now, wall_ms=wall_ms)
+    if kept is not None:
+        running.pending_media = PendingMedia(kept / "marks")
+        running.marks = MarkKeeper(
+            RecordingsFolder(kept / "recordings"),
+            running.pending_media,
+            vehicles=lambda: tuple(running.sessions),
+            find_events=bus.find_events,
+            on_changed=running.marks_changed,
+            wall_ms=wall_ms,
+        )
+
+
+def _hub(
+    running: Callable[[], Services],
+    bus: PageBus,
+    replays: ReplayManager,
+    config: Config,
+    off: OffVehicles,
+    people: People,
+    *,
+    now: Callable[[], float],
+    wall_ms: Callable[[], int],
+) -> Hub:
+    return Hub(
+        bus,
+        replays=replays,
+        server=lambda: running().server_facts(),
+        limits=config.limits,
+        off=off.of,
+        now=now,
+        wall_ms=wall_ms,
+        people=people,
+    )
+
+
+def _fleet(
+    config: Config,
+    bus: LocalBus,
+    access: Access,
+    people: People,
+    boot: str,
+    storage: StorageThread,
+    orders: SignedOrders | None,
+    off: OffVehicles,
+    at_agent: AtAgent,
+    *,
+    now: Callable[[], float],
+    wall_ms: Callable[[], int],
+) -> tuple[PageBus, Link | None, HttpNode | None]:
+    """The bus of the pages, the connection to the broker, and at a web node the way to what agents keep.
+
+    Raises BrokerRefused.
+    """
+    if config.broker is None:
+        return bus, None, None
+    # Only here: without a broker nats-py need not be installed.
+    from server.access.devices_bucket import DevicesBucket
+    from server.bus.nats_agent import NatsAgent
+    from server.bus.nats_bus import NatsBus
+    from server.bus.nats_http_agent import HttpAgent
+    from server.bus.nats_http_node import HttpNode
+    from server.bus.nats_link import BrokerLink
+    from server.web.known_vehicles import KnownVehicles
+    from server.web.remote_frames import RemoteFrames
+
+    if config.is_node:
+        known = KnownVehicles(config.data, storage, forget=config.forgotten)
+        expected = known.names.union(config.expected)
+        remote = NatsBus(now=now, read=RemoteFrames(wall_ms), expected=expected, on_new=known.note, on_heard=off.heard)
+        agents = HttpNode(remote.trouble, now=now)
+        if not config.is_open:
+            bucket = DevicesBucket(SharedDevices(access, wall_ms=wall_ms, people=SharedPeople(people)))
+            access.devices.on_kept = people.on_changed = bucket.changed
+            return remote, BrokerLink(config.broker, remote, agents, bucket, name="catgraph web"), agents
+        return remote, BrokerLink(config.broker, remote, agents, name="catgraph web"), agents
+    assert orders is not None
+    agent = NatsAgent(bus, run=boot, now=now, admit=orders.admit)
+    kept = HttpAgent(lambda: bus.vehicles, at_agent, scope_of, now=now)
+    name = f"catgraph agent {' '.join(v.name for v in config.vehicles)}"
+    return bus, BrokerLink(config.broker, agent, kept, name=name), None
+
+
+def _replays(
+    agents: HttpNode | None, find: Callable[[str], ReplaySource | None], *, now: Callable[[], float]
+) -> ReplayManager:
+    """Replays of this machine, or at a web node those of the agents."""
+    if agents is None:
+        return ReplayManager(find, now=now)
+    from server.web.agents.remote_replays import RemoteReplays  # only here, as above
+
+    return RemoteReplays(agents, now=now)
+
+
+def _orders(
+    config: Config,
+    storage: StorageThread,
+    note: Callable[[str, str, str], None],
+    now: Callable[[], float],
+    wall_ms: Callable[[], int],
+) -> SignedOrders | None:
+    """What an agent requires of orders through web nodes; None: this is no agent. Raises OSError and BadList."""
+    if config.broker is None or config.is_node:
+        return None
+    listed = config.known_devices
+    return SignedOrders(
+        OrderKeys(None if config.data is None else config.data / ACCESS_FOLDER, storage=storage),
+        known=None if listed is None else KnownDevices(listed, storage=storage, now=now),
+        is_required=config.requires_signed,
+        now=now,
+        wall_ms=wall_ms,
+        note=note,
+    )
+
+
+def _note_device(running: Services, vehicle: str, by: str, text: str) -> None:
+    if (session := running.sessions.get(vehicle)) is not None:
+        session.note("device", text, by=by or None)
 
 
 def _session(
@@ -94,7 +246,12 @@ def _session(
         checks=checks,
         settings=SettingsFile(data / "settings" / f"{vehicle.name}.toml" if data else None),
         recordings=RecordingsFolder(data / "recordings") if data else None,
-        on_finished=running.recordings.add if running.recordings is not None else lambda _: None,
+        on_finished=running.recording_finished,
+        marks=MarksPlace(
+            on_late=partial(running.came_late, vehicle.name),
+            on_described=partial(running.came_late, vehicle.name),
+            media=data / "marks" / vehicle.name if data else None,
+        ),
         storage=storage,
     )
 
@@ -123,7 +280,11 @@ def _catalog(data: Path | None, *, now: Callable[[], float], wall_ms: Callable[[
     return Catalog(data / "recordings", data / "recordings.sqlite", now=now, wall_ms=wall_ms)
 
 
-def _exports(data: Path, catalog: Catalog, *, now: Callable[[], float], wall_ms: Callable[[], int]) -> Exports:
+def _exports(
+    data: Path | None, catalog: Catalog | None, *, now: Callable[[], float], wall_ms: Callable[[], int]
+) -> Exports | None:
+    if data is None or catalog is None:
+        return None
     folder = RecordingsFolder(catalog.folder)
     return Exports(data / "exports", folder, catalog.path, catalog.add, now=now, wall_ms=wall_ms)
 

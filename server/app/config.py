@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Literal
 
 from server.access.keys import Keys
+from server.bus.broker import Broker
 from server.protocol.rate_limit import Limits
+from server.recording.store.address import StoreAddress
 from server.system.loopback import is_loopback
 from server.vehicle.vehicle import Vehicle
 from server.web.maps.map_options import MapUpstream
@@ -22,6 +24,14 @@ class Tls:
     cert: Path | None = None  # the chain as PEM, the server's certificate first; with mode files
     key: Path | None = None
     setup_port: int | None = None  # of the plain listener that explains; None: the one after `port`, 0: a free one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Store:
+    """Where copies of recordings are."""
+
+    address: StoreAddress
+    depot_interface: str | None = None  # while it is connected, the car is in the depot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +51,13 @@ class Config:
     names: tuple[str, ...] = ()  # what else this server is called: hosts, or origins (https://…) of a proxy before it
     keys: Keys = field(default_factory=Keys)  # of programs, where devices are paired
     tls: Tls | None = None  # None: off on loopback, else auto
+    broker: Broker | None = None  # the vehicles are offered to web nodes there
+    requires_signed: bool = True  # at a broker: orders that web nodes pass on are signed by the device that gives them
+    known_devices: Path | None = None  # the list of devices whose orders count; None: those of any that signs
+    is_node: bool = False  # a web node: the vehicles are those of agents at the broker, and `vehicles` has none
+    expected: tuple[str, ...] = ()  # at a web node: vehicles that are listed before they are heard
+    forgotten: tuple[str, ...] = ()  # at a web node: vehicles that were heard once and are listed no more
+    store: Store | None = None  # recordings are uploaded into it; at a web node those of all cars are listed
     limits: Limits = field(default_factory=Limits)
     next_steps: tuple[str, ...] = ()  # printed at the start below the addresses, a line each
 

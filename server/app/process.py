@@ -20,7 +20,7 @@ import ifaddr
 import uvicorn
 
 from server.access.invitations import LASTS_S
-from server.app import tls_options
+from server.app import store_options, tls_options
 from server.app.app import create_app
 from server.app.banner import Announcement, Pairing, addresses, invitation, lines
 from server.app.config import Config, Tls, default_data
@@ -44,7 +44,8 @@ class CannotServe(Exception):
     """The server cannot start; `str()` is one sentence."""
 
 
-def add_common_arguments(parser: argparse.ArgumentParser) -> None:
+def add_common_arguments(parser: argparse.ArgumentParser, *, has_cars: bool = True) -> None:
+    """`has_cars`: the sessions are in this process, and so are their recordings."""
     parser.add_argument(
         "--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1: this machine only)"
     )
@@ -72,6 +73,7 @@ def add_common_arguments(parser: argparse.ArgumentParser) -> None:
         help="an image of the site above the maps; FILE.toml has its corners (docs/guide/map.md)",
     )
     map_options.add_arguments(parser)
+    store_options.add_arguments(parser, uploads=has_cars)
     parser.add_argument(
         "--no-worker",
         action="store_true",
@@ -204,10 +206,12 @@ def _announce(
         print(line, flush=True)
     running.access.listens_at(said.url)
     if draws and not config.is_open:
-        running.access.on_paired = lambda name, role: _tell_paired(running, said.url, f"{name} was paired as {role}.")
+        running.access.on_paired = lambda name, role: _print_invitation(
+            running, said.url, f"{name} was paired as {role}."
+        )
 
 
-def _tell_paired(running: Services, url: str, what: str) -> None:
+def _print_invitation(running: Services, url: str, what: str) -> None:
     for line in invitation(url, _pairing(running), f"  {what} The next device:"):
         print(line, flush=True)
 

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 Handler = Callable[[Mapping[str, Any]], Awaitable[Mapping[str, Any]]]
 Watcher = Callable[[str], None]
 ALL = ""  # in the place of a vehicle, whose name is never empty: what is of all of them
+SUMMARY = "summary"  # what a session puts for the pages of other cars, in `ALL` under the vehicle's name
+UNSERVED = "unserved"  # to a watcher: nothing comes from the vehicle's session
 FRAME_LIVES_S = 2.0  # an older frame is outdated: its session has stopped
 
 
@@ -19,8 +21,8 @@ FRAME_LIVES_S = 2.0  # an older frame is outdated: its session has stopped
 class Frame:
     """Bytes ready to send, made once for all pages.
 
-    `put_s`: when it was put, by the clock of this process in seconds; where it came from another one, it was not put
-    earlier than that.
+    `put_s`: when what it holds was so, by the clock of this process in seconds; where it came from another one, it was
+    not put earlier than that.
     """
 
     number: int
@@ -28,15 +30,35 @@ class Frame:
     put_s: float
 
 
+Outcome = Literal["not_delivered", "unknown"]
+Cut = Literal["server-broker", "broker-agent"]  # where the way to the session is broken
+
+
 class NotServed(LookupError):
-    """No session serves the vehicle, or it did not answer in time."""
+    """No session serves the vehicle, or it did not answer in time; `str()` says why.
+
+    `outcome`: a command was not delivered and never will be, or it may have been carried out.
+    """
+
+    def __init__(self, why: str, *, outcome: Outcome = "not_delivered", cut: Cut | None = None) -> None:
+        super().__init__(why)
+        self.outcome = outcome
+        self.cut = cut
+
+
+class NotAdmitted(PermissionError):
+    """The vehicle does not carry out what was passed on to it in somebody's name; `str()` is one sentence."""
 
 
 class SessionBus(Protocol):
     """What a session needs: to publish, to serve, and to know whether anybody looks."""
 
-    def put(self, vehicle: str, kind: str, payload: str | bytes) -> None:
-        """Replaces the newest frame of a kind and wakes those who watch the vehicle."""
+    def put(self, vehicle: str, kind: str, payload: str | bytes, *, made_s: float | None = None) -> None:
+        """Replaces the newest frame of a kind and wakes those who watch the vehicle.
+
+        `made_s`: when what it holds was so, by the clock of this process: it may have been stopped before the frame was
+        put. None: now.
+        """
 
     def append(self, vehicle: str, events: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         """Numbers events and returns them with their numbers `n`; pages are woken once they may have them."""
@@ -92,11 +114,32 @@ class PageBus(Protocol):
     def vehicles(self) -> tuple[str, ...]:
         """The vehicles that are served."""
 
+    @property
+    def grows(self) -> bool:
+        """Whether vehicles may be added while it runs."""
+
+    def trouble(self, vehicle: str) -> str | None:
+        """Why nothing comes from the vehicle's session, as a sentence; None: it is there.
+
+        While there is a trouble, watchers are called with `UNSERVED` twice a second.
+        """
+
+    def knows(self, vehicle: str) -> bool:
+        """Whether it is known which events the vehicle has; before, pages of it are not greeted."""
+
+    def run(self, vehicle: str) -> str:
+        """In which run of its session the vehicle's events are numbered; "": in this process."""
+
     async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> Mapping[str, Any]:
         """The answer to a command, once the events that it caused may be shown. Raises NotServed."""
 
     def watch(self, vehicle: str, watcher: Watcher) -> Callable[[], None]:
         """Calls `watcher(kind)` whenever something new is there; answers how to end that."""
 
+    def watch_events(self, vehicle: str, watcher: Watcher) -> Callable[[], None]:
+        """Calls `watcher(name)` whenever pages may have new events of a vehicle, or of any for `ALL`; whoever does is
+        no viewer. Answers how to end that."""
+
     def want(self, vehicle: str, kind: str, change: int) -> None:
-        """Add (+1) or remove (−1) a viewer of a frame kind that is built only while it is viewed."""
+        """Add (+1) or remove (−1) a viewer of a frame kind that is built only while it is viewed; of `ALL`, a viewer of
+        summaries also where one vehicle is known."""

@@ -14,7 +14,7 @@ COLUMNS = (
     *("n", "time", "change", "alarm", "occurrence", "title", "priority", "state", "text", "by"),
     *("measured", "limit", "unit", "causes", "settings_version", "details"),
 )
-_TOLD = frozenset((*COLUMNS, "at_ms", "place", "sound", "announces"))  # the rest is in `details`, as JSON
+_NOT_DETAILS = frozenset((*COLUMNS, "at_ms", "place", "sound", "announces"))  # the rest is in `details`, as JSON
 # A spreadsheet runs a cell that begins so; some take the wide letters for the same.
 _FORMULA = ("=", "+", "-", "@", "|", "\uff1d", "\uff0b", "\uff0d", "\uff20")
 
@@ -22,7 +22,7 @@ _FORMULA = ("=", "+", "-", "@", "|", "\uff1d", "\uff0b", "\uff0d", "\uff20")
 def event_row(event: Mapping[str, Any]) -> list[Any]:
     """The columns of one event: its values as numbers, everything else as JSON."""
     measured, limit = event.get("measured") or {}, event.get("limit") or {}
-    details = {name: value for name, value in event.items() if name not in _TOLD and value not in (None, [])}
+    details = {name: value for name, value in event.items() if name not in _NOT_DETAILS and value not in (None, [])}
     row = {
         **event,
         "time": datetime.fromtimestamp(event["at_ms"] / 1000, UTC).isoformat(timespec="milliseconds"),

@@ -9,6 +9,7 @@ from typing import Any
 
 from server.bus.bus import FRAME_LIVES_S, Frame, Handler, NotServed, Watcher
 from server.bus.journal import Journal
+from server.bus.watchers import Watchers
 from server.storage.storage_thread import StorageThread
 
 SHOWN_AFTER_S = 0.05  # an event that waits longer for the disk is shown without it
@@ -30,17 +31,15 @@ class LocalBus:
         self._changed = asyncio.Event()  # something was released
         self._frames: dict[tuple[str, str], Frame] = {}
         self._handlers: dict[str, Handler] = {}
-        self._watchers: dict[str, dict[int, Watcher]] = {}
-        self._event_watchers: dict[str, list[Callable[[], None]]] = {}
-        self._next_watcher = 0
+        self._watchers = Watchers()
         self._wanted: dict[tuple[str, str], int] = {}
 
-    def put(self, vehicle: str, kind: str, payload: str | bytes) -> None:
-        """Replaces the newest frame of a kind and wakes those who watch the vehicle."""
+    def put(self, vehicle: str, kind: str, payload: str | bytes, *, made_s: float | None = None) -> None:
         previous = self._frames.get((vehicle, kind))
         number = previous.number + 1 if previous else 1
-        self._frames[vehicle, kind] = Frame(number=number, payload=payload, put_s=self._now())
-        self._wake(vehicle, kind)
+        put_s = self._now() if made_s is None else made_s
+        self._frames[vehicle, kind] = Frame(number=number, payload=payload, put_s=put_s)
+        self._watchers.wake(vehicle, kind)
 
     def newest(self, vehicle: str, kind: str) -> Frame | None:
         frame = self._frames.get((vehicle, kind))
@@ -52,7 +51,7 @@ class LocalBus:
             return []
         if self._storage is None:
             numbered = self._journal.append(vehicle, events)
-            self._wake(vehicle, "events")
+            self._watchers.wake(vehicle, "events")
             return numbered
         loop = asyncio.get_running_loop()
         self._journal.on_saved = lambda: _call_soon(loop, self._release_saved)
@@ -76,7 +75,7 @@ class LocalBus:
             self._held[vehicle] = n + 1
         self._changed.set()
         self._changed = asyncio.Event()
-        self._wake(vehicle, "events")
+        self._watchers.wake(vehicle, "events")
 
     def recent_events(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]] | None:
         """The events after number `n` that pages may have, from memory; None where the disk must be read."""
@@ -137,6 +136,19 @@ class LocalBus:
     def vehicles(self) -> tuple[str, ...]:
         return tuple(self._handlers)
 
+    @property
+    def grows(self) -> bool:
+        return False
+
+    def trouble(self, vehicle: str) -> str | None:
+        return None
+
+    def knows(self, vehicle: str) -> bool:
+        return True
+
+    def run(self, vehicle: str) -> str:
+        return ""
+
     async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> Mapping[str, Any]:
         """The answer to a command, once the events that it caused may be shown. Raises NotServed."""
         handler = self._handlers.get(vehicle)
@@ -146,7 +158,7 @@ class LocalBus:
             async with asyncio.timeout(deadline_s):
                 answer = await handler(command)
         except TimeoutError:
-            raise NotServed(f"{vehicle} did not answer within {deadline_s:g} s") from None
+            raise NotServed(f"{vehicle} did not answer within {deadline_s:g} s", outcome="unknown") from None
         last = self._journal.last(vehicle)
         while self._held.get(vehicle, last + 1) <= last:  # what is answered survives a crash; `SHOWN_AFTER_S` at most
             await self._changed.wait()
@@ -154,20 +166,15 @@ class LocalBus:
 
     def watch(self, vehicle: str, watcher: Watcher) -> Callable[[], None]:
         """Calls `watcher(kind)` whenever something new is there; answers how to end that."""
-        self._next_watcher += 1
-        key = self._next_watcher
-        self._watchers.setdefault(vehicle, {})[key] = watcher
-        return lambda: self._watchers[vehicle].pop(key, None) and None
+        return self._watchers.view(vehicle, watcher)
 
-    def watch_events(self, vehicle: str, watcher: Callable[[], None]) -> Callable[[], None]:
-        """Calls `watcher()` whenever pages may have new events; whoever does is no viewer."""
-        watchers = self._event_watchers.setdefault(vehicle, [])
-        watchers.append(watcher)
-        return lambda: watchers.remove(watcher)
+    def watch_events(self, vehicle: str, watcher: Watcher) -> Callable[[], None]:
+        """Calls `watcher(name)` whenever pages may have new events; whoever does is no viewer."""
+        return self._watchers.follow(vehicle, watcher)
 
     def watched(self, vehicle: str) -> int:
         """The number of viewers of the vehicle."""
-        return len(self._watchers.get(vehicle, ()))
+        return self._watchers.viewers(vehicle)
 
     def want(self, vehicle: str, kind: str, change: int) -> None:
         """Add (+1) or remove (−1) a viewer of a frame kind that is built only while it is viewed."""
@@ -175,13 +182,6 @@ class LocalBus:
 
     def wanted(self, vehicle: str, kind: str) -> bool:
         return self._wanted.get((vehicle, kind), 0) > 0
-
-    def _wake(self, vehicle: str, kind: str) -> None:
-        for watcher in tuple(self._watchers.get(vehicle, {}).values()):
-            watcher(kind)
-        if kind == "events":
-            for notify in tuple(self._event_watchers.get(vehicle, ())):
-                notify()
 
 
 def _call_soon(loop: asyncio.AbstractEventLoop, callback: Callable[[], None]) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from nats.aio.client import Client
@@ -18,16 +18,22 @@ from nats.aio.subscription import Subscription
 from nats.errors import Error as NatsError
 
 from server.bus import nats_wire as wire
-from server.bus.bus import ALL, Frame, NotServed
+from server.bus.bus import ALL, SUMMARY, Frame, NotAdmitted, NotServed
 from server.bus.local import LocalBus
 from server.bus.nats_sync import processed
+from server.system import log_context
 
 log = logging.getLogger("catgraph.bus")
 
 WANTED_FOR_S = 2.5  # after the last pull a node is taken to look no longer
 MOST_PULLS = 256  # that wait at once, of all nodes
 MOST_ASKED = 64  # requests at once; a flood is refused
+Admit = Callable[[str, Mapping[str, Any]], Awaitable[Mapping[str, Any]]]  # of vehicle, message; raises NotAdmitted
 FILTERS = frozenset({"before", "alarm", "change", "since_ms", "until_ms"})
+
+
+async def as_it_is(vehicle: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+    return message
 
 
 class Looked:
@@ -35,9 +41,9 @@ class Looked:
 
     def __init__(self, bus: LocalBus, vehicle: str, kind: str) -> None:
         self._bus = bus
-        self._key = (ALL, vehicle) if kind == wire.SUMMARY else (vehicle, kind)
+        self._key = (ALL, vehicle) if kind == SUMMARY else (vehicle, kind)
         self._changed = asyncio.Event()
-        self._is_extra = kind not in ("state", wire.SUMMARY)
+        self._is_extra = kind not in ("state", SUMMARY)
         self._unwatch = bus.watch(self._key[0], self._on_new)
         if self._is_extra:
             bus.want(*self._key, +1)
@@ -70,9 +76,11 @@ class Looked:
 class NatsAgent:
     """Answers nodes for the vehicles of `bus`, in this run of it. `now`: a monotonic clock in seconds, as the bus's."""
 
-    def __init__(self, bus: LocalBus, client: Client, *, run: str, now: Callable[[], float]) -> None:
+    def __init__(self, bus: LocalBus, *, run: str, now: Callable[[], float], admit: Admit = as_it_is) -> None:
+        """`admit` decides who gave a command that a node passes on, and whether it is carried out."""
+        self._admit = admit
         self._bus = bus
-        self._client = client
+        self._client: Client | None = None
         self._run = run
         self._now = now
         self._looked: dict[tuple[str, str], Looked] = {}
@@ -83,22 +91,33 @@ class NatsAgent:
         self._subscriptions: list[Subscription] = []
         self.refused = 0  # what could not be read, or was too much
 
-    async def start(self) -> None:
+    def open(self) -> None:
+        """Nothing: an agent does without a broker."""
+
+    def close(self) -> None:
+        """Nothing."""
+
+    async def start(self, client: Client) -> None:
+        """From now on nodes are answered by this client, until `stop`."""
+        self._client = client
         for vehicle in self._bus.vehicles:
             self._published[vehicle] = self._bus.last_event(vehicle)
             for what, answer in (("pull.*", self._on_pull), ("ask", self._on_ask)):
-                self._subscriptions.append(await self._client.subscribe(wire.subject(vehicle, what), cb=answer))
-            self._stops.append(self._bus.watch_events(vehicle, lambda v=vehicle: self._spawn(self._tell(v))))  # type: ignore[misc]
-        await processed(self._client)  # from now on it is asked
+                self._subscriptions.append(await client.subscribe(wire.subject(vehicle, what), cb=answer))
+            self._stops.append(self._bus.watch_events(vehicle, lambda name: self._spawn(self._publish_events(name))))
+        await processed(client)  # from now on it is asked
         self._spawn(self._be_here())
 
     async def stop(self) -> None:
+        client = self._client
         with contextlib.suppress(NatsError, TimeoutError):  # without a broker nothing is routed to it
             for subscription in self._subscriptions:
                 await subscription.unsubscribe()
-            await processed(self._client, within_s=1)  # from now on it is not asked
-        for stop in self._stops:
-            stop()
+            if client is not None:
+                await processed(client, within_s=1)  # from now on it is not asked
+        self._subscriptions.clear()
+        while self._stops:
+            self._stops.pop()()
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -147,7 +166,7 @@ class NatsAgent:
 
     # -- events --------------------------------------------------------------------------------------------------------
 
-    async def _tell(self, vehicle: str) -> None:
+    async def _publish_events(self, vehicle: str) -> None:
         """Publishes the events that pages may have since the last time; what is lost on the way is asked for."""
         while (n := self._published[vehicle]) < self._bus.last_event(vehicle):
             events = await self._bus.events_after(vehicle, n, wire.PORTION)
@@ -177,7 +196,12 @@ class NatsAgent:
         if self._asked >= MOST_ASKED:
             self.refused += 1
             return
-        self._spawn(self._answer(message, wire.vehicle_of(message.subject), asked))
+        vehicle = wire.vehicle_of(message.subject)
+        if (trace := (message.headers or {}).get(wire.TRACE)) is None:
+            self._spawn(self._answer(message, vehicle, asked))
+            return
+        with log_context.tracing(trace):
+            self._spawn(self._answer(message, vehicle, asked))
 
     async def _answer(self, message: Msg, vehicle: str, asked: wire.Ask) -> None:
         self._asked += 1
@@ -191,7 +215,7 @@ class NatsAgent:
                 filters = {name: value for name, value in asked.filters.items() if name in FILTERS}
                 found["events"] = await self._bus.find_events(vehicle, **filters, limit=asked.limit)
         except NotServed as why:
-            found["refused"] = str(why)
+            found["refused"], found["is_unknown"] = str(why), why.outcome == "unknown"
         finally:
             self._asked -= 1
         body = wire.Answer(run=self._run, now_s=self._now(), last=self._bus.last_event(vehicle), **found)
@@ -199,19 +223,28 @@ class NatsAgent:
 
     async def _command(self, vehicle: str, asked: wire.Ask) -> Any:
         """Raises NotServed, also for a command that came too late or was meant for an earlier run."""
-        left_s = asked.not_after_s - self._now()
         if asked.run != self._run:
             raise NotServed(f"{vehicle} has started again since the command was given")
-        if left_s <= 0:
+        self._left_s(vehicle, asked)
+        try:
+            command = await self._admit(vehicle, asked.command)
+        except NotAdmitted as why:
+            log.warning("command_not_admitted vehicle=%s why=%s", vehicle, why)
+            return {"ok": False, "reason": str(why)}
+        return await self._bus.request(vehicle, command, deadline_s=self._left_s(vehicle, asked))
+
+    def _left_s(self, vehicle: str, asked: wire.Ask) -> float:
+        """Until the command may not be carried out any more. Raises NotServed."""
+        if (left_s := asked.not_after_s - self._now()) <= 0:
             raise NotServed(f"the command reached {vehicle} too late and was not carried out")
-        return await self._bus.request(vehicle, asked.command, deadline_s=left_s)
+        return left_s
 
     async def _publish(self, vehicle: str, what: str, body: wire.Body) -> None:
         with contextlib.suppress(NatsError):
-            if self._client.is_connected:  # else it would wait in the client and come late
+            if self._client is not None and self._client.is_connected:  # else it would wait in the client and come late
                 await self._client.publish(wire.subject(vehicle, what), wire.encode(body))
 
     async def _respond(self, message: Msg, data: bytes) -> None:
         with contextlib.suppress(NatsError):
-            if self._client.is_connected and message.reply:
+            if self._client is not None and self._client.is_connected and message.reply:
                 await message.respond(data)

@@ -3,57 +3,108 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from nats.aio.client import Client
 from nats.aio.msg import Msg
 
 from server.bus import nats_wire as wire
-from server.bus.bus import ALL, FRAME_LIVES_S, Frame, NotServed, Watcher
-from server.bus.nats_events import EventCache
+from server.bus.bus import ALL, FRAME_LIVES_S, SUMMARY, UNSERVED, Frame, NotServed, Watcher
+from server.bus.nats_heard import GONE_AFTER_S, Heard
+from server.bus.nats_logs import RemoteLogs
 from server.bus.nats_pulls import Pulls
 from server.bus.nats_questions import Questions
 from server.bus.nats_sync import processed
+from server.bus.watchers import Watchers
 
-GONE_AFTER_S = 3.0  # an agent that has not been heard for so long is not served
+NOTIFY_EVERY_S = 0.5
+
+
+Read = Callable[[str, str, str | bytes, float], str | bytes]  # of vehicle, kind, payload, age [s]; raises Malformed
+
+
+def as_it_is(vehicle: str, kind: str, payload: str | bytes, age_s: float) -> str | bytes:
+    return payload
 
 
 class NatsBus:
     """What pages need, of vehicles whose agents are elsewhere. `now`: a monotonic clock in seconds."""
 
-    def __init__(self, client: Client, *, now: Callable[[], float]) -> None:
-        self._client = client
-        self._now = now
-        self._frames: dict[tuple[str, str], Frame] = {}
-        self._events: dict[str, EventCache] = {}
-        self._heard_s: dict[str, float] = {}
-        self._watchers: dict[str, dict[int, Watcher]] = {}
-        self._next_watcher = 0
-        self._wanted: dict[tuple[str, str], int] = {}
-        self._fetches: dict[str, asyncio.Task[None]] = {}
-        self._changed = asyncio.Event()
-        self._questions = Questions(client, now=now)
-        self._pulls = Pulls(client, self._questions, self._take_frame, now=now)
+    def __init__(
+        self,
+        *,
+        now: Callable[[], float],
+        read: Read = as_it_is,
+        expected: Collection[str] = (),
+        on_new: Watcher = lambda _: None,
+        on_heard: Watcher = lambda _: None,
+    ) -> None:
+        """`read` frames of agents; `expected`: vehicles that are listed from the start, the others once heard.
 
-    async def start(self) -> None:
-        await self._client.subscribe(wire.subject("*", "events"), cb=self._on_events)
-        await self._client.subscribe(wire.subject("*", "here"), cb=self._on_here)
-        await processed(self._client)
+        `on_new` is called with the name of each vehicle that is heard for the first time, `on_heard` each time.
+        """
+        self._on_new = on_new
+        self._on_heard = on_heard
+        self._now = now
+        self._read_frame = read
+        self._frames: dict[tuple[str, str], Frame] = {}
+        self._watchers = Watchers()
+        self._wanted: dict[tuple[str, str], int] = {}
+        self._notifying: asyncio.Task[None] | None = None
+        self._questions = Questions(now=now)
+        self._heard = Heard(self._questions, now=now, expected=expected)
+        self._logs = RemoteLogs(self._questions, lambda vehicle: self._watchers.wake(vehicle, "events"))
+        self._pulls = Pulls(self._questions, self._take_frame, now=now)
+
+    def open(self) -> None:
+        """Notify watchers of troubles, with or without a broker."""
+        self._notifying = asyncio.create_task(self._notify_of_troubles(), name="notify of troubles")
+
+    def close(self) -> None:
+        if self._notifying is not None:
+            self._notifying.cancel()
+
+    async def start(self, client: Client) -> None:
+        """From now on by this client, until `stop`."""
+        self._questions.client = client
+        await client.subscribe(wire.subject("*", "events"), cb=self._on_events)
+        await client.subscribe(wire.subject("*", "here"), cb=self._on_here)
+        await processed(client)
+        self._look(ALL)
 
     async def stop(self) -> None:
+        """Nothing comes any more, until the next start."""
+        self._questions.client = None
         await self._pulls.stop()
-        for task in self._fetches.values():
-            task.cancel()
-        await asyncio.gather(*self._fetches.values(), return_exceptions=True)
-
-    # -- who is there --------------------------------------------------------------------------------------------------
+        await self._logs.stop()
 
     @property
     def vehicles(self) -> tuple[str, ...]:
-        """All that were ever heard: one whose agent is gone is shown as lost, not left out."""
-        return tuple(sorted(self._events))
+        return self._heard.vehicles
+
+    @property
+    def grows(self) -> bool:
+        return True
+
+    def trouble(self, vehicle: str) -> str | None:
+        trouble = self._heard.trouble(vehicle)
+        if trouble is None and self._watchers.viewers(vehicle) and self.newest(vehicle, "state") is None:
+            return f"The agent of {vehicle} answers, and sends no values."
+        return trouble
+
+    def knows(self, vehicle: str) -> bool:
+        return vehicle in self._logs
+
+    def run(self, vehicle: str) -> str:
+        return self._logs.run(vehicle)
+
+    async def _notify_of_troubles(self) -> None:
+        while True:
+            for vehicle in self._watchers.viewed:
+                if vehicle != ALL and self.trouble(vehicle) is not None:
+                    self._watchers.wake(vehicle, UNSERVED)
+            await asyncio.sleep(NOTIFY_EVERY_S)
 
     async def _on_here(self, message: Msg) -> None:
         try:
@@ -64,15 +115,14 @@ class NatsBus:
         self._meet(vehicle, here.run, here.last)
 
     def _meet(self, vehicle: str, run: str, last: int) -> None:
-        is_new = vehicle not in self._events
-        cache = self._events.setdefault(vehicle, EventCache())
-        self._heard_s[vehicle] = self._now()
-        cache.begin(run, last)
-        self._fetch_missing(vehicle)
+        is_new = vehicle not in self._logs
+        self._heard.note(vehicle)
+        self._on_heard(vehicle)
+        self._logs.begin(vehicle, run, last)
         if is_new:
-            self._look(vehicle)
-
-    # -- frames --------------------------------------------------------------------------------------------------------
+            self._on_new(vehicle)
+            self._look(ALL)  # with a second one summaries are wanted of all
+            self._watchers.wake(vehicle, "events")  # from now on pages of it can be greeted
 
     def put(self, vehicle: str, kind: str, payload: str | bytes) -> None:
         """Of this node alone: a frame composed of what it has of all vehicles."""
@@ -88,62 +138,62 @@ class NatsBus:
         before = self._frames.get((vehicle, kind))
         number = before.number + 1 if before else 1
         self._frames[vehicle, kind] = Frame(number=number, payload=payload, put_s=put_s)
-        self._wake(vehicle, kind)
+        self._watchers.wake(vehicle, kind)
 
     def watch(self, vehicle: str, watcher: Watcher) -> Callable[[], None]:
-        self._next_watcher += 1
-        key = self._next_watcher
-        self._watchers.setdefault(vehicle, {})[key] = watcher
-        self._look_all(vehicle)
+        leave = self._watchers.view(vehicle, watcher)
+        self._look(vehicle)
 
-        def leave() -> None:
-            self._watchers[vehicle].pop(key, None)
-            self._look_all(vehicle)
+        def end() -> None:
+            leave()
+            self._look(vehicle)
 
-        return leave
+        return end
+
+    def watch_events(self, vehicle: str, watcher: Watcher) -> Callable[[], None]:
+        return self._watchers.follow(vehicle, watcher)
 
     def want(self, vehicle: str, kind: str, change: int) -> None:
         self._wanted[vehicle, kind] = self._wanted.get((vehicle, kind), 0) + change
         self._look(vehicle)
 
-    def _look_all(self, vehicle: str) -> None:
-        for one in self._events if vehicle == ALL else (vehicle,):
-            self._look(one)
-
     def _look(self, vehicle: str) -> None:
-        """Pull what somebody looks at, and nothing else."""
-        looked = {
-            "state": bool(self._watchers.get(vehicle)),
-            wire.SUMMARY: bool(self._watchers.get(ALL)) and vehicle in self._events,
-            **{kind: number > 0 for (whose, kind), number in self._wanted.items() if whose == vehicle},
-        }
-        for kind, is_looked in looked.items():
-            self._pulls.look(vehicle, kind, is_looked)
+        """Pull what somebody looks at, and nothing else; `ALL`: of each vehicle that was heard."""
+        for one in self._logs if vehicle == ALL else (vehicle,):
+            looked = {
+                "state": self._watchers.viewers(one) > 0,
+                SUMMARY: one in self._logs and self._shows_summaries,
+                **{kind: number > 0 for (whose, kind), number in self._wanted.items() if whose == one},
+            }
+            for kind, is_looked in looked.items():
+                self._pulls.look(one, kind, is_looked)
+
+    @property
+    def _shows_summaries(self) -> bool:
+        """The pages of a node that knows one car have no use for its summary, and its pulls would delay their states;
+        the page of all cars wants it."""
+        is_wanted = len(self.vehicles) > 1 or self._wanted.get((ALL, SUMMARY), 0) > 0
+        return is_wanted and self._watchers.viewers(ALL) > 0
 
     def _take_frame(self, vehicle: str, kind: str, payload: str | bytes, put_s: float) -> None:
-        whose, name = (ALL, vehicle) if kind == wire.SUMMARY else (vehicle, kind)
+        """Raises Malformed."""
+        payload = self._read_frame(vehicle, kind, payload, self._now() - put_s)
+        whose, name = (ALL, vehicle) if kind == SUMMARY else (vehicle, kind)
         self._keep(whose, name, payload, put_s)
 
-    def _wake(self, vehicle: str, kind: str) -> None:
-        for watcher in tuple(self._watchers.get(vehicle, {}).values()):
-            watcher(kind)
-
-    # -- events --------------------------------------------------------------------------------------------------------
-
     def last_event(self, vehicle: str) -> int:
-        cache = self._events.get(vehicle)
-        return 0 if cache is None else cache.last
+        return self._logs.last(vehicle)
 
     def recent_events(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]] | None:
-        cache = self._events.get(vehicle)
-        return [] if cache is None else cache.after(n, limit)
+        return self._logs.after(vehicle, n, limit)
 
     async def events_after(self, vehicle: str, n: int, limit: int = 100) -> list[dict[str, Any]]:
         """Raises NotServed where they are at the agent and it does not answer."""
+        self._heard.check_known(vehicle)
         recent = self.recent_events(vehicle, n, limit)
         if recent is not None:
             return recent
-        return await self._read(
+        return await self._questions.read(
             vehicle, limit, lambda last, portion: wire.Ask(do="after", n=n if last is None else last, limit=portion)
         )
 
@@ -154,18 +204,7 @@ class NatsBus:
             before = {} if last is None else {"before": last}
             return wire.Ask(do="find", filters={**filters, **before}, limit=portion)
 
-        return await self._read(vehicle, filters.pop("limit", wire.PORTION), ask)
-
-    async def _read(self, vehicle: str, limit: int, ask: Callable[[int | None, int], wire.Ask]) -> list[dict[str, Any]]:
-        """In portions: `ask` is given the number of the last event that was read and how many to ask for."""
-        found: list[dict[str, Any]] = []
-        while len(found) < limit:
-            portion = min(limit - len(found), wire.PORTION)
-            answer = await self._questions.ask(vehicle, ask(found[-1]["n"] if found else None, portion))
-            found += answer.events
-            if len(answer.events) < portion:
-                break
-        return found
+        return await self._questions.read(vehicle, filters.pop("limit", wire.PORTION), ask)
 
     async def _on_events(self, message: Msg) -> None:
         try:
@@ -175,61 +214,25 @@ class NatsBus:
         vehicle = wire.vehicle_of(message.subject)
         if not news.events or type(first := news.events[0].get("n")) is not int:
             return None
-        if vehicle not in self._events:
+        if vehicle not in self._logs:
             self._meet(vehicle, news.run, first - 1)
-        return self._take(vehicle, news.events)
-
-    def _take(self, vehicle: str, events: list[dict[str, Any]]) -> None:
-        cache = self._events[vehicle]
-        if cache.take(events):
-            self._changed.set()
-            self._changed = asyncio.Event()
-            self._wake(vehicle, "events")
-        self._fetch_missing(vehicle)
-
-    def _fetch_missing(self, vehicle: str) -> None:
-        running = self._fetches.get(vehicle)
-        if self._events[vehicle].is_behind and (running is None or running.done()):
-            self._fetches[vehicle] = asyncio.create_task(self._fetch(vehicle))
-
-    async def _fetch(self, vehicle: str) -> None:
-        """What was lost on the way; where the agent does not answer, its next word begins it again."""
-        cache = self._events[vehicle]
-        with contextlib.suppress(NotServed):
-            while cache.is_behind:
-                before = cache.last
-                answer = await self._questions.ask(vehicle, wire.Ask(do="after", n=before))
-                self._take(vehicle, answer.events)
-                if cache.last == before:
-                    return
-
-    # -- requests ------------------------------------------------------------------------------------------------------
+        return self._logs.take(vehicle, news.events)
 
     async def request(self, vehicle: str, command: Mapping[str, Any], *, deadline_s: float = 3.0) -> Mapping[str, Any]:
         """The agent carries it out within `deadline_s` or not at all: the deadline is a time of its own clock."""
         ends_s = self._now() + deadline_s
-        heard_s = self._heard_s.get(vehicle)
-        if heard_s is None:
-            raise NotServed(f"no vehicle is named {vehicle}")
-        if self._now() - heard_s > GONE_AFTER_S:
-            raise NotServed(f"nothing from {vehicle} for {self._now() - heard_s:.0f} s")
+        self._heard.check(vehicle)
         clock = self._questions.clocks.get(vehicle)
-        if clock is None or clock.run != self._events[vehicle].run or self._now() - clock.heard_s > GONE_AFTER_S:
-            await self._questions.ask(vehicle, wire.Ask(do="clock"), within_s=deadline_s)
+        if clock is None or clock.run != self._logs.run(vehicle) or self._now() - clock.heard_s > GONE_AFTER_S:
+            try:
+                await self._questions.ask(vehicle, wire.Ask(do="clock"), within_s=deadline_s)
+            except NotServed as why:  # the command itself was not sent
+                raise NotServed(str(why), cut=why.cut) from None
             clock = self._questions.clocks[vehicle]
         left_s = ends_s - self._now()
         not_after_s = clock.earliest(self._now()) + left_s
         asked = wire.Ask(do="command", command=dict(command), not_after_s=not_after_s, run=clock.run)
         answer = await self._questions.ask(vehicle, asked, within_s=left_s)
-        await self._caught_up(vehicle, answer.last, ends_s)
+        # What the command caused may be shown before it is answered; the answer does not wait longer than it may.
+        await self._logs.caught_up(vehicle, answer.last, ends_s - self._now())
         return answer.answer
-
-    async def _caught_up(self, vehicle: str, last: int, ends_s: float) -> None:
-        """What the command caused may be shown before it is answered; the answer does not wait longer than it may."""
-        cache = self._events[vehicle]
-        cache.newest = max(cache.newest, last)
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(max(0.0, ends_s - self._now())):
-                while cache.last < last:
-                    self._fetch_missing(vehicle)
-                    await self._changed.wait()

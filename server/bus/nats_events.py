@@ -24,8 +24,10 @@ class EventCache:
 
     def begin(self, run: str, last: int) -> None:
         """The agent is there, in this run of it; the first time older events are left where they are."""
-        if not self.run or last < self.last:  # its log was begun anew
+        if not self.run:
             self.last = self.newest = last
+        elif run != self.run and last < self.last:  # its log was begun anew: all of it is new
+            self.last, self.newest = 0, last
             self._recent.clear()
         self.run = run
         self.newest = max(self.newest, last)

@@ -5,21 +5,23 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from nats.aio.client import Client
 from nats.errors import Error as NatsError
 
 from server.bus import nats_wire as wire
 from server.bus.nats_questions import ANSWER_S, Questions
 
+MOST = 100  # questions a second for one kind of frame, where an agent answers at once
 RETRY_S = 0.5  # after a pull that nobody answered
 Keep = Callable[[str, str, str | bytes, float], None]
 
 
 class Pulls:
-    """`keep` gets vehicle, kind, payload, and when it was put by our clock `now`, in seconds: at the latest then."""
+    """`keep` gets vehicle, kind, payload, and when it was put by our clock `now`, in seconds: at the latest then.
 
-    def __init__(self, client: Client, questions: Questions, keep: Keep, *, now: Callable[[], float]) -> None:
-        self._client = client
+    It raises Malformed.
+    """
+
+    def __init__(self, questions: Questions, keep: Keep, *, now: Callable[[], float]) -> None:
         self._questions = questions
         self._keep = keep
         self._now = now
@@ -30,22 +32,34 @@ class Pulls:
         key = (vehicle, kind)
         if is_looked and key not in self._tasks:
             self._tasks[key] = asyncio.create_task(self._pull(vehicle, kind))
+        elif is_looked and self._tasks[key].done():
+            self._tasks[key] = asyncio.create_task(self._pull(vehicle, kind))
         elif not is_looked and key in self._tasks:
             self._tasks.pop(key).cancel()
 
     async def stop(self) -> None:
-        for task in self._tasks.values():
+        tasks, self._tasks = self._tasks, {}
+        for task in tasks.values():
             task.cancel()
-        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
+        await asyncio.gather(*tasks.values(), return_exceptions=True)
 
     async def _pull(self, vehicle: str, kind: str) -> None:
         """One frame after the other: the next is asked for when the last is here, so that none waits on the way."""
         have, run = 0, ""
         subject = wire.subject(vehicle, f"pull.{kind}")
+        began_s, asked = self._now(), 0  # in the second that began then
         while True:
+            if asked >= MOST:
+                await asyncio.sleep(max(0.0, began_s + 1.0 - self._now()))
+            if self._now() >= began_s + 1.0:
+                began_s, asked = self._now(), 0
+            asked += 1
             asked_s = self._now()
+            if (client := self._questions.client) is None:
+                await asyncio.sleep(RETRY_S)
+                continue
             try:
-                message = await self._client.request(
+                message = await client.request(
                     subject, wire.encode(wire.Pull(have=have, run=run)), timeout=wire.PULL_WAITS_S + ANSWER_S
                 )
                 head, payload = wire.decode_frame(message.data)
@@ -57,9 +71,13 @@ class Pulls:
                 await asyncio.sleep(RETRY_S)
                 continue
             self._questions.set_clock(vehicle, head.run, head.now_s)
-            if not head.number:
+            if not head.number or (head.number, head.run) == (have, run):
                 continue
             have, run = head.number, head.run
             # By our clock, and no later than it was: the pull was at the agent after `asked_s`.
             put_s = min(asked_s + max(0.0, head.waited_s), self._now()) - max(0.0, head.age_s)
-            self._keep(vehicle, kind, payload, put_s)
+            try:
+                self._keep(vehicle, kind, payload, put_s)
+            except wire.Malformed as why:
+                self._questions.refuse(subject, why)
+                await asyncio.sleep(RETRY_S)

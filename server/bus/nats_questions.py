@@ -5,16 +5,18 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from nats.aio.client import Client
 from nats.errors import Error as NatsError
 from nats.errors import NoRespondersError
 
 from server.bus import nats_wire as wire
-from server.bus.bus import NotServed
+from server.bus.bus import NotServed, Outcome
 
 log = logging.getLogger("catgraph.bus")
 
+SAID_AGAIN_S = 10.0  # what an agent sends fills no log
 ANSWER_S = 2.0  # for a question; a command has its own deadline
 
 
@@ -34,36 +36,69 @@ class AgentClock:
 class Questions:
     """Asks the agents. `now`: a monotonic clock in seconds."""
 
-    def __init__(self, client: Client, *, now: Callable[[], float]) -> None:
-        self._client = client
+    def __init__(self, *, now: Callable[[], float]) -> None:
+        self.client: Client | None = None  # None: there was no connection yet
         self._now = now
         self.clocks: dict[str, AgentClock] = {}
+        self.heard_s = 0.0  # when any agent answered last
+        self._said_s: dict[str, float] = {}  # of each subject
         self.refused = 0  # bodies of agents that could not be read
 
     def refuse(self, subject: str, why: wire.Malformed) -> None:
         """Counts and logs what cannot be read."""
         self.refused += 1
+        if self._now() - self._said_s.get(subject, -SAID_AGAIN_S) < SAID_AGAIN_S:
+            return
+        self._said_s[subject] = self._now()
         log.warning("message not read: subject=%s why=%s", subject, why)
 
     def set_clock(self, vehicle: str, run: str, now_s: float) -> None:
         """An answer that was just received showed `now_s` on the agent's clock."""
-        self.clocks[vehicle] = AgentClock(run=run, now_s=now_s, heard_s=self._now())
+        self.heard_s = self._now()
+        self.clocks[vehicle] = AgentClock(run=run, now_s=now_s, heard_s=self.heard_s)
 
     async def ask(self, vehicle: str, asked: wire.Ask, *, within_s: float = ANSWER_S) -> wire.Answer:
         """Raises NotServed: no agent, no broker, no answer in time, or refused by the agent."""
-        if not self._client.is_connected:  # else it would wait in the client and come late
-            raise NotServed("the broker is not connected")
+        client = self.client
+        if client is None or not client.is_connected:  # else it would wait in the client and come late
+            raise NotServed("the broker is not connected", cut="server-broker")
         try:
-            message = await self._client.request(wire.subject(vehicle, "ask"), wire.encode(asked), timeout=within_s)
+            message = await client.request(
+                wire.subject(vehicle, "ask"), wire.encode(asked), timeout=within_s, headers=wire.headers()
+            )
             answer = wire.decode(wire.Answer, message.data)
         except NoRespondersError:
-            raise NotServed(f"{vehicle} is not connected to the broker") from None
+            raise NotServed(f"the agent of {vehicle} is not connected to the broker", cut="broker-agent") from None
         except (NatsError, TimeoutError):
-            raise NotServed(f"{vehicle} did not answer within {within_s:.1f} s") from None
+            raise self._unanswered(vehicle, client, within_s) from None
         except wire.Malformed as why:
             self.refuse(vehicle, why)
-            raise NotServed(f"{vehicle} answered what cannot be read") from None
+            raise NotServed(f"the agent of {vehicle} answered what cannot be read", outcome="unknown") from None
         self.set_clock(vehicle, answer.run, answer.now_s)
         if answer.refused:
-            raise NotServed(answer.refused)
+            outcome: Outcome = "unknown" if answer.is_unknown else "not_delivered"
+            raise NotServed(answer.refused, outcome=outcome, cut=None if answer.is_unknown else "broker-agent")
         return answer
+
+    def _unanswered(self, vehicle: str, client: Client, within_s: float) -> NotServed:
+        """It was sent: it may have been lost on its way there, or its answer on the way back."""
+        if not client.is_connected:
+            return NotServed("the broker was lost before it answered", outcome="unknown", cut="server-broker")
+        why = f"the agent of {vehicle} did not answer within {within_s:.1f} s"
+        return NotServed(why, outcome="unknown", cut="broker-agent")
+
+    async def read(
+        self, vehicle: str, limit: int, question: Callable[[int | None, int], wire.Ask]
+    ) -> list[dict[str, Any]]:
+        """Events in portions: `question` gets the number of the last one that was read, and how many to ask for.
+
+        Raises as `ask`.
+        """
+        found: list[dict[str, Any]] = []
+        while len(found) < limit:
+            portion = min(limit - len(found), wire.PORTION)
+            answer = await self.ask(vehicle, question(found[-1]["n"] if found else None, portion))
+            found += answer.events
+            if len(answer.events) < portion:
+                break
+        return found

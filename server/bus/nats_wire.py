@@ -4,8 +4,11 @@
 |---|---|---|
 | `pull.<kind>` | node asks, agent answers | `Pull`; a frame's head as a line of JSON, then the frame |
 | `ask` | node asks, agent answers | a request, or a question for events or the clock |
+| `http.…` | node asks, agent answers | requests for what the agent keeps: `nats_http.py` |
 | `events` | agent publishes | events in order, once pages may have them |
 | `here` | agent publishes every second | its run and the number of its newest event |
+
+A request about a command has its id in the header `Catgraph-Trace`, for the logs.
 
 A frame is pulled, never pushed: one is under way to a node at a time, so that a stalled hop finds nothing old. All
 times are of the agent's monotonic clock, in seconds.
@@ -18,11 +21,14 @@ from typing import Annotated, Any, Literal, TypeVar
 import orjson
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from server.bus.bus import SUMMARY
+from server.system import log_context
+
 HERE_EVERY_S = 1.0
 PULL_WAITS_S = 1.0  # an agent without a newer frame answers after so long that there is none
 PORTION = 100  # events of one message: far below the broker's largest
+TRACE = "Catgraph-Trace"
 LARGEST = 900_000  # bytes of a body; the broker takes 1 MiB
-SUMMARY = "summary"  # what a session puts for the pages of other cars
 KINDS = frozenset({"state", "scan", SUMMARY})
 
 
@@ -38,6 +44,8 @@ class Body(BaseModel):
 
 B = TypeVar("B", bound=Body)
 Number = Annotated[int, Field(ge=0, lt=1 << 53)]
+Seconds = Annotated[float, Field(allow_inf_nan=False, ge=-1e12, le=1e12)]
+Duration = Annotated[float, Field(allow_inf_nan=False, ge=-3600.0, le=3600.0)]
 Run = Annotated[str, Field(max_length=40)]
 
 
@@ -53,9 +61,9 @@ class FrameHead(Body):
 
     run: Run
     number: Number
-    now_s: float
-    waited_s: float = 0.0  # from the pull to this answer
-    age_s: float = 0.0  # of the frame when it was sent
+    now_s: Seconds
+    waited_s: Duration = 0.0  # from the pull to this answer
+    age_s: Duration = 0.0  # of the frame when it was sent
     is_text: bool = True
 
 
@@ -66,7 +74,7 @@ class Here(Body):
 
 class Events(Body):
     run: Run
-    events: list[dict[str, Any]]
+    events: Annotated[list[dict[str, Any]], Field(max_length=PORTION)]
 
 
 class Ask(Body):
@@ -83,11 +91,17 @@ class Ask(Body):
 
 class Answer(Body):
     run: Run
-    now_s: float
+    now_s: Seconds
     last: Number
     answer: dict[str, Any] = {}
-    events: list[dict[str, Any]] = []
+    events: Annotated[list[dict[str, Any]], Field(max_length=PORTION)] = []
     refused: str = ""  # not served; why, as a sentence
+    is_unknown: bool = False  # a command that was not served may have been carried out
+
+
+def headers() -> dict[str, str] | None:
+    """Of a request: the id of the command that it is about, for the logs of both sides."""
+    return {TRACE: trace} if (trace := log_context.trace()) else None
 
 
 def subject(vehicle: str, what: str) -> str:

@@ -5,17 +5,15 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from dataclasses import replace
 
-from server.access.keys import keys_from
-from server.app import tls_options
-from server.app.config import Config
 from server.app.process import CannotServe, add_common_arguments, serve
 from server.app.process import run as run_server
+from server.cli.serve import common_config
 from server.simulator.console import Console, need_stdin
 from server.simulator.service import CarService
 from server.system.loopback import is_loopback
 from server.vehicle.vehicle import Vehicle
-from server.web.maps import map_options
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,19 +42,10 @@ async def _demo(args: argparse.Namespace) -> int:
     service = CarService(seed=args.seed, scenarios=args.scenario)
     port = await service.start()
     address = f"ws://127.0.0.1:{port}"
-    config = Config(
+    config = replace(
+        common_config(args),
         vehicles=(Vehicle(name="demo", address=address),),
-        data=args.data,
-        host=args.host,
-        port=args.port,
         found=(Vehicle(name="Simulated car", address=address),),
-        maps=tuple(args.map),
-        site_image=args.site_image,
-        tls=tls_options.read(args),
-        names=tuple(args.name),
-        keys=keys_from(os.environ),
-        map_upstream=map_options.read(args),
-        worker=not args.no_worker,
         next_steps=next_steps(args.host, sys.argv[0]),
     )
     console = Console.of_stdin(service)

@@ -126,12 +126,12 @@ async def _report(address: Address, link: RosLink, ear: _Listener, seconds: floa
     diagnosis = Diagnosis()
     asks = Questions(link, diagnosis, now=time.monotonic)
     try:
-        return await _tell(address, link, ear, asks, diagnosis, seconds)
+        return await _discover_and_report(address, link, ear, asks, diagnosis, seconds)
     finally:
         asks.stop()
 
 
-async def _tell(
+async def _discover_and_report(
     address: Address, link: RosLink, ear: _Listener, asks: Questions, diagnosis: Diagnosis, seconds: float
 ) -> int:
     server_software = link.server_software

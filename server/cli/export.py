@@ -28,7 +28,7 @@ from server.cli.progress import Progress
 from server.recording.export.bag_file import COMPRESSIONS
 from server.recording.export.clip import AFTER_S, BEFORE_S, LONGEST_S, Window, first_raised_ns, write_clip
 from server.recording.export.formats import CLIP, FORMATS
-from server.recording.export.outcome import ExportRefused, Outcome
+from server.recording.export.outcome import ExportRefused, NothingRecorded, Outcome
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 from server.recording.space import amount, free_at
 from server.storage.output_file import Output, output_of, writing
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
             outcome = _export(recording, args, out, progress)
             is_whole = not recording.damage
     except (RecordingUnreadable, ExportRefused, AssetsMissing, _Impossible) as error:
-        return speaker.refused(str(error))
+        return speaker.refused(str(error), is_nothing=isinstance(error, NothingRecorded))
     except BrokenPipeError:
         return speaker.refused("It cannot be written: the reader closed the pipe.")
     except OSError as error:
@@ -228,7 +228,7 @@ class _Person:
     def progress(self, part: float) -> None:
         self._bar(part)
 
-    def refused(self, sentence: str) -> int:
+    def refused(self, sentence: str, *, is_nothing: bool = False) -> int:
         self._bar.close()
         print(f"catgraph export: {sentence}", file=sys.stderr)
         return CANNOT
@@ -254,17 +254,17 @@ class _Lines:
         now_s = time.monotonic()
         if now_s >= self._next_s:
             self._next_s = now_s + _EVERY_S
-            self._tell({"progress": round(part, 4)})
+            self._write_line({"progress": round(part, 4)})
 
-    def refused(self, sentence: str) -> int:
-        self._tell({"refused": f"{sentence[:1].upper()}{sentence[1:]}"})
+    def refused(self, sentence: str, *, is_nothing: bool = False) -> int:
+        self._write_line({"refused": f"{sentence[:1].upper()}{sentence[1:]}", "is_nothing": is_nothing})
         return CANNOT
 
     def done(self, out: Output, outcome: Outcome, *, is_whole: bool) -> None:
         notes = [*outcome.notices, *outcome.notes][:MOST_NOTES]
-        self._tell({"done": str(out.path), "entries": outcome.entries, "notes": notes, "is_whole": is_whole})
+        self._write_line({"done": str(out.path), "entries": outcome.entries, "notes": notes, "is_whole": is_whole})
 
-    def _tell(self, what: dict[str, Any]) -> None:
+    def _write_line(self, what: dict[str, Any]) -> None:
         with contextlib.suppress(BrokenPipeError):
             sys.stdout.write(orjson.dumps(what).decode() + "\n")
             sys.stdout.flush()

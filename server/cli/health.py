@@ -30,7 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: well; 1: it does not answer, or not as catgraph does; 2: the authority cannot be read."""
+    """0: well, also where cars are not heard; 1: not well, no answer, or none of catgraph; 2: the authority cannot be
+    read."""
     try:
         body = _ask((args.url,) if args.url else _HERE, args.ca)
     except _NoAnswer as why:
@@ -43,7 +44,9 @@ def run(args: argparse.Namespace) -> int:
     print(f"catgraph {body.get('version')}: {body.get('status')}{f', {vehicles}' if vehicles else ''}")
     for problem in body.get("problems", ()):
         print(f"  {problem}")
-    return 0 if body.get("status") == "ok" else 1
+    for name, trouble in (body.get("lost") or {}).items():
+        print(f"  {name}: {trouble}")
+    return 0 if body.get("status") in ("ok", "cars lost") else 1
 
 
 class _NoAnswer(Exception):

@@ -25,6 +25,9 @@ class _Command:
 
 COMMANDS = {
     "serve": _Command(module="server.cli.serve", help="monitor cars and serve the page"),
+    "agent": _Command(module="server.cli.agent", help="monitor cars, and offer them to web nodes through a broker"),
+    "web": _Command(module="server.cli.web", help="serve the page of the cars whose agents are at a broker"),
+    "fleet": _Command(module="server.cli.fleet", help="make and withdraw the keys of agents and web nodes"),
     "pair": _Command(
         module="server.cli.pair", help="show a code and a PIN to pair one more device with a running server"
     ),
@@ -32,6 +35,9 @@ COMMANDS = {
     "simulate": _Command(module="server.cli.simulate", help="run a simulated car behind its own rosbridge server"),
     "replay": _Command(module="server.cli.replay", help="play a recording behind a rosbridge server, in real time"),
     "check": _Command(module="server.cli.check", help="run every check over recordings, faster than real time"),
+    "verify": _Command(
+        module="server.cli.verify", help="say whether recordings are as they were recorded, or where they are not"
+    ),
     "export": _Command(module="server.cli.export", help="convert a recording, or a part of it, to another format"),
     "doctor": _Command(module="server.cli.doctor", help="list what a car publishes and how it maps to signals"),
     "health": _Command(module="server.cli.health", help="report the health of a running server"),
@@ -57,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             module.add_arguments(sub)
             sub.set_defaults(run=module.run)
     args = parser.parse_args(given)
-    logging.begin()
+    logging.begin(getattr(args, "log_format", "text"), getattr(args, "log_level", "warning"))
     try:
         return int(args.run(args))
     except KeyboardInterrupt:

@@ -21,6 +21,7 @@ from server.recording.read.read import Recording, RecordingUnreadable, open_reco
 from server.rosbridge_server.player import play
 from server.rosbridge_server.server import CannotListen, RosBridge
 from server.rosbridge_server.stamps import moved
+from server.system.memory_limit import TOO_LARGE, bounded_memory
 
 SETTLED_S = 1.0  # --wait: so long without a new subscription
 AHEAD = 512  # messages read before they are due: unpacking a chunk must not make others late
@@ -64,10 +65,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Plays the recording: 0 at its end, 2 with one sentence where it cannot be played, 130 when interrupted."""
     try:
-        with open_recording(args.files) as recording:
+        with bounded_memory(), open_recording(args.files) as recording:
             return uvloop.run(_Replay(recording, args).run())
     except (RecordingUnreadable, CannotListen, _Impossible) as error:
         print(f"catgraph replay: {error}", file=sys.stderr)
+        return 2
+    except MemoryError:
+        print(f"catgraph replay: {args.files[0]}: {TOO_LARGE}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130

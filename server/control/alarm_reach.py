@@ -119,6 +119,11 @@ class AlarmReach:
         """The operator of a page that is here and seen."""
         return next((one.of for one in self._pages.values() if one.of.page == page and one.is_seen(now_s)), None)
 
+    def people(self, now_s: float) -> list[Operator]:
+        """Whose page is seen, here or on a page that announces this car's alarms, in the order of their names."""
+        seen = {key: one.of for key, one in (self._elsewhere | self._pages).items() if one.is_seen(now_s)}
+        return sorted(seen.values(), key=lambda one: (one.name, one.page))
+
     def all(self, now_s: float) -> list[PageStatus]:
         """Every page that counts, in the order of their names."""
         self._forget(now_s)

@@ -5,6 +5,7 @@ It holds the control lease and the status of the pages, and logs changes of both
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,12 +14,16 @@ from monitor.reach import ReachFacts
 from monitor.runner import Refused
 from server.control import display_name
 from server.control.alarm_reach import AlarmReach, Present
-from server.control.lease import ANSWER_S, LEASE_S, RETURN_S, Act, Control, NotInControl, Operator
+from server.control.duty import OnDuty, person_name, role_of
+from server.control.lease import ANSWER_S, LEASE_S, RETURN_S, Act, Control, Lease, NotInControl, Operator
 from server.protocol import commands, serialize
 from server.protocol.alarm_state import Note
 from server.protocol.operator_state import OperatorsState
 
 MAX_FENCE = 2**53
+MOST_SUPERVISORS = 3  # who are named
+KNOWN_S = 10.0  # the pages state every second who is on duty as supervisor
+MOST_NOTED = 64  # pages of which is known who is on duty there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,12 +36,20 @@ class Caller:
     fence: int | None = None
     is_console: bool = False  # a request over HTTP to a server that only this machine reaches: its own console
     is_replaying: bool = False
+    device: str = display_name.NAMELESS
+    person: OnDuty | None = None  # who is on duty at the device that sends
+    supervisors: tuple[str, ...] | None = None  # who is on duty as such, anywhere; None: not known
 
     @classmethod
     def of(cls, message: Mapping[str, Any]) -> Caller:
         page, fence = message.get("page"), message.get("fence")
+        device = display_name.clean(message.get("by")) or display_name.NAMELESS
+        person = on_duty(message.get("person"))
         return cls(
-            name=display_name.clean(message.get("by")) or display_name.NAMELESS,
+            name=device if person is None else display_name.with_person(person.name, device),
+            device=device,
+            person=person,
+            supervisors=_supervisors(message.get("supervisors")),
             who=str(message.get("who") or ""),
             page=page if isinstance(page, str) else None,
             fence=fence if type(fence) is int and 0 <= fence <= MAX_FENCE else None,
@@ -47,7 +60,27 @@ class Caller:
     @property
     def operator(self) -> Operator | None:
         """The page that may be in control; None: no page sent this."""
-        return None if self.page is None else Operator(page=self.page, who=self.who, name=self.name)
+        if self.page is None:
+            return None
+        return Operator(page=self.page, who=self.who, name=self.name, person=self.person)
+
+
+def _supervisors(found: object) -> tuple[str, ...] | None:
+    if not isinstance(found, list):
+        return None
+    names = (display_name.clean(one) for one in found[:MOST_SUPERVISORS])
+    return tuple(name for name in names if name is not None)
+
+
+def on_duty(found: object) -> OnDuty | None:
+    """The person in a message of a web node; None: nobody, or none that can be read."""
+    if not isinstance(found, Mapping):
+        return None
+    with contextlib.suppress(Refused):
+        device = found.get("device")
+        device = device[:60] if isinstance(device, str) else ""
+        return OnDuty(name=person_name(found.get("name")), role=role_of(found.get("role")), device=device)
+    return None
 
 
 class Authorization:
@@ -58,12 +91,14 @@ class Authorization:
         self._note = note
         self._control = Control(fence)
         self._reach = AlarmReach()
+        self._on_duty: dict[tuple[str, str], OnDuty | None] = {}  # by page, as logged last
+        self._supervisors: tuple[tuple[str, ...], float] | None = None  # and when it was stated
 
     def tick(self, now_s: float) -> bool:
         """Time passes; whether control changed by it."""
         acts = self._control.advance(now_s, lambda one: self._reach.is_here(one, now_s))
         for act in acts:
-            self._tell(act)
+            self._log_act(act)
         return bool(acts)
 
     def admit(self, command: commands.Command, caller: Caller, now_s: float) -> None:
@@ -76,7 +111,7 @@ class Authorization:
         if operator is not None:
             control.admit(operator, caller.fence)
             if control.holder is None and self._reach.is_here(operator, now_s):
-                self._tell(control.take(operator, now_s))
+                self._log_act(control.take(operator, now_s))
             return
         if caller.is_console:
             return
@@ -106,14 +141,14 @@ class Authorization:
             case "release":
                 acts = [*control.release(by, fence, now_s)]
             case "hand_over":
-                to = self._reach.find(command.to or "", now_s)
+                to = self.find(command.to or "", now_s)
                 if to is None:
                     raise Refused("That page is closed or not visible.")
                 acts = [control.hand_over(by, fence, to, now_s)]
             case "keep":
                 acts = [control.keep(by, fence, command.to or "")]
         for act in acts:
-            self._tell(act)
+            self._log_act(act)
         return self.fence_of(caller)
 
     def hear(self, word: commands.PresentWord, caller: Caller, now_s: float) -> bool:
@@ -121,17 +156,18 @@ class Authorization:
         operator = caller.operator
         if operator is None:
             return False
+        self._note_duty(operator, caller, now_s)
         if word.leaves:
             self._reach.leave(operator)
             given_up = self._control.leave(operator, now_s)
             for released in given_up:
-                self._tell(released)
+                self._log_act(released)
             return bool(given_up)
         self._reach.hear(operator, _present(word, caller), now_s)
         changed = self.tick(now_s)
         if word.visible:
             act = self._control.present(operator, now_s)
-            self._tell(act)
+            self._log_act(act)
             changed = changed or act is not None
         return changed
 
@@ -139,10 +175,54 @@ class Authorization:
         """Store the status of a page that shows another car: it may hear alarms, and has no part in control."""
         if (operator := caller.operator) is None:
             return
+        self._hear_supervisors(caller, now_s)
         if word.leaves:
             self._reach.leave_elsewhere(operator)
         else:
             self._reach.hear_elsewhere(operator, _present(word, caller), now_s)
+
+    def _hear_supervisors(self, caller: Caller, now_s: float) -> None:
+        if caller.supervisors is not None:
+            self._supervisors = caller.supervisors, now_s
+
+    def supervisors(self, now_s: float) -> tuple[str, ...] | None:
+        """Who is on duty as supervisor; None: no page states it now."""
+        stated = self._supervisors
+        return None if stated is None or now_s - stated[1] > KNOWN_S else stated[0]
+
+    def _note_duty(self, operator: Operator, caller: Caller, now_s: float) -> None:
+        """Log who comes on duty, and who goes, at a page of this car."""
+        self._hear_supervisors(caller, now_s)
+        key, now = (operator.who, operator.page), caller.person
+        before = self._on_duty.pop(key, None)
+        self._on_duty = dict([*self._on_duty.items(), (key, now)][-MOST_NOTED:])
+        if before is not None and before != now:
+            text = f"{before.name}, {before.title}, is not on duty at {caller.device} any more."
+            self._note("duty", text, act="off", person=before.name, role=before.role)
+        if now is not None and before != now:
+            text = f"{now.name} is on duty as {now.title} at {caller.device}."
+            self._note("duty", text, by=caller.name, act="on", person=now.name, role=now.role)
+
+    @property
+    def lease(self) -> Lease | None:
+        """Who is in control, and since when."""
+        return self._control.lease
+
+    def is_here(self, operator: Operator, now_s: float) -> bool:
+        """Whether this page is open and visible."""
+        return self._reach.is_here(operator, now_s)
+
+    def find(self, page: str, now_s: float) -> Operator | None:
+        """The operator of a page that is open and visible."""
+        return self._reach.find(page, now_s)
+
+    def answer(self, operator: Operator) -> None:
+        """The request of this page is answered by an offer."""
+        self._control.answer(operator)
+
+    def hand_over(self, by: Operator, fence: int, to: Operator, now_s: float) -> None:
+        """Give control to another page, by a lease that is still the one. Raises NotInControl."""
+        self._log_act(self._control.hand_over(by, fence, to, now_s))
 
     def fence_of(self, caller: Caller) -> int | None:
         """The number of the lease that this page has; None: it has none."""
@@ -152,6 +232,10 @@ class Authorization:
     def heard_s(self) -> float | None:
         """The time of the newest status of an operator's page; None: no page."""
         return self._reach.heard_s()
+
+    def people(self, now_s: float) -> list[Operator]:
+        """Whose page is seen, here or on a page that announces this car's alarms."""
+        return self._reach.people(now_s)
 
     def facts(self, now_s: float) -> ReachFacts:
         return self._reach.facts(now_s)
@@ -187,7 +271,7 @@ class Authorization:
             "reach": self._reach.as_json(now_s),
         }
 
-    def _tell(self, act: Act | None) -> None:
+    def _log_act(self, act: Act | None) -> None:
         if act is not None:
             self._note(
                 "control",

@@ -20,6 +20,11 @@ def clean(text: object) -> str | None:
     return " ".join(seen.split())[:MAX_LETTERS].strip() or None
 
 
+def with_person(person: str, device: str) -> str:
+    """How an order of a person at a device is signed: "A. K. (Pixel 7)"."""
+    return f"{person} ({device})"
+
+
 def of_program(user_agent: str | None) -> str:
     """How a program that gives no name of its own is called: "api · curl"."""
     product = clean((user_agent or "").split("/", 1)[0].split(" ", 1)[0])

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from monitor.runner import Refused
+from server.control.duty import OnDuty
 
 LEASE_S = 3.0  # a visible page reports once a second
 RETURN_S = 30.0
@@ -31,6 +32,7 @@ class Operator:
     page: str  # the page's own name for itself, the same over reconnections and reloads
     who: str  # the device that was let in
     name: str  # as people read it
+    person: OnDuty | None = None  # who is on duty there
 
     def is_same(self, other: Operator | None) -> bool:
         return other is not None and (self.page, self.who) == (other.page, other.who)
@@ -186,6 +188,10 @@ class Control:
             return None
         self.requests = tuple(one for one in self.requests if not operator.is_same(one.of))
         return self._act("withdrawn", f"{operator.name} cancelled the request for control.", operator)
+
+    def answer(self, operator: Operator) -> None:
+        """A request was answered otherwise than by granting it: silence does not grant it any more."""
+        self.requests = tuple(one for one in self.requests if not operator.is_same(one.of))
 
     def hand_over(self, by: Operator, fence: int | None, to: Operator, now_s: float) -> Act | None:
         """The holder gives control to another page; so it also grants a request. Raises NotInControl."""

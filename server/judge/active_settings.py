@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, cast
 
 from monitor import catalog
@@ -26,7 +27,11 @@ class ActiveSettings:
         self.settings: Settings = file.read()
         self.complaint = file.complaint
         self._limits: tuple[Settings, Profile, AllLimits] | None = None  # as they follow from those two
-        self._told = self.in_force()
+        self._reported = self.in_force()
+
+    def beside(self, suffix: str) -> Path | None:
+        """A file beside that of the settings, of the same vehicle; None: nothing is kept on the disk."""
+        return None if self._file.path is None else self._file.path.with_suffix(suffix)
 
     @property
     def profile(self) -> Profile:
@@ -101,8 +106,8 @@ class ActiveSettings:
 
     def changes(self) -> dict[str, list[Any]]:
         """Changes of the active settings since the last call: name → [from, to]; topics are "topics.speed"."""
-        before, after = _flat(self._told), _flat(now := self.in_force())
-        self._told = now
+        before, after = _flat(self._reported), _flat(now := self.in_force())
+        self._reported = now
         names = sorted({*before, *after})
         return {name: [before.get(name), after.get(name)] for name in names if before.get(name) != after.get(name)}
 

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from monitor.runner import Monitor, Transition
 from monitor.state import State
-from monitor.values import Steering
+from monitor.values import DriveMode, Steering
 from server.judge.active_settings import PERCENT_A_RAD
 from server.judge.message_fields import stamp_s
 from server.judge.profiles import Profile
@@ -69,6 +69,8 @@ def receive(
             continue
         if type(value) is Steering:
             value = steered(value, profile, tyre_rad_per_unit)
+        elif type(value) is DriveMode and (mode := profile.modes.get(value.said.casefold())) is not None:
+            value = DriveMode(mode=mode, said=value.said)
         if on_value is not None:
             on_value(source.signal, value, at_s, stamp)
         changed += state.receive(source.signal, value, at_s, stamp, delay_s)

@@ -30,7 +30,7 @@ MAX_TOML_BYTES = bounded_toml.MAX_BYTES
 _MAX_VERSION = 2**53  # a larger one is not exact in JSON on a page
 _HUGE = 1e12
 _SECTIONS = {"version", "profile", "topics", "limits"}
-_TOLD = 5  # things left out that a complaint names
+_MOST_NAMED = 5  # things left out that a complaint names
 
 
 class BadSetting(ValueError):
@@ -247,17 +247,17 @@ class SettingsFile:
     """Where one vehicle's settings are kept; without a path, in memory."""
 
     def __init__(self, path: Path | None) -> None:
-        self._path = path
+        self.path = path
         self._is_unread = False  # what the file holds is not known: it is set aside before anything is written
         self.complaint: str | None = None  # why what was found could not be used
 
     def read(self) -> Settings:
         """The stored settings, or the defaults; an unusable file is set aside, never overwritten. Its usable values are
         in force and stored again."""
-        if self._path is None:
+        if self.path is None:
             return Settings()
         try:
-            with open(self._path, encoding="utf-8") as file:
+            with open(self.path, encoding="utf-8") as file:
                 text = file.read(MAX_TOML_BYTES + 1)
         except FileNotFoundError:
             return Settings()
@@ -274,17 +274,19 @@ class SettingsFile:
             return self._rescue(*salvage(text, known))
 
     def _rescue(self, settings: Settings, left_out: list[str]) -> Settings:
-        assert self._path is not None
-        aside = self._path
+        assert self.path is not None
+        aside = self.path
         self._is_unread = True
         try:
-            aside = set_aside(self._path)
+            aside = set_aside(self.path)
             self._is_unread = False
             if settings != Settings():
                 self.write(settings)
         except OSError:
-            log.exception("settings not set aside or saved: path=%s", self._path)
-        listed = " ".join(left_out[:_TOLD]) + (f" And {len(left_out) - _TOLD} more." if len(left_out) > _TOLD else "")
+            log.exception("settings not set aside or saved: path=%s", self.path)
+        listed = " ".join(left_out[:_MOST_NAMED]) + (
+            f" And {len(left_out) - _MOST_NAMED} more." if len(left_out) > _MOST_NAMED else ""
+        )
         rest = "the rest is in force" if settings != Settings() else "the defaults are in force"
         self.complaint = f"The settings kept in {aside.name} cannot all be used; {rest}. {listed}"
         return settings
@@ -294,11 +296,11 @@ class SettingsFile:
 
         A file that could not be read is set aside first; where that fails, nothing is written.
         """
-        if self._path is None:
+        if self.path is None:
             return
         if self._is_unread:
             with contextlib.suppress(FileNotFoundError):
-                log.warning("settings unreadable, set aside: path=%s aside=%s", self._path, set_aside(self._path))
+                log.warning("settings unreadable, set aside: path=%s aside=%s", self.path, set_aside(self.path))
             self._is_unread = False
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        durable_file.write(self._path, to_toml(settings).encode())
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        durable_file.write(self.path, to_toml(settings).encode())

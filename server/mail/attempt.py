@@ -10,7 +10,7 @@ from server.mail.replies import Trouble
 from server.mail.retry_backoff import MAX_ATTEMPTS
 from server.mail.smtp_connection import Reply
 
-_TOLD = 5  # recipients named in a sentence
+_MOST_NAMED = 5  # recipients named in a sentence
 
 
 def answered(
@@ -70,8 +70,8 @@ def _again(
 
 
 def _named(some: Sequence[Recipient]) -> str:
-    listed = ", ".join(f"{one.address}: {one.said}" if one.said else one.address for one in some[:_TOLD])
-    return listed + (f" and {len(some) - _TOLD} more" if len(some) > _TOLD else "")
+    listed = ", ".join(f"{one.address}: {one.said}" if one.said else one.address for one in some[:_MOST_NAMED])
+    return listed + (f" and {len(some) - _MOST_NAMED} more" if len(some) > _MOST_NAMED else "")
 
 
 def _count(recipients: Sequence[Recipient]) -> str:

@@ -29,9 +29,11 @@ def attached(
     pack: Pack,
     parts: Sequence[Stretch],
     missing: Sequence[str] = (),
+    heads: Sequence[str] = (),
 ) -> list[str]:
-    """The text of each mail. `missing`: what of the recordings is not in the files, a sentence each."""
-    what = _joined(f"{_recordings(recordings)} as {FORMATS[format]}.", _missing(missing))
+    """The text of each mail. `missing`: what of the recordings is not in the files, a sentence each; `heads`: of hash
+    chains, a line each."""
+    what = _joined(f"{_recordings(recordings)} as {FORMATS[format]}.", _missing(missing), _heads(heads))
     sum_ = f"SHA-256 of {pack.name}: {pack.sha256}"
     if len(parts) == 1:
         return [_joined(text, what, f"Attached: {pack.name}, {_size(pack.size_bytes)}.", sum_)]
@@ -62,12 +64,13 @@ def linked(
     pack: Pack,
     links: Sequence[str],
     missing: Sequence[str] = (),
+    heads: Sequence[str] = (),
 ) -> str:
     """The text of a mail with links in place of an attachment."""
     what = f"{_recordings(recordings)} as {FORMATS[format]}: {_size(pack.size_bytes)}, too large to be attached."
     many = "Each link is" if len(links) > 1 else "The link is"
     note = f"{many} one to catgraph's own server: it works while that runs, and where its network can be reached."
-    return _joined(text, what, _missing(missing), "\n".join(links), note)
+    return _joined(text, what, _missing(missing), _heads(heads), "\n".join(links), note)
 
 
 def _missing(sentences: Sequence[str]) -> str:
@@ -76,6 +79,11 @@ def _missing(sentences: Sequence[str]) -> str:
     more = len(sentences) - MOST_MISSING
     lines = [f"- {one}" for one in sentences[:MOST_MISSING]] + ([f"- and {more} more."] if more > 0 else [])
     return "\n".join(["Not all of the recording is in the file:", *lines])
+
+
+def _heads(lines: Sequence[str]) -> str:
+    """To be held against the report, and against what `catgraph verify` says of the recording."""
+    return "\n".join(["Head of the hash chain of each recording:", *lines]) if lines else ""
 
 
 def _recordings(recordings: Sequence[str]) -> str:

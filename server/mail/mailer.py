@@ -36,6 +36,7 @@ class Mailer:
         pause_s: Callable[[int], float] = retry_backoff.pause_s,
     ) -> None:
         self.settings = MailSettings()
+        self.place = folder
         self._source = source
         self._wall_ms = wall_ms
         self._folder = MailFolder(folder)

@@ -116,8 +116,8 @@ def state_of(mails: tuple[Mail, ...]) -> State:
 def said_of(mails: tuple[Mail, ...]) -> str:
     """The status text of a letter: the newest reply for the mail that determines its state."""
     state = state_of(mails)
-    telling = [mail for mail in mails if mail.state == state and mail.said]
-    if not telling:
+    with_reply = [mail for mail in mails if mail.state == state and mail.said]
+    if not with_reply:
         return ""
-    mail = telling[0]
+    mail = with_reply[0]
     return f"Part {mail.part} of {mail.parts}: {mail.said}" if mail.parts > 1 else mail.said

@@ -55,7 +55,7 @@ def pack(
     """
     whole = sum(path.stat().st_size for path in files) or 1
     if len(files) == 1 and files[0].suffix == ".zip":
-        return _told(files[0], f"{name}.zip", stop)
+        return _pack_of(files[0], f"{name}.zip", stop)
     need_room(into.parent, whole)
     when = datetime.fromtimestamp(at_ms // 1000, UTC)
     stamp = (min(max(when.year, 1980), 2107), when.month, when.day, when.hour, when.minute, when.second)
@@ -74,7 +74,7 @@ def pack(
                     entry.write(piece)
                     done += len(piece)
                     progress(done / whole)
-    return _told(into, f"{name}.zip", stop)
+    return _pack_of(into, f"{name}.zip", stop)
 
 
 def cut(pack: Pack, limit_bytes: int) -> list[Stretch]:
@@ -105,7 +105,7 @@ def _is_huge(path: Path) -> bool:
     return path.stat().st_size > 2**31 - 2**20
 
 
-def _told(path: Path, name: str, stop: threading.Event) -> Pack:
+def _pack_of(path: Path, name: str, stop: threading.Event) -> Pack:
     digest = hashlib.sha256()
     size = 0
     with open(path, "rb") as file:

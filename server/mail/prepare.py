@@ -6,7 +6,7 @@ import asyncio
 import re
 import shutil
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -17,6 +17,7 @@ from server.mail.order import Composed, Letter, Prepared, Way
 from server.mail.pack import NoRoom, Pack, cut, need_room, pack
 from server.mail.settings import MailSettings
 from server.mail.source import Source
+from server.recording.mcap.chain import read_head
 from server.storage.durable_file import sync_folder
 
 T = TypeVar("T")
@@ -49,7 +50,8 @@ async def prepare(
             stop,
         )
         packed = await _in_thread(packing, stop)
-        made = await _in_thread(partial(_write, letter, settings, packed, missing, files, stop), stop)
+        heads = await asyncio.to_thread(_heads, letter, source)
+        made = await _in_thread(partial(_write, letter, settings, packed, (missing, heads), files, stop), stop)
         progress(1.0)
         return made
     except (NoRoom, ValueError) as why:
@@ -109,9 +111,27 @@ def _part_of(progress: Callable[[float], None], i: int, of: int, share: float) -
     progress((i + share) / of)
 
 
+def _heads(letter: Letter, source: Source) -> list[str]:
+    """Of a mail of reports: the head of each recording's hash chain, a line each."""
+    if letter.order.format != "html":
+        return []
+    found = []
+    for recording in letter.order.recordings:
+        path = source.path_of(recording)
+        head = None if path is None else read_head(path, recording)
+        found.append(f"{recording}: {'not known' if head is None else head.digest}")
+    return found
+
+
 def _write(
-    letter: Letter, settings: MailSettings, packed: Pack, missing: list[str], files: Path, stop: threading.Event
+    letter: Letter,
+    settings: MailSettings,
+    packed: Pack,
+    provenance: tuple[Sequence[str], Sequence[str]],
+    files: Path,
+    stop: threading.Event,
 ) -> Prepared:
+    """`provenance`: what of the recordings is missing, and the heads of their hash chains, in lines."""
     order = letter.order
     parts = cut(packed, settings.limit_bytes)
     way: Way = "attached" if len(parts) == 1 else order.too_large
@@ -122,10 +142,10 @@ def _write(
         )
     if way == "link":
         texts = [
-            mail_text.linked(order.text, order.recordings, order.format, packed, _links(letter, settings), missing)
+            mail_text.linked(order.text, order.recordings, order.format, packed, _links(letter, settings), *provenance)
         ]
     else:
-        texts = mail_text.attached(order.text, order.recordings, order.format, packed, parts, missing)
+        texts = mail_text.attached(order.text, order.recordings, order.format, packed, parts, *provenance)
         need_room(files, packed.size_bytes * 3 // 2)
     sender = address.parse(settings.sender)
     made: list[Composed] = []

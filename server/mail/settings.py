@@ -25,6 +25,7 @@ USUAL_PORT: Mapping[str, int] = {"starttls": 587, "tls": 465, "none": 25}
 # Base64 in lines makes 1.37 of 1: 18 MB are 24.7 MB of mail, and most providers take 25.
 LIMIT_MB = 18.0
 _LIMITS_MB = (0.1, 50.0)
+MOST_REPORT_TO = 20
 _MAX_FILE = 128 * 1024
 _MAX_CA = 32 * 1024
 _HOST = re.compile(r"(?=.{1,253}\Z)[A-Za-z0-9]([A-Za-z0-9-]*[A-Za-z0-9])?(\.[A-Za-z0-9]([A-Za-z0-9-]*[A-Za-z0-9])?)*")
@@ -50,6 +51,7 @@ class MailSettings:
     sender: str = ""
     sender_name: str = ""
     allowed: tuple[str, ...] = ()  # empty: everyone
+    report_to: tuple[str, ...] = ()  # who gets the report of each drive by itself; empty: nobody
     limit_mb: float = LIMIT_MB  # raw size of what is attached to one mail [10⁶ bytes]
     link_base: str = ""  # this server's address in links; empty: the address of the ordering page
     ca: str = ""  # PEM; only these are trusted then
@@ -85,6 +87,7 @@ def checked(body: Mapping[str, Any], old: MailSettings) -> MailSettings:
         sender=_sender(str(body.get("sender", ""))),
         sender_name=_line("sender_name", str(body.get("sender_name", "")), 100).strip(),
         allowed=_allowed(body.get("allowed", ())),
+        report_to=_report_to(body.get("report_to", ())),
         limit_mb=_limit(body.get("limit_mb", LIMIT_MB)),
         link_base=_link_base(str(body.get("link_base", "")).strip()),
         ca=_ca(str(body.get("ca", ""))),
@@ -160,6 +163,19 @@ def _allowed(value: Any) -> tuple[str, ...]:
         return tuple(dict.fromkeys(address.parse_allowed(one.strip()) for one in value if one.strip()))
     except address.BadAddress as why:
         raise BadMailSetting("allowed", str(why)) from None
+
+
+def _report_to(value: Any) -> tuple[str, ...]:
+    if (
+        not isinstance(value, (list, tuple))
+        or len(value) > MOST_REPORT_TO
+        or not all(isinstance(x, str) for x in value)
+    ):
+        raise BadMailSetting("report_to", f"Drive reports are mailed to at most {MOST_REPORT_TO} addresses.")
+    try:
+        return tuple(dict.fromkeys(address.parse(one.strip()).text for one in value if one.strip()))
+    except address.BadAddress as why:
+        raise BadMailSetting("report_to", str(why)) from None
 
 
 def _limit(value: Any) -> float:
@@ -261,5 +277,7 @@ class MailSettingsFile:
             with contextlib.suppress(FileNotFoundError):
                 set_aside(self._path)
             self._is_unread = False
-        content = tomli_w.dumps({**asdict(settings), "allowed": list(settings.allowed)})
+        content = tomli_w.dumps(
+            {**asdict(settings), "allowed": list(settings.allowed), "report_to": list(settings.report_to)}
+        )
         durable_file.write(self._path, content.encode(), mode=0o600)

@@ -101,14 +101,14 @@ def _thresholds() -> Iterator[str]:
     yield ""
     yield "| Name | What | Default | Range | |"
     yield "|---|---|---|---|---|"
-    is_rate_told = False
+    is_rate_listed = False
     for name, field in catalog.schema().items():
         group, _, short = name.partition(".")
         title = field["title"]
         if group == "signals" and short.removesuffix("_hz") in SIGNALS:
-            if is_rate_told:
+            if is_rate_listed:
                 continue
-            is_rate_told = True
+            is_rate_listed = True
             name, title = "signals.<signal>_hz", "(signal): expected rate"
         span = f"{field['minimum']:g} … {field['maximum']:g}".replace("-", "−")
         yield (

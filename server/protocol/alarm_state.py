@@ -9,7 +9,13 @@ from typing_extensions import TypedDict, Unpack
 from monitor.alarm import AlarmState
 from monitor.alarm_spec import Action, Place, Priority, Sound
 from monitor.check import Verdict
+from monitor.interventions import By, KindOf
+from monitor.values import Mode
+from server.protocol.departure import DepartureResult, RecurringItem
 from server.protocol.doc import doc
+from server.protocol.driving_state import DriveSample
+from server.protocol.marks import HasPhoto, HasVoice, MarkedBy, MarkedMs, MarkId, MarkWords
+from server.protocol.people import DutyRole
 
 
 class Tile(TypedDict):
@@ -90,12 +96,18 @@ class AlarmLoad(TypedDict):
 class EventDetails(TypedDict, total=False):
     """What an event of no alarm may say besides."""
 
-    # Of control.
-    act: Annotated[str, doc("what happened to control; below")]
+    # Of what a person on duty did.
+    person: Annotated[str, doc("who was on duty at the device that did it; left out: nobody")]
+    role: Annotated[DutyRole, doc("of that person")]
+    # Of control, and of an item of the attention queue.
+    act: Annotated[str, doc("what happened to control, or to the item; below")]
     by_page: str | None
-    holder: Annotated[str | None, doc("who is in control now")]
+    holder: Annotated[str | None, doc("who is in control now, or to whom the item is assigned")]
     page: str | None
-    before: Annotated[str | None, doc("who was in control until now")]
+    before: Annotated[
+        str | list[DriveSample] | None,
+        doc("the one before, where that is another; of an intervention: the 10 s before it, twice a second"),
+    ]
     before_page: str | None
     fence: int | None
     # Of a slow-down, and of a slow link.
@@ -109,6 +121,35 @@ class EventDetails(TypedDict, total=False):
     stands: Literal["before", "unproven"] | None
     trigger: Annotated[str, doc("the rule that counts down")]
     hold: Annotated[int, doc("number of the guard's hold")]
+    # Of the driving mode, and of interventions.
+    mode: Mode
+    mode_source: Annotated[str, doc('the topic, "commands" or ""')]
+    moment_ms: Annotated[int, doc("when it happened; it is logged a moment later")]
+    flickers: Annotated[int, doc("single changes of a mode that flickers, which are not events of their own")]
+    intervention: Annotated[str, doc("its id")]
+    kind_of: KindOf
+    speed_mps: float | None
+    lat_deg: float | None
+    lon_deg: float | None
+    initiated_by: By
+    active: Annotated[list[str], doc("ids of the alarms that were active")]
+    brake_percent: float | None
+    acted_before_s: Annotated[float | None, doc("brake or wheel so long before the mode changed")]
+    what: Annotated[str, doc("the description of an intervention")]
+    # Of the departure check.
+    check: Annotated[str, doc("id of the departure check")]
+    item: Annotated[str, doc("id of the item that turned")]
+    item_title: str
+    result: DepartureResult
+    value: Annotated[str, doc("what was seen")]
+    note: str
+    done: Annotated[int, doc("items of the departure check; so are `failed`, `not_applicable` and `of`")]
+    failed: int
+    not_applicable: int
+    of: int
+    fixed: Annotated[int, doc("items that had failed first")]
+    recurring: Annotated[list[RecurringItem], doc("of a signed departure check: its items that have an interval")]
+    hash: Annotated[str, doc("SHA-256 of the list and its results [hex]; with an item: of what it asks")]
     # Of the rest.
     address: str
     settings: Annotated[dict[str, Any], doc("all that are in force, as monitoring begins")]
@@ -116,6 +157,15 @@ class EventDetails(TypedDict, total=False):
     recording: Annotated[str, doc("the recording that was recovered")]
     phone: Annotated[str | None, doc("the phone that was chosen")]
     since_ms: Annotated[int, doc("when the pause began")]
+    resumes: Annotated[bool, doc("monitoring goes on after the server was started again: the drive is the same")]
+    # Of a mark.
+    mark: MarkId
+    marked_ms: MarkedMs
+    category: str | None
+    words: MarkWords
+    voice: HasVoice
+    photo: HasPhoto
+    source: MarkedBy
 
 
 class NotedEvent(EventDetails):

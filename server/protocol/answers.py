@@ -8,8 +8,14 @@ from typing_extensions import TypedDict
 
 from monitor.alarm_spec import Priority
 from server.protocol.check_state import CheckAnswer
+from server.protocol.departure import DepartureAnswer
 from server.protocol.doc import doc
+from server.protocol.drive_course import Course
 from server.protocol.drive_trends import DriveTrendsAnswer
+from server.protocol.driving_state import DrivingAnswer, InterventionAnswer
+from server.protocol.logbook import LogbookAnswer
+from server.protocol.marks import DriveMark, MarkList
+from server.protocol.people import PeopleList
 
 ExportState = Literal["waiting", "working", "done", "failed", "cancelled"]
 
@@ -114,6 +120,55 @@ class RaisedAlarm(TypedDict):
     text: str
 
 
+class VerificationBreak(TypedDict):
+    """Where a hash chain breaks: the record whose hash does not hold, and what it covers."""
+
+    record: int
+    from_byte: int
+    to_byte: int
+    from_ns: Annotated[int, doc("ns since 1970; 0: not known")]
+    to_ns: int
+
+
+class VerificationAnswer(TypedDict):
+    """Whether a recording is as it was recorded."""
+
+    state: Annotated[
+        Literal["intact", "broken", "unfinished", "no chain", "unreadable"],
+        doc("unfinished: it ends before its seal; no chain: recorded by an older version"),
+    ]
+    is_broken: Annotated[bool, doc("broken or unfinished, or a recording beside it names another hash")]
+    short: Annotated[str, doc("a few words, as *Intact · 3f9a12bc* or *Broken at record 57*")]
+    sentence: str
+    records: int
+    head: Annotated[str | None, doc("SHA-256 of the last record [hex]; null: there is none, or it is broken")]
+    broken: VerificationBreak | None
+    is_recovered: Annotated[bool, doc("the recorder was interrupted, and the file completed later")]
+    previous: Annotated[str | None, doc("the recording that it names as the one before it")]
+    previous_missing: bool
+    problems: Annotated[list[str], doc("what recordings beside it object, a sentence each")]
+    at_ms: Annotated[int, doc("when it was verified")]
+
+
+class StoredCopy(TypedDict):
+    """The copy of a recording in the store."""
+
+    state: Annotated[Literal["none", "waiting", "uploading", "stored", "failed"], doc("of the whole file")]
+    share: Annotated[float | None, doc("of the whole file that is in the store, 0 to 1; null: none is being uploaded")]
+    checked_ms: Annotated[int | None, doc("when the copy was read back and was the same")]
+    sentence: Annotated[str, doc("why it is not there, or why it failed; empty: nothing to say")]
+    clips: Annotated[int, doc("clips around alarms that are in the store")]
+    is_asked: Annotated[bool, doc("a person's request stands, which can be taken back")]
+    is_deletion_asked: Annotated[bool, doc("it is deleted here once the copy was read back, by request or setting")]
+
+
+class StoreFacts(TypedDict):
+    """The store of a server."""
+
+    address: str
+    problem: Annotated[str | None, doc("why nothing is uploaded now, as a sentence")]
+
+
 class Recording(TypedDict):
     """A row of `GET /api/recordings`."""
 
@@ -129,7 +184,15 @@ class Recording(TypedDict):
     alarms: Annotated[dict[Priority, int] | None, doc("raised in it; null: no alarms were recorded with it")]
     title: str
     note: str
+    weather: Annotated[str, doc('for the report of the drive; "": nobody said')]
     tags: list[str]
+    marks: Annotated[int, doc("how many; their words are found by a search")]
+    late: NotRequired[
+        Annotated[str, doc("another value: other marks or descriptions came after it was complete; left out: none did")]
+    ]
+    late_marks: NotRequired[
+        Annotated[list[DriveMark], doc("of one recording: those that came after it was complete, at most 200")]
+    ]
     state: Annotated[Literal["waiting", "read", "unreadable"], doc("waiting: listed by its name, and read soon")]
     problem: Annotated[str | None, doc("why it cannot be read, as a sentence")]
     damage: Annotated[list[str], doc("what of it cannot be read, a sentence each")]
@@ -147,9 +210,12 @@ class Recording(TypedDict):
     file: Annotated[str, doc("its name in the folder")]
     format: Annotated[str, doc("mcap · bag · db3")]
     sha256: str | None
+    head: Annotated[str | None, doc("SHA-256 of the last record of its hash chain [hex], not verified; null: none")]
+    verified: Annotated[VerificationAnswer | None, doc("null: this file was not verified since the server started")]
     thumbnail: str
     sketch: Annotated[SketchAnswer | None, doc("null: no position")]
     trashed_ms: int | None
+    stored: NotRequired[Annotated[StoredCopy, doc("where the server has a store")]]
     raised: NotRequired[Annotated[list[RaisedAlarm], doc("of a recording that is asked for alone; at most 200")]]
     speed_mps: NotRequired[
         Annotated[
@@ -175,6 +241,42 @@ class RecordingList(RecordingNames):
     free_bytes: int | None
     waiting: Annotated[int, doc("files that are yet to be read")]
     formats: list[ExportFormat]
+    store: NotRequired[Annotated[StoreFacts, doc("where the server has one")]]
+
+
+class StoredClip(TypedDict):
+    name: str
+    at_ms: Annotated[int, doc("the alarm it is about")]
+    size_bytes: int
+
+
+class StoredRecording(TypedDict):
+    """A row of `GET /api/stored`, as the agent wrote it into the store."""
+
+    id: str
+    vehicle: str
+    folder: Annotated[str, doc("of the vehicle, in addresses")]
+    title: str
+    started_ms: int
+    length_s: float | None
+    distance_m: float | None
+    top_speed_mps: float | None
+    alarms: dict[Priority, int] | None
+    sketch: SketchAnswer | None
+    file: Annotated[str | None, doc("its name, if the whole file is stored and was verified")]
+    size_bytes: Annotated[int | None, doc("of the whole file in the store")]
+    sha256: str | None
+    checked_ms: int | None
+    clips: list[StoredClip]
+
+
+class StoredList(TypedDict):
+    """`GET /api/stored`."""
+
+    store: str
+    recordings: list[StoredRecording]
+    next: Annotated[str | None, doc("the `cursor` of the page after this one")]
+    count: int
 
 
 class ExportJob(TypedDict):
@@ -220,7 +322,16 @@ Answers = (
     | CheckAnswer
     | TrackPoints
     | RecordingList
+    | LogbookAnswer
+    | Course
+    | VerificationAnswer
+    | StoredList
     | ExportJob
     | DeviceList
     | DriveTrendsAnswer
+    | PeopleList
+    | InterventionAnswer
+    | DrivingAnswer
+    | MarkList
+    | DepartureAnswer
 )

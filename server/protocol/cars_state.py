@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -27,6 +27,7 @@ class CarAlarm(TypedDict):
     active: bool
     raised_ms: int
     sound: Annotated[Sound, doc("none while it is silenced")]
+    text: NotRequired[Annotated[str, doc("value against limit, in words")]]
 
 
 class CarLink(TypedDict):
@@ -46,8 +47,63 @@ class CarSpeed(TypedDict):
     horizon_s: float | None
 
 
+class CarPlace(TypedDict):
+    """Where a car is by its own GPS, WGS84."""
+
+    lat_deg: float
+    lon_deg: float
+    heading_rad: Annotated[float | None, doc("counter-clockwise from east")]
+    freshness: SignalFreshness
+    age_s: float | None
+
+
+class ItemHolder(TypedDict):
+    """Who has the item of a car in the attention queue."""
+
+    name: str
+    page: str
+    since_ms: int
+
+
+class ItemOffer(TypedDict):
+    """Who is asked to take the item over; it stays where it is until they accept."""
+
+    by: str
+    name: str
+    page: str
+    since_ms: int
+
+
+class AttentionItem(TypedDict):
+    """Why a car needs a person, and who has it. Its session alone decides."""
+
+    since_ms: Annotated[int, doc("the car needs a person without a break since then")]
+    assigned: ItemHolder | None
+    offered: ItemOffer | None
+    escalates_ms: Annotated[int | None, doc("when it goes on to the supervisor; null: no timer runs")]
+    escalated_ms: Annotated[int | None, doc("when it went on to the supervisor")]
+    supervisors: NotRequired[
+        Annotated[list[str] | None, doc("who is on duty as such now, 3 at most; null: not known, or by an older agent")]
+    ]
+
+
+class PagePerson(TypedDict):
+    """An operator's page that announces the alarms of this car."""
+
+    page: str
+    name: str
+
+
+class AskedControl(TypedDict):
+    """An operator who asks for control of the car, and whom nobody has answered yet."""
+
+    page: str
+    name: str
+    left_s: Annotated[float, doc("until silence grants it")]
+
+
 class CarSummary(TypedDict):
-    """One car, as its session states it."""
+    """One car, as its session states it. What is not required came later: an older agent does not state it."""
 
     phase: Phase
     paused: bool
@@ -60,12 +116,28 @@ class CarSummary(TypedDict):
     recording: RecorderState
     recording_for_s: float | None
     slow_down: SlowDownPhase
+    time_ms: NotRequired[Annotated[int, doc("when it was made, by the clock that its other times are of")]]
+    attention: NotRequired[Annotated[AttentionItem | None, doc("null: it needs nobody")]]
+    place: NotRequired[Annotated[CarPlace | None, doc("null: no position was received")]]
+    energy_percent: NotRequired[Annotated[float | None, doc("of battery or fuel")]]
+    requests: NotRequired[Annotated[list[AskedControl], doc("who asks for control, the oldest first, 3 at most")]]
+    people: NotRequired[Annotated[list[PagePerson], doc("to whom its item can be handed over, 20 at most")]]
+    challenge: NotRequired[Annotated[str, doc("as `challenge` of a state")]]
+
+
+class OffOnPurpose(TypedDict):
+    """A person said that a car is off; it holds until the car's agent is heard again."""
+
+    by: str
+    since_ms: int
 
 
 class ListedCar(TypedDict):
     name: str
     age_s: Annotated[float | None, doc("of the summary when this was sent; null: there was none in this run")]
     summary: Annotated[CarSummary | None, doc("null: its session has stopped, and nothing is known of the car now")]
+    trouble: NotRequired[Annotated[str | None, doc("which part is silent, as a sentence; null: none")]]
+    off: NotRequired[Annotated[OffOnPurpose | None, doc("who said that a car that is silent is off; null: nobody")]]
 
 
 class Cars(TypedDict):

@@ -12,7 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 from pydantic_core import PydanticCustomError
 
 from server.protocol.command_base import BaseCommand, Name, Needs, Number, PageName
+from server.protocol.departure_commands import DepartureCommand
 from server.protocol.doc import doc
+from server.protocol.handover_commands import HandoverCommand
+from server.protocol.item_commands import ItemCommand
+from server.protocol.mark_commands import MarkCommand
+from server.protocol.mode_commands import DescribeIntervention
+from server.protocol.slowing_commands import SlowingCommand
 
 MAX_COMMAND_BYTES = 16 * 1024
 
@@ -73,6 +79,7 @@ class Acknowledge(BaseCommand):
     needs: ClassVar[Needs] = "operator"
     http: ClassVar[str] = "The operator has seen this occurrence"
     path: ClassVar[str] = "/api/alarms/{alarm}/acknowledge"
+    from_fleet: ClassVar[bool] = True
     kind: Literal["acknowledge"]
     alarm: Name
     occurrence: Annotated[Number, doc("which occurrence was seen; an older one is refused")]
@@ -154,6 +161,7 @@ class Position(BaseCommand):
 
     needs: ClassVar[Needs] = "operator"
     passes_replay: ClassVar[bool] = True  # the live monitor must know, whatever the page shows
+    is_signed: ClassVar[bool] = False
     kind: Literal["position"]
     phone: PageName
     handheld: bool
@@ -197,6 +205,7 @@ class PresentWord(BaseCommand):
     it. Nothing answers it but its refusal."""
 
     needs: ClassVar[Needs] = "operator"
+    is_signed: ClassVar[bool] = False
     kind: Literal["present"]
     visible: bool
     draws: Annotated[bool, doc("false: drawing fails, and the page covers its values")] = True
@@ -206,77 +215,25 @@ class PresentWord(BaseCommand):
     battery: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = None
     charging: bool | None = None
     lag_s: Annotated[float, Field(ge=0, allow_inf_nan=False, description="age of its newest state")] = 0.0
+    key: Annotated[Name | None, doc("id of the key by which the page signs its orders")] = None
     leaves: Annotated[bool, doc("it is closed, or another page takes its place")] = False
     announces: list[Name] = Field(
         default_factory=list, max_length=100, description="the other cars whose next alarm would be heard from it"
     )
 
 
-class OfCar(BaseCommand):
-    """Acts on the car itself: refused where it was meant for another one."""
-
-    vehicle: Annotated[Name | None, doc("the car that the page named to its operator; refused by any other")] = None
-
-
-class Arm(OfCar):
-    """Slow-down may be ordered from now on."""
-
-    http: ClassVar[str] = "Slow-down may be ordered from now on"
-    path: ClassVar[str] = "/api/slow-down/arm"
-    has_body: ClassVar[bool] = False
-    kind: Literal["arm"]
-
-
-class Disarm(OfCar):
-    """Slow-down may not be ordered any more."""
-
-    http: ClassVar[str] = "Nothing can be ordered any more"
-    path: ClassVar[str] = "/api/slow-down/disarm"
-    has_body: ClassVar[bool] = False
-    kind: Literal["disarm"]
-
-
-class Decelerate(OfCar):
-    """Slows the car, once armed; refused where it took longer than 300 ms on its way."""
+class AskOutcome(BaseCommand):
+    """What became of a command whose answer was lost. One that did not arrive yet is not carried out any more."""
 
     needs: ClassVar[Needs] = "operator"
-    http: ClassVar[str] = "Slow the car, and hold it until it is released; no emergency stop"
-    path: ClassVar[str] = "/api/slow-down/order"
-    has_body: ClassVar[bool] = False
-    kind: Literal["slow_down"]
-    pressed_ago_s: Annotated[
-        float, Field(ge=0, le=86_400, allow_inf_nan=False, description="since the finger let go, when it was sent")
-    ] = 0.0
-    heard_ms: Annotated[float, Field(ge=0, le=2**53, allow_inf_nan=False)] | None = None
-    held_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)] = 0.0
-
-    def late_s(self, wall_ms: float) -> float:
-        """How long ago it was pressed, at least: half of the way there and back belongs to this direction."""
-        way_s = 0.0 if self.heard_ms is None else max(0.0, (wall_ms - self.heard_ms) / 1000 - self.held_s)
-        return self.pressed_ago_s + way_s / 2
-
-
-class Release(OfCar):
-    """Ends the order, or the guard's hold, of this number: whoever drives may drive on."""
-
-    http: ClassVar[str] = "The driver or controller may continue"
-    path: ClassVar[str] = "/api/slow-down/release"
-    kind: Literal["release"]
-    number: Annotated[Number, doc("of the very order that ends, as the state names it")]
-
-
-class Veto(OfCar):
-    """Stops a count-down: the car is not slowed by itself this time."""
-
-    needs: ClassVar[Needs] = "operator"
-    http: ClassVar[str] = "Not slowed by itself this time"
-    path: ClassVar[str] = "/api/slow-down/veto"
     passes_replay: ClassVar[bool] = True
-    kind: Literal["veto"]
-    trigger: Annotated[Name, doc("as the count-down names it")]
+    from_fleet: ClassVar[bool] = True
+    is_signed: ClassVar[bool] = False
+    kind: Literal["outcome"]
+    of: Annotated[str, Field(max_length=80, description="the `id` of the command")]
+    ago_s: Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False, description="since it was asked for, at most")]
 
 
-SlowingCommand = Arm | Disarm | Decelerate | Release | Veto
 LoggedCommand = (
     Connect
     | Retry
@@ -293,15 +250,19 @@ LoggedCommand = (
     | Position
     | Ride
     | TakeControl
+    | ItemCommand
+    | HandoverCommand
+    | MarkCommand
+    | DepartureCommand
     | SlowingCommand
+    | DescribeIntervention
 )
-Command = LoggedCommand | PresentWord
+Command = LoggedCommand | PresentWord | AskOutcome
 
 
 def kind_of(command: type[Command]) -> str:
     """The `kind` by which a command is sent."""
-    kind: str = get_args(command.model_fields["kind"].annotation)[0]
-    return kind
+    return str(get_args(command.model_fields["kind"].annotation)[0])
 
 
 BY_KIND: Mapping[str, type[Command]] = {kind_of(one): one for one in get_args(Command)}

@@ -177,7 +177,7 @@ def marks_between(
     """The most urgent marks of a part of the drive in the order of time, and how many more there are."""
     inside = [mark for mark in marks if from_s <= mark.at_s - since_s <= to_s]
     kept = sorted(inside, key=lambda mark: (mark.priority.rank, mark.at_s))[:MOST_MARKS]
-    told: list[TrendMark] = [
+    shown: list[TrendMark] = [
         {
             "at_s": round(mark.at_s - since_s, 2),
             "alarm": mark.alarm,
@@ -186,7 +186,7 @@ def marks_between(
         }
         for mark in sorted(kept, key=lambda mark: mark.at_s)
     ]
-    return told, len(inside) - len(kept)
+    return shown, len(inside) - len(kept)
 
 
 def _numbers(numbers: Sequence[float | None]) -> list[float | None]:

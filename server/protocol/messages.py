@@ -9,9 +9,13 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from monitor.alarm_spec import Priority
+from server.bus.bus import NotServed
 from server.protocol.alarm_state import LogEvent
 from server.protocol.cars_state import Cars
 from server.protocol.doc import doc
+from server.protocol.marks import DriveMark
+from server.protocol.operator_state import HandoverState
+from server.protocol.people import Duty
 from server.protocol.state import ConnectionProblem, RecordedState, ReplayState, State
 
 RoleName = Literal["viewer", "operator"]
@@ -38,6 +42,7 @@ class ServerHello(TypedDict):
     time_ms: int
     last_event: int
     veil_after_s: Annotated[float, doc("without a message for so long a page covers its values")]
+    signs: NotRequired[Annotated[bool, doc("of a web node: orders are signed, as agents require it")]]
 
 
 class Hello(ServerHello):
@@ -64,16 +69,40 @@ class RefusedAddress(ConnectionProblem):
     suggestion: Annotated[str | None, doc("an address that would do")]
 
 
+class HandedOver(TypedDict):
+    """For the web node: control was handed over, so who had it is not on duty there any more."""
+
+    device: Annotated[str, doc("under which somebody was on duty")]
+    to: str
+    ago_s: NotRequired[Annotated[float, doc("of `outcome`: how long ago")]]
+
+
 class Answer(TypedDict):
     """What became of a command."""
 
     ok: bool
+    outcome: NotRequired[
+        Annotated[
+            Literal["refused", "not_delivered", "unknown"],
+            doc("of one that is not ok: refused where left out; not_delivered: it never will be; unknown: it may be"),
+        ]
+    ]
+    cut: NotRequired[
+        Annotated[Literal["server-broker", "broker-agent", "agent-car"] | None, doc("where it was lost, where known")]
+    ]
+    became: NotRequired[
+        Annotated[
+            Literal["done", "refused", "never", "under_way", "not_known"], doc("of `outcome`; never: nor will it be")
+        ]
+    ]
     reason: NotRequired[Annotated[str, doc("one sentence")]]
     problem: NotRequired[Annotated[RefusedAddress, doc("of an address that cannot be dialled")]]
     field: NotRequired[Annotated[str | None, doc("the setting at fault")]]
     conflict: NotRequired[Annotated[bool, doc("the settings changed meanwhile")]]
     version: NotRequired[Annotated[int, doc("of the settings, once changed")]]
     fence: NotRequired[Annotated[int, doc("number of the lease that the page has")]]
+    handover: NotRequired[Annotated[HandoverState | None, doc("what stands now, where a read-back was refused")]]
+    handed_over: NotRequired[Annotated[HandedOver, doc("not sent to pages")]]
     held_by: NotRequired[Annotated[str | None, doc("who is in control instead")]]
 
 
@@ -89,6 +118,13 @@ class Problem(TypedDict):
 
     kind: Literal["problem"]
     reason: str
+
+
+class Unserved(TypedDict):
+    """Of web nodes, twice a second while nothing comes from the vehicle's session; over with the next state."""
+
+    kind: Literal["unserved"]
+    why: Annotated[str, doc("one sentence")]
 
 
 class Mark(TypedDict):
@@ -115,10 +151,30 @@ class IndexedTimeline(TypedDict):
     marks_left_out: int
 
 
+class ReplayIntervention(TypedDict):
+    """An intervention in a recording."""
+
+    at_s: float
+    kind_of: Annotated[str, doc("as of the event; of another version it may be another word")]
+    category: str | None
+    what: Annotated[str, doc('its description, also one that came later; "" and no category: nobody described it')]
+
+
+class DrivenSpan(TypedDict):
+    """A time in one mode."""
+
+    mode: Annotated[str, doc("autonomous · manual · unknown")]
+    from_s: float
+    to_s: float
+
+
 class Timeline(IndexedTimeline):
     """The time line of a recording."""
 
     kind: Literal["timeline"]
+    flags: Annotated[list[DriveMark], doc("moments that somebody marked, oldest first; at most 400, words shortened")]
+    interventions: Annotated[list[ReplayIntervention], doc("oldest first, at most 400")]
+    modes: Annotated[list[DrivenSpan], doc("who drove when, without a gap, at most 400; empty: not recorded")]
     notes: Annotated[list[str], doc("what is to be said of the file")]
 
 
@@ -145,9 +201,33 @@ class ReplayEnded(TypedDict):
     ended: Annotated[str, doc("one sentence")]
 
 
-ToPage = Reply | Problem | ReplayEnded | BesideEnded
+class FleetEvent(TypedDict):
+    """To a page of all cars: what happened to the item of one, the newest 20 first, then each new one."""
+
+    kind: Literal["fleet_event"]
+    vehicle: str
+    n: Annotated[int, doc("its number in the log of the car")]
+    time_ms: int
+    text: str
+    by: Annotated[str | None, doc("who did it, where a person did")]
+
+
+ToPage = Reply | Problem | ReplayEnded | BesideEnded | Unserved | Duty
 Message = Annotated[
-    Hello | Offer | State | Cars | Events | Reply | Problem | Timeline | Beside | BesideEnded | ReplayEnded,
+    Hello
+    | Offer
+    | State
+    | Cars
+    | Events
+    | Reply
+    | Problem
+    | Timeline
+    | Beside
+    | BesideEnded
+    | ReplayEnded
+    | Unserved
+    | FleetEvent
+    | Duty,
     Field(discriminator="kind"),
 ]
 
@@ -160,6 +240,19 @@ def reply(identity: str, answer: Mapping[str, Any] | Answer) -> Reply:
 def refusal(identity: str, reason: str) -> Reply:
     """A command that is refused, with why as a sentence."""
     return reply(identity, {"ok": False, "reason": reason})
+
+
+MAYBE = "It may have been carried out."  # core/outcome.js has it too
+
+
+def not_served(why: NotServed, trouble: str | None = None) -> Answer:
+    """A command that no session answered; `trouble`: a better sentence than the one in `why`."""
+    text = (trouble or str(why)).rstrip(".")
+    if why.outcome == "unknown":
+        reason = f"{text[:1].upper()}{text[1:]}. {MAYBE}"
+    else:
+        reason = f"Not delivered: {text[:1].lower()}{text[1:]}."
+    return {"ok": False, "reason": reason, "outcome": why.outcome, "cut": why.cut}
 
 
 def beside_ended(why: str) -> BesideEnded:

@@ -6,10 +6,12 @@ from typing import Annotated, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
+from monitor.alarm_spec import Priority
 from monitor.phones import Why
 from server.protocol.doc import doc
 
 Ready = Literal["ready", "refused", "asks", "missing", "interrupted"]
+LineKind = Literal["alarm", "shelved", "limit", "rides", "driving", "departure", "slow_down", "paused"]
 ReaderEnded = Literal["silent", "blind", "hidden", "undrawn", "sound", "replay"]
 
 
@@ -25,6 +27,32 @@ class ControlRequest(TypedDict):
     left_s: Annotated[float, doc("until silence grants it")]
 
 
+class HandoverLine(TypedDict):
+    """One thing that stands, to be read back."""
+
+    key: str
+    kind: LineKind
+    title: str
+    text: str
+    priority: Annotated[Priority | None, doc("of an alarm")]
+    since_ms: int | None
+    until_ms: Annotated[int | None, doc("of what is shelved")]
+    read: Annotated[bool, doc("who takes over has confirmed it")]
+
+
+class HandoverState(TypedDict):
+    """Control is being handed over: it changes once every line is read back."""
+
+    by: str
+    by_page: str
+    name: Annotated[str, doc("who takes over")]
+    page: str
+    since_ms: int
+    lines: list[HandoverLine]
+    left: Annotated[int, doc("lines that are not confirmed")]
+    version: Annotated[str, doc("of the list")]
+
+
 class ControlState(TypedDict):
     """Who is in control."""
 
@@ -36,6 +64,7 @@ class ControlState(TypedDict):
     lapses_s: NotRequired[Annotated[float, doc("after so long without renewal it lapses")]]
     former: NotRequired[Annotated[FormerHolder | None, doc("whose lease lapsed, and who can reclaim it until then")]]
     requests: NotRequired[Annotated[list[ControlRequest], doc("who asks for control, the oldest first")]]
+    handover: NotRequired[Annotated[HandoverState | None, doc("null: control is not being handed over")]]
 
 
 class PagePresence(TypedDict):

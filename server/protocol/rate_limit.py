@@ -22,6 +22,8 @@ class Limits:
 
     body_bytes: int = 256 * 1024  # the largest there is, settings as TOML, has 64 kB
     body_s: float = 20.0  # from a request's head to the end of its body
+    upload_bytes: int = 8 * 1024 * 1024  # of a voice note or a photo, which its route bounds further
+    upload_s: float = 120.0
     head_bytes: int = 32 * 1024
     head_s: float = 10.0  # from a connection's first byte to the end of a request's head; also the first word itself
     connections: int = 64  # from one address that is not this machine's own

@@ -112,7 +112,7 @@ def read(message: Any) -> ReplayOrder:
 
 def opening(recording: str | None, moment: str | None) -> OpenReplay | None:
     """From an address: a moment that is none is the beginning, and what cannot be a recording's id is looked for like
-    any other, so that its page is told there is none."""
+    any other, so that its page reports that there is none."""
     if recording is None:
         return None
     try:

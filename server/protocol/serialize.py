@@ -1,4 +1,4 @@
-"""What a page is told, as docs/protocol.md has it: signals, alarms and events as JSON, scans as bytes."""
+"""What a page receives, as docs/protocol.md has it: signals, alarms and events as JSON, scans as bytes."""
 
 from __future__ import annotations
 
@@ -85,6 +85,8 @@ def value(reading: Any) -> SignalValue | None:
             return {"speed_mps": plain(reading.speed_mps), "tyre_angle_rad": plain(reading.tyre_angle_rad)}
         case values.Level():
             return {"value": plain(reading.value, 1), "unit": reading.unit}
+        case values.DriveMode():
+            return {"mode": reading.mode, "said": reading.said}
         case values.Number():
             return {"value": plain(reading.value)}
     return None
@@ -128,7 +130,7 @@ class Judged:
 
 
 def scan_frame(scan: values.LaserScan, *, number: int, age_s: float, kinds_kept: bool, judged: Judged) -> bytes:
-    """The scan's binary frame. `kinds_kept`: the transport told NaN and ±Inf apart; else they are all one code.
+    """The scan's binary frame. `kinds_kept`: the transport kept NaN and ±Inf apart; else they are all one code.
 
     Source of the meaning of ±Inf and NaN: REP-117.
     """

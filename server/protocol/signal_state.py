@@ -9,6 +9,7 @@ from typing_extensions import TypeAliasType, TypedDict
 
 from monitor.reading import Freshness
 from monitor.signals import SIGNALS
+from monitor.values import Mode
 from server.protocol.doc import doc
 
 
@@ -94,6 +95,11 @@ class FuelValue(TypedDict):
     unit: Annotated[str, doc("% or l")]
 
 
+class ModeValue(TypedDict):
+    mode: Annotated[Mode, doc("of a plain number always unknown: what it means is a setting")]
+    said: Annotated[str, doc("in the car's own words")]
+
+
 class NumberValue(TypedDict):
     value: Annotated[float | None, doc("in the unit of the signal")]
 
@@ -112,6 +118,7 @@ SignalValue = (
     | DiagnosticsValue
     | CommandValue
     | FuelValue
+    | ModeValue
     | NumberValue
 )
 Value = TypeVar("Value")
@@ -163,6 +170,7 @@ VALUES: Mapping[str, type] = {
     "diagnostics": DiagnosticsValue,
     "command": CommandValue,
     "fuel": FuelValue,
+    "mode": ModeValue,
 }
 if TYPE_CHECKING:
     Signals = dict[str, SignalState[SignalValue]]

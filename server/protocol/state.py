@@ -8,7 +8,9 @@ from typing_extensions import TypeAliasType, TypedDict
 
 from monitor.link import Phase
 from server.protocol.alarm_state import AlarmLoad, StandingAlarm, SuppressedAlarm, Tile
+from server.protocol.departure import DepartureState
 from server.protocol.doc import doc
+from server.protocol.driving_state import ModeState
 from server.protocol.operator_state import ControlState, PhoneCompared, PhoneListed, ReachState
 from server.protocol.recording_state import RecordingState
 from server.protocol.signal_state import Signals
@@ -28,6 +30,7 @@ class ServerState(TypedDict):
     pages: int
     frames_skipped: Annotated[int, doc("replaced by newer ones before a page took them")]
     loop_lag_ms: NotRequired[float]
+    challenge: NotRequired[Annotated[str, doc("of an agent: what a device signs with its next order")]]
 
 
 class HeldState(TypedDict):
@@ -151,6 +154,7 @@ class LiveSummary(TypedDict):
     decelerate: SlowDownState
     alarms: Annotated[list[StandingAlarm], doc("at most 8")]
     alarms_in_all: int
+    challenge: NotRequired[Annotated[str, doc("as `challenge` of a live state")]]
 
 
 class RecordedState(TypedDict):
@@ -171,10 +175,12 @@ class RecordedState(TypedDict):
     limits: Annotated[dict[str, float], doc("every threshold in force, by its full name")]
     recording: RecordingState
     decelerate: Annotated[SlowDownState, doc("the slow-down")]
+    mode: Annotated[ModeState, doc("who drives")]
     control: ControlState
     reach: Annotated[ReachState | None, doc("whom an alarm would reach; null: of a recording")]
     phone: Annotated[PhoneCompared | None, doc("the phone that is compared with the car; null: none")]
     phones: Annotated[list[PhoneListed], doc("all that share a position, at most 12, the one compared first")]
+    marks: Annotated[int, doc("how many marks this drive has, or a recording up to the moment shown")]
 
 
 class ReplayEnvelope(TypedDict):
@@ -189,6 +195,7 @@ class LiveState(RecordedState):
     """The state of a vehicle."""
 
     server: ServerState
+    departure: NotRequired[Annotated[DepartureState, doc("the departure check; left out of a recording's state")]]
 
 
 class State(LiveState):

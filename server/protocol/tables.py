@@ -85,15 +85,15 @@ def _replay(_: list[str]) -> Iterator[str]:
 
 def _fields(schema: Mapping[str, Any]) -> str:
     """The fields of an order, those that every order has left out."""
-    told = []
+    fields = []
     for name, of in schema["properties"].items():
         if name in ("id", "kind", "do") and not (name == "do" and "enum" in of):
             continue
         most = f" ≤ {of['maximum']:g}" if of.get("maximum", math.inf) < 1000 else ""
         left_out = "" if name in schema.get("required", ()) else ", may be left out"
         about = f": {of['description']}" if "description" in of else ""
-        told.append(_line(f"**{name}** ({_type(of)}{most}{left_out}){about}"))
-    return "; ".join(told)
+        fields.append(_line(f"**{name}** ({_type(of)}{most}{left_out}){about}"))
+    return "; ".join(fields)
 
 
 def _name(schema: Mapping[str, Any]) -> str:

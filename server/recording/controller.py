@@ -20,6 +20,7 @@ from server.recording.folder import RecordingsFolder
 from server.recording.own import Own
 from server.recording.parts import RecordingParts
 from server.recording.recorded_topics import Also, Missing
+from server.recording.recorder_queue import Attachment
 from server.recording.recording_session import ControllerState
 from server.recording.recording_settings import RecordingSettings
 from server.recording.recording_status import NOWHERE, RecordingStatus
@@ -173,6 +174,14 @@ class SessionRecording:
             self.own("phone", {"by": by} | {name: value for name, value in said.items() if name != "kind"})
         else:
             self.own("operator", {"by": by, "ok": reason is None, "reason": reason} | said)
+
+    def mark(self, said: Mapping[str, Any], marked_ms: int, at_ms: int) -> bool:
+        """Records what is said of a mark; False: no part that is written covers its moment."""
+        return self._parts.mark(said, marked_ms, at_ms)
+
+    def attach(self, attachment: Attachment) -> bool:
+        """Stores a file in the part that is written; False: it does not cover the moment."""
+        return self._parts.attach(attachment)
 
     def delays(self, delays: Mapping[str, float], link: LinkDelay) -> None:
         """Record the delay of messages once a tick, because a later evaluation needs it."""

@@ -82,6 +82,10 @@ class RecordedDelay:
     def is_known(self) -> bool:
         return bool(self._links)
 
+    def course(self) -> list[tuple[float, float]]:
+        """The delay of the link over time: when it changed, and to what [s]."""
+        return [(link.at_s, link.late_s) for link in self._links if link.late_s is not None]
+
     def receive(self, topic: str, at_s: float, stamp_s: float | None = None) -> float:
         """How old a message was that came now [s]."""
         times = self._times.get(topic)

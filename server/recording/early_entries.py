@@ -21,6 +21,8 @@ class EarlyEntries:
     def hold(self, at_s: float, channel: Own, said: Mapping[str, Any]) -> None:
         """Keeps an entry for the next part."""
         self._entries.append((at_s, channel, said))
+        if channel == "alarms":
+            self._stood.note_departure(said)  # it counts at once: a part that begins now was checked
         for _, old_channel, old in self._entries[:-EARLY_AT_MOST]:
             self.note(old_channel, old)
         del self._entries[:-EARLY_AT_MOST]

@@ -1,4 +1,4 @@
-"""catgraph's own channels in a recording: alarms, commands, settings and orders, as JSON."""
+"""catgraph's own channels in a recording: alarms, commands, settings, orders and marks, as JSON."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ PREFIX = "/catgraph/"
 LIBRARY = "catgraph"  # prefix of the library name in the header of our files
 METADATA = "catgraph"  # the name of the metadata record with vehicle and recording
 
-Own = Literal["alarms", "phone", "operator", "settings", "link", "commands", "delay"]
+Own = Literal["alarms", "phone", "operator", "settings", "link", "commands", "delay", "marks"]
 
 _TEXT: dict[str, Any] = {"type": "string"}
 _MAYBE_TEXT: dict[str, Any] = {"type": ["string", "null"]}
 _WHOLE: dict[str, Any] = {"type": "integer"}
+_YES_NO: dict[str, Any] = {"type": "boolean"}
+_TIME: dict[str, Any] = {"type": "object", "title": "time", "properties": {"sec": _WHOLE, "nsec": _WHOLE}}
+_NAMES: dict[Own, str] = {"marks": "foxglove.Log"}  # which viewers show as lines of a log; the others are ours
 
 # channel → (what it is, fields); each has time_ms besides, and may have more fields than these
 _CHANNELS: dict[Own, tuple[str, dict[str, Any]]] = {
@@ -48,21 +51,28 @@ _CHANNELS: dict[Own, tuple[str, dict[str, Any]]] = {
         "Frames sent to the car, unchanged.",
         {"topic": _TEXT, "type": _MAYBE_TEXT, "message": {"type": "object"}, "by": _MAYBE_TEXT},
     ),
+    "marks": (
+        "A moment that somebody marked, whole again at each change; the newest of an id holds.",
+        {"timestamp": _TIME, "level": _WHOLE, "message": _TEXT, "name": _TEXT, "file": _TEXT, "line": _WHOLE}
+        | {"change": _TEXT, "mark": _TEXT, "marked_ms": _WHOLE, "category": _MAYBE_TEXT, "words": _TEXT}
+        | {"voice": _YES_NO, "photo": _YES_NO, "source": _TEXT, "by": _MAYBE_TEXT},
+    ),
 }
 
 
 def own_schema(channel: Own) -> Schema:
     what, fields = _CHANNELS[channel]
+    name = _NAMES.get(channel, f"catgraph.{channel}")
     described = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": f"catgraph.{channel}",
+        "title": name,
         "description": what,
         "type": "object",
         "properties": {"time_ms": {"type": "number", "description": "time of day, ms since 1970"}} | fields,
         "required": ["time_ms"],
     }
     return Schema(
-        name=f"catgraph.{channel}",
+        name=name,
         encoding="jsonschema",
         data=orjson.dumps(described),
         message_encoding="json",

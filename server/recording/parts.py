@@ -17,7 +17,7 @@ from server.recording.folder import RecordingsFolder, id_of, part_id
 from server.recording.own import Own
 from server.recording.recorded_topics import Missing
 from server.recording.recorder import Recorder
-from server.recording.recorder_queue import Part
+from server.recording.recorder_queue import Attachment, Part
 from server.recording.recorder_thread import Status
 from server.recording.recording_session import ControllerState, RecordingSession
 from server.recording.recording_settings import RecordingSettings
@@ -144,6 +144,27 @@ class RecordingParts:
             self.early.note(channel, said)
         elif self._folder is not None:
             self.early.hold(self._now(), channel, {"time_ms": self._wall_ms(), **said})
+
+    def mark(self, said: Mapping[str, Any], marked_ms: int, at_ms: int) -> bool:
+        """Records at `at_ms` what is said of a mark; False: the part that is written does not cover its moment."""
+        recorder = self._covering(marked_ms)
+        if recorder is not None:
+            recorder.own("marks", said, at_ms * 1_000_000)
+        return recorder is not None
+
+    def attach(self, attachment: Attachment) -> bool:
+        """False: the part that is written does not cover it."""
+        recorder = self._covering(attachment.at_ns / 1e6)
+        if recorder is not None:
+            recorder.attach(attachment)
+        return recorder is not None
+
+    def _covering(self, moment_ms: float) -> Recorder | None:
+        """The recorder, where it writes a part that covers this moment."""
+        session = self._state.session
+        if session is None or not session.is_open or session.begun is None:
+            return None
+        return self.recorder if moment_ms >= int(session.begun.metadata["started_ms"]) else None
 
     def delays(self, delays: Mapping[str, float], link: LinkDelay) -> None:
         """Record the delay of messages once a tick, because a later evaluation needs it."""

@@ -13,6 +13,7 @@ from typing import Any
 from server.recording.folder import RecordingsFolder
 from server.recording.own import Own
 from server.recording.recorder_queue import (
+    Attachment,
     Begin,
     CarMessage,
     End,
@@ -118,6 +119,10 @@ class Recorder:
     def own(self, channel: Own, said: Mapping[str, Any], at_ns: int) -> None:
         """Something of ours: there is little of it, and room is kept for it."""
         self._queue.own(OwnEntry(channel, at_ns, {"time_ms": at_ns // 1_000_000, **said}))
+
+    def attach(self, attachment: Attachment) -> None:
+        """A file becomes an attachment of the part."""
+        self._queue.put(attachment)
 
     def note(self, **more: str) -> None:
         """Write the current metadata of the part, so that it survives a kill."""

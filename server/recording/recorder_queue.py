@@ -52,6 +52,16 @@ class OwnEntry:
     said: Mapping[str, Any]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attachment:
+    """A file that becomes an attachment of the part; read when it is written."""
+
+    path: Path
+    name: str
+    media_type: str
+    at_ns: int  # the moment it belongs to
+
+
 @dataclass(slots=True)
 class Prepare:
     """Get the types ready."""
@@ -93,7 +103,7 @@ class Stop:
     then: Callable[[], None]
 
 
-Item = CarMessage | OwnEntry | Prepare | Begin | Learn | Note | End | Stop
+Item = CarMessage | OwnEntry | Attachment | Prepare | Begin | Learn | Note | End | Stop
 
 
 class RecorderQueue:
@@ -135,7 +145,7 @@ class RecorderQueue:
             return
         self._items.append(entry)
 
-    def put(self, item: Prepare | Begin | Learn | Note | End | Stop) -> None:
+    def put(self, item: Attachment | Prepare | Begin | Learn | Note | End | Stop) -> None:
         """Takes an order to the thread, and wakes it."""
         self._items.append(item)
         self.wake.set()

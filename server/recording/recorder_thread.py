@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 import time
@@ -11,12 +12,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from server.recording import space
-from server.recording.folder import FINISHED, RecordingsFolder, writing_path
+from server.recording import chain_neighbours, space
+from server.recording.folder import FINISHED, RecordingsFolder, id_of, writing_path
+from server.recording.mcap.chain import Head
 from server.recording.mcap.write import PartFile
 from server.recording.part_writer import PartWriter
 from server.recording.read.schemas import TypeBook, standard
 from server.recording.recorder_queue import (
+    Attachment,
     Begin,
     CarMessage,
     End,
@@ -87,6 +90,7 @@ class RecorderThread:
         self._book: TypeBook | None = None
         self._space = SpaceWatch(folder.root)
         self._unfinished = UnfinishedParts()
+        self._newest_head: Head | None = None  # of the part that was closed last
         self._stumbled = False
         self._flushed_s = 0.0
 
@@ -140,6 +144,9 @@ class RecorderThread:
             case OwnEntry():
                 if self._writer is not None:
                     self._writer.own(item.channel, item.at_ns, item.said)
+            case Attachment():
+                if self._writer is not None:
+                    self._attach(self._writer, item)
             case Begin():
                 self._open(item.part)
             case Prepare():
@@ -167,6 +174,15 @@ class RecorderThread:
                 self._stumbled = True
                 log.exception("message not written (logged once): topic=%s", item.topic)
 
+    def _attach(self, writer: PartWriter, item: Attachment) -> None:
+        """One that cannot be read stays where it is, and is kept beside the recording later."""
+        try:
+            data = item.path.read_bytes()
+        except OSError as error:
+            log.error("attachment not read: name=%s error=%s", item.name, error)
+            return
+        writer.file.attach(item.name, item.media_type, item.at_ns, data)
+
     def _learn(self, definitions: Mapping[str, str]) -> None:
         if self._book is not None:
             self._book.learn(definitions)
@@ -186,7 +202,12 @@ class RecorderThread:
             found = self._space.look(now_s, 0)
             path = part.path.with_name(self._folder.free_id(part.id) + FINISHED)
             if (exhausted := found.exhausted(self.allowance)) is None:
-                file = PartFile(path, profile=f"ros{part.version}", metadata=part.metadata)
+                before = self._newest_head
+                if before is None:
+                    with contextlib.suppress(Exception):  # recording never fails for what other files are
+                        before = chain_neighbours.newest_head(path)
+                metadata = {**part.metadata, **chain_neighbours.as_metadata(before)}
+                file = PartFile(path, profile=f"ros{part.version}", metadata=metadata)
                 self._writer = PartWriter(file, self._book)
         except OSError as error:
             log.error("recording not started: %s", error)
@@ -212,10 +233,12 @@ class RecorderThread:
         except Exception as error:  # one of the library too: what the disk has is of use in any case
             said = space.why(error) if isinstance(error, OSError) else type(error).__name__
             log.error("recording not completed: %s", said)
+            self._newest_head = None  # it is in the file, as far as the disk took it
             self._unfinished.add(writing_path(writer.file.path), time.monotonic())
             failed = f"The recording could not be completed: {said}. What was written is kept."
             self.status = replace(self.status, state="stopped", trouble=trouble or failed)
             return
+        self._newest_head = writer.file.head(id_of(path))
         self.status = replace(self.status, state=state, size=writer.file.size, trouble=trouble)
         self._call(self._on_finished, path)
 

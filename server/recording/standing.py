@@ -1,5 +1,5 @@
-"""What is in force when a part of a drive begins: alarms, pause, chosen phone, slow-down. Its metadata says so, for no
-message in it does."""
+"""What is in force when a part of a drive begins: alarms, pause, phone, slow-down, who is on duty and in control, mode.
+Its metadata says so, for no message in it does."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import orjson
 
+DEPARTURE = "departure"  # in the metadata: the newest signature of the departure check; "": none was signed
 STANDING = "standing"  # in the metadata: the newest event of each alarm that stood and of each mode, as a JSON array
 _STATES = ("UNACKED", "ACKED", "RTN_UNACKED", "SHELVED")
 
@@ -19,9 +20,13 @@ _MODES = {  # change → the mode that it begins or ends
     "disarmed": ("armed", False),
     "ride": ("ride", True),
     "slow_down": ("order", False),
+    "control": ("control", True),
+    "mode": ("mode", True),
 }
 _MOST_OF_ORDER = 50  # events
 _ORDER_ENDS = ("released", "ended")
+
+_SIGNED = ("check", "at_ms", "by", "person", "role", "done", "failed", "not_applicable", "of", "hash", "recurring")
 
 Event = Mapping[str, Any]
 
@@ -32,9 +37,19 @@ class Stood:
     def __init__(self) -> None:
         self._newest: dict[str, Event] = {}
         self._modes: dict[str, list[Event]] = {}
+        self._departure: Event | None = None  # its signature
+
+    def note_departure(self, event: Event) -> None:
+        """The signature of the departure check stands until the check is opened or begun again, or the drive ends."""
+        change, step = event.get("change"), event.get("step")
+        if change == "departure" and step in ("signed", "begun", "reopened"):
+            self._departure = event if step == "signed" else None
+        elif change == "stopped":
+            self._departure = None
 
     def note(self, event: Event) -> None:
         """One event of the log, in their order."""
+        self.note_departure(event)
         alarm, state = event.get("alarm"), event.get("state")
         if not isinstance(alarm, str):
             self._note_mode(event)
@@ -52,6 +67,10 @@ class Stood:
         mode, begins = _MODES.get(str(change), ("", False))
         if change == "ride":
             begins = event.get("phone") is not None
+        elif change == "control":
+            begins = event.get("holder") is not None
+        elif change == "duty":
+            mode, begins = f"duty {event.get('person')}"[:80], event.get("act") == "on"
         if begins:
             self._modes[mode] = [event]
         else:
@@ -63,7 +82,11 @@ class Stood:
 
     def as_metadata(self) -> dict[str, str]:
         modes = [event for events in self._modes.values() for event in events]
-        return {STANDING: orjson.dumps([*self._newest.values(), *modes]).decode()}
+        signature = {name: self._departure.get(name) for name in _SIGNED} if self._departure is not None else None
+        return {
+            STANDING: orjson.dumps([*self._newest.values(), *modes]).decode(),
+            DEPARTURE: "" if signature is None else orjson.dumps(signature).decode(),
+        }
 
 
 def read_standing(metadata: Mapping[str, str]) -> list[dict[str, Any]]:

@@ -68,8 +68,11 @@ class ReplayClient:
         self._process: asyncio.subprocess.Process | None = None
         self._reader: asyncio.Task[None] | None = None
 
-    async def open(self, source: ReplaySource, opening: Mapping[str, Any]) -> None:
-        """Starts the process and waits for its first state. Raises NoReplay."""
+    async def open(self, source: ReplaySource | None, opening: Mapping[str, Any]) -> None:
+        """Starts the process and waits for its first state; `source` None: there is no such recording. Raises
+        NoReplay."""
+        if source is None:
+            raise NoReplay(f"There is no recording named {_seen(self.recording)}.")
         self._source = source
         paths = os.pathsep.join(filter(None, (ROOT, os.environ.get("PYTHONPATH"))))
         self._process = await asyncio.create_subprocess_exec(
@@ -81,6 +84,10 @@ class ReplayClient:
         self._reader = asyncio.create_task(self._read(self._process), name=f"replay of {self.recording}")
         sketches = {"sketch": list(source.sketch), "trends": source.trends}
         self._order({"path": str(source.path), "name": self.recording, **sketches, **opening})
+        await self._until_ready()
+
+    async def _until_ready(self) -> None:
+        """Raises NoReplay."""
         try:
             async with asyncio.timeout(OPENS_WITHIN_S):
                 await self._ready.wait()
@@ -128,6 +135,28 @@ class ReplayClient:
         if self.failed is None:
             self._order({"kind": "scan", "wanted": is_wanted})
 
+    @property
+    def silent_s(self) -> float:
+        """Since its process said anything."""
+        return self._now() - self._heard_s
+
+    def source_facts(self) -> dict[str, str]:
+        """What the catalog knows of the recording, for a page elsewhere."""
+        assert self._source is not None
+        return {"vehicle": self._source.vehicle, "title": self._source.title}
+
+    def newest_parts(self, have: Mapping[str, int]) -> list[tuple[str, bytes]]:
+        """Its newest frames, of each kind where its number is another than the one in `have`."""
+        found: list[tuple[str, bytes]] = []
+        if self.numbers["state"] != have["state"] and self._position is not None:
+            found += [("state", self._state)] if self._state else []
+            found.append(("position", orjson.dumps(self._position)))
+        if self.numbers["scan"] != have["scan"]:
+            found.append(("scan", self.scan))
+        if self.numbers["timeline"] != have["timeline"]:
+            found.append(("timeline", self.timeline))
+        return found
+
     def compose(self, server: ServerState, live: LiveSummary | None) -> str:
         """The state a page gets: what was recorded, beside what is live now."""
         envelope: ReplayEnvelope = {"server": server, "replay": self._shown(), "live": live}
@@ -142,7 +171,7 @@ class ReplayClient:
     def _shown(self) -> ReplayState:
         assert self._position is not None  # `open` waits for it
         assert self._source is not None
-        silent_s = self._now() - self._heard_s
+        silent_s = self.silent_s
         return {
             **self._position,
             "id": self.recording,
@@ -214,9 +243,13 @@ class ReplayClient:
 class ReplayManager:
     """Opens replays and holds them by their tokens. `find` may read the disk; None: there is no such recording."""
 
-    def __init__(self, find: Callable[[str], ReplaySource | None], *, now: Callable[[], float]) -> None:
+    def __init__(
+        self, find: Callable[[str], ReplaySource | None], *, now: Callable[[], float], most: int | None = None
+    ) -> None:
+        """`most` replays at once; None: as many as this machine can run."""
         self._find = find
         self._now = now
+        self._most = most
         self._clients: dict[str, ReplayClient] = {}
 
     @property
@@ -225,19 +258,28 @@ class ReplayManager:
 
     async def open(self, recording: str, opening: Mapping[str, Any], *, on_new: Callable[[str], None]) -> ReplayClient:
         """A replay that is ready to be shown. Raises NoReplay."""
-        if len(self._clients) >= MOST_REPLAYS:
-            raise NoReplay(f"{MOST_REPLAYS} replays are open already: close one first.")
-        client = ReplayClient(recording, now=self._now, on_new=on_new)
+        most = MOST_REPLAYS if self._most is None else self._most
+        if len(self._clients) >= most:
+            raise NoReplay(f"{most} replays are open already: close one first.")
+        client = self._made(recording, opening, on_new)
         self._clients[client.token] = client
         try:
-            source = await asyncio.to_thread(self._find, recording)
-            if source is None:
-                raise NoReplay(f"There is no recording named {_seen(recording)}.")
-            await client.open(source, opening)
+            await self._begin(client, opening)
         except BaseException:
             await self.close(client)
             raise
         return client
+
+    def _made(self, recording: str, _opening: Mapping[str, Any], on_new: Callable[[str], None]) -> ReplayClient:
+        return ReplayClient(recording, now=self._now, on_new=on_new)
+
+    async def _begin(self, client: ReplayClient, opening: Mapping[str, Any]) -> None:
+        """Raises NoReplay."""
+        await client.open(await asyncio.to_thread(self._find, client.recording), opening)
+
+    def holds(self, token: str) -> bool:
+        """Whether this replay is open."""
+        return token in self._clients
 
     async def close(self, client: ReplayClient) -> None:
         self._clients.pop(client.token, None)
@@ -257,7 +299,7 @@ class ReplayManager:
 def summary(state: LiveState) -> LiveSummary:
     """The part of the live state that is shown during a replay."""
     session, link = state["session"], state["link"]
-    return {
+    found: LiveSummary = {
         "phase": session["phase"],
         "name": session["name"],
         "paused": session["paused"],
@@ -270,6 +312,9 @@ def summary(state: LiveState) -> LiveSummary:
         "alarms": state["alarms"][:LIVE_ALARMS],
         "alarms_in_all": len(state["alarms"]),
     }
+    if (challenge := state["server"].get("challenge")) is not None:
+        found["challenge"] = challenge  # a page that replays may still order what is of the live car
+    return found
 
 
 def _seen(name: str) -> str:

@@ -20,6 +20,7 @@ from server.recording.delay import recorded_delay
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, RecordingUnreadable
 from server.replay import replay_frames
+from server.replay.recorded_events import MOST, NOTHING, TimelineEvents
 from server.replay.timeline import Index
 from server.vehicle import queries
 from server.vehicle.check_detail import check_answer
@@ -218,15 +219,19 @@ class Playback:
             "settings_from": "recording" if self.drive.settings_from_recording else "now",
         }
 
-    def timeline(self) -> Timeline:
-        """The time line so far, and the notes on the recording."""
+    def timeline(self, events: TimelineEvents = NOTHING) -> Timeline:
+        """The time line so far, the recorded events of the drive, and the notes on the recording."""
         said = [*self.drive.notes]
         if self.index.is_done:
             said += [f"{sentence}." for sentence in self._index_recording.damage]
         for why in (self.index.broke_off, self.broke_off):
             if why is not None:
                 said.append(f"Not all of it can be read: {why}.")
-        return {"kind": "timeline", **self.index.as_json(), "notes": list(dict.fromkeys(said))[:20]}
+        notes = list(dict.fromkeys(said))[:20]
+        return {
+            "kind": "timeline", **self.index.as_json(), "notes": notes, "flags": list(events.flags[:MOST]),
+            "interventions": list(events.interventions), "modes": list(events.modes),
+        }  # fmt: skip
 
     def scan_bytes(self) -> bytes | None:
         return replay_frames.scan_bytes(self._run)

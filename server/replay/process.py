@@ -11,8 +11,10 @@ import os
 import select
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,6 +23,7 @@ import orjson
 from server.recording.read.read import RecordingUnreadable, open_recording
 from server.replay.playback import Playback
 from server.replay.protocol import Kind, record
+from server.replay.recorded_events import NOTHING, TimelineEvents, read_timeline_events
 
 NICE = 10
 MOST_MEMORY = 1536 * 1024 * 1024  # of its own data; a file that needs more is not of a car
@@ -61,6 +64,8 @@ class _Process:
         self._scan_key: tuple[int, float] = (-1, -1.0)
         self._sent_s: dict[str, float] = {"state": -1.0, "scan": -1.0, "timeline": -1.0}
         self._timeline_done = False
+        self._events = NOTHING
+        self._reading: Future[TimelineEvents] | None = None  # of the events; None: not begun
         self._is_urgent = True  # after a command the state is sent at once
 
     def run(self) -> int:
@@ -74,8 +79,9 @@ class _Process:
         }
         paths = [Path(opening["path"])]
         try:
+            recording = open_recording(paths)
             playback = Playback(
-                open_recording(paths),
+                recording,
                 lambda: open_recording(paths),
                 settings=opening["settings"],
                 now_s=time.monotonic(),
@@ -84,7 +90,7 @@ class _Process:
                 trends=opening["trends"],
             )
             with contextlib.closing(playback):
-                self._play(playback)
+                self._play(playback, lambda: read_timeline_events(lambda: open_recording(paths)))
         except RecordingUnreadable as error:
             said = str(error).replace(str(paths[0]), paths[0].name)  # the path on the server is not disclosed
             self._say("failed", {"reason": _sentence(said)})
@@ -94,11 +100,13 @@ class _Process:
             return 3
         return 0
 
-    def _play(self, playback: Playback) -> None:
+    def _play(self, playback: Playback, read: Callable[[], TimelineEvents]) -> None:
         while True:
             began_s = time.monotonic()
             playback.work(began_s, _until(began_s + PORTION_S))
             self._show(playback)
+            if self._reading is None and not playback.is_seeking:  # after the first picture
+                self._reading = _begun(read)
             is_busy = playback.is_seeking or not playback.index.is_done
             due_s = 0.0 if is_busy else max(0.0, began_s + PORTION_S - time.monotonic())
             if not self._obey_all(playback, due_s):
@@ -170,15 +178,20 @@ class _Process:
 
     def _show(self, playback: Playback) -> None:
         now_s = time.monotonic()
+        is_read = self._reading is not None and self._reading.done()
         if now_s - self._sent_s["timeline"] >= TIMELINE_S and not self._timeline_done:
-            self._timeline_done = playback.index.is_done
-            self._send("timeline", orjson.dumps(playback.timeline()), now_s)
+            if self._reading is not None and is_read:
+                self._events = self._reading.result()
+            self._timeline_done = playback.index.is_done and is_read
+            self._send("timeline", orjson.dumps(playback.timeline(self._events)), now_s)
         every_s = FRAME_S if playback.is_playing or playback.is_seeking else REST_S
         if not self._is_urgent and now_s - self._sent_s["state"] < every_s:
             return self._show_scan(playback, now_s)
         self._is_urgent = playback.is_seeking and self._is_urgent
         if not playback.is_seeking:  # otherwise the old state stays until the sought one is ready
-            self._send("state", orjson.dumps(playback.frame(**self._names)), now_s)
+            state = playback.frame(**self._names)
+            state["marks"] = sum(flag["at_s"] <= playback.at_s for flag in self._events.flags)
+            self._send("state", orjson.dumps(state), now_s)
         self._send("position", orjson.dumps(playback.position()), now_s)
         self._sent_s["state"] = now_s
         self._show_scan(playback, now_s)
@@ -203,6 +216,13 @@ class _Process:
 
 def _until(over_s: float) -> Callable[[], bool]:
     return lambda: time.monotonic() >= over_s
+
+
+def _begun(read: Callable[[], TimelineEvents]) -> Future[TimelineEvents]:
+    """Done beside the replay, by a thread that does not keep the process from its end."""
+    reading: Future[TimelineEvents] = Future()
+    threading.Thread(target=lambda: reading.set_result(read()), name="recorded events", daemon=True).start()
+    return reading
 
 
 def _sentence(text: str) -> str:

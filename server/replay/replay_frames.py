@@ -11,6 +11,7 @@ from server.judge.offline import OfflineRun
 from server.judge.run_state import RunState
 from server.protocol import serialize
 from server.protocol.state import RecordedState
+from server.vehicle.mode_shown import mode_shown
 from server.vehicle.scan_feed import judged
 from server.vehicle.state_frame import Facts, state_frame
 
@@ -55,6 +56,9 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
         track_number=track_number,
         recording={"state": "off", "for_s": None},
         decelerate=run_state.slow_down.as_json(now_s, run.drive.start_s, epoch.tuning.limits.slow_down),
+        mode=mode_shown(
+            run_state.state.get("mode"), epoch.sources.get("mode"), run_state.monitor.limits.driving, now_s
+        ),
         operators={"control": {"holder": None}, "reach": None},  # not applicable to a recording
     )
     shown = state_frame(facts, run_state.state.glance(now_s), run_state.monitor)

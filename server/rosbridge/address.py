@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from urllib.parse import SplitResult, quote, urlsplit
 
@@ -175,6 +176,24 @@ def _wrong_scheme(scheme: str, rest: str) -> BadAddress:
         code="scheme",
         suggestion=better if host else None,
     )
+
+
+def url_of(typed: str | None) -> str | None:
+    """The URL of what was typed; None: it is none."""
+    try:
+        return parse(typed).url if typed else None
+    except BadAddress:
+        return None
+
+
+def demand_allowed(target: Address, hosts: Collection[str]) -> None:
+    """Raises BadAddress where only `hosts` may be dialled; empty: any may."""
+    if hosts and target.host not in hosts and target.shown not in hosts:
+        raise BadAddress(
+            f"{target.shown} is not among the vehicles that this server may connect to.",
+            "Ask whoever started the server.",
+            code="not_allowed",
+        )
 
 
 def without_login(typed: str) -> str:

@@ -25,6 +25,7 @@ from server.rosbridge.link_errors import LinkDown, NoWebSocket
 from server.rosbridge.link_listener import LinkListener, Marks
 from server.rosbridge.outgoing import NotAllowed, Outgoing
 from server.rosbridge.raw_frame import RawFrame
+from server.rosbridge.sent_rows import SentRows
 from server.rosbridge.service_calls import ServiceCalls
 from server.rosbridge.subscription import Subscription, operation_of
 from server.rosbridge.websocket import MAX_MESSAGE_BYTES, BridgeProtocol
@@ -36,7 +37,7 @@ ASSUMPTIONS = {
     "roslibpy": "2.1.0",
     "manager": "the factory takes its loop from its manager; autobahn below it takes it from the argument `loop`",
     "factory": "it calls _schedule_reconnect when a connection is lost, and dials nowhere but in _connect_async",
-    "protocol": "onOpen tells factory.ready, onClose factory.connection_lost; onClose comes once, opened or not",
+    "protocol": "onOpen calls factory.ready, onClose factory.connection_lost; onClose comes once, opened or not",
     "frames": "a message is onMessageBegin, of each frame onMessageFrameBegin, Data and End, then onMessageEnd",
     "state": "state is STATE_OPEN from the handshake to the first close frame; sendMessage raises in any other",
     "unread": "while shaking hands, what was received stands in `data`",
@@ -73,7 +74,7 @@ class RosLink:
         self._marks = marks
         self._ros = RosClient(address, self)
         self._socket: BridgeProtocol | None = None  # the open one
-        self._table: dict[str, Subscription] = {}
+        self._rows = SentRows(self.send_now, lambda: self.is_open, marks)
         self._calls = ServiceCalls(self.send_now)
         self._stopped = False
         self._outgoing = Outgoing()
@@ -118,35 +119,25 @@ class RosLink:
 
     def subscribe(self, wanted: Subscription) -> None:
         """Puts a row into the table; sent now if the link is open, and once at every opening."""
-        previous = self._table.get(wanted.topic)
-        if previous == wanted:
+        if self._rows.table.get(wanted.topic) == wanted:
             return
         try:
             Outgoing().frame(operation_of("subscribe", wanted))
         except NotAllowed as why:  # a name that only a hostile or broken bridge offers
             self._log_once(f"not subscribed: {why}")
             return
-        self._table[wanted.topic] = wanted
-        if self.is_open:
-            if previous is not None and not previous.is_like(wanted):
-                self._send_row("unsubscribe", previous)
-            self._send_row("subscribe", wanted)  # under the same id: its throttle and queue replace the old ones
+        self._rows.subscribe(wanted)
 
     def unsubscribe(self, topic: str) -> None:
-        row = self._table.pop(topic, None)
-        if row is not None and self.is_open:
-            self._send_row("unsubscribe", row)
+        self._rows.unsubscribe(topic)
 
     def renew(self, topic: str) -> None:
         """Renew the subscription of a topic without messages."""
-        row = self._table.get(topic)
-        if row is not None and self.is_open:
-            self._send_row("unsubscribe", row)
-            self._send_row("subscribe", row)
+        self._rows.renew(topic)
 
     @property
     def subscriptions(self) -> tuple[Subscription, ...]:
-        return tuple(self._table.values())
+        return tuple(self._rows.table.values())
 
     def send_now(self, operation: dict[str, Any]) -> None:
         """Writes one rosbridge operation to the open connection. Raises LinkDown when there is none, NotAllowed where
@@ -186,7 +177,7 @@ class RosLink:
         return socket is self._socket
 
     def dial_failed(self, error: Exception) -> None:
-        self._tell(self._listener.dial_failed, _problem_of_dialling(error, self.address))
+        self._notify(self._listener.dial_failed, _problem_of_dialling(error, self.address))
 
     # -- from the protocol -------------------------------------------------------------------------------------------
 
@@ -207,9 +198,8 @@ class RosLink:
         self.heard_s = self._now()
         if self._marks is not None:
             self._marks.open(self._now())
-        for row in self._table.values():
-            self._send_row("subscribe", row)
-        self._tell(self._listener.link_opened)
+        self._rows.opened()
+        self._notify(self._listener.link_opened)
 
     def send_mark(self, socket: BridgeProtocol) -> None:
         sent_s = self._now()
@@ -229,31 +219,32 @@ class RosLink:
         if socket is not self._socket:
             return  # it never opened: the dialer reports it
         self._socket = None
+        self._rows.closed()
         self._calls.fail_all("the connection to the bridge was lost")
         problem = _problem_of_end(socket, self.address, was_asked=self._was_asked)
-        self._tell(self._listener.link_closed, problem)
+        self._notify(self._listener.link_closed, problem)
 
     def _junk(self, socket: BridgeProtocol, why: str) -> None:
         if socket is self._socket:
             self.junk_count += 1
-            self._tell(self._listener.junk_received, why)
+            self._notify(self._listener.junk_received, why)
 
     def skipped(self, socket: BridgeProtocol, topic: str | None, size: int) -> None:
         if socket is self._socket:
             self._junk(socket, f"a message of more than {MAX_MESSAGE_BYTES // 2**20} MB")
-            self._tell(self._listener.large_skipped, topic, size)
+            self._notify(self._listener.large_skipped, topic, size)
 
     def frame(self, socket: BridgeProtocol, payload: bytes, is_binary: bool) -> None:
         if socket is not self._socket:
             return  # stopped, or dropped: what is still in the pipe is no news
         match self._reader.read(payload, is_binary):
             case Publish(topic, message, note):
-                if not self._tell(self._listener.message_received, topic, message, note):
+                if not self._notify(self._listener.message_received, topic, message, note):
                     self._junk(socket, "a message that caused an internal error")
             case Answer(operation):
                 self._calls.answered(operation)
             case Status(level, text):
-                self._tell(self._listener.status_received, level, text)
+                self._notify(self._listener.status_received, level, text)
             case InvalidFrame(why):
                 self._junk(socket, why)
             case TooLarge() as large:
@@ -267,9 +258,9 @@ class RosLink:
             nonlocal taken
             taken = self._take_unparsed(frame)
 
-        return self._tell(take, raw) and taken and not self._stopped
+        return self._notify(take, raw) and taken and not self._stopped
 
-    def _tell(self, listener: Callable[..., None], *what: Any) -> bool:
+    def _notify(self, listener: Callable[..., None], *what: Any) -> bool:
         """Call the listener unless stopped; return False if it raised.
 
         A fault of the listener costs this message and not the link: otherwise each such message would end the link and
@@ -286,11 +277,6 @@ class RosLink:
                 log.exception("handler failed (logged once): error=%s source=%s", fault, self.address.shown)
             return False
         return True
-
-    def _send_row(self, operation: str, row: Subscription) -> None:
-        if operation == "subscribe" and self._marks is not None:
-            self._marks.subscribe(row.topic, row.queue_length, row.throttle_ms / 1000)
-        self.send_now(operation_of(operation, row))
 
     def _log_once(self, text: str) -> None:
         if text not in self._faults and len(self._faults) < MAX_FAULTS:

@@ -84,7 +84,7 @@ class Connection(ServerConnection):
             self.data_received(unread)
         if not self.recv_messages.paused and not self.transport.is_closing():
             self.transport.resume_reading()
-        self._tell_ready()
+        self._notify_ready()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         super().connection_made(transport)
@@ -119,9 +119,9 @@ class Connection(ServerConnection):
 
     def resume_writing(self) -> None:
         super().resume_writing()
-        self._tell_ready()
+        self._notify_ready()
 
-    def _tell_ready(self) -> None:
+    def _notify_ready(self) -> None:
         if self.on_ready is not None:
             self.on_ready()
 

@@ -32,22 +32,22 @@ async def play(
     """Publish every message when it is due, at `rate` times real time; return their number.
 
     All due times are relative to the first message, so that delays never add up: late messages are sent at once, in
-    order, until none is late. The topics must have been advertised. `clock` tells seconds (monotonic
+    order, until none is late. The topics must have been advertised. `clock` returns seconds (monotonic
     where none is given) and `sleep` waits on it. `ahead`: so many messages are fetched in a thread before they are due,
     for sources that read files; 0 fetches each only when the one before it is out, for sources that react to what
     happens.
     """
     if not rate > 0:
         raise ValueError("the rate must be above 0")
-    tell = clock or time.monotonic
+    clock_s = clock or time.monotonic
     count = 0
     first_at_s = began_s = 0.0
     turn_ends = time.monotonic() + TURN_S
     async with contextlib.aclosing(_fetched(iter(messages), ahead)) as fetched:
         async for message in fetched:
             if count == 0:
-                first_at_s, began_s = message.at_s, tell()
-            wait_s = began_s + (message.at_s - first_at_s) / rate - tell()
+                first_at_s, began_s = message.at_s, clock_s()
+            wait_s = began_s + (message.at_s - first_at_s) / rate - clock_s()
             if wait_s > SOON_S:
                 await sleep(wait_s)
                 turn_ends = time.monotonic() + TURN_S

@@ -1,4 +1,4 @@
-"""The simulated car: drives its lap in virtual time and tells what its sensors measure, the same for the same seed."""
+"""The simulated car: drives its lap in virtual time and gives what its sensors measure, the same for the same seed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ from server.simulator.messages import (
     Writer,
 )
 from server.simulator.running import Scenarios
-from server.simulator.scenarios import BridgeFault, Planned, Scenario
+from server.simulator.safety_driver import SafetyDriver
+from server.simulator.scenario import BridgeFault, Scenario
+from server.simulator.scenarios import Planned
 from server.simulator.scenery import Scenery
 from server.simulator.sensors import GpsError, effort_percent, steering_percent, wheel_speed_mps
 from server.simulator.stack import Stack
@@ -90,6 +92,7 @@ class SimulatedCar:
         self._stage = Stage(scenery, self.scenarios)
         self._driver = Driver(START_STATION_M, driver_rng)
         self._stack = Stack(has_stopper=has_stopper)
+        self._person = SafetyDriver()
         self._gives_way = gives_way
         self._insists_on: MotionCommand | None = None
         self._client_until_s = -math.inf
@@ -172,6 +175,8 @@ class SimulatedCar:
                 "lon_deg": lon_deg,
                 "yaw_rad": math.remainder(self.motion.yaw_rad, 2 * math.pi),
                 "station_m": round(self._driver.station_m, 1),
+                "mode": self._person.mode,
+                "interventions": [one.as_json(self._clock_s) for one in self._person.interventions],
             },
             "scenarios": self.scenarios.state(self._elapsed_s),
         }
@@ -224,13 +229,18 @@ class SimulatedCar:
     def _control(self, now: Motion) -> list[Message]:
         at_s, writer = self.now_s, self._writer
         brake, accelerator = pedals(now)
+        person, orders = self._person, self.scenarios.orders
+        person.step(orders, self._elapsed_s, now)
+        if person.pedal_percent:
+            brake, accelerator = max(brake, person.pedal_percent), 0.0
         messages = [
+            writer.mode(at_s, person.mode),
             writer.twist(VEL, at_s, wheel_speed_mps(now, self._wheel_rng)),
             writer.effort(BRAKE, at_s, effort_percent(brake)),
             writer.effort(ACCELERATOR, at_s, effort_percent(accelerator)),
             writer.steering(at_s, steering_percent(now)),
         ]
-        orders = self.scenarios.orders
+        tyre_rad = self._stack.tyre_rad
         if Order.SILENCE in orders:
             self._client_until_s = max(self._client_until_s, self._elapsed_s)  # it takes the wheel anew afterwards
             self._insists_on = None
@@ -240,9 +250,15 @@ class SimulatedCar:
                 self._client_until_s = -math.inf
             self._stage.set(now, self._driver.station_m, orders)
             command = self._driver.command(now, self._elapsed_s, 1 / CONTROL_HZ, orders, self._stage.blocked_at_m)
-            self._stack.hear(command, self._elapsed_s)
-            self._insists_on = command
-            messages.append(writer.twist(CMD_VEL, at_s, command.speed_mps, command.tyre_rad))
+            tyre_rad = command.tyre_rad
+            if person.mode == "manual":
+                self._driver.resume(now)  # its controller commands nothing meanwhile, and goes on from here
+                self._insists_on = None
+            else:
+                self._stack.hear(command, self._elapsed_s)
+                self._insists_on = command
+                messages.append(writer.twist(CMD_VEL, at_s, command.speed_mps, command.tyre_rad))
+        self._stack.hand = person.hand(tyre_rad)
         return messages
 
     def _continue_commands(self) -> Iterable[Message]:

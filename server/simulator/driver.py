@@ -44,6 +44,8 @@ class Order(enum.StrEnum):
     STEADY = "steady"  # not faster than now
     YIELD = "yield"  # something stands in the way
     SILENCE = "silence"  # command nothing at all
+    TAKE_OVER = "take_over"  # of the safety driver: brake, and drive by hand
+    BRAKE = "brake"  # of the safety driver: brake, and let go
 
 
 def clear_distance_m(speed_mps: float) -> float:

@@ -1,6 +1,6 @@
 """Faults laid over a stream of messages: each effect takes one message and answers what becomes of it.
 
-An effect knows no clock and no topic: time is the message's own, and it is told which signal the message carries, as
+An effect knows no clock and no topic: time is the message's own, and it is given the signal that message carries, as
 the topic table names signals. So the same faults go over the simulated car and over any recording.
 """
 
@@ -62,7 +62,7 @@ class SlowRate(Effect):
 
 
 class Speeding(Effect):
-    """The speed told climbs to one well above the usual limit, and comes down again afterwards."""
+    """The published speed climbs to one well above the usual limit, and comes down again afterwards."""
 
     REACHED_MPS = 12.6
     CLIMB_MPS2 = 2.0
@@ -89,7 +89,7 @@ class Speeding(Effect):
 
 
 class FrozenSpeed(Effect):
-    """Messages of speed go on, but from the first one in motion they all tell the same."""
+    """Messages of speed go on, but from the first one in motion they all have the same value."""
 
     def __init__(self, *, above_mps: float = 0.5) -> None:
         super().__init__()
@@ -124,7 +124,7 @@ class IgnoredCommand(Effect):
 
 
 class BothPedals(Effect):
-    """Brake and accelerator are told to be down at once."""
+    """Brake and accelerator are reported as pressed at once."""
 
     PERCENT: ClassVar[Mapping[str, float]] = {"brake": 31 * 100 / 255, "accelerator": 46 * 100 / 255}
 
@@ -162,7 +162,7 @@ class GpsOffset(Effect):
         self._after_s, self._back_mps = after_s, back_mps
         self._offset_m = 0.0
         self._before_s: float | None = None
-        self._speed_mps: float | None = None  # None: not told yet
+        self._speed_mps: float | None = None  # None: not received yet
         self._stood_since_s: float | None = None
 
     @property
@@ -235,7 +235,7 @@ class GpsOffset(Effect):
 
 
 class BlindLaser(Effect):
-    """The laser turns, but no beam comes back; the distance estimator then tells that nothing is near."""
+    """The laser turns, but no beam comes back; the distance estimator then reports that nothing is near."""
 
     def __init__(self) -> None:
         super().__init__()

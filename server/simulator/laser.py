@@ -47,7 +47,7 @@ class Laser:
 
 def nearest(ranges: npt.NDArray[np.float32], beams: Beams) -> tuple[float, float]:
     """Distance [m] and bearing [rad, counter-clockwise] of the nearest return within ±0.1 rad, as the car's distance
-    estimator tells them: where there is none, range_max and angle_min."""
+    estimator publishes them: where there is none, range_max and angle_min."""
     ahead = np.flatnonzero(np.abs(beams.angles_rad) <= CONE_RAD)
     seen = ahead[ranges[ahead] <= RANGE_MAX_M]  # NaN and +Inf both fall out here
     if not len(seen):

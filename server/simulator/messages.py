@@ -42,8 +42,9 @@ GPS_FIX = Published(topic="/gps_fix", type="sensor_msgs/NavSatFix", signal="posi
 GPS_ODOM = Published(topic="/gps_odom", type="nav_msgs/Odometry", signal="odometry")
 SCAN = Published(topic="/catvehicle/front_laser_points", type="sensor_msgs/LaserScan", signal="scan")
 DIAGNOSTICS = Published(topic="/diagnostics", type="diagnostic_msgs/DiagnosticArray", signal="diagnostics")
+MODE = Published(topic="/catvehicle/control_mode", type="std_msgs/String", signal="mode")
 
-PUBLISHED = (VEL, BRAKE, ACCELERATOR, STEERING, CMD_VEL, DISTANCE, ANGLE, GPS_FIX, GPS_ODOM, SCAN, DIAGNOSTICS)
+PUBLISHED = (VEL, BRAKE, ACCELERATOR, STEERING, CMD_VEL, DISTANCE, ANGLE, GPS_FIX, GPS_ODOM, SCAN, DIAGNOSTICS, MODE)
 SIGNAL_OF_TOPIC = {published.topic: published.signal for published in PUBLISHED}
 
 Component = tuple[int, str, str, str, dict[str, str]]  # level, name, message, hardware id, values
@@ -73,6 +74,10 @@ class Writer:
 
     def number(self, published: Published, at_s: float, value: float) -> Message:
         return self._message(published, at_s, {"data": value})
+
+    def mode(self, at_s: float, word: str) -> Message:
+        """Who drives, in a word."""
+        return self._message(MODE, at_s, {"data": word})
 
     def fix(self, at_s: float, stamp_s: float, lat_deg: float, lon_deg: float, alt_m: float) -> Message:
         """A NavSatFix as the real car's driver marks it: a fix, with a covariance of zeros called type 2."""

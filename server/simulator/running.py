@@ -9,7 +9,8 @@ from typing import Any
 from server.judge.message import Message
 from server.simulator.driver import Order
 from server.simulator.effects import Effect
-from server.simulator.scenarios import SCENARIOS, BridgeFault, Planned, Scenario, laid_over
+from server.simulator.scenario import BridgeFault, Scenario
+from server.simulator.scenarios import SCENARIOS, Planned, laid_over
 
 
 @dataclass(slots=True, kw_only=True)

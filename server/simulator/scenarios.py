@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal
 
 from server.judge.message import Message
 from server.simulator.driver import Order
@@ -22,32 +21,12 @@ from server.simulator.effects import (
     SlowRate,
     Speeding,
 )
+from server.simulator.mode_faults import FlickeringMode
 from server.simulator.other_clock import OtherClock
+from server.simulator.scenario import Scenario
 from server.simulator.sensor_faults import FrozenPosition, FrozenScan, NearObject, NoFix, TruncatedScan
 
-BridgeFault = Literal["freeze", "kill"]
-
 LONGEST_S = 3600.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scenario:
-    """A fault on demand.
-
-    `effect` works on the messages of any source. `order` is what the simulated car's driver does meanwhile; where
-    `order_suffices` the simulated car shows the fault by its own motion and the effect, if there is one, is left to
-    recordings.
-    """
-
-    name: str
-    sentence: str
-    duration_s: float
-    alarm: str  # as the table of alarms names it
-    consequences: tuple[str, ...] = ()  # what else may be raised, rightly
-    effect: Callable[[], Effect] | None = None
-    order: Order | None = None
-    order_suffices: bool = False
-    bridge: BridgeFault | None = None
 
 
 _SCENARIOS = (
@@ -56,7 +35,7 @@ _SCENARIOS = (
         sentence="The car drives 12 m/s for some seconds, as soon as the lap allows it (at most half a minute).",
         duration_s=60.0,  # at most; it ends by itself after some seconds above the limit
         alarm="speed above limit",
-        # over a recording, where only the speed told is another: nobody ordered it, and nobody keeps distance for it
+        # over a recording, where only the sent speed is another: nobody ordered it, and nobody keeps distance for it
         consequences=("command without response", "nearest object"),
         effect=Speeding,
         order=Order.HURRY,
@@ -65,7 +44,7 @@ _SCENARIOS = (
     Scenario(
         name="obstacle",
         sentence="Another car crosses the path; the driver stops before it until it leaves.",
-        duration_s=10.0,  # short of the ten seconds of standing after which that is told too
+        duration_s=10.0,  # short of the ten seconds of standing after which that raises an alarm too
         alarm="obstacle in corridor",
         # where the car stood already, the obstacle stopper keeps it standing
         consequences=("nearest object", "vehicle not moving"),
@@ -91,7 +70,7 @@ _SCENARIOS = (
     Scenario(
         name="standing",
         sentence="The car stops on its lap and stays there.",
-        duration_s=20.0,  # down to standstill, and ten seconds until that is told
+        duration_s=20.0,  # down to standstill, and ten seconds until that raises an alarm
         alarm="vehicle not moving",
         order=Order.STAND,
         order_suffices=True,
@@ -110,7 +89,7 @@ _SCENARIOS = (
         duration_s=24.0,
         alarm="GPS drift at standstill",
         consequences=("vehicle not moving", "phone and car disagree"),
-        # slower than the jump rule's 3 m/s; farther than 4.3 times the 2.5 m of a receiver that tells no quality
+        # slower than the jump rule's 3 m/s; farther than 4.3 times the 2.5 m of a receiver that reports no quality
         effect=lambda: GpsOffset(pace_mps=2.3, most_m=16.0, during="standing", after_s=3.0, back_mps=1.5),
         order=Order.STAND,
     ),
@@ -265,6 +244,29 @@ _SCENARIOS = (
         alarm="connection lost",
         bridge="kill",
     ),
+    Scenario(
+        name="manual-takeover",
+        sentence="The safety driver brakes and takes the car over; the mode turns manual 0.2 s later.",
+        duration_s=12.0,
+        alarm="",
+        order=Order.TAKE_OVER,
+        order_suffices=True,
+    ),
+    Scenario(
+        name="driver-brakes",
+        sentence="The safety driver brakes against the controller; the mode stays autonomous.",
+        duration_s=3.0,
+        alarm="",
+        order=Order.BRAKE,
+        order_suffices=True,
+    ),
+    Scenario(
+        name="mode-flaps",
+        sentence="The mode topic flickers between autonomous and manual; the car drives itself on.",
+        duration_s=8.0,
+        alarm="",
+        effect=FlickeringMode,
+    ),
 )
 
 SCENARIOS: dict[str, Scenario] = {scenario.name: scenario for scenario in _SCENARIOS}
@@ -316,7 +318,7 @@ def inject(
 ) -> Iterator[Message]:
     """Lays faults over any messages, such as a recording; `after_s` counts from the first message.
 
-    `signal_of` tells which signal a message carries. Faults of the bridge cannot happen in a recording and do nothing.
+    `signal_of` gives which signal a message carries. Faults of the bridge cannot happen in a recording and do nothing.
     """
     waiting = sorted(faults, key=lambda fault: fault.after_s)
     running: list[tuple[float, Effect]] = []

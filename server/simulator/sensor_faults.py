@@ -13,7 +13,7 @@ from server.simulator.fields import with_fields
 
 
 class FrozenPosition(Effect):
-    """Messages of position go on, their stamps too, but they all tell the place of the first one."""
+    """Messages of position go on, their stamps too, but they all have the place of the first one."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -65,7 +65,7 @@ class NoFix(Effect):
 
 
 class NearObject(Effect):
-    """The distance estimator tells of something near straight ahead, which no scan shows."""
+    """The distance estimator reports something near straight ahead, which no scan shows."""
 
     AHEAD_M = 3.5
 

@@ -16,7 +16,7 @@ HEIGHT_SIGMA_M = 0.5
 
 WHEEL_NOISE_MPS = 0.012
 WHEEL_QUANTUM_MPS = 0.0022
-WHEEL_RATTLE = 0.15  # how often the wheel sensors tell something at rest
+WHEEL_RATTLE = 0.15  # how often the wheel sensors measure something at rest
 WHEEL_REST_MAX_MPS = 0.08  # the real car's reach 0.084 m/s at rest
 
 STEERING_RAD_PER_PERCENT = -0.00536  # negative percent is left
@@ -43,7 +43,7 @@ class GpsError:
 
 
 def wheel_speed_mps(motion: Motion, rng: np.random.Generator) -> float:
-    """The speed the wheels tell. At rest they mostly tell 0, and now and then a little more."""
+    """The speed the wheels measure. At rest it is mostly 0, and now and then a little more."""
     noise, luck = rng.standard_normal(), rng.random()
     if motion.speed_mps > 0.0:
         speed_mps = max(0.0, motion.speed_mps + WHEEL_NOISE_MPS * noise)

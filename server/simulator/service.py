@@ -12,7 +12,8 @@ from server.judge.message import Json, RosVersion
 from server.rosbridge_server.server import CannotListen, Like, RosBridge, ServiceFailed
 from server.simulator.car import SimulatedCar, Step
 from server.simulator.messages import CMD_VEL
-from server.simulator.scenarios import BridgeFault, Planned, UnknownScenario, check_duration, find, planned
+from server.simulator.scenario import BridgeFault
+from server.simulator.scenarios import Planned, UnknownScenario, check_duration, find, planned
 
 SCENARIO_SERVICE = "/catgraph/simulator/scenario"
 STATE_SERVICE = "/catgraph/simulator/state"
@@ -29,7 +30,7 @@ class CarService:
     """One simulated car on one port.
 
     `port` 0 takes a free one. `scenarios` come as NAME, NAME@T or NAME@T+D (T and D in seconds of the drive). `rate` is
-    how many times faster than real time the car lives; `clock` tells the time at the beginning [s since 1970]. Raises
+    how many times faster than real time the car lives; `clock` returns the time at the beginning [s since 1970]. Raises
     UnknownScenario and ValueError, each with one sentence for a person. `like` is the bridge's.
     """
 

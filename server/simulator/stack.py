@@ -1,6 +1,6 @@
 """What stands between whoever commands the car and its motion: the obstacle stopper, as the real car has it.
 
-Without the stopper the vehicle does what the real one's simulator does: in silence it keeps the last speed it was told.
+Without the stopper the vehicle does what the real one's simulator does: in silence it keeps the last commanded speed.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ class Stack:
         self._command = STANDING
         self._heard_s = -math.inf
         self._distance_m = math.inf
+        self.hand: MotionCommand | None = None  # of a person at wheel and brake, before whom everything gives way
 
     @property
     def tyre_rad(self) -> float:
@@ -33,11 +34,13 @@ class Stack:
         self._command, self._heard_s = command, now_s
 
     def see(self, distance_m: float) -> None:
-        """What the distance estimator tells of the nearest object ahead. Until then the way is free."""
+        """What the distance estimator reports of the nearest object ahead. Until then the way is free."""
         self._distance_m = distance_m
 
     def passed(self, now_s: float) -> MotionCommand:
-        """What the vehicle is told now: the command, or zero speed with its tyre angle where the stopper steps in."""
+        """What the vehicle receives now: the command, or zero speed with its tyre angle where the stopper steps in."""
+        if self.hand is not None:
+            return self.hand
         is_silent = now_s - self._heard_s > DEAD_MAN_S
         if self.has_stopper and (is_silent or self._distance_m <= STANDOFF_M):
             return MotionCommand(speed_mps=0.0, tyre_rad=self._command.tyre_rad)

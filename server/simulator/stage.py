@@ -14,7 +14,7 @@ from server.simulator.vehicle import LASER_AHEAD_M, Motion
 # hurry is one alarm.
 LIMIT_MPS, HURRY_FOR_S, LEAST_HURRY_S = 11.0, 8.0, 0.3
 
-# What pulls across the way stands so far ahead of the laser that the driver can stop, and the alarm has time to tell.
+# What pulls across the way stands so far ahead of the laser that the driver can stop, and the alarm can be raised.
 BLOCKER_LENGTH_M, BLOCKER_WIDTH_M = 4.4, 1.8
 
 

@@ -62,9 +62,9 @@ class GuardClient:
 
     def end(self) -> bool:
         """Inform the guard of an intended end of monitoring, so that it does not slow the car. Return if sent."""
-        is_told = self._has_sent and self._publish(GUARD_HEARTBEAT, END_OF_MONITORING)
+        is_sent = self._has_sent and self._publish(GUARD_HEARTBEAT, END_OF_MONITORING)
         self._is_there, self._has_sent, self._state, self._received_s = False, False, None, None
-        return is_told
+        return is_sent
 
     def release(self, hold: int | None = None) -> None:
         """Release the car to its controllers; None: release the current hold."""

@@ -22,7 +22,12 @@ log = logging.getLogger("catgraph.storage")
 FORMAT = 1  # of the folder as a whole; one more when an older version could do harm to what a newer one keeps
 FORMAT_FILE = "format.json"
 LOCK_FILE = "lock"
-DATABASES = {"events.sqlite": 1, "recordings.sqlite": 1, "mail/outbox.sqlite": 1}  # newest user_version that we read
+DATABASES = {  # newest user_version that we read
+    "events.sqlite": 1,
+    "recordings.sqlite": 2,
+    "mail/outbox.sqlite": 1,
+    "store/uploads.sqlite": 1,
+}
 _UNLOCKABLE = (errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 
 

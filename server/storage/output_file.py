@@ -50,7 +50,7 @@ def output_of(path: Path) -> Output:
         file = Path(os.path.realpath(path))  # a link may lead to what is not there yet
         if not file.parent.is_dir():
             shown = file.parent if path.is_symlink() else path.parent
-            raise NotADirectoryError(errno.ENOTDIR, f"{shown} is not a directory") from None
+            raise FileNotFoundError(errno.ENOENT, f"{shown} does not exist") from None
         return Output(path=path, file=file)
     if stat.S_ISDIR(there.st_mode):
         raise IsADirectoryError(errno.EISDIR, "it is a directory")

@@ -83,7 +83,7 @@ class ProvidedCertificateRenewal:
         self._cert, self._key = cert, key
         self.given = provided_certificate.look(cert, key, now=now)
         self._seen = self._stamps()
-        self._told = self.given.warning
+        self._reported = self.given.warning
         try:
             self.context = LiveContext(cert, key)
         except (OSError, ssl.SSLError, ValueError) as why:
@@ -101,7 +101,7 @@ class ProvidedCertificateRenewal:
             self.context.use(self._cert, self._key)
         except (TlsRefused, OSError, ssl.SSLError, ValueError) as why:
             return self._once(f"the certificate of before stays, for the changed one cannot be served: {why}")
-        self.given, self._told = fresh, fresh.warning
+        self.given, self._reported = fresh, fresh.warning
         ends = f"{fresh.cert.not_valid_after_utc:%Y-%m-%d}"
         return f"the certificate {self._cert} was read again, it ends on {ends}"
 
@@ -114,9 +114,9 @@ class ProvidedCertificateRenewal:
         return None
 
     def _once(self, said: str) -> str | None:
-        if said == self._told:
+        if said == self._reported:
             return None
-        self._told = said
+        self._reported = said
         return said
 
     def _stamps(self) -> tuple[tuple[int, int, int], ...] | None:
@@ -131,10 +131,10 @@ async def keep(
     certificate: Certificate,
     *,
     now: Callable[[], dt.datetime],
-    told: Callable[[], None] = lambda: None,
+    on_renewed: Callable[[], None] = lambda: None,
     every_s: float = LOOK_EVERY_S,
 ) -> None:
-    """Renew the certificate when due, until cancelled; `told` is called after each renewal. Failures are retried."""
+    """Renew the certificate when due, until cancelled; call `on_renewed` after each renewal. Failures are retried."""
     last = ""
     while True:
         await asyncio.sleep(every_s)
@@ -142,7 +142,7 @@ async def keep(
             said = await asyncio.to_thread(certificate.refresh, now())
             if said is not None:
                 log.warning("%s", said)
-                told()
+                on_renewed()
         except Exception as bug:
             if repr(bug) != last:
                 log.exception("the certificate could not be checked; it is retried")

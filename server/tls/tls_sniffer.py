@@ -1,4 +1,4 @@
-"""One port for TLS and plain HTTP: the first byte of a connection tells which.
+"""One port for TLS and plain HTTP: the first byte of a connection decides which.
 
 `192.168.4.1:8000` typed into a phone is http, and a TLS port would not answer at all. The byte is peeked at; a
 connection that starts with 22 (RFC 8446 5.1) is served by TLS, any other by the instruction page.

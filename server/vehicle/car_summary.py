@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable, Iterable
 
 import orjson
@@ -12,7 +13,8 @@ from monitor.alarm_spec import Sound
 from monitor.state import Snapshot
 from server.bus.bus import ALL, SessionBus
 from server.protocol import serialize
-from server.protocol.cars_state import CarAlarm, CarSpeed, CarSummary
+from server.protocol.cars_state import CarAlarm, CarPlace, CarSpeed, CarSummary
+from server.protocol.state import ServerState
 from server.vehicle import facts
 from server.vehicle.session_parts import SessionParts
 from server.vehicle.state_frame import where_cut
@@ -20,6 +22,9 @@ from server.vehicle.state_frame import where_cut
 log = logging.getLogger("catgraph.session")
 
 EVERY_S = 0.5
+TEXT_LETTERS = 100  # of the sentence of an alarm; a summary is bounded
+MOST_REQUESTS = 3  # for control
+NO_FIX = -1  # NavSatStatus
 _RANK = {"critical": 3, "warning": 2, "advisory": 1}
 _ASKING = ("UNACKED", "RTN_UNACKED")
 
@@ -35,10 +40,12 @@ class SummaryPublisher:
         vehicle: str,
         parts: SessionParts,
         bus: SessionBus,
+        server: Callable[[], ServerState],
         *,
         now: Callable[[], float],
         wall_ms: Callable[[], int],
     ) -> None:
+        self._server = server
         self._vehicle = vehicle
         self._parts = parts
         self._bus = bus
@@ -59,7 +66,10 @@ class SummaryPublisher:
             return
         self._put_s = self._now()
         try:
-            self._bus.put(ALL, self._vehicle, orjson.dumps(self._make()).decode())
+            summary = self._make()
+            if (challenge := self._server().get("challenge")) is not None:
+                summary["challenge"] = challenge
+            self._bus.put(ALL, self._vehicle, orjson.dumps(summary).decode(), made_s=self._put_s)
             self._failure = ""
         except Exception as error:
             if self._failure != (failure := f"{type(error).__name__}: {error}"):
@@ -95,6 +105,15 @@ class SummaryPublisher:
             "recording": found.recording["state"],
             "recording_for_s": found.recording["for_s"],
             "slow_down": slow_down["state"],
+            "time_ms": wall_ms,
+            "attention": parts.attention.as_json(now_s, wall_ms),
+            "place": place(snapshot, now_s),
+            "energy_percent": energy_percent(snapshot, now_s),
+            "requests": [
+                {"page": one["page"], "name": one["name"], "left_s": one["left_s"]}
+                for one in control.get("requests", [])[:MOST_REQUESTS]
+            ],
+            "people": parts.attention.people(now_s),
         }
 
 
@@ -114,6 +133,7 @@ def worst(standing: Iterable[Alarm], now_s: float, wall_ms: int) -> CarAlarm | N
         "active": first["active"],
         "raised_ms": first["raised_ms"],
         "sound": Sound.NONE if first["silenced_until_ms"] else first["sound"],
+        "text": (first["text"] or first["trip_text"])[:TEXT_LETTERS],
     }
 
 
@@ -127,6 +147,34 @@ def _speed(snapshot: Snapshot, now_s: float) -> CarSpeed:
         "age_s": serialize.plain(reading.age_s(now_s), 3),
         "horizon_s": serialize.plain(reading.horizon_s, 2),
     }
+
+
+def place(snapshot: Snapshot, now_s: float) -> CarPlace | None:
+    """Where the car is by its own GPS; None where it has no fix, however old. A heading that is old is none."""
+    reading, heading = snapshot.readings.get("position"), snapshot.readings.get("heading")
+    if reading is None or reading.value.status == NO_FIX:
+        return None
+    lat_deg, lon_deg = serialize.plain(reading.value.lat_deg, 7), serialize.plain(reading.value.lon_deg, 7)
+    if lat_deg is None or lon_deg is None:
+        return None
+    heading_deg = heading.value.heading_deg if heading is not None and heading.is_fresh(now_s) else None
+    return {
+        "lat_deg": lat_deg,
+        "lon_deg": lon_deg,
+        "heading_rad": None
+        if heading_deg is None
+        else serialize.plain(math.remainder(math.radians(90 - heading_deg), math.tau)),
+        "freshness": reading.freshness(now_s),
+        "age_s": serialize.plain(reading.age_s(now_s), 2),
+    }
+
+
+def energy_percent(snapshot: Snapshot, now_s: float) -> float | None:
+    """Of the tank or battery; None where the car does not say it in percent, or said it too long ago."""
+    reading = snapshot.readings.get("fuel")
+    if reading is None or reading.value.unit != "%" or not reading.is_fresh(now_s):
+        return None
+    return serialize.plain(reading.value.value, 1)
 
 
 def _since(moment_s: float | None, now_s: float) -> float | None:

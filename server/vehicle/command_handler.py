@@ -2,27 +2,43 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any, assert_never
 
 from monitor.alarm import Refused
 from server.control import display_name
+from server.control.acting import acting_as
 from server.control.authorization import Caller
+from server.control.handover import NotReadBack
+from server.control.lease import Operator
 from server.judge.phone_report import phone_report
-from server.judge.settings import Settings
-from server.protocol import commands, serialize
+from server.protocol import (
+    commands,
+    departure_commands,
+    handover_commands,
+    item_commands,
+    mark_commands,
+    mode_commands,
+    serialize,
+    slowing_commands,
+)
+from server.protocol.command_base import OfCar
 from server.protocol.messages import Answer
 from server.protocol.state import LiveState
 from server.rosbridge.address import BadAddress
 from server.storage.storage_thread import StorageThread
-from server.vehicle import phone, queries
+from server.vehicle import phone, queries, responses
 from server.vehicle.check_detail import check_answer
+from server.vehicle.outcomes import Outcomes
 from server.vehicle.session_parts import SessionActions, SessionParts
+from server.vehicle.settings_change import SettingsChange
 
 log = logging.getLogger("catgraph.session")
+
+# Nothing of the car changes by these, so one that is not on the disk was not obeyed.
+RECORDS = (mark_commands.OfMark, departure_commands.OfDeparture, mode_commands.DescribeIntervention)
+OTHER_CAR = "This was meant for {meant}, and this is {this}: nothing was sent to either."
 
 
 class CommandHandler:
@@ -44,37 +60,53 @@ class CommandHandler:
     ) -> None:
         """`storage`: the thread that writes settings; None: the caller waits for the disk."""
         self._storage = storage
-        self._changing = asyncio.Lock()
+        self._settings = SettingsChange(parts, actions, now, storage)
         self._vehicle = vehicle
         self._parts = parts
         self._actions = actions
         self._frame = frame
         self._now = now
         self._wall_ms = wall_ms
+        self._outcomes = Outcomes(now)
 
     async def handle(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """The answer to a command or a query."""
         found = self._query(message)
         if found is not None:
             return found
-        parts = self._parts
+        return await self._outcomes.keep(message, self._carry_out)
+
+    async def _carry_out(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         caller = Caller.of(message)
-        by = caller.name
+        with acting_as(caller.name, caller.person):
+            return await self._obey(message, caller)
+
+    async def _obey(self, message: Mapping[str, Any], caller: Caller) -> Mapping[str, Any]:
+        parts, by = self._parts, caller.name
         try:
             command = commands.read(dict(message))
             if isinstance(command, commands.PresentWord):
                 return self._present(command, caller)
+            if isinstance(command, commands.AskOutcome):
+                return self._outcomes.ask(caller.page, command.of, command.ago_s, self._now())
             self._check_car(command, by)
             parts.authorization.admit(command, caller, self._now())
-            await self._apply(command, caller)
+            was = await self._apply(command, caller)
+        except NotReadBack as why:
+            self._record(message, by=by, reason=why.reason)
+            return parts.handover.refusal(why, self._now(), self._wall_ms())
         except queries.REFUSALS as why:
             if isinstance(why, BadAddress) and parts.connection.refuse(why):
                 parts.publisher.put()
             refusal = queries.refusal(why)
+            if message.get("kind") in commands.SLOW_DOWN and parts.connection.phase != "monitoring":
+                refusal["outcome"], refusal["cut"] = "not_delivered", "agent-car"
             self._record(message, by=by, reason=refusal.get("reason"))
             return refusal
         self._record(message, by=by)
         answer: Answer = {"ok": True}
+        if was is not None and was.person is not None:  # for the web node, which knows who is on duty there
+            answer["handed_over"] = {"device": was.person.device, "to": by}
         if isinstance(command, (commands.Set, commands.Import)):  # another version of the settings
             answer["version"] = parts.settings.settings.version
         if (fence := parts.authorization.fence_of(caller)) is not None:
@@ -83,46 +115,13 @@ class CommandHandler:
 
     def _check_car(self, command: commands.LoggedCommand, by: str) -> None:
         """A command that acts on a car must be for this one. Raises Refused; a slow-down that is refused is logged."""
-        meant = command.vehicle if isinstance(command, commands.OfCar) else None
+        meant = command.vehicle if isinstance(command, OfCar) else None
         if meant is None or meant == self._vehicle:
             return
-        why = (
-            f"This was meant for {display_name.clean(meant)}, and this is {self._vehicle}: nothing was sent to either."
-        )
-        if isinstance(command, commands.Decelerate):
+        why = OTHER_CAR.format(meant=display_name.clean(meant), this=self._vehicle)
+        if isinstance(command, slowing_commands.Decelerate):
             self._parts.event_log.note("slow_down", f"Slow-down refused: {why}", by=by, step="refused")
         raise Refused(why)
-
-    async def _change_settings(self, command: commands.Set | commands.Import, caller: Caller) -> None:
-        """Stores settings and puts them in force; both happen though the caller waits no longer.
-
-        Raises BadSetting, Conflict, OSError.
-        """
-        parts, by = self._parts, caller.name
-        if isinstance(command, commands.Import):  # a file may take a while to read, and control may pass meanwhile
-            read = await asyncio.to_thread(parts.settings.read, command.toml)
-            parts.authorization.admit(command, caller, self._now())
-            prepare = partial(parts.settings.prepare_all, read)
-        else:
-            prepare = partial(
-                parts.settings.prepare,
-                values=command.values,
-                topics=command.topics,
-                profile=command.profile,
-                version=command.version,
-            )
-        await asyncio.shield(asyncio.create_task(self._store_and_adopt(prepare, by), name="change settings"))
-
-    async def _store_and_adopt(self, prepare: Callable[[], Settings], by: str) -> None:
-        settings = self._parts.settings
-        async with self._changing:  # one after the other: each is prepared from what the one before put in force
-            new = prepare()
-            if self._storage is None:
-                settings.store(new)
-            else:
-                await self._storage.run(lambda: settings.store(new))
-            self._actions.settings_changed(settings.adopt(new), by=by)
-            self._parts.publisher.put()
 
     def _query(self, message: Mapping[str, Any]) -> Mapping[str, Any] | None:
         """The answer to a query; None: it is a command."""
@@ -134,8 +133,10 @@ class CommandHandler:
                 parts.publisher.put()
                 return {"ok": True}
             case "announces":  # of a page that shows another car; no page can send it itself
-                word = commands.PresentWord.model_validate({**message, "kind": "present"})
-                parts.authorization.hear_elsewhere(word, Caller.of(message), self._now())
+                word, caller = commands.PresentWord.model_validate({**message, "kind": "present"}), Caller.of(message)
+                parts.authorization.hear_elsewhere(word, caller, self._now())
+                if not word.leaves:
+                    parts.attention.hear(caller, self._now())
                 return {"ok": True}
             case "signals":
                 topics = parts.connection.subscriptions
@@ -145,10 +146,18 @@ class CommandHandler:
             case "check":
                 now_s = self._now()
                 return dict(check_answer(judgement.monitor, str(message.get("check")), now_s, judgement.minute))
+            case "driving" | "intervention":
+                return parts.driving.answer(message, self._now(), self._wall_ms())
+            case "departure":
+                return self._parts.departure.answer()
             case "trends":
                 return serialize.trends(judgement.trends.piece(self._now(), after=message.get("after")))
             case "drive_trends":
                 return queries.drive_trends(judgement, message, self._now(), self._wall_ms())
+            case "marks":
+                return parts.marks.rows()
+            case "mark_file":  # of the route that wrote it, into a folder of this server
+                return parts.marks.answer_file(message)
             case "track":
                 return queries.track(judgement.snapshot())
             case "track_points":
@@ -168,17 +177,19 @@ class CommandHandler:
             log.exception("command not recorded: vehicle=%s", self._vehicle)
 
     def _present(self, word: commands.PresentWord, caller: Caller) -> Answer:
+        if not word.leaves:
+            self._parts.attention.hear(caller, self._now())
         if self._parts.authorization.hear(word, caller, self._now()):
             self._parts.publisher.put_soon()
         return {"ok": True}
 
-    async def _apply(self, command: commands.LoggedCommand, caller: Caller) -> None:
-        """Each command has exactly one case here. Raises one of queries.REFUSALS."""
+    async def _apply(self, command: commands.LoggedCommand, caller: Caller) -> Operator | None:
+        """Who handed control over by it. Each command has exactly one case here. Raises one of queries.REFUSALS."""
         parts, now_s, by = self._parts, self._now(), caller.name
         match command:
             case commands.Set() | commands.Import():
-                await self._change_settings(command, caller)
-                return
+                await self._settings.change(command, caller)
+                return None
             case commands.Connect():
                 self._actions.connect(command.address, by=by)
             case commands.Retry():
@@ -193,51 +204,60 @@ class CommandHandler:
                 if parts.pause.end(parts.judgement.state, by=by):
                     parts.judgement.judge(now_s)
             case commands.Record():
-                parts.recording.order(command.on, by=by)
-                begins = "begins" if command.on else "ends"
-                parts.event_log.note("recording", f"Recording {begins}, by hand.", by=by)
-                self._actions.recording_ordered()
-                parts.publisher.put()
-                await parts.recording.demand_settled()
-                return
+                await self._record_by_hand(command.on, by=by)
+                return None
             case commands.Acknowledge() | commands.Silence() | commands.Shelve() | commands.Unshelve():
-                self._respond(command, now_s, by)
+                judgement = parts.judgement
+                judgement.report(responses.respond(judgement.monitor, command, now_s, by))
             case commands.TakeControl():
                 parts.authorization.obey(command, caller, now_s)
+                self._actions.attention_changed()  # the queue shows who asks for control
+            case handover_commands.OfHandover():
+                was = parts.handover.obey(command, caller, now_s, self._wall_ms())
+                parts.publisher.put()
+                return was
+            case departure_commands.OfDeparture():
+                await parts.departure.obey(command, caller, self._wall_ms(), self._storage)
+            case item_commands.OfItem():
+                parts.attention.obey(command, caller, now_s)
+                self._actions.attention_changed()
+                return None  # the state has nothing of it
             case commands.Ride():
                 self._ride(command.phone, now_s, by=by)
-            case commands.Arm() | commands.Disarm() | commands.Decelerate() | commands.Release() | commands.Veto():
+            case mode_commands.DescribeIntervention():
+                parts.driving.describe(command, by=by)
+            case mark_commands.OfMark():
+                parts.marks.obey(command, by=by, source="http" if caller.page is None else "page")
+            case slowing_commands.OfSlowing():
                 parts.slow_down.obey(command, by=by)
                 self._actions.slow_down_ordered()
             case commands.Position():
                 if parts.connection.phase == "idle":
                     raise Refused("No car is monitored: no position is needed.")
                 parts.judgement.state.receive_phone(phone_report(command, now_s, self._wall_ms(), by), now_s)
-                return  # many phones may report every second; the next tick judges and puts a state
+                return None  # many phones may report every second; the next tick judges and puts a state
             case _:
                 assert_never(command)
+        await self._demand_stored(command)
         parts.publisher.put()
+        return None
 
-    def _respond(
-        self,
-        command: commands.Acknowledge | commands.Silence | commands.Shelve | commands.Unshelve,
-        now_s: float,
-        by: str,
-    ) -> None:
-        """What an operator does about an alarm."""
-        judgement = self._parts.judgement
-        match command:
-            case commands.Acknowledge():
-                found = judgement.monitor.acknowledge(command.alarm, command.occurrence, by=by, now_s=now_s)
-            case commands.Silence():
-                found = judgement.monitor.silence(command.alarm, command.occurrence, by=by, now_s=now_s)
-            case commands.Shelve():
-                found = judgement.monitor.shelve(
-                    command.alarm, command.occurrence, minutes=command.minutes, by=by, now_s=now_s
-                )
-            case _:
-                found = judgement.monitor.unshelve(command.alarm, by=by, now_s=now_s)
-        judgement.report(found)
+    async def _demand_stored(self, command: commands.LoggedCommand) -> None:
+        """What was logged of a command that is only a record is on the disk. Raises Refused: it is not."""
+        if not isinstance(command, RECORDS):
+            return
+        if self._storage is not None:
+            await self._storage.run(lambda: None)  # behind the job that writes the log
+        if (trouble := self._parts.event_log.trouble_of_disk()) is not None:
+            raise Refused(trouble)
+
+    async def _record_by_hand(self, is_on: bool, *, by: str) -> None:
+        parts = self._parts
+        parts.recording.order(is_on, by=by)
+        parts.event_log.note("recording", f"Recording {'begins' if is_on else 'ends'}, by hand.", by=by)
+        self._actions.recording_ordered()
+        parts.publisher.put()
+        await parts.recording.demand_settled()
 
     def _ride(self, phone_: str | None, now_s: float, *, by: str) -> None:
         judgement = self._parts.judgement

@@ -11,6 +11,7 @@ from typing_extensions import Unpack
 
 from monitor.alarm import Alarm, Transition
 from server.bus.bus import SessionBus
+from server.control.acting import acting
 from server.judge.active_settings import ActiveSettings
 from server.protocol import serialize
 from server.protocol.alarm_state import EventDetails, NotedEvent
@@ -55,12 +56,16 @@ class EventLog:
         lost = f", {self._lost} lost" if self._lost else ""
         return f"The event log fails: {self._why}. Events that wait: {len(self._waiting)}{lost}."
 
+    def trouble_of_disk(self) -> str | None:
+        """Why what was logged by now would not survive the end of the server, as a sentence; None: it would."""
+        return self.trouble or self._bus.save_events()
+
     def retry(self) -> None:
         """Tries to append what waits; to be called now and then."""
         if self._waiting:
             self._write([])
 
-    def tell(self, transitions: Collection[Transition], alarms: Mapping[str, Alarm], now_s: float) -> None:
+    def log_transitions(self, transitions: Collection[Transition], alarms: Mapping[str, Alarm], now_s: float) -> None:
         """What happened to alarms, at `now_s` of the monitor's clock."""
         at_ms = self._wall_ms()
         self._write(
@@ -83,9 +88,12 @@ class EventLog:
         }
         self._write([event])
 
-    def started(self, address: str, shown: str, *, by: str | None) -> None:
+    def started(self, address: str, shown: str, *, by: str | None, resumes: bool = False) -> None:
         """Log the start of monitoring with all settings in force, so that the log is complete by itself."""
-        self.note("started", f"Monitoring of {shown} begins.", by=by, address=address, settings=self._tuning.in_force())
+        more: EventDetails = {"address": address, "settings": self._tuning.in_force()}
+        if resumes:
+            more["resumes"] = True
+        self.note("started", f"Monitoring of {shown} begins.", by=by, **more)
         self._tuning.changes()  # logged by this event
 
     def settings(self, text: str, *, by: str | None) -> None:
@@ -93,7 +101,7 @@ class EventLog:
         self.note("settings", text, by=by, changes=self._tuning.changes())
 
     def _write(self, events: Sequence[NotedEvent]) -> None:
-        due = [*self._waiting, *(events := [cleaned(event) for event in events])]
+        due = [*self._waiting, *(events := [cleaned(_signed(event)) for event in events])]
         try:
             numbered = self._bus.append(self._vehicle, due)
         except Exception as error:
@@ -116,3 +124,11 @@ class EventLog:
     @property
     def _version(self) -> int:
         return self._tuning.settings.version
+
+
+def _signed(event: NotedEvent) -> NotedEvent:
+    """With the person who is on duty where it was done; what nobody did, or another, has none."""
+    found = acting.get()
+    if found is None or event.get("by") != found[0]:
+        return event
+    return {**event, "person": found[1].name, "role": found[1].role}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from monitor.state import LinkFacts
+from server.protocol.departure import DepartureState
+from server.protocol.state import LiveState, RecordedState, ServerState
 from server.rosbridge.connection_errors import Problem
 from server.vehicle.restore import RestoredState
 from server.vehicle.session_parts import SessionParts
@@ -48,6 +50,11 @@ def link_facts(parts: SessionParts, now_s: float, *, wall_ms: int, log_trouble: 
     )
 
 
+def live_state(shown: RecordedState, departure: DepartureState, server: ServerState, lag_s: float) -> LiveState:
+    """A whole state; `lag_s`: how late the newest tick was."""
+    return {**shown, "departure": departure, "server": {**server, "loop_lag_ms": round(lag_s * 1000, 1)}}
+
+
 def frame_facts(
     vehicle: str,
     parts: SessionParts,
@@ -60,6 +67,8 @@ def frame_facts(
 ) -> Facts:
     """What a state is made of. `configured`: the address of the car the session was started for; `held`: what stood
     when the server ended, while no car is monitored yet."""
+    operators = parts.authorization.as_json(now_s, wall_ms)
+    operators["control"]["handover"] = parts.handover.as_json(now_s, wall_ms)
     connection, judgement, topics = parts.connection, parts.judgement, parts.connection.subscriptions
     return Facts(
         vehicle=vehicle,
@@ -94,6 +103,8 @@ def frame_facts(
         recording=parts.recording.frame(now_s),
         trends=judgement.trends.piece(now_s, at_most=TRENDS_A_FRAME),
         track_number=judgement.track_number,
-        operators=parts.authorization.as_json(now_s, wall_ms),
+        operators=operators,
         decelerate=parts.slow_down.frame(),
+        mode=parts.driving.frame(now_s, wall_ms),
+        marks=parts.marks.count,
     )

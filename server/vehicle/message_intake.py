@@ -10,8 +10,10 @@ from server.recording.controller import SessionRecording
 from server.rosbridge.raw_frame import RawFrame
 from server.slowdown.command_target import GUARD_STATE
 from server.slowdown.controller import SlowDownController
+from server.vehicle import car_marks
 from server.vehicle.connection import Connection
 from server.vehicle.judgement import Judgement
+from server.vehicle.marks import Marks
 from server.vehicle.scan_feed import ScanFeed
 from server.vehicle.tick_parts import TickParts
 from server.vehicle.undelivered import CLIENT_COUNT
@@ -30,6 +32,7 @@ class MessageIntake:
         recording: SessionRecording,
         slow_down: SlowDownController,
         tick_parts: TickParts,
+        marks: Marks,
         *,
         now: Callable[[], float],
     ) -> None:
@@ -39,6 +42,7 @@ class MessageIntake:
         self._recording = recording
         self._slow_down = slow_down
         self._tick_parts = tick_parts
+        self._button = marks.button(now(), read_s=judgement.transport.read_s)
         self._now = now
         self._connection: Connection | None = None
         self.reset()
@@ -84,9 +88,12 @@ class MessageIntake:
         now_s = self._now()
         topics = connection.subscriptions
         topics.received(topic)
+        is_button = topic == car_marks.TOPIC and topic not in topics.others
+        if is_button and self._button.receive(message, now_s, topics.table.button):
+            return  # recorded as a mark
         if self._recording.is_on and connection.link is not None:
             self._record(connection, topic, message, now_s, connection.link.frame_bytes)
-        if self._slow_down.receive(topic, message) or topics.took(topic, message):
+        if is_button or self._slow_down.receive(topic, message) or topics.took(topic, message):
             return
         if topic in topics.others:
             return  # subscribed to be recorded: what is judged must not depend on what is recorded

@@ -60,7 +60,7 @@ def recall(bus: SessionBus, vehicle: str, *, now_s: float, wall_ms: int) -> Rest
     address, paused = _monitored(bus, vehicle)
     newest = bus.past_events(vehicle, limit=1)
     alarms = [_since_rest(bus, vehicle, alarm) for alarm in bus.logged_alarms(vehicle)]
-    told = [
+    transitions = [
         transition
         for events in alarms
         for event in events
@@ -72,7 +72,7 @@ def recall(bus: SessionBus, vehicle: str, *, now_s: float, wall_ms: int) -> Rest
         paused_by=text_of(paused.get("by")) if paused else None,
         settings_version=int(number_of(newest[0].get("settings_version"), 0)) if newest else 0,
         order=_order(bus, vehicle, wall_ms) if address is not None else None,
-        transitions=tuple(told),
+        transitions=tuple(transitions),
         stood=tuple(events[-1] for events in alarms if events and events[-1].get("state") != AlarmState.NORMAL),
         recent=tuple(_recent(bus, vehicle, wall_ms, moment_s, shelf_s)),
     )

@@ -48,7 +48,7 @@ class ScanFeed:
                 kinds_kept=kinds_kept,
                 judged=judged(reading.value, snapshot, limits, was_active=was_active),
             )
-            self._bus.put(self._vehicle, "scan", frame)
+            self._bus.put(self._vehicle, "scan", frame, made_s=snapshot.now_s)
 
 
 def judged(scan: LaserScan, snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bool) -> serialize.Judged:

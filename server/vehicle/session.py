@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
+from typing_extensions import Unpack
+
 from monitor.alarm import Transition
-from monitor.catalog import AnyCheck
-from monitor.load import AlarmLoad
+from monitor.catalog import AllLimits, AnyCheck
 from server.bus.bus import SessionBus
 from server.judge.active_settings import ActiveSettings
-from server.judge.reception_stats import Tally
 from server.judge.settings import SettingsFile
+from server.protocol.alarm_state import EventDetails
 from server.protocol.state import LiveState, ServerState
 from server.recording.folder import RecordingsFolder
-from server.recording.recover import Recovered
 from server.rosbridge import address
-from server.rosbridge.address import BadAddress
 from server.rosbridge.connection_errors import Problem
 from server.rosbridge.link import RosLink
 from server.rosbridge.live_source import LiveSource, OpenSource
@@ -25,6 +24,8 @@ from server.system import log_context
 from server.system.supervision import Supervisor
 from server.vehicle import facts
 from server.vehicle.command_handler import CommandHandler
+from server.vehicle.judgement import Judgement
+from server.vehicle.marks import NO_PLACE, MarksPlace
 from server.vehicle.restoration import Restoration
 from server.vehicle.session_parts import session_parts
 from server.vehicle.state_frame import state_frame
@@ -53,11 +54,12 @@ class Session:
         settings: SettingsFile | None = None,
         recordings: RecordingsFolder | None = None,
         on_finished: Callable[[Path], None] = lambda _: None,
+        marks: MarksPlace = NO_PLACE,
         storage: StorageThread | None = None,
         open_source: OpenSource = RosLink,
     ) -> None:
-        """`recordings` None: nothing is recorded. `on_finished` is called with each part that is.
-
+        """`recordings` None: nothing is recorded. `on_finished` is called with each part. `marks`: where those go
+        that no part covers.
         `storage`: the thread that writes settings; None: the session does. `open_source`: where messages come from.
         """
         self.vehicle = vehicle
@@ -78,12 +80,13 @@ class Session:
             settings=ActiveSettings(settings or SettingsFile(None)),
             recordings=recordings,
             on_finished=on_finished,
+            marks=marks,
             frame=self.frame,
             open_source=open_source,
             now=now,
             wall_ms=wall_ms,
         )
-        self._tick = Tick(vehicle.name, self._parts, attempts, bus, now=now, wall_ms=wall_ms)
+        self._tick = Tick(vehicle.name, self._parts, attempts, bus, server, now=now, wall_ms=wall_ms)
         self._restoration = Restoration(vehicle.name, bus, self._parts, now=now, wall_ms=wall_ms)
         self._commands = CommandHandler(
             vehicle.name, self._parts, self, self.frame, now=now, wall_ms=wall_ms, storage=storage
@@ -111,9 +114,9 @@ class Session:
         await self._supervisor.stop()
         await self._parts.recording.stop()
 
-    def recovered(self, found: Recovered) -> None:
-        """What became of a recording that the last run of the server left."""
-        self._parts.event_log.note("recovered", found.sentence, recording=found.id)
+    def note(self, change: str, text: str, *, by: str | None = None, **more: Unpack[EventDetails]) -> None:
+        """Writes into the car's log what happened outside of this session."""
+        self._parts.event_log.note(change, text, by=by, **more)
 
     def _task_restarted(self, name: str, why: str) -> None:
         self._parts.event_log.note("restarted", f"A part of the server failed and was restarted: {name} ({why}).")
@@ -128,10 +131,7 @@ class Session:
     @property
     def configured(self) -> str | None:
         """The address of the car this session was started for, whatever has been dialled since."""
-        try:
-            return address.parse(self.vehicle.address).url if self.vehicle.address else None
-        except BadAddress:
-            return None
+        return address.url_of(self.vehicle.address)
 
     @property
     def address_url(self) -> str | None:
@@ -143,14 +143,14 @@ class Session:
         return self._tick.lag_s
 
     @property
-    def phones(self) -> int:
-        """How many phones share their position, or why they cannot."""
-        return self._parts.judgement.state.phones(self._now())
+    def judgement(self) -> Judgement:
+        """What is known of the car and what was announced; to be read only."""
+        return self._parts.judgement
 
     @property
-    def alarm_load(self) -> AlarmLoad:
-        """The alarms announced lately."""
-        return self._parts.judgement.load
+    def limits(self) -> AllLimits:
+        """The settings in force."""
+        return self._parts.settings.limits
 
     @property
     def log_trouble(self) -> str | None:
@@ -159,10 +159,6 @@ class Session:
 
     def bridge_answers(self, now_s: float) -> bool:
         return self._parts.connection.bridge_answers(now_s)
-
-    def tallies(self) -> dict[str, Tally]:
-        """What was received and rejected, by signal, since connecting."""
-        return self._parts.judgement.reception.by_signal
 
     def vitals(self) -> Vitals:
         """The ages for the health check of this session."""
@@ -177,7 +173,7 @@ class Session:
 
     def frame(self) -> LiveState:
         """The whole state, as `/api/state` answers it."""
-        now_s = self._now()
+        server, now_s = self._server(), self._now()  # in this order: what it holds is no older than its time of day
         self._tick.watch_link(now_s)
         found = facts.frame_facts(
             self.vehicle.name,
@@ -189,31 +185,28 @@ class Session:
             log_trouble=self.log_trouble,
         )
         shown = state_frame(found, self._parts.judgement.state.snapshot(now_s), self._parts.judgement.monitor)
-        return {**shown, "server": {**self._server(), "loop_lag_ms": round(self._tick.lag_s * 1000, 1)}}
+        return facts.live_state(shown, self._parts.departure.state(), server, self._tick.lag_s)
 
     def alarms_changed(self, transitions: Collection[Transition]) -> None:
-        self._parts.event_log.tell(transitions, self._parts.judgement.monitor.alarms, self._now())
+        self._parts.event_log.log_transitions(transitions, self._parts.judgement.monitor.alarms, self._now())
         self._parts.publisher.put_soon()
-        self._tick.summary.put()
+        self._tick.alarms_changed(self._now())
 
     # -- orders (SessionActions) -------------------------------------------------------------------------------------
 
     def connect(self, typed: str, *, by: str | None) -> None:
         """Dials what was typed, or the configured car where it is empty. Raises BadAddress."""
         target = address.parse(typed if typed.strip() else self.vehicle.address or "")
-        if self._allowed_hosts and target.host not in self._allowed_hosts and target.shown not in self._allowed_hosts:
-            raise BadAddress(
-                f"{target.shown} is not among the vehicles that this server may connect to.",
-                "Ask whoever started the server.",
-                code="not_allowed",
-            )
+        address.demand_allowed(target, self._allowed_hosts)
         before = self._restoration.of(target.url)
         if before is None:
             self._end()
+            self._parts.marks.begin_drive()
         else:
             self._parts.connection.drop()
             self._clear()
-        self._parts.event_log.started(target.url, target.shown, by=by)
+        self._parts.event_log.started(target.url, target.shown, by=by, resumes=before is not None)
+        self._parts.departure.dialled(self._wall_ms(), resumed=before is not None, by=by)
         self._parts.connection.dial(target, self._parts.judgement.transport)
         if before is not None:
             self._parts.pause.go_on(self._parts.judgement.state, before, self._now(), self._wall_ms())
@@ -226,6 +219,7 @@ class Session:
         self._end()
         if was != "idle":
             self._parts.event_log.note("stopped", "Monitoring was stopped.", by=by)
+            self._parts.departure.end_drive()
 
     def settings_changed(self, lines: Sequence[str], *, by: str | None) -> None:
         """New settings count from this moment on; only then are they logged."""
@@ -242,6 +236,9 @@ class Session:
     def slow_down_ordered(self) -> None:
         """The slow-down and the checks act on an order at once."""
         self._tick.slow_down_ordered(self._now())
+
+    def attention_changed(self) -> None:
+        self._tick.summary.put()
 
     def _end(self) -> None:
         """One car's monitoring is over: its alarms end in the log, and all that is known of it is forgotten."""

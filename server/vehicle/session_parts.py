@@ -18,9 +18,15 @@ from server.recording.folder import RecordingsFolder
 from server.rosbridge.live_source import LiveSource, OpenSource
 from server.slowdown.controller import SlowDownController
 from server.system.supervision import Supervisor
+from server.vehicle.car_attention import CarAttention
+from server.vehicle.car_departure import CarDeparture
+from server.vehicle.car_driving import CarDriving
+from server.vehicle.car_handover import CarHandover
 from server.vehicle.connection import Connection, ConnectionObserver
+from server.vehicle.departure_file import LIST_SUFFIX, DepartureFile
 from server.vehicle.event_log import EventLog
 from server.vehicle.judgement import Judgement
+from server.vehicle.marks import Marks, MarksPlace
 from server.vehicle.message_intake import MessageIntake
 from server.vehicle.pause import Pause
 from server.vehicle.state_publisher import StatePublisher
@@ -38,10 +44,15 @@ class SessionParts:
     recording: SessionRecording
     event_log: EventLog
     authorization: Authorization
+    attention: CarAttention
+    handover: CarHandover
+    departure: CarDeparture
     pause: Pause
+    driving: CarDriving
     slow_down: SlowDownController
     publisher: StatePublisher
     intake: MessageIntake
+    marks: Marks
 
 
 class SessionActions(Protocol):
@@ -62,6 +73,9 @@ class SessionActions(Protocol):
     def slow_down_ordered(self) -> None:
         """The slow-down and the checks act on an order at once."""
 
+    def attention_changed(self) -> None:
+        """Who looks after the car changed: pages of all cars are notified at once."""
+
 
 class SessionObserver(ConnectionObserver, Protocol):
     """What the parts report to the session."""
@@ -81,6 +95,7 @@ def session_parts(
     settings: ActiveSettings,
     recordings: RecordingsFolder | None,
     on_finished: Callable[[Path], None],
+    marks: MarksPlace,
     frame: Callable[[], LiveState],
     open_source: OpenSource,
     now: Callable[[], float],
@@ -89,20 +104,13 @@ def session_parts(
     """Makes the parts and joins them. `observer` learns what happens, `frame` makes a state for the pages."""
     judgement = Judgement(checks, settings, now=now, on_transitions=observer.alarms_changed)
     recording = SessionRecording(
-        vehicle,
-        recordings,
-        settings,
-        now=now,
-        wall_ms=wall_ms,
-        on_finished=on_finished,
+        vehicle, recordings, settings, now=now, wall_ms=wall_ms, on_finished=on_finished,
         unreadable=lambda topic, why: intake.recorded_unreadable(topic, why),
-    )
-    event_log = EventLog(vehicle, bus, settings, wall_ms=wall_ms, also=recording.events)
-    slow_down = SlowDownController(
-        event_log.note, now=now, wall_ms=wall_ms, snapshot=judgement.snapshot,
-        record=lambda sent: recording.own("commands", sent), number=bus.last_event(vehicle),
     )  # fmt: skip
-    intake = MessageIntake(vehicle, bus, judgement, recording, slow_down, attempts, now=now)
+    event_log = EventLog(vehicle, bus, settings, wall_ms=wall_ms, also=recording.events)
+    slow_down = _slow_down(event_log, judgement, recording, number=bus.last_event(vehicle), now=now, wall_ms=wall_ms)
+    placed = Marks(event_log.note, recording, wall_ms=wall_ms, place=marks)
+    intake = MessageIntake(vehicle, bus, judgement, recording, slow_down, attempts, placed, now=now)
 
     def subscriptions(link: LiveSource | None) -> Subscriptions:
         return Subscriptions(
@@ -116,17 +124,38 @@ def session_parts(
             timed=lambda asked_s, ros_s: judgement.transport.clock.answered(asked_s, now(), ros_s),
         )
 
+    authorization = Authorization(event_log.note, fence=bus.last_event(vehicle))
     connection = Connection(vehicle, observer, intake, subscriptions, open_source, supervisor, now=now)
     intake.follow(connection)
+    pause = Pause(event_log)
+    driving = CarDriving(judgement, connection, event_log.note, marks.on_described, now=now, wall_ms=wall_ms)
+    departure = CarDeparture(settings, DepartureFile(settings.beside(LIST_SUFFIX)), event_log.note)
     return SessionParts(
         settings=settings,
         connection=connection,
         judgement=judgement,
         recording=recording,
         event_log=event_log,
-        authorization=Authorization(event_log.note, fence=bus.last_event(vehicle)),
-        pause=Pause(event_log),
-        slow_down=slow_down,
+        authorization=authorization,
+        attention=CarAttention(judgement, authorization, event_log.note),
+        handover=CarHandover(judgement, settings, authorization, pause, slow_down, driving, departure, event_log.note),
+        departure=departure,
+        driving=driving,
         publisher=StatePublisher(vehicle, bus, frame, now=now),
-        intake=intake,
-    )
+        pause=pause, slow_down=slow_down, intake=intake, marks=placed,
+    )  # fmt: skip
+
+
+def _slow_down(
+    event_log: EventLog,
+    judgement: Judgement,
+    recording: SessionRecording,
+    *,
+    number: int,
+    now: Callable[[], float],
+    wall_ms: Callable[[], int],
+) -> SlowDownController:
+    return SlowDownController(
+        event_log.note, now=now, wall_ms=wall_ms, snapshot=judgement.snapshot,
+        record=lambda sent: recording.own("commands", sent), number=number,
+    )  # fmt: skip

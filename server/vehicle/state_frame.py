@@ -17,6 +17,7 @@ from monitor.trends import Piece
 from server.judge.reception_stats import Reception, Tally
 from server.judge.topics import Source
 from server.protocol import serialize
+from server.protocol.driving_state import ModeState
 from server.protocol.operator_state import OperatorsState
 from server.protocol.recording_state import RecordingState
 from server.protocol.signal_state import SignalFreshness, SignalState, SignalValue
@@ -76,7 +77,9 @@ class Facts:
     topics_judged: int = 0  # subscribed to for their signals
     recording: RecordingState
     decelerate: SlowDownState
+    mode: ModeState
     operators: OperatorsState
+    marks: int = 0  # of this drive
 
 
 def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> RecordedState:
@@ -100,9 +103,11 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> RecordedS
         "limits": catalog.flat(monitor.limits),
         "recording": facts.recording,
         "decelerate": facts.decelerate,
+        "mode": facts.mode,
         **facts.operators,
         "phone": phone.as_json(snapshot.phone, facts.now_s),
         "phones": phone.all_as_json(snapshot.phones, snapshot.phone, facts.now_s),
+        "marks": facts.marks,
     }
 
 

@@ -51,7 +51,8 @@ class StatePublisher:
         self.is_due = False
         try:
             if self._bus.watched(self._vehicle):
-                self._bus.put(self._vehicle, "state", orjson.dumps(self._make()).decode())
+                made_s = self._now()  # before: this process may be stopped while it makes one
+                self._bus.put(self._vehicle, "state", orjson.dumps(self._make()).decode(), made_s=made_s)
         except Exception as error:
             if self._failure != (failure := f"{type(error).__name__}: {error}"):
                 self._failure = failure

@@ -8,7 +8,7 @@ from server.judge.topics import Source
 from server.recording.recorded_topics import Also
 from server.rosbridge.live_source import LiveSource
 from server.rosbridge.subscription import Subscription
-from server.vehicle import wanted_topics
+from server.vehicle import car_marks, wanted_topics
 from server.vehicle.cbor_use import CborUse
 from server.vehicle.delivery import Delivery
 from server.vehicle.large_topics import LargeTopics
@@ -45,6 +45,7 @@ class SubscriptionTable:
         self.also: Also = "none"  # what is to be recorded beyond the signals
         self.recorded = wanted_topics.Recorded(topics={}, left_out=())
         self.judged = 0  # topics that are subscribed to for their signals
+        self.button: car_marks.Asked | None = None  # how the car's button was subscribed to
 
     @property
     def rows(self) -> tuple[Subscription, ...]:
@@ -57,6 +58,7 @@ class SubscriptionTable:
     def opened(self) -> None:
         """The connection opens, and the link sends its rows."""
         self._by_name_s, self._by_name_pause_s = self._now(), BY_NAME_AGAIN_S
+        self.button = car_marks.Asked(self._now())
         self.probation.opened(self._now())
 
     def subscribe(
@@ -73,11 +75,15 @@ class SubscriptionTable:
         )
         self.judged = len(wanted)
         if offered is not None:
-            without = {*wanted, *too_large}
+            has_button = car_marks.is_button(car_marks.TOPIC, offered.get(car_marks.TOPIC))
+            without = {*wanted, *too_large, *([car_marks.TOPIC] if has_button else ())}
             self.recorded = wanted_topics.recorded(
                 offered, self.load, without=without, held=self.probation.held, also=self.also, asked=known.asked
             )
             wanted |= wanted_topics.rows_of(self.recorded, fit=known.fit, compression=compression)
+            if has_button:
+                button = Subscription(topic=car_marks.TOPIC, type=offered[car_marks.TOPIC], queue_length=10)
+                wanted.setdefault(car_marks.TOPIC, button)
             if needs_client_count and CLIENT_COUNT in offered:
                 kind = offered[CLIENT_COUNT] or None
                 wanted.setdefault(CLIENT_COUNT, Subscription(topic=CLIENT_COUNT, type=kind, queue_length=1))
@@ -89,7 +95,8 @@ class SubscriptionTable:
         """Without rosapi, by the names that are known; the signals that each topic would fill."""
         by_topic, wanted = wanted_topics.by_name(picked, self.load)
         self.judged = len(by_topic)
-        self._apply(wanted, [*by_topic], [])
+        button = Subscription(topic=car_marks.TOPIC, type=None, queue_length=10)
+        self._apply({**wanted, button.topic: button}, [*by_topic], [button.topic])
         return by_topic
 
     def renew_by_name(self) -> None:
@@ -100,7 +107,7 @@ class SubscriptionTable:
         self._by_name_s, self._by_name_pause_s = now_s, min(self._by_name_pause_s * 2, BY_NAME_LAST_S)
         for row in self.rows:
             if row.type is None and self._delivery.never_received(row.topic):
-                self._renew(row.topic)
+                self._renew(row.topic, is_quiet=True)
 
     def is_cbor(self, topic: str) -> bool:
         """Whether a topic is subscribed to as CBOR."""
@@ -158,10 +165,14 @@ class SubscriptionTable:
         for row in self.rows:
             if row.topic not in wanted:
                 link.unsubscribe(row.topic)
+        if wanted.get(car_marks.TOPIC) not in (None, *self.rows):
+            self.button = car_marks.Asked(self._now())
         for subscription in wanted.values():
             link.subscribe(subscription)
         self._delivery.follow(judged, recorded, now_s=self._now())
 
-    def _renew(self, topic: str) -> None:
+    def _renew(self, topic: str, *, is_quiet: bool = False) -> None:
+        if topic == car_marks.TOPIC:
+            self.button = car_marks.Asked(self._now(), is_renewal=is_quiet)
         if self._link is not None:
             self._link.renew(topic)

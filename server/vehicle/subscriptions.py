@@ -13,7 +13,7 @@ from server.rosbridge.connection_errors import Problem
 from server.rosbridge.link_errors import LinkDown
 from server.rosbridge.live_source import LiveSource
 from server.rosbridge.rosapi_client import Asks
-from server.vehicle import discovery
+from server.vehicle import car_marks, discovery
 from server.vehicle.missing_watch import MissingWatch
 from server.vehicle.ros_watch import RosWatch
 from server.vehicle.signal_map import SignalMap
@@ -51,8 +51,8 @@ class Subscriptions:
         self._recognised = recognised
         self._noted = noted
         self._offer: discovery.Offer | None = None
-        self._looked = False
-        self._look_soon = False
+        self._looked = self._look_soon = False
+        self._unfit: str | None = None  # why the car's button does not mark
         self._definitions = TypeDefinitions(learned, self._subscribe)
         self._missing = MissingWatch(
             now=now,
@@ -259,6 +259,9 @@ class Subscriptions:
         """Chooses the topic of each signal and subscribes to them."""
         self.signals.update(offer.topics, self._tuning.settings.topics, self._missing.delivery.unpublished)
         self._subscribe()
+        before, self._unfit = self._unfit, car_marks.unfit(offer.topics.get(car_marks.TOPIC))
+        if self._unfit not in (None, before):
+            self._noted(self._unfit)
 
     def _subscribe(self) -> None:
         if self._link is not None:

@@ -10,9 +10,10 @@ from functools import partial
 from monitor.state import LinkFacts
 from server.bus.bus import SessionBus
 from server.judge.pipeline import TICK_S
+from server.protocol.state import ServerState
 from server.recording.delay import LinkDelay
 from server.slowdown.command_target import GUARD_STATE, target_of
-from server.vehicle import facts
+from server.vehicle import departure_seen, facts
 from server.vehicle.car_summary import SummaryPublisher
 from server.vehicle.link_load import RESTORE_BELOW_S
 from server.vehicle.session_parts import SessionParts
@@ -22,7 +23,7 @@ log = logging.getLogger("catgraph.session")
 
 FRAME_TICKS = 2  # a state is put on the bus with every second tick, ten a second
 READ_UP_S = 0.1  # to read what waits after the loop stood still
-TELL_STALL_S = 2.0  # a stall this long is logged, because pages were covered
+LOG_STALL_S = 2.0  # a stall this long is logged, because pages were covered
 SICK_LOOP_S = 0.25  # a loop later than this skips one heartbeat, which would otherwise hide the stall
 
 
@@ -35,6 +36,7 @@ class Tick:
         parts: SessionParts,
         attempts: TickParts,
         bus: SessionBus,
+        server: Callable[[], ServerState],
         *,
         now: Callable[[], float],
         wall_ms: Callable[[], int],
@@ -49,7 +51,7 @@ class Tick:
         self._wall_ms = wall_ms
         self._log_keeper = LogKeeper(parts.event_log, bus)
         self._open_files = OpenFilesWatch()
-        self.summary = SummaryPublisher(vehicle, parts, bus, now=now, wall_ms=wall_ms)
+        self.summary = SummaryPublisher(vehicle, parts, bus, server, now=now, wall_ms=wall_ms)
 
     @property
     def log_trouble(self) -> str | None:
@@ -83,7 +85,7 @@ class Tick:
 
     async def _catch_up(self) -> None:
         """After the loop stood still: what the car sent meanwhile waits to be read, and its silence was ours."""
-        if self.lag_s > TELL_STALL_S:
+        if self.lag_s > LOG_STALL_S:
             text = f"The server stalled for {self.lag_s:.1f} s: nothing was evaluated meanwhile."
             self._parts.event_log.note("stalled", text)
         await asyncio.sleep(READ_UP_S)
@@ -98,20 +100,33 @@ class Tick:
             ("recorder", self.watch_recording),
             ("control", self.watch_control),
             ("slow-down", self.watch_slow_down),
+            ("departure check", self.watch_departure),
         ):
             self._attempts.attempt(part, partial(work, now_s))
         judgement, publisher = self._parts.judgement, self._parts.publisher
         judgement.monitor.failed_parts = self._attempts.failed
         judgement.judge(now_s)
+        self._attempts.attempt("driving", partial(self._parts.driving.tick, now_s))
+        self._attempts.attempt("attention", partial(self.watch_attention, now_s))
         if put:
             if not publisher.is_due:
                 publisher.put()
             self.summary.tick(now_s)
 
+    def watch_departure(self, now_s: float) -> None:
+        parts, wall_ms = self._parts, self._wall_ms()
+        parts.departure.watch_drive(departure_seen.speed_of(parts, now_s), now_s)
+        parts.departure.tick(lambda: departure_seen.seen_of(parts, now_s, wall_ms), now_s, wall_ms)
+
     def slow_down_ordered(self, now_s: float) -> None:
         """The slow-down and the checks act on an order at once."""
         self._attempts.attempt("slow-down", partial(self.watch_slow_down, now_s))
         self._attempts.attempt("checks", partial(self._parts.judgement.judge, now_s))
+
+    def alarms_changed(self, now_s: float) -> None:
+        """The car may need a person, or nobody any more; pages of all cars are notified at once."""
+        self._attempts.attempt("attention", partial(self._parts.attention.tick, now_s))
+        self.summary.put()
 
     def watch_link(self, now_s: float) -> None:
         self._parts.judgement.state.link(self._link_facts(now_s))
@@ -144,9 +159,14 @@ class Tick:
 
     def watch_control(self, now_s: float) -> None:
         authorization = self._parts.authorization
-        if authorization.tick(now_s):
+        is_changed = authorization.tick(now_s)
+        if self._parts.handover.tick(now_s) or is_changed:
             self._parts.publisher.put_soon()
         self._parts.judgement.state.reach(authorization.facts(now_s))
+
+    def watch_attention(self, now_s: float) -> None:
+        if self._parts.attention.tick(now_s):
+            self.summary.put()
 
     def watch_slow_down(self, now_s: float) -> None:
         """What slows the car learns what the judge knows, and the other way round."""

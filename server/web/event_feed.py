@@ -6,7 +6,9 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from server.bus.bus import PageBus
+from server.bus.bus import NotServed, PageBus
+
+AGAIN_S = 1.0
 
 
 class EventFeed:
@@ -18,6 +20,7 @@ class EventFeed:
         self._on_read = on_read
         self._reading: asyncio.Task[list[dict[str, Any]]] | None = None
         self._reading_after = 0
+        self._again: asyncio.TimerHandle | None = None
 
     def after(self, n: int, limit: int) -> list[dict[str, Any]]:
         """The events after number `n`; none yet where the disk must be read, for which `on_read` is called."""
@@ -36,10 +39,17 @@ class EventFeed:
         return reading.result() if self._reading_after == n else self.after(n, limit)
 
     def _read(self, reading: asyncio.Task[list[dict[str, Any]]]) -> None:
-        if not reading.cancelled():
+        if reading.cancelled():
+            return
+        if isinstance(reading.exception(), NotServed):  # they are at an agent that does not answer
+            self._reading = None
+            self._again = asyncio.get_running_loop().call_later(AGAIN_S, self._on_read)
+        else:
             self._on_read()
 
     def close(self) -> None:
         """Ends a reading that is under way."""
         if self._reading is not None:
             self._reading.cancel()
+        if self._again is not None:
+            self._again.cancel()

@@ -8,14 +8,18 @@ from collections.abc import Callable
 from starlette.websockets import WebSocket
 
 from server.access.identity import LOCAL, Principal
+from server.access.people import NOBODY, People
 from server.bus.bus import PageBus
 from server.protocol import replay_commands
+from server.protocol.cars_state import OffOnPurpose
 from server.protocol.messages import Hello
 from server.protocol.rate_limit import Limits
 from server.protocol.state import ServerState
 from server.replay.manager import ReplayManager
 from server.web.cars_board import CarsBoard
 from server.web.fair_wakeup import FairWakeup
+from server.web.fleet_log import FleetLog
+from server.web.fleet_socket import FleetPage
 from server.web.page_socket import Page
 
 MAX_PAGES = 500
@@ -31,19 +35,24 @@ class Hub:
         replays: ReplayManager,
         server: Callable[[], ServerState],
         limits: Limits,
+        off: Callable[[str], OffOnPurpose | None] = lambda _: None,
         now: Callable[[], float],
         wall_ms: Callable[[], int],
+        people: People = NOBODY,
     ) -> None:
-        """`server`: the server's part of a state; `now` is a monotonic clock [s], `wall_ms` the time of day."""
+        """`server`: the server's part of a state; `off`: who said that a car is off; `now` is a monotonic clock [s],
+        `wall_ms` the time of day."""
         self._bus = bus
         self._limits = limits
         self._now = now
         self._replays = replays
         self._server = server
-        self._pages: set[Page] = set()
+        self._pages: set[Page | FleetPage] = set()
         self._wakeup = FairWakeup()
-        self._cars = CarsBoard(bus, now=now, wall_ms=wall_ms)
+        self._cars = CarsBoard(bus, off=off, now=now, wall_ms=wall_ms)
+        self._fleet_log = FleetLog(bus)
         self._by_device: Counter[str] = Counter()
+        self._people = people
 
     @property
     def pages(self) -> int:
@@ -59,30 +68,55 @@ class Hub:
         self,
         socket: WebSocket,
         vehicle: str,
-        hello: Hello,
+        hello: Callable[[], Hello],
         *,
         principal: Principal,
         replay: replay_commands.OpenReplay | None = None,
     ) -> None:
         """Serves one page until it leaves; `replay`: the recording it begins with."""
+        if await self._accept(socket, principal):
+            page = Page(
+                socket,
+                self._bus,
+                vehicle,
+                hello=hello,
+                principal=principal,
+                replays=self._replays,
+                server=self._server,
+                limits=self._limits,
+                now=self._now,
+                wakeup=self._wakeup,
+                cars=self._cars,
+                replay=replay,
+                people=self._people,
+            )
+            await self._serve(page, principal)
+
+    async def serve_fleet(self, socket: WebSocket, hello: Callable[[], Hello], *, principal: Principal) -> None:
+        """Serves one page of all cars until it leaves."""
+        if await self._accept(socket, principal):
+            page = FleetPage(
+                socket,
+                self._bus,
+                hello=hello,
+                principal=principal,
+                limits=self._limits,
+                now=self._now,
+                wakeup=self._wakeup,
+                cars=self._cars,
+                events=self._fleet_log,
+                people=self._people,
+            )
+            await self._serve(page, principal)
+
+    async def _accept(self, socket: WebSocket, principal: Principal) -> bool:
         await socket.accept()
         if len(self._pages) >= MAX_PAGES or self._has_too_many(principal):
             await socket.close(code=1013, reason="too many pages")
-            return
-        page = Page(
-            socket,
-            self._bus,
-            vehicle,
-            hello=hello,
-            principal=principal,
-            replays=self._replays,
-            server=self._server,
-            limits=self._limits,
-            now=self._now,
-            wakeup=self._wakeup,
-            cars=self._cars,
-            replay=replay,
-        )
+            return False
+        return True
+
+    async def _serve(self, page: Page | FleetPage, principal: Principal) -> None:
         self._pages.add(page)
         self._by_device[principal.id] += 1
         try:

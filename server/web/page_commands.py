@@ -4,23 +4,41 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import re
-import secrets
+import logging
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from server.access.identity import LOCAL, Principal
+from server.access.identity import Principal
+from server.access.people import NOBODY, People
 from server.bus.bus import NotServed, PageBus
-from server.control import display_name
-from server.protocol import command_base, commands, messages, replay_commands
+from server.protocol import commands, messages, replay_commands
 from server.protocol.rate_limit import Allowance, Limits
 from server.replay.manager import NoReplay
 from server.replay.view_source import ViewSource
+from server.system import log_context
+from server.web.announcements import LEAVES, Announcements
+from server.web.page_sender import PageSender
 
-LEAVES = {"kind": "present", "visible": False, "sound": "asks", "awake": "asks", "leaves": True}
+log = logging.getLogger("catgraph.web")
+
 TOO_MANY = "Too many commands at once from this page: wait a second."
 NOT_A_VIEWERS = "This device is paired as a viewer and cannot make changes."
 NOT_FROM_A_REPLAY = "This page shows a replay and cannot send commands. Return to live first."
+
+
+async def passed_on(
+    bus: PageBus, vehicle: str, message: Mapping[str, Any], *, fleet: bool = False
+) -> Mapping[str, Any]:
+    """The answer of the vehicle's session to a command of a page, under the command's id in all logs."""
+    with log_context.tracing(message.get("id")):
+        try:
+            answer = await bus.request(vehicle, message)
+        except NotServed as why:
+            answer = messages.not_served(why, bus.trouble(vehicle) if fleet else None)
+        if bus.grows:  # else the session has logged it
+            said = (vehicle, message.get("kind"), message.get("by"), answer.get("ok"), answer.get("reason", ""))
+            log.info("command_passed_on vehicle=%s kind=%s by=%s ok=%s reason=%s", *said)
+        return answer
 
 
 class PageCommands:
@@ -37,32 +55,32 @@ class PageCommands:
         now: Callable[[], float],
         send: Callable[[messages.ToPage], None],
         complain: Callable[[str], None],
+        people: People = NOBODY,
     ) -> None:
         self._bus = bus
         self._vehicle = vehicle
         self._view = view
-        self._principal = principal
+        self._sender = PageSender(principal, people, signs=bus.grows)
         self._now = now
         self._send = send
         self._complain = complain
         self._orders = Allowance(limits.commands, now())
         self._slow_downs = Allowance(limits.slow_down, now())
         self._opening: asyncio.Task[None] | None = None
-        self._has_begun = False
         self._is_counted = False  # as a page that may show and sound alarms
-        self._announced: set[str] = set()  # other cars whose alarms it announces
-        self._name = display_name.NAMELESS  # which the page gave itself: who gave its orders, in the log
-        self._page = secrets.token_hex(8)  # by which the page keeps control over a reload
+        self._announcements = Announcements(bus)  # to other cars
 
     async def begin(self, message: Mapping[str, Any]) -> None:
-        """The page's hello: its name, and the id that it keeps over a reload, of which only the first counts."""
-        page = message.get("page")
-        if isinstance(page, str) and re.fullmatch(command_base.PAGE, page) and not self._has_begun:
-            if self._is_counted:
-                await self.leave()  # it was counted under the former id, which is no longer used
-            self._page = page
-        self._name = display_name.clean(message.get("name")) or self._name
-        self._has_begun = True
+        """The page's hello."""
+        if self._is_counted and self._sender.is_other(message):
+            await self.leave()  # it was counted under the former id, which is no longer used
+        self._sender.begin(message)
+        self.send_duty()
+
+    def send_duty(self) -> None:
+        """Send the page who is on duty, once it said who it is."""
+        if self._sender.has_begun:
+            self._send(self._sender.duty)
 
     async def command(self, message: dict[str, Any]) -> None:
         """Has the session carry out a command, and messages."""
@@ -74,15 +92,12 @@ class PageCommands:
         if reason is not None:
             self._send(messages.refusal(id, reason))
             return
-        try:
-            answer: Mapping[str, Any] = await self._bus.request(self._vehicle, message | self._sender)
-        except NotServed as why:
-            answer = {"ok": False, "reason": f"{str(why).capitalize()}."}
-        self._send(messages.reply(id, answer))
+        answer = await passed_on(self._bus, self._vehicle, message | self._who)
+        self._send(messages.reply(id, await self._sender.end_handed_over(kind, answer)))
 
     def _refusal(self, kind: object) -> str | None:
         """Why a command does not reach the session; None: it does."""
-        if not self._principal.is_operator:  # whatever it is: no command of the union needs less than an operator
+        if not self._sender.is_operator:  # whatever it is: no command of the union needs less than an operator
             return NOT_A_VIEWERS
         command = commands.BY_KIND.get(kind) if isinstance(kind, str) else None
         if command is None:  # commands of the server to a session are not allowed for a page
@@ -96,30 +111,30 @@ class PageCommands:
 
     async def present(self, message: Mapping[str, Any]) -> None:
         """Pass on the page's status, once a second: without a reply, and not of a viewer's page."""
-        if not self._principal.is_operator:
+        if not self._sender.is_operator:
             return
+        self._sender.hear(message)
         self._is_counted = True
+        try:
+            commands.read(message)  # also where the page's own car is not served, and nobody else reads it
+        except commands.NotUnderstood as why:
+            self._complain(str(why))
+            return
         answer: Mapping[str, Any] = {"ok": True}
         with contextlib.suppress(NotServed):  # the other cars may be served
-            answer = await self._bus.request(self._vehicle, {**message, **self._sender})
+            answer = await self._bus.request(self._vehicle, {**message, **self._who})
         if answer.get("ok") is not True:
             self._complain(str(answer.get("reason")))
             return
-        await self._announce(message)
-
-    async def _announce(self, message: Mapping[str, Any]) -> None:
-        """Pass a page's status on to the other cars whose alarms it announces, and once to those that it did."""
         named = () if message.get("leaves") else message.get("announces", ())
-        now = set(self._bus.vehicles).intersection(named) - {self._vehicle}
-        before, self._announced = self._announced, now
-        for vehicle in now | before:
-            word = {**message, "kind": "announces", "leaves": vehicle not in now, **self._sender}
-            with contextlib.suppress(NotServed):
-                await self._bus.request(vehicle, word)
+        cars = set(self._bus.vehicles).intersection(named) - {self._vehicle}
+        self._announcements.forward(message, self._who, cars)
 
     async def leave(self) -> None:
         """The page is closed: it is not counted on to show alarms any more."""
+        await self._announcements.forwarded()
         await self.present(LEAVES)
+        await self._announcements.forwarded()
 
     async def replay(self, message: Mapping[str, Any]) -> None:
         """Has the page's own replay carry out an order, and messages."""
@@ -173,21 +188,15 @@ class PageCommands:
             self._send(messages.replay_ended(str(why)) if id is None else messages.refusal(id, str(why)))
 
     async def close(self) -> None:
-        """Ends what is being opened."""
+        """Ends what is being opened, or forwarded to other cars."""
         if self._opening is not None:
             self._opening.cancel()
             await asyncio.gather(self._opening, return_exceptions=True)
+        await self._announcements.close()
 
     @property
-    def _sender(self) -> dict[str, Any]:
-        """Who sends; it replaces whatever the page itself states of that."""
-        return {
-            "by": self._name if self._principal is LOCAL else self._principal.name,
-            "who": self._principal.id,
-            "page": self._page,
-            "replaying": self._view.is_replaying,
-            "console": False,
-        }
+    def _who(self) -> dict[str, Any]:
+        return self._sender.as_json(is_replaying=self._view.is_replaying)
 
     def _id_of(self, message: Mapping[str, Any]) -> str | None:
         id = message.get("id")

@@ -14,7 +14,7 @@ from typing import cast
 import orjson
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from server.bus.bus import NotServed, PageBus
+from server.bus.bus import UNSERVED, NotServed, PageBus
 from server.protocol import messages
 from server.protocol.alarm_state import LogEvent
 from server.protocol.messages import FrameKind, Hello
@@ -23,7 +23,9 @@ from server.web.event_feed import EventFeed
 from server.web.fair_wakeup import FairWakeup
 
 EVENTS_A_BATCH = 100
+RESTARTED = 1012  # RFC 6455: the page dials again, and is greeted anew
 HELLO_WITHIN_S = 1.0  # until then no event is sent: the page's hello names the newest that it has
+BATCH_EVERY_S = 0.01  # to a page that catches up: its answers stay far below the messages that it may send a second
 MAX_REPLIES = 200  # waiting for a page that does not read
 
 
@@ -54,10 +56,14 @@ class PageWriter:
         self._is_offered = False  # an offer is unanswered
         self._is_taking = False  # the page requested the newest
         self._replies: list[messages.ToPage] = []
-        self._event = bus.last_event(vehicle)  # the last number sent
+        self._event = 0  # the last number sent; from the greeting on
+        self._have: int | None = None  # the newest event that the page has, as it said
+        self._is_greeted = False
+        self._run = ""  # of the vehicle's session when the page was greeted
         self._feed = EventFeed(bus, vehicle, on_read=lambda: self.on_new("events"))
         self._are_events_due = False
         self._are_events_unanswered = False
+        self._is_catching_up = False  # more events wait than one message takes
         self._has_begun = False  # the page said hello
         self.skipped = 0  # frames that were replaced by newer ones before the page took them
 
@@ -68,6 +74,10 @@ class PageWriter:
         if kind == "events":
             self._are_events_due = True
             self._wakeup.queue(self._wake, is_urgent=True)
+        elif kind == UNSERVED:
+            why = self._bus.trouble(self._vehicle)
+            if why is not None and not self._replies:  # a page that does not read does not get it again
+                self.queue({"kind": "unserved", "why": why})
         elif kind == "scan" and self._view.is_replaying:
             return
         elif self._is_offered or (kind == "scan" and not self._watches_scan):
@@ -90,11 +100,18 @@ class PageWriter:
 
     def begin(self, have_event: object) -> None:
         """The page said hello, and which event is the newest that it has; only the first hello counts."""
-        if not self._has_begun and type(have_event) is int and 0 <= have_event <= self._bus.last_event(self._vehicle):
-            self._event = have_event
-            self._are_events_due = True
+        if not self._has_begun and type(have_event) is int:
+            self._have = have_event
+            if self._is_greeted:
+                self._go_on()
         self._has_begun = True
         self._wake.set()
+
+    def _go_on(self) -> None:
+        """Events follow those that the page has, where that can be."""
+        if self._have is not None and 0 <= self._have <= self._bus.last_event(self._vehicle):
+            self._event = self._have
+            self._are_events_due = True
 
     def take(self) -> None:
         """The page takes what was offered."""
@@ -104,6 +121,10 @@ class PageWriter:
 
     def have_events(self) -> None:
         """The page has the events that were sent."""
+        if self._is_catching_up:
+            self._is_catching_up = False
+            asyncio.get_running_loop().call_later(BATCH_EVERY_S, self.have_events)
+            return
         self._are_events_unanswered = False
         self._are_events_due = True
         self._wake.set()
@@ -126,12 +147,25 @@ class PageWriter:
 
     # -- the loop ----------------------------------------------------------------------------------------------------
 
-    async def run(self, hello: Hello) -> None:
-        """Sends until the socket fails, whose end the reader notices as well."""
+    async def run(self, hello: Callable[[], Hello]) -> None:
+        """Sends until the socket fails, whose end the reader notices as well.
+
+        Where the vehicle's session is elsewhere and was not heard yet, the page is informed, and greeted once it was.
+        """
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):
-            await self._send(hello)
+            while not self._bus.knows(self._vehicle):
+                await self._wake.wait()
+                self._wake.clear()
+                await self._send_round()  # the list of cars, from which another one may be chosen
+            self._since_s = self._now()
+            self._event, self._run = self._bus.last_event(self._vehicle), self._bus.run(self._vehicle)
+            self._is_greeted = True
+            self._go_on()
+            await self._send(hello())
             with contextlib.suppress(NotServed):
-                await self._bus.request(self._vehicle, {"kind": "refresh"})  # there may have been no viewer for a while
+                await self._bus.request(
+                    self._vehicle, {"kind": "refresh"}, deadline_s=0.5
+                )  # there may have been no viewer for a while
             await self._send_newest("state", unasked=True)
             while True:
                 await self._wake.wait()
@@ -145,6 +179,9 @@ class PageWriter:
         self.watch_scan(False)
 
     async def _send_round(self) -> None:
+        if self._is_greeted and self._bus.run(self._vehicle) != self._run:
+            await self._socket.close(code=RESTARTED, reason="the agent of the car has started again")
+            return
         if self._view.ended is not None:
             self._replies.append(messages.replay_ended(self._view.ended))
             await self._view.leave()
@@ -155,7 +192,7 @@ class PageWriter:
         for message in waiting:
             await self._send(message)
         has_begun = self._has_begun or self._now() >= self._since_s + HELLO_WITHIN_S
-        if self._are_events_due and has_begun and not self._are_events_unanswered:
+        if self._is_greeted and self._are_events_due and has_begun and not self._are_events_unanswered:
             await self._send_events()
         if self._is_taking:
             self._is_taking = False
@@ -170,6 +207,7 @@ class PageWriter:
         events = self._feed.after(self._event, EVENTS_A_BATCH)
         if events:
             self._are_events_unanswered = True
+            self._is_catching_up = len(events) == EVENTS_A_BATCH
             self._event = events[-1]["n"]
             last = self._bus.last_event(self._vehicle)
             await self._send({"kind": "events", "events": cast(list[LogEvent], events), "last": last})

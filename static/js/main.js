@@ -14,8 +14,10 @@ import { forgetWork } from './boot/forget.js';
 import { giveUp } from './boot/give-up.js';
 import { DeviceStatus } from './phone/device-status.js';
 import { holdTaps } from './boot/held-taps.js';
+import { laterWords } from './core/outcome.js';
 import { notices } from './shell/notice.js';
 import { ownName } from './control/own-name.js';
+import { Press } from './shell/press.js';
 import { Router } from './shell/router.js';
 import { Phone } from './phone/phone.js';
 import { Presence } from './control/presence.js';
@@ -33,12 +35,11 @@ import { mount as mountBadge } from './shell/badge.js';
 import { mount as mountChecks } from './alarms/checks.js';
 import { mount as mountConnect } from './shell/connect.js';
 import { Control, mount as mountControl } from './control/control.js';
+import { mount as mountDuty } from './control/duty.js';
 import { mount as mountGauge } from './home/gauge.js';
 import { mount as mountHelp } from './home/help.js';
 import { mount as mountInstall } from './shell/install.js';
-import { mount as mountKeys } from './shell/keys.js';
 import { mount as mountNearest } from './home/nearest.js';
-import { mount as mountPanes } from './shell/panes.js';
 import { mount as mountPedals } from './home/pedals.js';
 import { mount as mountPosition } from './home/position.js';
 import { mount as mountPreferences } from './shell/preferences.js';
@@ -104,8 +105,6 @@ async function begin() {
   await breath();
   mountTrends(need(page.monitor, '[data-part="trends"]'), page.store, page.say);
   await breath();
-  mountPanes(page.monitor, page.store);
-  mountKeys(page.monitor, page.store, page.tabs, page.say);
   mountBadge(page.store);
   page.router.onShown = () => {
     page.shown();
@@ -122,7 +121,9 @@ async function begin() {
   page.front();
   void unfold(page);
   release();
-  // What outlasts this visit is loaded once the page is complete.
+  mountDesk(page);
+  // What outlasts this visit, and what nobody presses at once, is loaded when the page is complete.
+  setTimeout(() => import('./drive/ledge.js').then(({ mount }) => mount(page.monitor, page.store, page.say)).catch(() => page.say('The Mark key could not be loaded from the server. Reload the page.', 'Not complete')), 3000);
   setTimeout(() => import('./boot/service-worker.js').then(({ Shell }) => new Shell(page.store, page.say)).catch(() => {}), 2000);
   setTimeout(prefetch, 10_000);
 }
@@ -131,6 +132,7 @@ async function begin() {
 class Page {
   alarmSound = new AlarmSound();
   monitor = need(document, '#monitor');
+  press = new Press(field(this.monitor, 'sound-off'), this.alarmSound);
   /** Called when another tab or screen came in front; the contents of the tabs come later. */
   front = () => {};
   /** The alarms of the other cars. @type {CarsAlarms | null} */
@@ -153,10 +155,10 @@ class Page {
       store.stop();
       this.alarmSound.say(null);
     };
-    const tell = notices(field(document, 'snacks'));
-    this.control = new Control(store, tell, () => this.openPhone());
-    /** A refusal because another page is in control is shown with a key that helps. @type {typeof tell} */
-    this.say = (sentence, title, way) => tell(sentence, title, way ?? this.control.wayOf(sentence));
+    const notify = notices(field(document, 'snacks'));
+    this.control = new Control(store, notify, () => this.openPhone());
+    /** A refusal because another page is in control is shown with a key that helps. @type {typeof notify} */
+    this.say = (sentence, title, way) => notify(sentence, title, way ?? this.control.wayOf(sentence));
     this.cars = new Cars(store, this.say);
     this.cars.openControl = () => this.control.openSheet();
     this.router = new Router(store, this.say);
@@ -167,7 +169,7 @@ class Page {
 
   draw() {
     this.router.draw();
-    show(field(this.monitor, 'sound-off'), this.alarmSound.isPossible ? !this.alarmSound.isRunning : false);
+    this.press.draw();
   }
 
   /** Another screen is shown. */
@@ -235,7 +237,7 @@ class Page {
 }
 
 /** Mounts what is seen at a glance. @param {Page} page */
-function mountGlance({ alarmSound, cars, monitor, router, say, store }) {
+function mountGlance({ cars, monitor, router, say, store }) {
   mountChip(monitor, cars);
   mountTopbar(monitor, store, say);
   mountStrip(monitor, store);
@@ -246,8 +248,6 @@ function mountGlance({ alarmSound, cars, monitor, router, say, store }) {
   mountPedals(need(monitor, '[data-part="pedals"]'), store);
   mountPosition(need(monitor, '[data-part="position"]'), store);
   mountActionBar(monitor, store, router);
-  // Any touch lets a browser sound; the first one anywhere arms the alarms again after a reload.
-  for (const type of ['pointerup', 'keydown']) listen(document, type, () => alarmSound.isRunning || alarmSound.arm(), { capture: true });
 }
 
 /** Mounts what alerts the operator, and what acts on the car. @param {Page} page */
@@ -265,13 +265,16 @@ function mountAlarms(page) {
 function mountScreens(page, arming) {
   const { cars, monitor, router, say, store, tabs } = page;
   mountChip(need(document, '#connect'), cars);
-  mountStart(need(document, '#start'), store);
+  const start = need(document, '#start');
+  mountStart(start, store);
+  if (start.querySelector('[data-f="who"]')) mountChip(start, cars); // the car that is asked for may never answer: another one may be chosen
   mountConnect(need(document, '#connect'), store, router, arming);
   const contents = tabContents(monitor, store, say, (name) => router.isMonitorShown && tabs.shows(name) && screens.open === null);
-  const screens = new Screens(monitor, store, () => page.front());
+  const screens = new Screens(monitor, store, () => page.front(), say);
   mountSheets();
   mountInstall(say);
   mountPreferences(page.alarmSound);
+  mountDuty(store, say);
   return contents;
 }
 
@@ -297,6 +300,10 @@ function listenEverywhere(page, arming) {
     closeSheet(/** @type {HTMLDialogElement} */ (need(document, '#sheet-menu')));
     page.openPhone();
   });
+  store.on('became', ({ kind, became, reason }) => {
+    const { text, title } = laterWords(kind, became, reason);
+    say(text, title);
+  });
   store.on('gap', (gap) => say(`${gapWords(gap)}.`, 'This page was blind'));
   listen(document, 'keydown', () => { document.documentElement.dataset['keys'] = ''; }, { capture: true });
   listen(document, 'pointerdown', () => { delete document.documentElement.dataset['keys']; }, { capture: true });
@@ -304,6 +311,11 @@ function listenEverywhere(page, arming) {
   listen(field(need(document, '#connect'), 'saved'), 'click', () => {
     import('./files/files-board.js').then(({ openSaved }) => openSaved(store, say, router)).catch(() => say('The recordings could not be loaded from the server. Try again.', 'Not opened'));
   });
+}
+
+/** Fetches and mounts what only a wide window or a keyboard uses. @param {Page} page */
+function mountDesk({ monitor, say, store, tabs }) {
+  import('./shell/desk.js').then(({ mount }) => mount(monitor, store, tabs, say)).catch(() => say('The list of alarms and the log beside the values, and the keys of a keyboard, could not be loaded from the server. Reload the page.', 'Not complete'));
 }
 
 /** Fetches the screens that an operator may want when the server is gone. */

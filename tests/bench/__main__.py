@@ -17,7 +17,20 @@ import psutil
 from tests.bench import yardstick
 from tests.bench.child import Failed
 from tests.bench.rig import FULL, QUICK, Rig
-from tests.bench.rows import bridge, cpu, gap, latency, memory, recording, rehearsal, size, slow_down, stall
+from tests.bench.rows import (
+    bridge,
+    cpu,
+    fleet,
+    gap,
+    latency,
+    many,
+    memory,
+    recording,
+    rehearsal,
+    size,
+    slow_down,
+    stall,
+)
 from tests.bench.table import Group, printed
 
 GROUPS: dict[str, Callable[[Rig], Group]] = {
@@ -32,6 +45,8 @@ GROUPS: dict[str, Callable[[Rig], Group]] = {
     "stall": stall.measure,
     "slow-down": slow_down.measure,
     "rehearsal": rehearsal.measure,
+    "fleet": fleet.measure,
+    "many": many.measure,
 }
 
 

@@ -25,6 +25,7 @@ class Page:
 
     def __init__(self) -> None:
         self.newest: dict[str, Any] = {}  # the newest state, read only while `reads_states`
+        self.listed = 0  # cars whose summary was in the newest list, read only while `reads_states`
         self.reads_states = True
         self.forget()
 
@@ -34,6 +35,7 @@ class Page:
         self.ages_s: list[float] = []  # of each state when it came, while `reads_states`
         self.round_trips_s: list[float] = []  # from a take to the state it brought
         self.alarms: list[list[Any]] = []  # [text, ns] of each speed alarm raised
+        self.lists = 0  # of all cars
         self.scans: list[int] = []  # bytes of each
         self._took_s: float | None = None
 
@@ -46,6 +48,10 @@ class Page:
         elif payload.startswith(b'{"kind":"offer"'):
             self._took_s = time.monotonic()
             socket.send(b'{"kind":"take","seq":%d}' % orjson.loads(payload)["seq"])
+        elif payload.startswith(b'{"kind":"cars"'):
+            self.lists += 1
+            if self.reads_states:
+                self.listed = sum(car["summary"] is not None for car in orjson.loads(payload)["cars"])
         elif payload.startswith(b'{"kind":"events"'):
             events = orjson.loads(payload)["events"]
             at_ns = time.monotonic_ns()
@@ -78,11 +84,35 @@ class Pages:
         """Opens pages, waits until they see a car that is monitored, and lets some of them stop reading."""
         pages = [await self._open(url, scan=scan, deflate=deflate) for _ in range(count + stalled)]
         await self._monitored(pages)
-        for page in pages:
-            page.reads_states = False
+        self._come_in(pages)
         self._live, self._stalled = pages[:count], pages[count:]
         for page in self._stalled:
             page.socket.pause()
+
+    async def open(self, url: str, vehicles: list[str], count: int) -> None:
+        """More pages, each on Home of the next of the vehicles in turn, until there are `count`."""
+        pages = [
+            await self._open(f"{url}/ws?vehicle={vehicles[k % len(vehicles)]}", scan=False, deflate=True)
+            for k in range(len(self._live), count)
+        ]
+        await self._monitored(pages)
+        self._come_in(pages)
+
+    async def open_fleet(self, url: str, cars: int, count: int) -> None:
+        """More pages of all cars, until there are `count`; each sees so many cars that are heard."""
+        pages = [await self._open(f"{url}/ws?fleet=1", scan=False, deflate=True) for _ in range(len(self._live), count)]
+        ends_s = time.monotonic() + MONITORING_WITHIN_S
+        for page in pages:
+            while page.listed < cars:
+                if time.monotonic() > ends_s:
+                    raise TimeoutError(f"a page saw {page.listed} of {cars} cars within {MONITORING_WITHIN_S:g} s")
+                await asyncio.sleep(0.01)
+        self._come_in(pages)
+
+    def _come_in(self, pages: list[Page]) -> None:
+        for page in pages:
+            page.reads_states = False
+        self._live += pages
 
     async def begin(self) -> None:
         """From now on counts."""
@@ -104,6 +134,7 @@ class Pages:
         return {
             "seconds": ended_s - self._began_s,
             "states": [len(page.state_at_s) for page in self._live],
+            "lists": [page.lists for page in self._live],
             "longest_silence_s": max(silences),
             "alarms": [page.alarms for page in self._live],
             "scans": [page.scans for page in self._live],
@@ -160,6 +191,8 @@ async def main() -> None:
     pages = Pages()
     orders = {
         "connect": pages.connect,
+        "open": pages.open,
+        "open_fleet": pages.open_fleet,
         "begin": pages.begin,
         "report": pages.report,
         "gap": pages.gap,

@@ -29,6 +29,10 @@ class Pace:
     memory_s: float  # how long memory is looked at
     stall_s: float  # how long the event loop is watched
     events: int  # in the journal of a server that has run for long
+    agents: tuple[int, ...]  # real ones at a broker
+    cars: tuple[int, ...]  # at a broker
+    watchers: tuple[int, ...]  # pages at a web node
+    use_s: float  # how long each point of a fleet's load is measured
 
 
 FULL = Pace(
@@ -45,6 +49,10 @@ FULL = Pace(
     memory_s=420.0,
     stall_s=60.0,
     events=200_000,
+    agents=(1, 3),
+    cars=(1, 10, 30, 100),
+    watchers=(10, 100, 300),
+    use_s=8.0,
 )
 QUICK = Pace(
     probes=20,
@@ -60,6 +68,10 @@ QUICK = Pace(
     memory_s=1.5,
     stall_s=3.0,
     events=2_000,
+    agents=(1,),
+    cars=(1, 2),
+    watchers=(2, 6),
+    use_s=0.6,
 )
 
 

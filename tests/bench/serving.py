@@ -20,11 +20,13 @@ from monitor import catalog
 from monitor.runner import Monitor
 from server.app import app, process
 from server.app.config import Config
+from server.bus.broker import Broker
 from server.bus.journal import Journal
 from server.rosbridge import codec
 from server.vehicle.message_intake import MessageIntake
 from server.vehicle.session import Session
 from server.vehicle.tick import Tick
+from server.vehicle.vehicle import Vehicle
 from tests.bench import slow_disk
 from tests.bench.orders import obey, options
 
@@ -104,8 +106,11 @@ def _event(n: int) -> dict[str, Any]:
     }
 
 
-async def main(events: int = 0, disk_s: float = 0.0) -> None:
-    """`events`: in the alarm log when it starts. `disk_s`: what each access to the disk takes longer, once it runs."""
+async def main(events: int = 0, disk_s: float = 0.0, broker: str | None = None, is_node: bool = False) -> None:
+    """`events`: in the alarm log when it starts. `disk_s`: what each access to the disk takes longer, once it runs.
+
+    With a `broker` it is an agent, or a web node.
+    """
     timed = {
         "parse": Timed(codec, "decode"),
         "message": Timed(MessageIntake, "message_received"),
@@ -125,7 +130,14 @@ async def main(events: int = 0, disk_s: float = 0.0) -> None:
     fill(Path(kept.name) / "events.sqlite", events)
     lag = LoopLag()
     with contextlib.redirect_stdout(announced):
-        running = asyncio.create_task(process.serve(Config(port=0, data=Path(kept.name))))
+        config = Config(
+            port=0,
+            data=Path(kept.name),
+            broker=Broker(address=broker) if broker else None,
+            is_node=is_node,
+            vehicles=() if is_node else (Vehicle(name=VEHICLE),),
+        )
+        running = asyncio.create_task(process.serve(config))
         while "listens on" not in announced.getvalue() or not made[-1].state.services.bus.vehicles:
             if running.done():
                 running.result()

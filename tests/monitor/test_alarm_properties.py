@@ -162,7 +162,7 @@ def test_unknown_decides_nothing(spec: AlarmSpec, day: list[tuple[float, Judge |
 @given(SPECS, DAY)
 def test_an_acknowledgement_covers_only_what_was_shown(spec: AlarmSpec, day: list[tuple[float, Judge | Tap]]) -> None:
     alarm, now_s = Alarm(id="hot", spec=spec), 0.0
-    told: set[str] = set()  # the causes the operator was told of since the alarm was raised
+    announced: set[str] = set()  # the causes announced to the operator since the alarm was raised
     for wait_s, event in day:
         now_s += wait_s
         before = alarm
@@ -177,9 +177,9 @@ def test_an_acknowledgement_covers_only_what_was_shown(spec: AlarmSpec, day: lis
         announcing = [t for t in transitions if t.change in ("raised", "recaused")]
         assert len(announcing) <= 1
         if announcing:
-            told = (set() if announcing[0].change == "raised" else told) | set(event.finding.causes)
+            announced = (set() if announcing[0].change == "raised" else announced) | set(event.finding.causes)
         if alarm.state is AlarmState.ACKED and event.finding.verdict is Verdict.FAULT:
-            assert set(event.finding.causes) <= told
+            assert set(event.finding.causes) <= announced
 
 
 @given(SPECS, DAY)
@@ -219,8 +219,8 @@ def test_time_going_back_is_harmless(
                 stories.append(happen(alarm, event, clock_s))
             except Refused as refused:
                 stories.append((alarm, (refused.reason,)))  # type: ignore[arg-type]
-        (straight, told), (bent, bent_told) = stories
-        assert [getattr(t, "change", t) for t in told] == [getattr(t, "change", t) for t in bent_told]
+        (straight, changes), (bent, bent_changes) = stories
+        assert [getattr(t, "change", t) for t in changes] == [getattr(t, "change", t) for t in bent_changes]
         assert straight.state is bent.state
 
 

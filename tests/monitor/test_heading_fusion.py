@@ -14,7 +14,7 @@ def odometry(yaw_rad: float | None, frame_id: str = "map", x_m: float = 0.0, y_m
     return Odometry(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad, frame_id=frame_id)
 
 
-def tell(headings: HeadingFusion, course_deg: float, times: int = 1, speed_mps: float | None = 2.0) -> Heading | None:
+def feed(headings: HeadingFusion, course_deg: float, times: int = 1, speed_mps: float | None = 2.0) -> Heading | None:
     found = None
     for _ in range(times):
         found = headings.on_course(course_deg, speed_mps, yaw_is_fresh=True)
@@ -47,7 +47,7 @@ def test_an_orientation_that_never_changes_is_none() -> None:
     """Some drivers send UTM positions with an identity quaternion: always east would be a comfortable lie."""
     headings = HeadingFusion()
     assert [headings.on_odometry(odometry(0.0)) for _ in range(9)] == [None] * 9
-    course = tell(headings, 10.0)
+    course = feed(headings, 10.0)
     assert course is not None
     assert course.source == "track"
 
@@ -56,12 +56,12 @@ def test_a_yaw_which_the_course_contradicts_is_not_believed() -> None:
     headings = HeadingFusion()
     for n in range(5):
         headings.on_odometry(odometry(0.001 * n))  # east
-    assert tell(headings, 0.0, DOUBTS - 1) is None
-    course = tell(headings, 0.0)
+    assert feed(headings, 0.0, DOUBTS - 1) is None
+    course = feed(headings, 0.0)
     assert course is not None
     assert (course.heading_deg, course.source) == (0.0, "track")
     assert headings.on_odometry(odometry(0.1)) is None
-    assert tell(headings, 90.0, 2 * DOUBTS) is None  # in agreement again
+    assert feed(headings, 90.0, 2 * DOUBTS) is None  # in agreement again
     assert headings.on_odometry(odometry(0.2)) is not None
 
 
@@ -70,15 +70,15 @@ def test_a_published_heading_wins() -> None:
     headings.on_odometry(odometry(0.0))
     headings.is_published = True
     assert headings.on_odometry(odometry(0.1)) is None
-    assert tell(headings, 10.0) is None
+    assert feed(headings, 10.0) is None
 
 
 def test_the_course_is_the_heading_unless_the_car_reverses() -> None:
-    forward, backward = tell(HeadingFusion(), 350.0), tell(HeadingFusion(), 350.0, speed_mps=-1.0)
+    forward, backward = feed(HeadingFusion(), 350.0), feed(HeadingFusion(), 350.0, speed_mps=-1.0)
     assert forward is not None
     assert backward is not None
     assert (forward.heading_deg, backward.heading_deg) == (350.0, 170.0)
-    unknown = tell(HeadingFusion(), 350.0, speed_mps=None)
+    unknown = feed(HeadingFusion(), 350.0, speed_mps=None)
     assert unknown is not None
     assert unknown.heading_deg == 350.0
 
@@ -91,7 +91,7 @@ def test_odometry_that_fell_silent_makes_way_for_the_course() -> None:
     headings = HeadingFusion()
     for n in range(5):
         headings.on_odometry(odometry(0.001 * n))
-    assert tell(headings, 90.0) is None
+    assert feed(headings, 90.0) is None
     course = headings.on_course(90.0, 2.0, yaw_is_fresh=False)
     assert course is not None
     assert course.source == "track"

@@ -16,6 +16,7 @@ import pytest
 from monitor import catalog
 from monitor.catalog import CHECKS, AllLimits
 from monitor.checks.slow_down import SlowDownLimits
+from monitor.instruments import DrivingLimits, StoreLimits
 from monitor.link import LinkFacts
 from monitor.phones import PhoneReport
 from monitor.recorder import RecorderFacts
@@ -304,6 +305,10 @@ NO_LIMIT = {
     "slow_down.deceleration_mps2": "what is ordered; the proof has a deadband",
     "slow_down.longest_s": "time only grows",
     **{f"slow_down.{name}": "a switch" for name in SlowDownLimits.model_fields if name.startswith("on_")},
+    **{f"store.{name}": "of copies in the store, not judged" for name in StoreLimits.model_fields},
+    "attention.escalates_s": "of the attention queue, not judged",
+    "attention.unheard_s": "of the attention queue, not judged",
+    **{f"driving.{name}": "of who drives, which is no check" for name in DrivingLimits.model_fields},
     "gauge.speed_max_mps": "drawn, not judged",
     "gauge.acceleration_max_mps2": "drawn, not judged",
 }
@@ -340,8 +345,8 @@ class Hover(Drive):
 
 def announced(case: Case, seconds: float) -> list[str]:
     """The announcements of the check; it is the only one that may speak, but for what its own case brings along."""
-    told = Hover(case).open().to(seconds).announced
-    return [alarm for alarm in told if alarm == case.alarm]
+    announcements = Hover(case).open().to(seconds).announced
+    return [alarm for alarm in announcements if alarm == case.alarm]
 
 
 @pytest.mark.parametrize(
@@ -353,24 +358,24 @@ def announced(case: Case, seconds: float) -> list[str]:
     ],
 )
 def test_at_its_limit_a_signal_is_told_at_most_three_times(case: Case, seconds: float) -> None:
-    told = announced(case, seconds)
-    assert 0 < len(told) <= AT_MOST
+    announcements = announced(case, seconds)
+    assert 0 < len(announcements) <= AT_MOST
 
 
 @pytest.mark.parametrize("seconds", [60.0, pytest.param(600.0, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("late", [False, True], ids=["offset", "late"])
 def test_a_clock_about_its_limit(seconds: float, late: bool) -> None:
     """clock_offset: 5 s from the server's time, or messages 2 s later than usual, give or take a radio's jitter."""
-    dice, monitor, state, told = random.Random(1), Monitor(), State(), []
+    dice, monitor, state, announcements = random.Random(1), Monitor(), State(), []
     state.link(LinkFacts(phase="monitoring", connected_s=0.0, wall_zero_s=1.79e9, published=frozenset({"position"})))
     for n in range(round(10 * seconds)):
         now_s = n / 10
         behind_s = min(2.0, 0.1 * max(0.0, now_s - 6.0)) if late else 5.0
         behind_s += 0.1 * swing(now_s) + dice.expovariate(50.0)
         state.receive("position", north(0.01 * n), now_s, 1.79e9 + now_s - behind_s)
-        told += [t.alarm_id for t in monitor.step(state.snapshot(now_s)) if t.announces]
-    assert set(told) == {"clock_offset"}
-    assert len(told) <= AT_MOST
+        announcements += [t.alarm_id for t in monitor.step(state.snapshot(now_s)) if t.announces]
+    assert set(announcements) == {"clock_offset"}
+    assert len(announcements) <= AT_MOST
 
 
 LONG = pytest.mark.parametrize("seconds", [60.0, pytest.param(600.0, marks=pytest.mark.soak)])
@@ -380,7 +385,7 @@ LONG = pytest.mark.parametrize("seconds", [60.0, pytest.param(600.0, marks=pytes
 @pytest.mark.parametrize("alarm", ["recorder_behind", "disk_nearly_full"])
 def test_a_disk_about_as_slow_or_as_full_as_is_allowed(alarm: str, seconds: float) -> None:
     """Others write on it and delete from it; a write waits for theirs."""
-    dice, monitor, state, told = random.Random(1), Monitor(), State(), []
+    dice, monitor, state, announcements = random.Random(1), Monitor(), State(), []
     state.link(LinkFacts(phase="monitoring", connected_s=0.0, last_message_s=0.0))
     for n in range(round(10 * seconds)):
         now_s = n / 10
@@ -389,22 +394,22 @@ def test_a_disk_about_as_slow_or_as_full_as_is_allowed(alarm: str, seconds: floa
         state.recorder(
             RecorderFacts(state="recording", behind_s=about if is_slow else 0.1, left_gb=90.0 if is_slow else about)
         )
-        told += [t.alarm_id for t in monitor.step(state.snapshot(now_s)) if t.announces]
-    assert 0 < told.count(alarm) <= AT_MOST, told
+        announcements += [t.alarm_id for t in monitor.step(state.snapshot(now_s)) if t.announces]
+    assert 0 < announcements.count(alarm) <= AT_MOST, announcements
 
 
 @LONG
 @pytest.mark.world(n=6)
 @pytest.mark.parametrize(("alarm", "late_s"), [("link_late", 1.0), ("link_late_moving", 2.0)])
 def test_a_link_about_as_late_as_is_allowed(alarm: str, late_s: float, seconds: float) -> None:
-    dice, monitor, state, told = random.Random(1), Monitor(), State(), []
+    dice, monitor, state, announcements = random.Random(1), Monitor(), State(), []
     for n in range(round(10 * seconds)):
         now_s = n / 10
         about_s = gauss(dice, late_s, 0.05, now_s)
         state.link(LinkFacts(phase="monitoring", connected_s=0.0, last_message_s=now_s, late_s=about_s))
         state.receive("speed", Twist(speed_mps=4.0), now_s, None)
-        told += [t.alarm_id for t in monitor.step(state.snapshot(now_s)) if t.announces]
-    assert 0 < told.count(alarm) <= AT_MOST, told
+        announcements += [t.alarm_id for t in monitor.step(state.snapshot(now_s)) if t.announces]
+    assert 0 < announcements.count(alarm) <= AT_MOST, announcements
 
 
 SPOKEN = ("speed", "brake", "accelerator", "position")
@@ -412,8 +417,8 @@ SPOKEN = ("speed", "brake", "accelerator", "position")
 
 def few(car: Drive, alarm: str) -> bool:
     """Told, at most three times, and no other alarm beside it but for the rates that fall with the gaps."""
-    told = [name for name in car.announced if not name.startswith(("signal_slow", "all_slow"))]
-    return set(told) == {alarm} and len(told) <= AT_MOST
+    announcements = [name for name in car.announced if not name.startswith(("signal_slow", "all_slow"))]
+    return set(announcements) == {alarm} and len(announcements) <= AT_MOST
 
 
 @LONG

@@ -42,7 +42,7 @@ class Life(RuleBasedStateMachine):
         self.monitor = self.born()
         self.now_s = 100.0
         self.paused = False
-        self.told: list[Transition] = []
+        self.transitions: list[Transition] = []
         self.before: dict[str, Alarm] = {}
         self.seen: set[str] = set()  # alarms acknowledged, or ended, by the newest step
         self.announced: dict[str, list[int]] = {name: [] for name in NAMES}
@@ -52,7 +52,7 @@ class Life(RuleBasedStateMachine):
 
     def hear(self, happened: tuple[Transition, ...]) -> None:
         for transition in happened:
-            self.told.append(transition)
+            self.transitions.append(transition)
             if transition.change in ("raised", "recaused"):
                 self.announced[transition.alarm_id].append(transition.occurrence)
 
@@ -123,7 +123,9 @@ class Life(RuleBasedStateMachine):
         """Noticed, and made up for, at the next judgement; what is told after it is on the new clock."""
         self.remember()
         self.now_s -= back_s
-        self.told = [replace(t, at_s=t.at_s - back_s, shelved_until_s=self.moved(t, back_s)) for t in self.told]
+        self.transitions = [
+            replace(t, at_s=t.at_s - back_s, shelved_until_s=self.moved(t, back_s)) for t in self.transitions
+        ]
         for script in self.scripts.values():
             script.finding = unknown("cannot tell")
         self.hear(self.monitor.step(at(self.now_s, paused=self.paused)))
@@ -140,19 +142,19 @@ class Life(RuleBasedStateMachine):
     def restart(self, down_s: float) -> None:
         """The process is killed; another one goes on from the log, on a clock of its own."""
         self.remember()
-        self.told = [
+        self.transitions = [
             replace(
                 t,
                 at_s=t.at_s - self.now_s - down_s,
                 shelved_until_s=None if t.shelved_until_s is None else t.shelved_until_s - self.now_s - down_s,
             )
-            for t in self.told
+            for t in self.transitions
         ]
         self.now_s = 0.0
         for script in self.scripts.values():
             script.finding = unknown("nothing came yet")
         self.monitor = self.born()
-        self.monitor.restore(self.told)
+        self.monitor.restore(self.transitions)
         for name in NAMES:
             was, is_ = self.before[name], self.monitor.alarms[name]
             assert (is_.active, is_.acknowledged, is_.occurrence) == (was.active, was.acknowledged, was.occurrence)
@@ -170,7 +172,7 @@ class Life(RuleBasedStateMachine):
     @invariant()
     def the_log_says_what_stands(self) -> None:
         fresh = {name: Alarm(id=name, spec=SPECS[name]) for name in NAMES}
-        again = restore(fresh, self.told)
+        again = restore(fresh, self.transitions)
         for name in NAMES:
             live, read = self.monitor.alarms[name], again[name]
             assert (read.active, read.acknowledged, read.occurrence) == (

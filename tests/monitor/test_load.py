@@ -8,7 +8,7 @@ from monitor.alarm import Change, Transition
 from monitor.load import KEPT, RecentLoad, most_within
 
 
-def told(at_s: float, change: Change = "raised", name: str = "a", announces: bool = True) -> Transition:
+def change_of(at_s: float, change: Change = "raised", name: str = "a", announces: bool = True) -> Transition:
     return Transition(
         alarm_id=name,
         occurrence=1,
@@ -38,15 +38,22 @@ def test_alarms_of_the_last_ten_minutes(
 ) -> None:
     recent = RecentLoad()
     for at_s in announced:
-        recent.add([told(at_s, name=f"alarm {at_s}")])
+        recent.add([change_of(at_s, name=f"alarm {at_s}")])
     load = recent.at(now_s)
     assert (load.in_10_min, load.is_flood, load.is_bearable) == (number, flood, bearable)
 
 
 def test_only_what_is_announced_loads_the_operator() -> None:
     recent = RecentLoad()
-    recent.add([told(0.0, announces=False), told(1.0, "acknowledged"), told(2.0, "shelved"), told(3.0, "cleared")])
-    recent.add([told(4.0, "recaused"), told(5.0, "unshelved")])
+    recent.add(
+        [
+            change_of(0.0, announces=False),
+            change_of(1.0, "acknowledged"),
+            change_of(2.0, "shelved"),
+            change_of(3.0, "cleared"),
+        ]
+    )
+    recent.add([change_of(4.0, "recaused"), change_of(5.0, "unshelved")])
     assert recent.at(6.0).in_10_min == 2
 
 
@@ -65,7 +72,7 @@ def test_an_alarm_that_turns_three_times_in_a_minute_chatters(
 ) -> None:
     recent = RecentLoad()
     for number, at_s in enumerate(turns):
-        recent.add([told(at_s, "cleared" if number % 2 else "raised"), told(at_s, "acknowledged", name="b")])
+        recent.add([change_of(at_s, "cleared" if number % 2 else "raised"), change_of(at_s, "acknowledged", name="b")])
     load = recent.at(now_s)
     assert load.chattering == (("a",) if chattering else ())
     if chattering:
@@ -74,22 +81,22 @@ def test_an_alarm_that_turns_three_times_in_a_minute_chatters(
 
 def test_three_alarms_of_one_turn_each_do_not_chatter() -> None:
     recent = RecentLoad()
-    recent.add([told(float(n), name=name) for n, name in enumerate("abc")])
+    recent.add([change_of(float(n), name=name) for n, name in enumerate("abc")])
     assert recent.at(3.0).chattering == ()
 
 
 @pytest.mark.parametrize("back_s", [1.0, 300.0, 1e9])
 def test_a_clock_that_went_back_makes_no_flood_and_forgets_in_time(back_s: float) -> None:
     recent = RecentLoad()
-    recent.add([told(2e9)])
+    recent.add([change_of(2e9)])
     assert recent.at(2e9 - back_s).in_10_min == (1 if back_s < 600 else 0)
-    recent.add([told(2e9 - back_s)])
+    recent.add([change_of(2e9 - back_s)])
     assert 1 <= recent.at(2e9 - back_s).in_10_min <= 2
 
 
 def test_a_storm_is_bounded_in_memory() -> None:
     recent = RecentLoad()
-    recent.add(told(n / 1000, name=f"{n}") for n in range(3 * KEPT))
+    recent.add(change_of(n / 1000, name=f"{n}") for n in range(3 * KEPT))
     assert recent.at(15.0).in_10_min == KEPT
     assert recent.at(15.0).is_flood
 

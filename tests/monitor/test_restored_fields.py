@@ -14,14 +14,14 @@ from tests.monitor.test_alarm import NO_ACK, SPEC
 FIRST, SECOND = fault("first"), fault("second")
 
 
-def told(change: Change, at_s: float, state: AlarmState = AlarmState.UNACKED, **more: Any) -> Transition:
+def transition(change: Change, at_s: float, state: AlarmState = AlarmState.UNACKED, **more: Any) -> Transition:
     fields = {"occurrence": 1, "text": ""} | more
     return Transition(alarm_id="hot", change=change, at_s=at_s, state=state, **fields)
 
 
-RAISED = told("raised", 1.0, finding=FIRST, causes=("a",))
-ACKED = told("acknowledged", 2.0, AlarmState.ACKED, by="Ann", finding=SECOND, causes=("a",))
-SHELVED = told("shelved", 3.0, AlarmState.SHELVED, by="Ben", causes=("a",), shelved_until_s=60.0)
+RAISED = transition("raised", 1.0, finding=FIRST, causes=("a",))
+ACKED = transition("acknowledged", 2.0, AlarmState.ACKED, by="Ann", finding=SECOND, causes=("a",))
+SHELVED = transition("shelved", 3.0, AlarmState.SHELVED, by="Ben", causes=("a",), shelved_until_s=60.0)
 STANDING: dict[str, Any] = {
     "occurrence": 1,
     "active": True,
@@ -40,39 +40,39 @@ SEEN = STANDING | {"acknowledged": True, "acknowledged_by": "Ann"}
     [
         ([RAISED], STANDING),
         (
-            [told("raised", 1.0, AlarmState.ACKED, finding=FIRST)],
+            [transition("raised", 1.0, AlarmState.ACKED, finding=FIRST)],
             {"active": True, "raised_s": 1.0, "worst": FIRST, "occurrence": 1},
         ),
         ([RAISED, ACKED], SEEN),
         (
-            [RAISED, ACKED, told("recaused", 5.0, occurrence=2, finding=SECOND, causes=("a", "b"))],
+            [RAISED, ACKED, transition("recaused", 5.0, occurrence=2, finding=SECOND, causes=("a", "b"))],
             STANDING
             | {"occurrence": 2, "announced_s": 5.0, "trip": SECOND, "causes": (Cause(name="a"), Cause(name="b"))},
         ),
         (
-            [RAISED, told("cleared", 4.0, AlarmState.RTN_UNACKED)],
+            [RAISED, transition("cleared", 4.0, AlarmState.RTN_UNACKED)],
             STANDING | {"active": False, "cleared_s": 4.0, "causes": ()},
         ),
         ([RAISED, SHELVED], STANDING | {"shelved_by": "Ben", "shelved_until_s": 60.0}),
         (
-            [RAISED, ACKED, SHELVED, told("unshelved", 60.0, occurrence=2, causes=("a",))],
+            [RAISED, ACKED, SHELVED, transition("unshelved", 60.0, occurrence=2, causes=("a",))],
             STANDING | {"occurrence": 2, "announced_s": 60.0},
         ),
         (
             [
                 RAISED,
-                told("cleared", 4.0, AlarmState.SHELVED, shelved_until_s=60.0),
-                told("unshelved", 60.0, AlarmState.RTN_UNACKED),
+                transition("cleared", 4.0, AlarmState.SHELVED, shelved_until_s=60.0),
+                transition("unshelved", 60.0, AlarmState.RTN_UNACKED),
             ],
             STANDING | {"active": False, "cleared_s": 4.0, "causes": ()},
         ),
         (
-            [RAISED, told("suppressed", 4.0, AlarmState.SUPPRESSED, suppressed_by=("link_lost",), causes=("a",))],
+            [RAISED, transition("suppressed", 4.0, AlarmState.SUPPRESSED, suppressed_by=("link_lost",), causes=("a",))],
             STANDING | {"suppressed_by": ("link_lost",)},
         ),
-        ([RAISED, ACKED, told("cleared", 9.0, AlarmState.NORMAL)], {"occurrence": 1}),
+        ([RAISED, ACKED, transition("cleared", 9.0, AlarmState.NORMAL)], {"occurrence": 1}),
         (
-            [told("recaused", 5.0, occurrence=7), told("suppressed", 6.0, AlarmState.NORMAL, occurrence=3)],
+            [transition("recaused", 5.0, occurrence=7), transition("suppressed", 6.0, AlarmState.NORMAL, occurrence=3)],
             {"occurrence": 7},
         ),
     ],
@@ -85,7 +85,7 @@ def test_each_change_of_the_log(log: list[Transition], fields: dict[str, Any]) -
 
 
 def test_what_needs_no_acknowledgement_is_acknowledged_when_it_clears_on_the_shelf() -> None:
-    log = [RAISED, SHELVED, told("cleared", 4.0, AlarmState.SHELVED, shelved_until_s=60.0)]
+    log = [RAISED, SHELVED, transition("cleared", 4.0, AlarmState.SHELVED, shelved_until_s=60.0)]
     for spec, acknowledged in [(NO_ACK, True), (SPEC, False)]:
         alarm = restore({"hot": Alarm(id="hot", spec=spec)}, log)["hot"]
         assert (alarm.active, alarm.acknowledged, alarm.shelved_by) == (False, acknowledged, "Ben")
@@ -93,6 +93,6 @@ def test_what_needs_no_acknowledgement_is_acknowledged_when_it_clears_on_the_she
 
 def test_out_of_service_stays_and_other_alarms_are_not_touched() -> None:
     alarms = {"hot": Alarm(id="hot", spec=SPEC, out_of_service=True), "cold": Alarm(id="cold", spec=SPEC)}
-    after = restore(alarms, [RAISED, told("cleared", 2.0, AlarmState.NORMAL)])
+    after = restore(alarms, [RAISED, transition("cleared", 2.0, AlarmState.NORMAL)])
     assert after == {"hot": Alarm(id="hot", spec=SPEC, out_of_service=True, occurrence=1), "cold": alarms["cold"]}
     assert alarms["hot"].occurrence == 0

@@ -26,15 +26,15 @@ TRIP = fault("12.6 m/s", causes=("a",))._replace(measured=Quantity(label="Speed"
 
 def lived(*findings: Finding, spec: AlarmSpec = PATIENT, each_s: float = 1.0) -> tuple[Alarm, list[Transition]]:
     """An alarm that saw these findings, one a second, and what was told of it."""
-    alarm, told = Alarm(id="hot", spec=spec), []
+    alarm, transitions = Alarm(id="hot", spec=spec), []
     for number, finding in enumerate(findings):
         alarm, happened = advance(alarm, finding, number * each_s)
-        told += happened
-    return alarm, told
+        transitions += happened
+    return alarm, transitions
 
 
-def restored(told: list[Transition], spec: AlarmSpec = PATIENT) -> Alarm:
-    return restore({"hot": Alarm(id="hot", spec=spec)}, told)["hot"]
+def restored(transitions: list[Transition], spec: AlarmSpec = PATIENT) -> Alarm:
+    return restore({"hot": Alarm(id="hot", spec=spec)}, transitions)["hot"]
 
 
 def same(one: Alarm, other: Alarm) -> bool:
@@ -54,19 +54,19 @@ def test_the_transitions_alone_say_where_an_alarm_stands(
     spec: AlarmSpec, day: list[tuple[float, Judge | Tap]], ends: bool
 ) -> None:
     alarm, now_s = Alarm(id="hot", spec=spec), 0.0
-    told: list[Transition] = []
+    transitions: list[Transition] = []
     for wait_s, event in day:
         now_s += wait_s
         try:
             alarm, happened = happen(alarm, event, now_s)
         except Refused:
             continue
-        told += happened
-        assert same(restored(told, spec), alarm)
+        transitions += happened
+        assert same(restored(transitions, spec), alarm)
     if ends:
         alarm, happened = end(alarm, now_s, "Monitoring ended")
-        assert same(restored([*told, *happened], spec), alarm)
-        assert not restored([*told, *happened], spec).is_standing
+        assert same(restored([*transitions, *happened], spec), alarm)
+        assert not restored([*transitions, *happened], spec).is_standing
 
 
 @given(SPECS, DAY, DAY)
@@ -74,7 +74,7 @@ def test_a_restart_in_the_middle_loses_nothing_and_repeats_no_number(
     spec: AlarmSpec, before: list[tuple[float, Judge | Tap]], after: list[tuple[float, Judge | Tap]]
 ) -> None:
     alarm, now_s = Alarm(id="hot", spec=spec), 0.0
-    told: list[Transition] = []
+    transitions: list[Transition] = []
 
     def live(alarm: Alarm, day: list[tuple[float, Judge | Tap]]) -> Alarm:
         nonlocal now_s
@@ -84,18 +84,18 @@ def test_a_restart_in_the_middle_loses_nothing_and_repeats_no_number(
                 alarm, happened = happen(alarm, event, now_s)
             except Refused:
                 continue
-            told.extend(happened)
+            transitions.extend(happened)
         return alarm
 
     alarm = live(alarm, before)
     numbers = alarm.occurrence
-    alarm = live(restored(told, spec), after)
-    assert same(restored(told, spec), alarm)
-    raises = [t.occurrence for t in told if t.change in ("raised", "recaused")]
+    alarm = live(restored(transitions, spec), after)
+    assert same(restored(transitions, spec), alarm)
+    raises = [t.occurrence for t in transitions if t.change in ("raised", "recaused")]
     assert raises == sorted(set(raises)), "an occurrence was given twice"
     assert alarm.occurrence >= numbers
     standing = False
-    for transition in told:  # raised and cleared take turns over the restart as without it
+    for transition in transitions:  # raised and cleared take turns over the restart as without it
         if transition.change == "raised":
             assert not standing
             standing = True
@@ -108,7 +108,7 @@ def test_a_restart_in_the_middle_loses_nothing_and_repeats_no_number(
 def test_unknown_after_a_restart_clears_nothing(
     spec: AlarmSpec, day: list[tuple[float, Judge | Tap]], blind: list[Finding]
 ) -> None:
-    _, told = Alarm(id="hot", spec=spec), []
+    _, transitions = Alarm(id="hot", spec=spec), []
     alarm, now_s = Alarm(id="hot", spec=spec), 0.0
     for wait_s, event in day:
         now_s += wait_s
@@ -116,8 +116,8 @@ def test_unknown_after_a_restart_clears_nothing(
             alarm, happened = happen(alarm, event, now_s)
         except Refused:
             continue
-        told += happened
-    was = alarm = restored(told, spec)
+        transitions += happened
+    was = alarm = restored(transitions, spec)
     for _ in blind:
         now_s += 10.0
         alarm, happened = advance(alarm, unknown("no link"), now_s)
@@ -127,19 +127,19 @@ def test_unknown_after_a_restart_clears_nothing(
 
 
 def test_an_unacknowledged_return_stays_until_somebody_says_that_they_saw_it() -> None:
-    live, told = lived(BAD, OK, OK, OK)
+    live, transitions = lived(BAD, OK, OK, OK)
     assert live.state is AlarmState.RTN_UNACKED
-    alarm = restored(told)
+    alarm = restored(transitions)
     assert alarm.state is AlarmState.RTN_UNACKED
     alarm, happened = acknowledge(alarm, alarm.occurrence, "Ann", 9.0)
     assert alarm.state is AlarmState.NORMAL
-    assert restored([*told, *happened]).state is AlarmState.NORMAL
+    assert restored([*transitions, *happened]).state is AlarmState.NORMAL
 
 
 def test_an_acknowledged_alarm_whose_cause_is_still_there_is_not_announced_again() -> None:
-    live, told = lived(TRIP, TRIP)
+    live, transitions = lived(TRIP, TRIP)
     live, happened = acknowledge(live, live.occurrence, "Ann", 2.0)
-    alarm = restored([*told, *happened])
+    alarm = restored([*transitions, *happened])
     assert (alarm.state, alarm.acknowledged_by) == (AlarmState.ACKED, "Ann")
     assert advance(alarm, TRIP, 60.0)[1] == ()
     worse = TRIP._replace(causes=("a", "b"))
@@ -147,24 +147,24 @@ def test_an_acknowledged_alarm_whose_cause_is_still_there_is_not_announced_again
 
 
 def test_the_trip_comes_back_with_its_values() -> None:
-    _, told = lived(TRIP, TRIP)
-    alarm = restored(told)
+    _, transitions = lived(TRIP, TRIP)
+    alarm = restored(transitions)
     assert alarm.trip == TRIP
     assert alarm.finding is None  # what the check says now is not known
     assert not alarm.condition
 
 
 def test_a_late_acknowledgement_of_an_older_occurrence_is_refused_after_a_restart_too() -> None:
-    live, told = lived(BAD, OK, OK, OK, BAD)
+    live, transitions = lived(BAD, OK, OK, OK, BAD)
     assert live.occurrence == 2
     with pytest.raises(Refused):
-        acknowledge(restored(told), 1, "Ann", 9.0)
+        acknowledge(restored(transitions), 1, "Ann", 9.0)
 
 
 def test_shelving_goes_on_for_its_remaining_time_and_its_end_announces() -> None:
-    live, told = lived(BAD, BAD)
+    live, transitions = lived(BAD, BAD)
     live, happened = shelve(live, live.occurrence, 5.0, "Ann", 2.0, is_inhibitor=False)
-    alarm = restored([*told, *happened])
+    alarm = restored([*transitions, *happened])
     assert (alarm.state, alarm.shelved_by, alarm.shelved_until_s) == (AlarmState.SHELVED, "Ann", 302.0)
     alarm, happened_early = advance(alarm, BAD, 301.0)
     assert happened_early == ()
@@ -173,44 +173,44 @@ def test_shelving_goes_on_for_its_remaining_time_and_its_end_announces() -> None
 
 
 def test_a_shelf_that_ran_out_during_the_outage_announces_at_the_first_look() -> None:
-    live, told = lived(BAD, BAD)
+    live, transitions = lived(BAD, BAD)
     _, happened = shelve(live, live.occurrence, 1.0, "Ann", 2.0, is_inhibitor=False)
-    _, happened = advance(restored([*told, *happened]), unknown("no link"), 500.0)
+    _, happened = advance(restored([*transitions, *happened]), unknown("no link"), 500.0)
     assert [(t.change, t.announces) for t in happened] == [("unshelved", True)]
 
 
 def test_the_end_of_monitoring_takes_an_alarm_off_the_shelf_in_the_log_too() -> None:
     """Shelved, cleared and acknowledged: it stands no more, but the log must not leave it on the shelf."""
     spec = replace(PATIENT, needs_ack=False)
-    live, told = lived(BAD, BAD, spec=spec)
+    live, transitions = lived(BAD, BAD, spec=spec)
     live, happened = shelve(live, live.occurrence, 10.0, "Ann", 2.0, is_inhibitor=False)
-    told += happened
+    transitions += happened
     for now_s in (3.0, 4.0, 5.0):
         live, happened = advance(live, OK, now_s)
-        told += happened
+        transitions += happened
     assert (live.state, live.is_standing) == (AlarmState.SHELVED, False)
-    assert same(restored(told, spec), live)
+    assert same(restored(transitions, spec), live)
     _, happened = end(live, 6.0, "Monitoring ended")
     assert [t.change for t in happened] == ["unshelved"]
-    assert restored([*told, *happened], spec).state is AlarmState.NORMAL
+    assert restored([*transitions, *happened], spec).state is AlarmState.NORMAL
 
 
 def test_what_is_told_of_an_alarm_that_is_no_more_is_passed_over() -> None:
-    _, told = lived(BAD)
-    assert restore({}, told) == {}
+    _, transitions = lived(BAD)
+    assert restore({}, transitions) == {}
 
 
 def test_numbering_on_brings_back_nothing_but_the_numbers() -> None:
-    _, told = lived(BAD, OK, OK, OK, BAD)
-    alarm = numbered_on({"hot": Alarm(id="hot", spec=PATIENT)}, told)["hot"]
+    _, transitions = lived(BAD, OK, OK, OK, BAD)
+    alarm = numbered_on({"hot": Alarm(id="hot", spec=PATIENT)}, transitions)["hot"]
     assert (alarm.occurrence, alarm.state) == (2, AlarmState.NORMAL)
 
 
 def test_the_monitor_goes_on_from_its_past() -> None:
     first = Monitor([check("a", Script(BAD)), check("b", Script())])
-    told = [*first.step(at(1.0)), *first.acknowledge("a", 1, "Ann", 1.5)]
+    transitions = [*first.step(at(1.0)), *first.acknowledge("a", 1, "Ann", 1.5)]
     second = Monitor([check("a", script := Script(unknown("no link"))), check("b", Script())])
-    second.restore([replace(t, at_s=t.at_s - 100.0) for t in told])
+    second.restore([replace(t, at_s=t.at_s - 100.0) for t in transitions])
     assert [(a.id, a.state, a.acknowledged_by) for a in second.standing()] == [("a", AlarmState.ACKED, "Ann")]
     assert second.step(at(0.0)) == ()  # blind: it stands
     assert second.alarms["a"].active
@@ -223,9 +223,9 @@ def test_an_inhibitor_that_stood_explains_nothing_until_it_is_seen_again() -> No
     inhibited = replace(SPEC, on_delay_s=0.0, off_delay_s=0.0, inhibited_by=("cause",))
     checks = [check("cause", Script(BAD)), check("effect", Script(BAD), alarm=inhibited)]
     first = Monitor(checks)
-    told = first.step(at(0.0))
-    assert [t.alarm_id for t in told] == ["cause"]
+    transitions = first.step(at(0.0))
+    assert [t.alarm_id for t in transitions] == ["cause"]
     second = Monitor([check("cause", Script(unknown("no link"))), check("effect", Script(BAD), alarm=inhibited)])
-    second.restore(told)
+    second.restore(transitions)
     assert [t.alarm_id for t in second.step(at(1.0))] == ["effect"]
     assert second.alarms["cause"].active

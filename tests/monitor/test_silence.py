@@ -29,10 +29,15 @@ def silenced() -> Alarm:
 
 
 def test_a_silenced_alarm_stands_unacknowledged_and_says_by_whom() -> None:
-    alarm, (told,) = silence(standing(), 1, "Ann", 12.0)
+    alarm, (happened,) = silence(standing(), 1, "Ann", 12.0)
     assert (alarm.sound, alarm.state, alarm.occurrence) == (Sound.NONE, AlarmState.UNACKED, 1)
     assert (alarm.silenced_until_s, alarm.silenced_by) == (12.0 + SILENCE_S, "Ann")
-    assert (told.change, told.by, told.announces, told.state) == ("silenced", "Ann", False, AlarmState.UNACKED)
+    assert (happened.change, happened.by, happened.announces, happened.state) == (
+        "silenced",
+        "Ann",
+        False,
+        AlarmState.UNACKED,
+    )
 
 
 @pytest.mark.parametrize(
@@ -47,15 +52,15 @@ def test_a_silenced_alarm_stands_unacknowledged_and_says_by_whom() -> None:
     ],
 )
 def test_how_long_it_is_silent(finding: Finding, at_s: float, sound: Sound, changes: list[str]) -> None:
-    alarm, told = advance(silenced(), finding, at_s)
-    assert (alarm.sound, [one.change for one in told]) == (sound, changes)
+    alarm, happened = advance(silenced(), finding, at_s)
+    assert (alarm.sound, [one.change for one in happened]) == (sound, changes)
 
 
 def test_what_returned_and_comes_again_sounds_again() -> None:
     gone, _ = advance(silenced(), OK, 13.0)
     assert gone.silenced_until_s is None
-    again, (told,) = advance(gone, BAD, 14.0)
-    assert (again.sound, told.announces) == (Sound.MEDIUM, True)
+    again, (happened,) = advance(gone, BAD, 14.0)
+    assert (again.sound, happened.announces) == (Sound.MEDIUM, True)
 
 
 def test_a_clock_that_goes_back_makes_it_no_longer() -> None:
@@ -97,5 +102,5 @@ def test_silence_is_refused(more: dict[str, Any], occurrence: int, reason: str) 
 def test_a_restart_sounds_again() -> None:
     fresh = Alarm(id="hot", spec=SPEC)
     alarm, raised = advance(fresh, BAD, 10.0)
-    told: tuple[Transition, ...] = (*raised, *silence(alarm, 1, "Ann", 12.0)[1])
-    assert restore({"hot": fresh}, told)["hot"].sound is Sound.MEDIUM
+    happened: tuple[Transition, ...] = (*raised, *silence(alarm, 1, "Ann", 12.0)[1])
+    assert restore({"hot": fresh}, happened)["hot"].sound is Sound.MEDIUM

@@ -46,15 +46,15 @@ def test_a_steady_clock_neither_jumps_nor_drifts() -> None:
 @pytest.mark.parametrize("hz", [1.0, 10.0, 75.0])
 def test_a_step_between_two_steady_stretches_is_a_jump(by_s: float, hz: float) -> None:
     jumps, change_s = run(lambda at_s: steady(at_s) + (by_s if at_s >= 30.0 else 0.0), hz=hz)
-    ((at_s, told_s),) = jumps
-    assert told_s == pytest.approx(by_s, abs=0.05)
+    ((at_s, jump_s),) = jumps
+    assert jump_s == pytest.approx(by_s, abs=0.05)
     assert 30.0 <= at_s <= 30.0 + 3.0 / hz  # the third message that agrees
     assert change_s == pytest.approx(0.0, abs=0.05)
 
 
 def test_a_loop_of_a_recording_is_one_jump_each_time() -> None:
     jumps, _ = run(lambda at_s: EPOCH_S + at_s % 20.0)
-    assert [told_s for _, told_s in jumps] == [-20.0, -20.0]
+    assert [jump_s for _, jump_s in jumps] == [-20.0, -20.0]
 
 
 def test_a_step_too_small_to_be_one_is_none() -> None:

@@ -236,3 +236,21 @@ def test_a_new_connection_knows_nothing_of_the_old_one() -> None:
     link.open(100.0)
     assert (link.delays(), link.waiting_s(105.0), link.late_s(105.0), link.clock.ahead_s) == ({}, 0.0, 0.0, None)
     assert link.receive("/vel", 100.2, stamp_s=60.0) == pytest.approx(0.2)
+
+
+def test_what_was_sent_has_been_read_once_a_ping_behind_it_is_answered() -> None:
+    """Also where it lay on the way with the pings behind it."""
+    link = opened(10.0)
+    for sent_s in (9.9, 10.4, 10.9, 11.4):
+        link.sent(sent_s)
+    link.answered(9.9, 11.0)
+    assert link.read_s(10.0) is None
+    link.answered(10.4, 13.5)
+    link.answered(10.9, 13.5)
+    assert link.read_s(10.0) == 13.5
+    assert link.read_s(11.0) is None
+    for n in range(5000):
+        ping(link, 14.0 + n / 2, 14.1 + n / 2)
+    assert (link.read_s(10.0) or 0.0) < 2400.0, "long ago"
+    link.open(3000.0)
+    assert link.read_s(3000.0) is None

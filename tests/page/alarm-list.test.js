@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { countWords, noneWords, pagesOf, rowsOf, silentWords, together } from '../../static/js/alarms/alarms-layout.js';
+import { countWords, latelyWords, noneWords, pagesOf, rowsOf, silentWords, together } from '../../static/js/alarms/alarms-layout.js';
 
 /** @param {string} id @param {any} [more] @returns {any} */
 const alarm = (id, more) => ({
@@ -86,4 +86,16 @@ test('an empty list says "no alarms" only where alarms could have come', () => {
   for (const more of [{ isSilent: true }, { isPaused: true }, { isPaused: true, isReplay: true }, { isChecked: false }, { isChecked: false, isReplay: true }]) {
     assert.doesNotMatch(words(more), /^No alarms/);
   }
+});
+
+test('a quiet list says which alarm ended last and how many came lately', () => {
+  /** @param {string | null} alarm @param {string} change @param {number} at_ms */
+  const row = (alarm, change, at_ms) => /** @type {any} */ ({ event: { alarm, change, at_ms, title: 'Car not moving', text: '' }, gap: null });
+  const at_ms = new Date(2026, 4, 6, 14, 3, 58).getTime();
+  const log = [row(null, 'settings', at_ms + 2000), row('a', 'raised', at_ms + 1000), { event: null, gap: /** @type {any} */ ({}) }, row('a', 'cleared', at_ms), row('b', 'cleared', at_ms - 5000)];
+  assert.equal(latelyWords(log, 2), 'Last: Car not moving, ended 14:03:58. In 10 min: 2 alarms.');
+  assert.equal(latelyWords(log, 1), 'Last: Car not moving, ended 14:03:58. In 10 min: 1 alarm.');
+  assert.equal(latelyWords(log, 0), 'Last: Car not moving, ended 14:03:58.');
+  assert.equal(latelyWords([row('a', 'raised', at_ms)], 0), '');
+  assert.equal(latelyWords([], undefined), '');
 });

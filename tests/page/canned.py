@@ -11,18 +11,21 @@ import math
 import struct
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import uvicorn
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 from fastapi.templating import Jinja2Templates
 
 from monitor.tracks import TrackPoint
+from server.access.people import People
 from server.judge.active_settings import ActiveSettings
 from server.judge.settings import SettingsFile
 from server.judge.topics import candidates
 from server.recording.catalog.sketch import sketch
 from server.system.page_files import static_dir, templates_dir
+from server.vehicle.car_departure import CarDeparture
+from server.vehicle.departure_file import DepartureFile
 from server.web.assets.bundle import find
 from server.web.assets.static_files import StaticText
 from server.web.compression import PageSocket
@@ -100,6 +103,7 @@ def live() -> Json:
             "diagnostics": signal("Diagnostics", diagnostics, {"worst": 0, "components": []}, hz=1.0),
             "command": signal("Command", None, None),
             "fuel": signal("Fuel", None, None),
+            "mode": signal("Driving mode", None, None),
         },
         "nearest": {"time_gap_s": 3.0, "stopping_m": 7.1},
         "checks": [
@@ -119,8 +123,10 @@ def live() -> Json:
         },
         "recording": {"state": "recording", "for_s": 252.0},
         "decelerate": slow("not_available", why="/catvehicle/cmd_vel is not on the car."),
+        "mode": {"mode": "unknown", "why": "no_source", "since_ms": None, "way_m": None, "source": "", "open": []},
         "control": {"holder": "You"},
         "reach": None,
+        "marks": 0,
         "phones": [],
         "phone": {
             "id": "9c0f", "label": "Pixel 7", "count": 1, "handheld": True, "chosen": False, "choice": "only",
@@ -320,8 +326,19 @@ class Canned:
         @self.app.get("/")
         def page(request: Request) -> Response:
             built = find(files.static)
-            context = {"version": "0.1.0", "vehicle": self.vehicle, "access": "open"}
+            context = {"version": "0.1.0", "vehicle": self.vehicle, "access": self.access, "has_store": True}
             return files.response(files.render("page.html", request, built, **context), request, built)
+
+        @self.app.get("/fleet")
+        def fleet(request: Request) -> Response:
+            built = find(files.static)
+            context = {"version": "0.1.0", "access": self.access}
+            return files.response(files.render("fleet.html", request, built, **context), request, built)
+
+        @self.app.post("/api/ticket")
+        async def ticket(response: Response) -> Json:
+            response.status_code = 401
+            return {"code": "unknown", "detail": "This device is not paired."}
 
         @self.app.get("/api/vehicles")
         async def vehicles() -> Json:
@@ -382,9 +399,24 @@ class Canned:
                 ]
             }  # fmt: skip
 
+        @self.app.get("/api/recordings/{name}/marks")
+        async def recorded_marks(name: str) -> Json:
+            return {"marks": self.marks}
+
         @self.app.get("/api/devices")
         async def devices() -> Json:
             return {"you": "local", "open": True, "devices": []}
+
+        @self.app.get("/api/people")
+        async def people() -> Json:
+            people = People(None, wall_ms=lambda: 0)
+            people.board.add("ak", "A. K.", "operator", 0)
+            return cast(Json, people.listed(None))
+
+        @self.app.get("/api/departure")
+        async def departure() -> Json:
+            active = ActiveSettings(SettingsFile(None))
+            return cast(Json, CarDeparture(active, DepartureFile(None), lambda *_, **__: None).answer())
 
         @self.app.get("/api/mail/settings")
         async def mail_settings() -> Json:
@@ -406,7 +438,7 @@ class Canned:
         async def socket(socket: WebSocket) -> None:
             await socket.accept()
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-                await self._serve(socket)
+                await self._serve(socket, is_fleet="fleet" in socket.query_params)
 
     def reset(self) -> None:
         """As it is at first: a calm drive."""
@@ -424,20 +456,28 @@ class Canned:
         self.checks: dict[str, Json] = {}  # the answer for each check that is requested by its id
         self.timeline: Json | None = None  # of the recording that a page asks to replay
         self.mails: list[Json] = []
+        self.marks: list[Json] = []  # of every recording
         self.vehicle = "car"
+        self.access = "open"
+        self.cars_every_s = 0.5
+        self.states_every_s = 0.1
+        self.fleet_events: list[Json] = []
         self.cars: list[Json] = []  # summaries of all cars, by their name
         self.tile: Callable[[int, int, int], bytes] = lambda z, x, y: b""
         self.drive = CannedDrive()
         begin = int(time.monotonic() * 5)
         self._trends = lambda steps: trends(time.monotonic() * 5, begin, steps)
 
-    async def _serve(self, socket: WebSocket) -> None:
+    async def _serve(self, socket: WebSocket, *, is_fleet: bool) -> None:
         names = [one["name"] for one in self.cars] or [self.vehicle]
-        hello = {"kind": "hello", "version": "0.1.0", "boot": "9f00", "vehicle": self.vehicle, "vehicles": names}
+        hello = {"kind": "hello", "version": "0.1.0", "boot": "9f00", "vehicles": names}
+        hello["vehicle"] = "" if is_fleet else self.vehicle
         who = {"id": "local", "name": "Pixel 7", "role": self.role}
         more = {"build": "", "time_ms": _now_ms(), "last_event": 117, "veil_after_s": 2.0, "who": who}
         await socket.send_json(hello | more)
-        beat = asyncio.create_task(self._beat(socket))
+        for event in self.fleet_events if is_fleet else ():
+            await socket.send_json({"kind": "fleet_event"} | event)
+        beat = asyncio.create_task(self._fleet_beat(socket) if is_fleet else self._beat(socket))
         try:
             while True:
                 message = await socket.receive_json()
@@ -446,6 +486,8 @@ class Canned:
                     self._watching = message["scan"]
                 if message.get("kind") == "hello":
                     self._page = message.get("page")
+                    if self.log and not is_fleet:
+                        await socket.send_json({"kind": "events", "events": self.log[::-1], "last": self.log[0]["n"]})
                 if "id" in message:
                     why = self.refuses.get(message["kind"])
                     reply = {"kind": "reply", "id": message["id"], "ok": why is None}
@@ -454,6 +496,15 @@ class Canned:
                     await socket.send_json(self.timeline)
         finally:
             beat.cancel()
+
+    async def _fleet_beat(self, socket: WebSocket) -> None:
+        while True:
+            if not self.silent:
+                for one in self.cars:
+                    if one["summary"]:
+                        one["summary"]["time_ms"] = _now_ms()
+                await socket.send_json({"kind": "cars", "time_ms": _now_ms(), "cars": self.cars})
+            await asyncio.sleep(self.cars_every_s)
 
     async def _beat(self, socket: WebSocket) -> None:
         number = 0
@@ -471,7 +522,7 @@ class Canned:
                     await socket.send_json({"kind": "cars", "time_ms": _now_ms(), "cars": self.cars})
                 if self._watching:
                     await socket.send_bytes(scan(number))
-            await asyncio.sleep(0.1)
+            await asyncio.sleep(self.states_every_s)
 
     @contextlib.asynccontextmanager
     async def running(self) -> Any:

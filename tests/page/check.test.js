@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { endsOf, episodeWords, episodesOf, figuresOf, gapsOf, markAt, meantOf, placeOf, thresholdWords, totalWords } from '../../static/js/alarms/check-layout.js';
-import { countWords } from '../../static/js/alarms/checks.js';
+import { endsOf, episodeWords, episodesOf, figuresOf, gapsOf, meantOf, placeOf, thresholdWords, totalWords } from '../../static/js/alarms/check-layout.js';
+import { countWords, markAt } from '../../static/js/alarms/checks.js';
 import { alarm } from './frames.js';
 
 const quantity = (/** @type {number} */ value, label = 'Speed', unit = 'm/s') => ({ label, value, unit });

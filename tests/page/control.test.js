@@ -145,3 +145,10 @@ test('among several the phone that is compared has its own name too', () => {
   assert.equal(label(2, 'aaaa'), 'phone bbbb ±5 m');
   assert.equal(label(2, 'bbbb'), 'You ±5 m');
 });
+
+test('a device shows the key by which agents know it, where any asks for it', () => {
+  /** @type {any} */
+  const facts = { sound: 'ready', screen: 'ready', position: 'ready', positionSays: '', rides: false, vibrates: true, battery: 1, charging: true, isOnline: true, network: '', lag_s: 0, isApple: false, isSecure: true, isReplaying: false };
+  const rows = (/** @type {string | null} */ key) => rowsOf({ ...facts, key }).filter(({ what }) => what === 'Signed orders').map(({ tag, kind }) => [tag, kind]);
+  assert.deepEqual([rows(null), rows(''), rows('k4f2a91c3000')], [[], [['Not available', 'warn']], [['4f2a91c3', 'plain']]]);
+});

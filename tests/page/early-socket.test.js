@@ -20,10 +20,10 @@ class Socket {
   }
 }
 
-/** What early.js leaves behind. @param {Early['told']} told */
-function dialled(told) {
+/** What early.js leaves behind. @param {Early['queue']} queue */
+function dialled(queue) {
   const socket = new Socket();
-  const early = /** @type {Early} */ ({ told, hear: null, socket: /** @type {any} */ (socket) });
+  const early = /** @type {Early} */ ({ queue, handle: null, socket: /** @type {any} */ (socket) });
   /** @type {any} */ (globalThis).catgraphEarly = early;
   return { early, socket };
 }
@@ -54,7 +54,7 @@ test('what came before the script is heard first, in its order and with the mome
   pageSocket.look(100);
   assert.deepEqual(heard, []); // whoever dials hears nothing before it listens
   await Promise.resolve();
-  early.hear?.({ type: 'message', data: 'later', at_ms: 110 });
+  early.handle?.({ type: 'message', data: 'later', at_ms: 110 });
   assert.deepEqual(heard, ['open', ['hello', 20], 3, ['later', 110]]);
   assert.equal(pageSocket.send({ kind: 'hello' }), true);
   assert.deepEqual(socket.sent, ['{"kind":"hello"}']);
@@ -66,9 +66,9 @@ test('one that opens after it was taken over is as any other', async () => {
   pageSocket.look(0);
   await Promise.resolve();
   assert.equal(pageSocket.send({}), false);
-  early.hear?.({ type: 'open', at_ms: 5 });
-  early.hear?.({ type: 'message', data: 'hello', at_ms: 6 });
-  early.hear?.({ type: 'close', at_ms: 7 });
+  early.handle?.({ type: 'open', at_ms: 5 });
+  early.handle?.({ type: 'message', data: 'hello', at_ms: 6 });
+  early.handle?.({ type: 'close', at_ms: 7 });
   assert.deepEqual(heard, ['open', ['hello', 6], 'closed']);
 });
 
@@ -89,7 +89,7 @@ test('one that was given up while its ticket was under way is hung up when it op
   pageSocket.look(6000); // given up, and dialled anew
   pageSocket.look(9000);
   early.socket = /** @type {any} */ (socket);
-  early.hear?.({ type: 'open', at_ms: 9100 });
+  early.handle?.({ type: 'open', at_ms: 9100 });
   assert.equal(socket.isClosed, true);
   assert.deepEqual(heard, []);
 });

@@ -4,8 +4,9 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import {
-  alarmWords, choiceOf, countsOf, distanceWords, factWords, lengthWords, liveOf, nameOf, originWords, pointsOf, queryOf, sizeWords, tagsOf, warningWords, whenWords,
+  alarmWords, choiceOf, countsOf, distanceWords, factWords, lengthWords, liveOf, nameOf, originWords, pointsOf, queryOf, sizeWords, storedWords, tagsOf, warningWords, whenWords,
 } from '../../static/js/files/files-layout.js';
+import { listingOf, storedQueryOf } from '../../static/js/files/stored-list.js';
 
 const NOW = new Date(2026, 10, 21, 15, 0).getTime();
 const row = (more = {}) => /** @type {import('../../static/js/files/files-layout.js').Recording} */ ({
@@ -109,4 +110,24 @@ test('what is recorded now, and why nothing is', () => {
   assert.equal(liveOf({ ...off, ...missing }, now)?.missing, '');
   const many = { left_out: ['/points', '/camera'], left_out_count: 9, too_large: [{ topic: '/camera', mb: 40.2 }], too_large_count: 1, not_received: ['/imu'], not_received_count: 2 };
   assert.equal(liveOf({ ...on, ...many }, now)?.missing, 'Not recorded: /points and 7 more. Too large to record: /camera (40 MB a message). No messages from: /imu and 1 more.');
+});
+
+test('where the copy of a recording is', () => {
+  const stored = (/** @type {object} */ more) => storedWords(/** @type {any} */ ({ state: 'none', share: null, checked_ms: null, sentence: '', clips: 0, is_asked: false, is_deletion_asked: false, ...more }));
+  assert.equal(storedWords(undefined), '');
+  assert.equal(stored({ sentence: 'The whole file is uploaded on request.' }), 'not stored');
+  assert.equal(stored({ state: 'waiting' }), 'not stored, waits for its upload');
+  assert.equal(stored({ state: 'uploading', share: 0.999 }), 'uploading 99 %');
+  assert.equal(stored({ state: 'stored', checked_ms: new Date(2026, 10, 21, 14, 3).getTime() }), 'stored (checked 14:03)');
+  assert.equal(stored({ state: 'stored', checked_ms: new Date(2026, 10, 21, 14, 3).getTime(), sentence: 'The file changed after it was uploaded.' }), 'stored (checked 14:03). Failed since: The file changed after it was uploaded.');
+  assert.equal(stored({ state: 'failed', sentence: 'The store x is full.' }), 'not stored, failed: The store x is full.');
+});
+
+test('what agents stored is listed as recordings are', () => {
+  const of = /** @type {any} */ ({ id: 'a_1', vehicle: 'a', folder: 'a', title: '', started_ms: NOW, length_s: 3, distance_m: null, top_speed_mps: null, alarms: null, sketch: null, file: null, size_bytes: null, sha256: null, checked_ms: null, clips: [] });
+  const listing = listingOf({ store: 's3://b', recordings: [of, { ...of, id: 'a_2', file: 'a_2.mcap', size_bytes: 5, checked_ms: NOW }], next: 'a/a_2', count: 7 }, null);
+  assert.deepEqual(listing.recordings.map(({ id, size_bytes, stored }) => [id, sizeWords(size_bytes), storedWords(stored).slice(0, 10)]), [['a_1', '–', 'not stored'], ['a_2', '5 B', 'stored (ch']]);
+  assert.deepEqual([listing.next, listing.all.count], ['a/a_2', 7]);
+  assert.equal(storedQueryOf(null, 5, { kind: 'all', value: '' }, 'b'), 'limit=5&vehicle=b');
+  assert.equal(storedQueryOf('a/a_2', 200, { kind: 'vehicle', value: 'a b' }), 'limit=100&cursor=a%2Fa_2&vehicle=a+b');
 });

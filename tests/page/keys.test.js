@@ -30,6 +30,12 @@ test('no key acts while something else has it, held down, with a modifier, or tu
   }
 });
 
+test('the key of a shutter marks on a phone, and is the loudness of a desk', () => {
+  assert.equal(keyOf(pressed('AudioVolumeUp'), { ...free, isTouch: true })?.act, 'mark');
+  assert.equal(keyOf(pressed('AudioVolumeUp'), free), null);
+  assert.equal(keyOf(pressed('m'), free)?.act, 'mark');
+});
+
 test('panes are in sight together, a page alone, a drawer beside Home', () => {
   const tabs = [['home', 'pane'], ['map', 'pane'], ['scan', 'pane'], ['files', 'page'], ['settings', 'drawer']].map(([name = '', wide = '']) => ({ name, wide }));
   assert.deepEqual(tabsInSight(tabs, 0, true), ['home', 'map', 'scan']);

@@ -23,6 +23,15 @@ test('each silence is said of the part that fell silent', () => {
   assert.deepEqual([car.word, car.cut, car.sentence, car.nodes[3]?.mark, car.since_ms], ['Silent', 2, 'The car fell silent.', 'silent 3.4 s', 5]);
 });
 
+test('a server that answers and has nothing of the car accuses what is between', () => {
+  const lost = chainOf({ ...now, frame: state(), isSilent: true, silence_s: 3.4, unserved: 'The agent of car does not answer.' });
+  assert.deepEqual([lost.word, lost.cut, lost.sentence, lost.isUnserved], ['Lost', 1, 'The agent of car does not answer.', true]);
+  assert.deepEqual(lost.nodes.map(({ name, mark, isBad }) => [name, mark, isBad]), [['Phone', 'here', false], ['Server', 'answers', false], ['Agent', 'silent 3.4 s', true], ['Car', 'unknown', false]]);
+  const never = chainOf({ ...now, frame: null, isSilent: true, heard_ms: null, unserved: 'It was not heard.' });
+  assert.deepEqual([never.age_s, never.nodes[2]?.mark, never.detail], [null, 'no answer', 'The server answers.']);
+  assert.equal(chainOf({ ...now, frame: state(), unserved: 'It was not heard.' }).word, 'Live', 'what came since is newer');
+});
+
 test('the words of the server’s problem are used where it has any', () => {
   const problem = { code: 'refused', title: 'Nothing listens.', hint: 'Start it.', mark: 'refused' };
   const chain = chainOf({ ...now, frame: state({ session: { phase: 'failed' }, link: { cut: 'server-bridge', problem } }) });

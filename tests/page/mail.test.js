@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { aboutOf, keysOf, mailtoOf, pathOf, recipientProblem, recipientsOf, refusedOf, sizeNote, stateOf } from '../../static/js/mail/mail-layout.js';
+import { aboutOf, keysOf, mailtoOf, pathOf, recipientProblem, recipientsOf, refusedOf, sizeNote, stateOf } from '../../static/js/files/mail-layout.js';
 
 const NOW_MS = new Date(2026, 8, 21, 14, 0, 0).getTime();
 

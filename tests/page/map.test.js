@@ -7,7 +7,8 @@ import {
 } from '../../static/js/map/map-layout.js';
 import { besideWay, inside } from '../../static/js/map/map-figure.js';
 import { MOST, Track, trackPaths } from '../../static/js/map/map-track.js';
-import { apartOf, bearingWords, carOf, distanceWords, phoneOf, pictureWords } from '../../static/js/map/map-text.js';
+import { distanceWords } from '../../static/js/core/format.js';
+import { apartOf, bearingWords, carOf, phoneOf, pictureWords } from '../../static/js/map/map-text.js';
 import { state } from './frames.js';
 
 const HERE = { lat_deg: 32.2319, lon_deg: -110.9501 };

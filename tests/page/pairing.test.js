@@ -85,8 +85,8 @@ test('a device that was removed forgets cars and people, and keeps how its owner
 });
 
 test('whatever a page keeps is either forgotten, or is of the phone alone', async () => {
-  const OF_THE_PHONE = ['device', 'range', 'speed-unit', 'tab', 'theme', 'hand', 'keys', 'trends'];
-  const OF_THE_TAB = ['phone', 'armed']; // gone with it
+  const OF_THE_PHONE = ['device', 'range', 'speed-unit', 'tab', 'theme', 'hand', 'keys', 'trends', 'clock-ahead'];
+  const OF_THE_TAB = ['phone', 'armed', 'asked-duty']; // gone with it
   const folder = new URL('../../static/js/', import.meta.url);
   const texts = await Promise.all((await readdir(folder, { recursive: true })).filter((name) => name.endsWith('.js')).map((name) => readFile(new URL(name, folder), 'utf8')));
   const kept = new Set(texts.flatMap((text) => [...text.matchAll(/'catgraph\.([a-z-]+)'/g)].map(([, name]) => name)));

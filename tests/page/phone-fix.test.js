@@ -1,22 +1,22 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { FixClock, Teller, whyOf } from '../../static/js/phone/phone-fix.js';
+import { FixClock, PositionReporter, whyOf } from '../../static/js/phone/phone-fix.js';
 
 const HOUR_MS = 3_600_000;
 const coords = { latitude: 32.23, longitude: -110.95, accuracy: 5, altitude: null, speed: NaN, heading: NaN };
 
 /** A phone that began to ask at 0. */
 function asking() {
-  const teller = new Teller();
-  teller.begin(0);
-  return teller;
+  const reporter = new PositionReporter();
+  reporter.begin(0);
+  return reporter;
 }
 
-/** What goes out at this moment. @param {Teller} teller @param {number} now_ms @returns {any} */
-function say(teller, now_ms) {
-  const word = teller.due(now_ms);
-  if (word) teller.told(word, now_ms);
-  return word && ('why' in word ? word.why : word.fix);
+/** What goes out at this moment. @param {PositionReporter} reporter @param {number} now_ms @returns {any} */
+function say(reporter, now_ms) {
+  const report = reporter.due(now_ms);
+  if (report) reporter.sent(report, now_ms);
+  return report && ('why' in report ? report.why : report.fix);
 }
 
 test('the age of a fix by one clock is what its stamp says', () => {
@@ -50,86 +50,86 @@ test('a browser’s clock that is set while it runs is found out within ten fixe
 });
 
 test('a fix is told once, with its age at sending, and what is no number is null', () => {
-  const teller = asking();
-  teller.fix(coords, 1_700_000_000_000, 100, 1_700_000_000_300);
-  assert.deepEqual(teller.due(250), {
+  const reporter = asking();
+  reporter.fix(coords, 1_700_000_000_000, 100, 1_700_000_000_300);
+  assert.deepEqual(reporter.due(250), {
     fix: { lat_deg: 32.23, lon_deg: -110.95, accuracy_m: 5, alt_m: null, speed_mps: null, heading_deg: null, at_ms: 1_700_000_000_000, age_s: 0.45 },
   });
-  say(teller, 250);
-  assert.equal(say(teller, 3000), null);
+  say(reporter, 250);
+  assert.equal(say(reporter, 3000), null);
 });
 
 test('at most one fix a second, the newest', () => {
-  const teller = asking();
+  const reporter = asking();
   const told = [];
   for (let now_ms = 0; now_ms <= 5000; now_ms += 100) {
-    teller.fix({ ...coords, accuracy: now_ms }, now_ms, now_ms, now_ms);
-    const fix = say(teller, now_ms);
+    reporter.fix({ ...coords, accuracy: now_ms }, now_ms, now_ms, now_ms);
+    const fix = say(reporter, now_ms);
     if (fix) told.push(fix.accuracy_m);
   }
   assert.deepEqual(told, [0, 1000, 2000, 3000, 4000, 5000]);
 });
 
 test('one fix that the browser tells again and again grows old all the same', () => {
-  const teller = asking();
-  for (let now_ms = 0; now_ms <= 4000; now_ms += 500) teller.fix(coords, 0, now_ms, now_ms);
-  assert.equal(teller.why(4000), null);
-  assert.equal(teller.why(4001), 'timeout');
+  const reporter = asking();
+  for (let now_ms = 0; now_ms <= 4000; now_ms += 500) reporter.fix(coords, 0, now_ms, now_ms);
+  assert.equal(reporter.why(4000), null);
+  assert.equal(reporter.why(4001), 'timeout');
 });
 
 test('until the first fix comes it is waited for, and that is told every three seconds', () => {
-  const teller = asking();
+  const reporter = asking();
   const told = [];
-  for (let now_ms = 0; now_ms <= 7000; now_ms += 200) if (say(teller, now_ms) === 'timeout') told.push(now_ms);
+  for (let now_ms = 0; now_ms <= 7000; now_ms += 200) if (say(reporter, now_ms) === 'timeout') told.push(now_ms);
   assert.deepEqual(told, [0, 3000, 6000]);
 });
 
 test('a single failure between fixes is none, a lasting one is told', () => {
-  const teller = asking();
-  teller.fix(coords, 0, 0, 0);
-  say(teller, 0);
-  teller.fail('unavailable');
-  assert.equal(say(teller, 1000), null);
-  teller.fix(coords, 1500, 1500, 1500);
-  assert.ok(say(teller, 1500).lat_deg);
-  teller.fail('unavailable');
-  assert.equal(say(teller, 5500), null);
-  assert.equal(say(teller, 5501), 'unavailable');
-  teller.fix(coords, 6000, 6000, 6000);
-  assert.ok(say(teller, 6000).lat_deg, 'a fix after a reason waits for nothing');
+  const reporter = asking();
+  reporter.fix(coords, 0, 0, 0);
+  say(reporter, 0);
+  reporter.fail('unavailable');
+  assert.equal(say(reporter, 1000), null);
+  reporter.fix(coords, 1500, 1500, 1500);
+  assert.ok(say(reporter, 1500).lat_deg);
+  reporter.fail('unavailable');
+  assert.equal(say(reporter, 5500), null);
+  assert.equal(say(reporter, 5501), 'unavailable');
+  reporter.fix(coords, 6000, 6000, 6000);
+  assert.ok(say(reporter, 6000).lat_deg, 'a fix after a reason waits for nothing');
 });
 
 test('a refusal is told at once, over everything, and forgotten when it is asked again', () => {
-  const teller = asking();
-  teller.fix(coords, 0, 0, 0);
-  say(teller, 0);
-  teller.fail('denied');
-  assert.equal(say(teller, 100), 'denied');
-  teller.isHidden = true;
-  assert.equal(say(teller, 200), null);
-  assert.equal(teller.why(200), 'denied');
-  teller.isHidden = false;
-  teller.begin(300);
-  assert.equal(say(teller, 300), 'timeout');
+  const reporter = asking();
+  reporter.fix(coords, 0, 0, 0);
+  say(reporter, 0);
+  reporter.fail('denied');
+  assert.equal(say(reporter, 100), 'denied');
+  reporter.isHidden = true;
+  assert.equal(say(reporter, 200), null);
+  assert.equal(reporter.why(200), 'denied');
+  reporter.isHidden = false;
+  reporter.begin(300);
+  assert.equal(say(reporter, 300), 'timeout');
 });
 
 test('in the background there is no position, whatever came before', () => {
-  const teller = asking();
-  teller.fix(coords, 0, 0, 0);
-  teller.isHidden = true;
-  assert.equal(say(teller, 100), 'hidden');
-  teller.isHidden = false;
-  assert.ok(say(teller, 200).lat_deg);
+  const reporter = asking();
+  reporter.fix(coords, 0, 0, 0);
+  reporter.isHidden = true;
+  assert.equal(say(reporter, 100), 'hidden');
+  reporter.isHidden = false;
+  assert.ok(say(reporter, 200).lat_deg);
 });
 
 test('a new connection is told anew, and what did not go out is told later', () => {
-  const teller = asking();
-  teller.fail('denied');
-  assert.equal(say(teller, 0), 'denied');
-  assert.equal(say(teller, 100), null);
-  teller.forget();
-  assert.deepEqual(teller.due(200), { why: 'denied' });
-  assert.deepEqual(teller.due(300), { why: 'denied' });
+  const reporter = asking();
+  reporter.fail('denied');
+  assert.equal(say(reporter, 0), 'denied');
+  assert.equal(say(reporter, 100), null);
+  reporter.forget();
+  assert.deepEqual(reporter.due(200), { why: 'denied' });
+  assert.deepEqual(reporter.due(300), { why: 'denied' });
 });
 
 test('the browser’s three errors', () => {

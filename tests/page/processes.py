@@ -9,26 +9,50 @@ import re
 import signal
 import socket
 import sys
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 import httpx
+import psutil
+
+from tests.through_broker import NODE
+
+IS_PARTED = bool(os.environ.get("CATGRAPH_THROUGH_BROKER"))  # a server is an agent, a broker and a web node
+
+
+AT_AGENT = "/agents/car" if IS_PARTED else ""  # what stands before addresses of the recordings and the mail of a car
+
+
+def page_data(data: Path) -> Path:
+    """The folder with what belongs to the pages of a server, as who is paired."""
+    return data / NODE if IS_PARTED else data
 
 
 class Process:
     """One `python -m server …`, of the project in `folder` where one is given; `address` is what it printed."""
 
-    def __init__(self, *arguments: str, folder: Path | None = None) -> None:
+    def __init__(
+        self, *arguments: str, module: str = "server", folder: Path | None = None, within: tuple[str, ...] = ()
+    ) -> None:
+        """`within`: a command that runs another one, as in a network of its own."""
+        self._given = module
+        self._within = within
         self._arguments = arguments
         self._folder = folder
         self._process: asyncio.subprocess.Process | None = None
         self._reader: asyncio.Task[None] | None = None
         self.address = ""
+        self.console = ""  # where a program beside the car asks: the agent's own address, where a server is parted
+
+    @property
+    def _module(self) -> str:
+        return "tests.through_broker" if IS_PARTED and self._arguments[0] == "serve" else self._given
 
     async def start(self) -> Process:
         """Starts it and waits until it says its address."""
         self._process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "server", *self._arguments),
+            *(*self._within, sys.executable, "-m", self._module, *self._arguments),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
@@ -37,13 +61,15 @@ class Process:
         )
         out = self._process.stdout
         assert out is not None
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(90 if IS_PARTED else 30):
             while True:
                 line = (await out.readline()).decode()
                 assert line, f"{self._arguments} ended before it said its address"
-                found = re.search(r"(?:ws|https?)://[^\s/]+:\d+", line)
-                if found:
+                if at_agent := re.match(r"console at (\S+)", line):
+                    self.console = f"http://{at_agent[1]}"
+                elif found := re.search(r"(?:ws|https?)://[^\s/]+:\d+", line):
                     self.address = found.group()
+                    self.console = self.console or self.address
                     break
         self._reader = asyncio.create_task(self._drain(out))
         return self
@@ -67,6 +93,14 @@ class Process:
     def thaw(self) -> None:
         self._send(signal.SIGCONT)
 
+    async def terminate(self) -> float:
+        """As a service manager ends it; answers how long it took [s]."""
+        assert self._process is not None
+        began_s = time.monotonic()
+        self._process.terminate()
+        await asyncio.wait_for(self._process.wait(), 60)
+        return time.monotonic() - began_s
+
     async def kill(self) -> None:
         """At once; nothing happens where it never began."""
         if self._process is None:
@@ -79,6 +113,8 @@ class Process:
 
     def _send(self, what: signal.Signals) -> None:
         assert self._process is not None
+        for part in psutil.Process(self._process.pid).children(recursive=True):  # where it is several
+            part.send_signal(what)
         self._process.send_signal(what)
 
     @staticmethod
@@ -88,9 +124,11 @@ class Process:
 
 
 @contextlib.asynccontextmanager
-async def running(*arguments: str, folder: Path | None = None) -> AsyncIterator[Process]:
+async def running(
+    *arguments: str, module: str = "server", folder: Path | None = None, within: tuple[str, ...] = ()
+) -> AsyncIterator[Process]:
     """A process for the length of the block."""
-    process = Process(*arguments, folder=folder)
+    process = Process(*arguments, module=module, folder=folder, within=within)
     try:
         yield await process.start()
     finally:

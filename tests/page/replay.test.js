@@ -6,8 +6,8 @@ import { dialogOf } from '../../static/js/shell/dialogs.js';
 import { chainOf } from '../../static/js/core/link.js';
 import { Track } from '../../static/js/map/map-track.js';
 import { readMessage } from '../../static/js/core/protocol.js';
-import { asideOf, atByKey, atOf, BASE, clockOf, countWords, gapBands, liveWords, markBeside, markPath, momentOf, placed, rateWords, sketchOf, speedPath, spoken, summaryOf, xOf } from '../../static/js/replay/replay-layout.js';
-import { LEAD_S, jumpAt, jumpsOf, lengthOfJump, nearestJump } from '../../static/js/replay/replay-jumps-layout.js';
+import { asideOf, atByKey, atOf, BASE, clockOf, countWords, gapBands, liveWords, manualBands, markBeside, markPath, momentOf, placed, rateWords, sketchOf, speedPath, spoken, summaryOf, xOf } from '../../static/js/replay/replay-layout.js';
+import { LEAD_S, jumpAt, jumpWords, jumpsOf, lengthOfJump, nearestJump } from '../../static/js/replay/replay-jumps-layout.js';
 import { alarm, state } from './frames.js';
 
 const mark = (at_s, more = {}) => ({ at_s, alarm: 'speed_limit', title: 'Speed above limit', priority: /** @type {const} */ ('critical'), text: '', duration_s: null, ...more });
@@ -115,7 +115,7 @@ test('what is live is told beside a recording: alarms, a lost link, a pause, and
 
 test('the list of jumps has alarms of every priority and gaps, in the order of time, and leads to what came before each', () => {
   const marks = [mark(20, { duration_s: 8.04 }), mark(33, { priority: 'advisory', title: 'Fuel low' }), mark(3, { priority: 'warning', duration_s: 71 })];
-  const jumps = jumpsOf({ marks, gaps: [[40, 46]] });
+  const jumps = jumpsOf({ marks, gaps: [[40, 46]], flags: [], interventions: [] });
   assert.deepEqual(jumps.map(({ at_s, kind, title }) => [at_s, kind, title]), [[3, 'warning', 'Speed above limit'], [20, 'critical', 'Speed above limit'], [33, 'advisory', 'Fuel low'], [40, 'gap', 'Nothing recorded']]);
   assert.deepEqual(jumps.map(jumpAt), [0, 20 - LEAD_S, 33 - LEAD_S, 40 - LEAD_S], 'never before the beginning');
   assert.deepEqual(jumps.map((jump) => lengthOfJump(jump, true)), ['1:11 min', '8.0 s', 'to the end', '6.0 s']);
@@ -125,6 +125,24 @@ test('the list of jumps has alarms of every priority and gaps, in the order of t
   assert.equal(nearestJump([3, 20], 0), 0);
   assert.equal(nearestJump([8, 20], 0), 0, 'before the first');
   assert.equal(nearestJump([], 9), -1);
+});
+
+test('marks and interventions stand among the jumps, with what was said of them', () => {
+  const said = { mark: 'm', marked_ms: 0, voice: false, photo: false, source: /** @type {const} */ ('page') };
+  const flags = [{ ...said, at_s: 5, category: 'object', words: '<b>crate', by: 'A. K.' }, { ...said, at_s: 9, category: null, words: '', by: null }];
+  const interventions = [{ at_s: 7, kind_of: 'to_manual', category: 'object_late', what: 'A box.' }, { at_s: 8, kind_of: 'of a newer server', category: null, what: '' }];
+  const line = { marks: [mark(6)], gaps: [], flags, interventions };
+  assert.deepEqual(jumpsOf(line).map(({ at_s, kind, title, text }) => [at_s, kind, title, text]), [
+    [5, 'flag', '<b>crate', 'Object · A. K.'], [6, 'critical', 'Speed above limit', ''], [7, 'wheel', 'Take-over', 'Object late: A box.'],
+    [8, 'wheel', 'Intervention', 'not described'], [9, 'flag', 'Mark', ''],
+  ]);
+  assert.equal(jumpWords(line), '1 alarm, 2 marks, 2 interventions');
+  assert.equal(lengthOfJump({ length_s: 0 }, true), '');
+});
+
+test('where a person drives is a band', () => {
+  const modes = [{ mode: 'manual', from_s: 0, to_s: 10 }, { mode: 'autonomous', from_s: 10, to_s: 90 }, { mode: 'manual', from_s: 90, to_s: 90.01 }];
+  assert.deepEqual(manualBands({ modes, length_s: 100 }, 200), [[0, 20], [180, 1]]);
 });
 
 test('the number of alarms is no promise while the recording is still read', () => {

@@ -219,3 +219,11 @@ test('words give way to words: half a line, a line, or they are left out', () =>
   assert.equal(clearOf([{ left: 41, top: 100, width: 40, height: 20 }], box)?.top, 100, 'beside it');
   assert.equal(clearOf([{ left: 0, top: 70, width: 40, height: 80 }], box), null);
 });
+
+test('a plot too low for its foot still has a scale: what lies ahead is above, and no radius is negative', () => {
+  for (const height of [1, 20, 47, 48, 60]) {
+    const { k, far_m, at } = plotScale(300, height, 20);
+    assert.ok(k > 0 && far_m > 0, String(height));
+    assert.ok(at(5, 0)[1] < at(0, 0)[1], String(height));
+  }
+});

@@ -16,6 +16,7 @@ from typing import Any
 from playwright.async_api import Browser, Page, async_playwright
 
 from tests.chromium import FLAGS, find_chromium
+from tests.page import canned_fleet
 from tests.page.canned import Canned, alarm, check, idle, live, slow, slowed
 from tests.server.web.map_files import png
 
@@ -53,6 +54,25 @@ WATCH: dict[str, tuple[str, int, int, str]] = {
     "watch-phone-home-320": ("home", 320, 568, "dark"),
     "watch-phone-alarms": ("alarms", 412, 915, "dark"),
     "watch-phone-alarms-ended": ("alarms-ended", 412, 915, "light"),
+    "watch-fleet-3": ("fleet-three", 1440, 900, "dark"),
+    "watch-fleet-3-light": ("fleet-three", 1440, 900, "light"),
+    "watch-fleet-100": ("fleet-hundred", 1440, 900, "light"),
+    "watch-fleet-100-flood": ("fleet-flood", 1440, 900, "dark"),
+    "watch-fleet-100-lap": ("fleet-flood", 1280, 720, "dark"),
+    "watch-fleet-quiet": ("fleet-quiet", 1440, 900, "dark"),
+    "watch-fleet-quiet-light": ("fleet-quiet", 1440, 900, "light"),
+    "watch-fleet-two": ("fleet-asked", 1440, 900, "light"),
+    "watch-fleet-broker-lost": ("fleet-lost", 1440, 900, "dark"),
+    "watch-fleet-tablet": ("fleet-three", 820, 1180, "dark"),
+    "watch-fleet-tablet-100": ("fleet-flood", 820, 1180, "light"),
+    "watch-fleet-phone-3": ("fleet-three", 412, 915, "light"),
+    "watch-fleet-phone-3-360": ("fleet-three", 360, 740, "dark"),
+    "watch-fleet-phone-flood": ("fleet-flood", 412, 915, "dark"),
+    "watch-fleet-phone-quiet": ("fleet-quiet", 412, 915, "dark"),
+    "watch-fleet-phone-lost": ("fleet-lost", 412, 915, "light"),
+    "watch-fleet-phone-cars": ("fleet-cars", 412, 915, "dark"),
+    "watch-fleet-phone-map": ("fleet-map", 412, 915, "light"),
+    "watch-fleet-land": ("fleet-three", 915, 412, "light"),
     "watch-phone-cars": ("cars", 412, 915, "dark"),
     "watch-bars-412": ("cars-bar", 412, 915, "dark"),
     "watch-bars-360": ("cars-bar", 360, 800, "dark"),
@@ -460,7 +480,7 @@ async def alarms_ended(server: Canned, page: Page) -> None:
     await page.wait_for_timeout(1200)
 
 
-def _car(name: str, speed_mps: float, *, holder: str | None = None, cut: str | None = None, **worst: Any) -> Any:
+def car(name: str, speed_mps: float, *, holder: str | None = None, cut: str | None = None, **worst: Any) -> Any:
     """One car of several, with its worst alarm."""
     age_s, waiting = 41.0 if cut else 0.1, int(worst.get("state") == "UNACKED")
     raised_ms = time.time_ns() // 1_000_000 - 7000
@@ -478,7 +498,7 @@ def _car(name: str, speed_mps: float, *, holder: str | None = None, cut: str | N
 
 async def _several_cars(server: Canned, page: Page, *others: Any) -> None:
     server.vehicle = "Ocelot"
-    server.cars = [_car("Ocelot", 4.2, holder="You"), *others]
+    server.cars = [car("Ocelot", 4.2, holder="You"), *others]
     server.state = live() | {"decelerate": slow("safe")}
     await page.goto("about:blank")
     await page.goto(f"{server.address}/#home")
@@ -491,20 +511,82 @@ async def _several_cars(server: Canned, page: Page, *others: Any) -> None:
 async def cars_bar(server: Canned, page: Page) -> None:
     """The bar with a badge: the name, who is in control, the chain, the recording, the menu."""
     drift: dict[str, Any] = {"title": "GPS drift", "priority": "warning", "state": "UNACKED"}
-    await _several_cars(server, page, _car("Caracal", 0.0, **drift))
+    await _several_cars(server, page, car("Caracal", 0.0, **drift))
 
 
 @scene("cars")
 async def cars(server: Canned, page: Page) -> None:
     await _several_cars(
         server, page,
-        _car("Serval", 12.6, title="Speed above limit", priority="critical", state="UNACKED"),
-        _car("Margay", 3.1, cut="bridge-car", title="Car silent", priority="critical", state="UNACKED"),
-        _car("Caracal", 0.0, holder="Desk 2", title="GPS drift", priority="warning", state="ACKED"),
-        _car("Kodkod", 8.0),
+        car("Serval", 12.6, title="Speed above limit", priority="critical", state="UNACKED"),
+        car("Margay", 3.1, cut="bridge-car", title="Car silent", priority="critical", state="UNACKED"),
+        car("Caracal", 0.0, holder="Desk 2", title="GPS drift", priority="warning", state="ACKED"),
+        car("Kodkod", 8.0),
     )  # fmt: skip
     await page.tap("#monitor [data-f=who]")
     await page.wait_for_selector("#sheet-cars[open]")
+
+
+async def _fleet(server: Canned, page: Page, cars: list[Any], show: str = "queue") -> None:
+    """The page of all cars."""
+    server.cars, server.fleet_events = cars, canned_fleet.events()
+    await page.goto(f"{server.address}/fleet")
+    await page.wait_for_selector("#fleet tbody tr", state="attached")
+    await page.mouse.click(4, 4)  # any touch lets the page sound
+    if await page.locator(f"[data-f=show-{show}]").is_visible():
+        await page.tap(f"[data-f=show-{show}]")
+    await page.wait_for_timeout(900)
+
+
+@scene("fleet-three")
+async def fleet_three(server: Canned, page: Page) -> None:
+    await _fleet(server, page, canned_fleet.three())
+
+
+@scene("fleet-quiet")
+async def fleet_quiet(server: Canned, page: Page) -> None:
+    await _fleet(server, page, canned_fleet.quiet())
+
+
+@scene("fleet-hundred")
+async def fleet_hundred(server: Canned, page: Page) -> None:
+    await _fleet(server, page, canned_fleet.hundred())
+
+
+@scene("fleet-flood")
+async def fleet_flood(server: Canned, page: Page) -> None:
+    await _fleet(server, page, canned_fleet.hundred(31))
+
+
+@scene("fleet-cars")
+async def fleet_cars(server: Canned, page: Page) -> None:
+    await _fleet(server, page, canned_fleet.hundred(31), "cars")
+
+
+@scene("fleet-map")
+async def fleet_map(server: Canned, page: Page) -> None:
+    await _fleet(server, page, canned_fleet.hundred(31), "map")
+
+
+@scene("fleet-asked")
+async def fleet_asked(server: Canned, page: Page) -> None:
+    """One item is offered to this page, another is its own."""
+    await _fleet(server, page, canned_fleet.three())
+    me = next(one["page"] for one in server.heard if one.get("kind") == "hello" and one["page"] != "")
+    mine = canned_fleet.holder({"page": me, "name": "Me"})
+    offered = {"by": "Desk 2", "name": "Me", "page": me, "since_ms": canned_fleet.now_ms() - 12_000}
+    server.cars[1]["summary"]["attention"] = canned_fleet.attention(ago_s=7, assigned=mine)
+    server.cars[2]["summary"]["attention"] = canned_fleet.attention(
+        ago_s=156, assigned=canned_fleet.holder(canned_fleet.DESK_2), offered=offered
+    )
+    await page.wait_for_selector("[data-act=accept]:visible")
+
+
+@scene("fleet-lost")
+async def fleet_lost(server: Canned, page: Page) -> None:
+    await _fleet(server, page, canned_fleet.three())
+    server.silent = True
+    await page.wait_for_selector("#fleet[data-state=lost]")
 
 
 @scene("check")

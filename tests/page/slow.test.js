@@ -29,14 +29,14 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
   };
   assert.equal(words(slow('not_available', { why: 'No link to the car.' })), 'off: Slow-down off No link to the car');
   assert.equal(words(slow('not_available', { why: 'The steering of this kind of car is not known, and a command would turn its wheels.' })), 'off: Slow-down off press for the reason');
-  assert.equal(words(slow('safe')), 'off: Slow-down off press to arm');
-  assert.equal(words(slow('safe'), { isViewer: true }), 'off: Slow-down off not for viewers');
+  assert.equal(words(slow('safe')), 'off: Slow-down not armed press to arm');
+  assert.equal(words(slow('safe'), { isViewer: true }), 'off: Slow-down not armed not for viewers');
   assert.equal(words(slow('armed'), { car: 'Ocelot', vehicle: 'Ocelot' }), 'armed: Slide to slow Ocelot');
   assert.equal(words(slow('armed')), 'armed: Slide to slow the car');
   assert.equal(words(slow('armed'), { isViewer: true }), 'off: Slow-down armed not for viewers');
   assert.equal(words(slow('armed'), { mayControl: false, holder: 'Ben' }), 'armed: Slide to slow the car', 'any operator stops the car');
-  assert.equal(words(slow('armed'), { isSilent: true }), 'off: Slow-down off the server does not answer');
-  assert.equal(words(null), 'off: Slow-down off the server does not answer');
+  assert.equal(words(slow('armed'), { isSilent: true }), 'off: State unknown no answer');
+  assert.equal(words(null), 'off: State unknown no answer');
   assert.equal(words(ordered()), 'go: Slowing to 0.0 m/s');
   assert.equal(words(ordered({ confirmed: null })), 'go: Ordered to 0.0 m/s', 'not told yet is not "slowing"');
   assert.equal(words(ordered({ confirmed: false })), 'go: Not confirmed physical stop!');

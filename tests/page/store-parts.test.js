@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Emitter } from '../../static/js/core/emitter.js';
 import { EventLog } from '../../static/js/core/event-log.js';
-import { controlOf, fenceOf, liveOf } from '../../static/js/core/live-car.js';
+import { challengeOf, controlOf, fenceOf, liveOf } from '../../static/js/core/live-car.js';
 import { LogSync } from '../../static/js/core/log-sync.js';
 import { Requests } from '../../static/js/core/requests.js';
 import { ScanFeed } from '../../static/js/core/scan-feed.js';
@@ -21,25 +21,123 @@ test('a listener that throws is a failure, and stops none of the others', () => 
   assert.deepEqual([heard, failed.length], [['one'], 2]);
 });
 
-test('what is asked is answered once, refused where it cannot be sent, and refused when the connection breaks', async (t) => {
+const NOT_SENT = { ok: false, outcome: 'not_delivered', reason: 'Not sent: the server does not answer.' };
+
+test('what is asked is answered once, not sent where it cannot be, and not known when no answer comes', async (t) => {
   t.mock.timers.enable({ apis: ['setTimeout'] });
   const sent = /** @type {any[]} */ ([]);
   const refused = /** @type {(string | undefined)[]} */ ([]);
   let isOpen = false;
   const requests = new Requests((message) => isOpen && Boolean(sent.push(message)), ({ reason }) => refused.push(reason));
-  assert.deepEqual(await requests.ask('pause', {}), { ok: false, reason: 'Not sent: the server does not answer.' });
+  assert.deepEqual(await requests.ask('pause', {}), NOT_SENT);
   isOpen = true;
   const first = requests.ask('pause', { fence: 7 });
-  assert.deepEqual(sent[0], { kind: 'pause', id: 'p2', fence: 7 });
-  requests.answered(/** @type {any} */ ({ kind: 'reply', id: 'p2', ok: false, reason: 'Not now.', held_by: 'Ann', conflict: true }));
+  const { id } = sent[0];
+  assert.deepEqual(sent[0], { kind: 'pause', id, fence: 7 });
+  requests.answered(/** @type {any} */ ({ kind: 'reply', id, ok: false, reason: 'Not now.', held_by: 'Ann', conflict: true }));
   assert.deepEqual(await first, { ok: false, reason: 'Not now.', isConflict: true, heldBy: 'Ann' });
   const second = requests.ask('pause', {});
   requests.broke();
-  assert.equal((await second).reason, 'The connection to the server broke.');
+  const broken = 'The connection to the server broke. It may have been carried out.';
+  assert.deepEqual(await second, { ok: false, outcome: 'unknown', reason: broken });
   const third = requests.ask('pause', {}, 100);
   t.mock.timers.tick(100);
-  assert.equal((await third).reason, 'The server did not answer in time.');
-  assert.deepEqual(refused, ['Not now.', 'The connection to the server broke.', 'The server did not answer in time.']);
+  const late = 'The server did not answer in time. It may have been carried out.';
+  assert.equal((await third).reason, late);
+  assert.deepEqual(refused, ['Not now.', broken, late]);
+});
+
+test('what became of it is asked since the moment it was asked for, not since it was given up', async (t) => {
+  t.mock.timers.enable({ apis: ['setTimeout'] });
+  let now_ms = 50_000;
+  t.mock.method(performance, 'now', () => now_ms);
+  const sent = /** @type {any[]} */ ([]);
+  const requests = new Requests((message) => Boolean(sent.push(message)), () => {});
+  const answer = requests.ask('pause', {});
+  now_ms += 4000;
+  t.mock.timers.tick(4000);
+  await answer;
+  requests.look(now_ms + 1000);
+  assert.equal(sent[1].ago_s, 5);
+});
+
+test('what became of a command that was not answered is asked until it is known, and told once', async () => {
+  const sent = /** @type {any[]} */ ([]);
+  const found = /** @type {any[]} */ ([]);
+  const requests = new Requests((message) => Boolean(sent.push(message)), () => {}, () => null, (one) => found.push(one));
+  void requests.ask('pause', {});
+  void requests.ask('take_item', /** @type {any} */ ({ vehicle: 'ocelot' }));
+  void requests.ask('replay', /** @type {any} */ ({ do: 'play' }));
+  requests.broke();
+  const [pause, take] = sent.splice(0).map(({ id }) => id);
+  const now_ms = performance.now();
+  requests.look(now_ms);
+  requests.look(now_ms + 1000);
+  assert.deepEqual(sent.map(({ ago_s, ...rest }) => (assert.ok(ago_s >= 0 && ago_s < 1), rest)), [
+    { kind: 'outcome', id: `${pause}?`, of: pause }, { kind: 'outcome', id: `${take}?`, of: take, vehicle: 'ocelot' },
+  ]);
+  const reply = (/** @type {string} */ id, /** @type {object} */ rest) => requests.answered(/** @type {any} */ ({ kind: 'reply', id, ok: true, ...rest }));
+  reply(`${pause}?`, { became: 'under_way' });
+  reply(`${pause}?`, { ok: false, reason: 'The agent does not answer.' });
+  assert.deepEqual(found, []);
+  reply(`${pause}?`, { became: 'done' });
+  reply(`${pause}?`, { became: 'done' });
+  reply(take, { ok: false, reason: 'Ben has it.' }); // its own answer, late
+  assert.deepEqual(found, [{ kind: 'pause', became: 'done', reason: '' }, { kind: 'take_item', became: 'refused', reason: 'Ben has it.' }]);
+  sent.length = 0;
+  void requests.ask('resume', {});
+  requests.broke();
+  requests.look(performance.now() + 61_000);
+  assert.deepEqual(found[2], { kind: 'resume', became: 'not_known', reason: '' });
+  void requests.ask('resume', {});
+  requests.broke();
+  requests.forget();
+  sent.length = 0;
+  requests.look(performance.now() + 5000);
+  assert.deepEqual(sent, []);
+});
+
+test('an answer that says that it is not known is looked up as well', async () => {
+  const sent = /** @type {any[]} */ ([]);
+  const requests = new Requests((message) => Boolean(sent.push(message)), () => {});
+  const answer = requests.ask('pause', {});
+  requests.answered(/** @type {any} */ ({ kind: 'reply', id: sent[0].id, ok: false, outcome: 'unknown', reason: 'The agent of ocelot did not answer. It may have been carried out.' }));
+  assert.equal((await answer).outcome, 'unknown');
+  requests.look(performance.now());
+  assert.equal(sent[1].of, sent[0].id);
+});
+
+test('what must be signed is sent once it is, in its order, and never late', async (t) => {
+  t.mock.timers.enable({ apis: ['setTimeout'] });
+  const sent = /** @type {any[]} */ ([]);
+  let isOpen = true;
+  /** @type {((message: object | null) => void)[]} */
+  const done = [];
+  const seal = (/** @type {{id: string}} */ message) => new Promise((resolve, reject) => { done.push((signed) => (signed ? resolve({ ...message, ...signed }) : reject(new Error('no key')))); });
+  const requests = new Requests((message) => isOpen && Boolean(sent.push(message)), () => {}, /** @type {any} */ (seal));
+  const first = requests.ask('pause', {});
+  assert.deepEqual(sent, []);
+  done[0]?.({ signed: 1 });
+  await Promise.resolve();
+  await Promise.resolve();
+  assert.equal(sent[0].signed, 1);
+  requests.answered(/** @type {any} */ ({ kind: 'reply', id: sent[0].id, ok: true }));
+  assert.deepEqual(await first, { ok: true });
+  const second = requests.ask('pause', {});
+  t.mock.timers.tick(4000);
+  assert.deepEqual(await second, { ...NOT_SENT, reason: 'Not sent: this device could not sign it.' }, 'it never went out');
+  done[1]?.({ signed: 2 });
+  const third = requests.ask('pause', {});
+  isOpen = false;
+  done[2]?.({ signed: 3 });
+  assert.deepEqual(await third, NOT_SENT);
+  const fourth = requests.ask('pause', {});
+  done[3]?.(null);
+  assert.equal((await fourth).reason, 'Not sent: this device could not sign it.');
+  const fifth = requests.ask('pause', {});
+  requests.broke();
+  assert.deepEqual(await fifth, NOT_SENT);
+  assert.equal(sent.length, 1);
 });
 
 test('a scan is asked for while anybody wants it, and again of a server that begins anew', () => {
@@ -76,6 +174,9 @@ test('while a recording is shown, alarms and control are those of the live car',
   assert.deepEqual(liveOf(frame)?.alarms, live.alarms);
   assert.equal(liveOf(frame)?.session.phase, 'lost');
   assert.equal(liveOf(state({ replay: {} })), null);
+  assert.equal(challengeOf(state({ replay: {}, live: { challenge: 'now' }, server: { challenge: 'of the node' } })), 'now');
+  assert.equal(challengeOf(state({ replay: {}, server: { challenge: 'of the node' } })), undefined);
+  assert.equal(challengeOf(state({ server: { challenge: 'live' } })), 'live');
   assert.equal(fenceOf(controlOf(frame), 'mine', null), 4);
   assert.equal(fenceOf(controlOf(frame), 'other', null), null);
   assert.equal(fenceOf(controlOf(frame), 'other', 5), 5, 'an answer is ahead of the frames');

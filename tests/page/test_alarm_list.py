@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import re
 from typing import Any
 
 import pytest
@@ -97,6 +99,7 @@ async def test_a_list_longer_than_the_screen_is_turned_and_no_row_is_sliced(phon
     await phone.page.set_viewport_size({"width": 320, "height": 640})
     await phone.open(canned.address)
     await phone.live()
+    await expect(phone.page.locator(".ledge")).to_be_attached()  # it comes last, and takes room
     await phone.f("strip").press("Enter")
     rows = phone.page.locator("[data-f=alarms] li:not([hidden])")
     whole = """() => {
@@ -237,3 +240,26 @@ async def test_the_empty_list_of_a_paused_car_does_not_say_that_there_are_no_ala
     await expect(none).to_have_text("No alarms.")
     returned.state["session"] |= {"paused": True, "paused_for_s": 42.1}
     await expect(none).to_have_text("Monitoring is paused: no alarm can be raised.")
+
+
+async def test_a_quiet_list_says_what_was_lately_and_makes_way_for_what_waits(phone: Phone, canned: Canned) -> None:
+    at_ms = 1_778_076_238_000
+    common = {"alarm": "not_moving", "title": "Car not moving", "text": "", "occurrence": 1, "priority": "advisory"}
+    canned.log = [
+        {"n": 117, "at_ms": at_ms, "change": "cleared"} | common,
+        {"n": 116, "at_ms": at_ms - 9000, "change": "raised"} | common,
+    ]
+    canned.state["alarm_load"] |= {"in_10_min": 2}
+    await phone.open(canned.address)
+    await phone.live()
+    await phone.f("strip").tap()
+    lately = phone.f("alarms-lately")
+    await expect(lately).to_have_text(re.compile(r"^Last: Car not moving, ended \d\d:03:58. In 10 min: 2 alarms.$"))
+    if folder := os.environ.get("CATGRAPH_LOOK"):
+        await phone.page.screenshot(path=f"{folder}/lately.png")
+    canned.state["alarms"] = [alarm("gps_jump", "GPS runs away", **RETURNED)]
+    await expect(lately).to_be_hidden()
+    canned.state["alarms"] = []
+    await expect(lately).to_be_visible()
+    canned.silent = True
+    await expect(lately).to_be_hidden()

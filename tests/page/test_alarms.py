@@ -66,6 +66,7 @@ async def test_case_17_and_18_a_speed_alarm_on_each_tab_and_its_acknowledgement(
         await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "asking")
         await expect(phone.f("strip")).to_contain_text("Speed above limit")
         if tab == "map":
+            await expect(sheet).not_to_have_attribute("data-moved", "")
             await phone.page.keyboard.press("Escape")  # and the phone's back key: seen
         else:
             await phone.f("acknowledge", "#sheet-alarm").tap()

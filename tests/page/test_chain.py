@@ -15,6 +15,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
+from tests.page.canned import Canned
 from tests.page.conftest import Phone
 from tests.page.drives import number, steady, twist, write
 from tests.page.processes import Drive, driving, free_port, replay, running, server, simulate
@@ -63,6 +64,7 @@ async def test_a_silent_car(phone: Phone, drive: Drive) -> None:
     await covered(phone, "values", "The car fell silent.", CAR_S, began_s)
     sheet = phone.page.locator("#sheet-lost")
     await expect(sheet).to_contain_text("The car may still be moving: watch the car.")
+    await expect(phone.page.locator("#sheet-lost")).not_to_have_attribute("data-moved", "")
     await phone.page.keyboard.press("Escape")  # seen: the sheet goes, the veil stays
     await expect(sheet).to_be_hidden()
     await cut_between(phone, "#monitor .veil", "Bridge", "Car")
@@ -107,6 +109,7 @@ async def test_a_killed_bridge_and_its_return_on_the_same_port(phone: Phone, tmp
         sheet = phone.page.locator("#sheet-lost")
         await expect(sheet).to_be_visible()
         await cut_between(phone, "#sheet-lost", "Server", "Bridge")
+        await expect(phone.page.locator("#sheet-lost")).not_to_have_attribute("data-moved", "")
         await phone.page.keyboard.press("Escape")  # seen: the sheet goes, the veil and the strip stay
         await expect(sheet).to_be_hidden()
         await expect(phone.f("strip")).to_contain_text("Connection lost")
@@ -273,6 +276,7 @@ async def test_a_page_that_is_stopped_wakes_under_the_veil(phone: Phone, drive: 
     finally:
         for one in renderers:
             one.resume()
+    await phone.page.wait_for_function("() => window.seen.length > 0")  # else what still stood from before would do
     await phone.live()
     assert (await phone.page.evaluate("window.seen"))[0] == "all"
 
@@ -329,3 +333,20 @@ async def test_case_03_connected_but_no_message(phone: Phone, tmp_path: Path) ->
         await expect(sheet).to_be_visible(timeout=12_000)
         await sheet.locator("[data-f=exit]").tap()
         await expect(phone.page.locator("#connect")).to_be_visible()
+
+
+@pytest.mark.parametrize("every_s", [0.6, 0.7, 0.9])
+async def test_seldom_states_are_not_covered(phone: Phone, canned: Canned, every_s: float) -> None:
+    """Between two of them the page draws on its own; each fresh one rewinds the cover all the same."""
+    canned.states_every_s = every_s
+    await phone.open(f"{canned.address}/#home")
+    await phone.live()
+    await phone.page.evaluate(
+        """() => {
+          window.covered = 0;
+          const veil = document.querySelector('#monitor .veil');
+          setInterval(() => { window.covered += Number(getComputedStyle(veil).opacity === '1'); }, 20);
+        }"""
+    )
+    await phone.page.wait_for_timeout(5000)
+    assert await phone.page.evaluate("() => window.covered") == 0

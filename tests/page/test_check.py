@@ -119,3 +119,21 @@ async def test_what_the_server_no_longer_says_is_not_shown_as_checked(phone: Pho
     await expect(phone.f("check-tag")).to_have_text("NOT CHECKED")
     await expect(phone.f("check-figures")).to_contain_text("Speed–")
     await expect(phone.f("check-sentence")).to_contain_text("It was: 12.6 m/s")
+
+
+async def test_a_suppressed_alarm_opens_with_its_cause(phone: Phone, checked: Canned) -> None:
+    checked.state["suppressed"] = [
+        {"id": "gps_jump", "title": "GPS jumps", "priority": "warning", "by": ["Connection lost"], "raised_ms": None}
+    ]
+    checked.checks["gps_jump"] = check(
+        "gps_jump", "GPS jump", title="GPS jumps", verdict="fault", text="Moved 40 m in 0.1 s",
+        suppressed_by=["Connection lost"],
+    )  # fmt: skip
+    await phone.open(checked.address)
+    await phone.live()
+    await phone.f("strip").press("Enter")
+    await phone.page.locator("[data-f=alarms] li [data-f=open]").press("Enter")
+    story = phone.f("check-alarm")
+    await expect(story).to_contain_text("GPS jumps suppressed")
+    await expect(story).to_contain_text("Cause: Connection lost. It is announced if it stands when that is over.")
+    await expect(story.locator("button")).to_have_count(0)

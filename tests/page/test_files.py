@@ -18,7 +18,7 @@ from tests.page.barriers import SIZES, no_barrier
 from tests.page.canned import Canned
 from tests.page.conftest import Phone
 from tests.page.drives import steady
-from tests.page.processes import Process, replay, running, server
+from tests.page.processes import AT_AGENT, Process, replay, running, server
 from tests.page.touch import DRAWN, stroke
 from tests.server.recording.made import BEGAN_MS, record
 
@@ -96,7 +96,8 @@ async def test_case_7_6_2_pressing_a_file_opens_its_context_menu(opened: Phone) 
         await expect(sheet(opened).locator("h2")).to_have_text(HOSTILE)
         items = await sheet(opened).locator(".menu-list li").all_inner_texts()
         assert [re.sub(r"\n.*", "", one) for one in items] == [
-            "Open replay", "Share", "E-mail", "Download", "Cut out an incident", "Rename", "Note and tags", "Delete",
+            "Open replay", "Drive report", "Compare along the way", "Share", "E-mail", "Download",
+            "Cut out an incident", "Verify", "Rename", "Note and tags", "Delete",
         ]  # fmt: skip
         about = sheet(opened).locator(".bd")
         for words in ("00:30 min", "2 critical alarms, 1 warning", "Recovered", "wet"):
@@ -239,7 +240,7 @@ async def test_the_file_itself_is_saved(opened: Phone, tmp_path: Path) -> None:
 async def test_another_form_is_made_while_one_waits_and_can_be_cancelled(opened: Phone, tmp_path: Path) -> None:
     await row(opened, name_of(5)).get_by_role("button").tap()
     await sheet(opened).get_by_text("Download").tap()
-    await sheet(opened).get_by_role("button", name="HTML report").tap()
+    await sheet(opened).get_by_role("button", name="Drive report").tap()
     await expect(sheet(opened).get_by_role("progressbar")).to_be_visible()
     await sheet(opened).get_by_role("button", name="Cancel").tap()
     await expect(sheet(opened).get_by_role("button", name="GPX track")).to_be_visible()
@@ -263,6 +264,18 @@ async def test_an_incident_becomes_a_recording_of_its_own(opened: Phone) -> None
     await expect(clip).to_have_count(1, timeout=40_000)
     await expect(clip).to_have_attribute("data-state", "read", timeout=40_000)
     await expect(clip).to_contain_text("00:30 min")  # all of it lies within 30 s of the alarm
+
+
+async def test_verify_says_whether_it_is_as_it_was_recorded(opened: Phone, watch: Process) -> None:
+    await row(opened, name_of(0)).click()
+    about = sheet(opened).locator(".bd")
+    await expect(about.locator("[data-f=chain]")).to_have_count(0)
+    await sheet(opened).get_by_role("button", name="Verify").click()
+    await expect(about.locator("[data-f=verified]")).to_have_text(re.compile(r"^Intact · [0-9a-f]{8}$"))
+    await expect(about).to_contain_text(re.compile(r"Intact: \d+ records, head [0-9a-f]{64}\."))
+    await sheet(opened).get_by_role("button", name="Back").click()
+    await expect(about.locator("[data-f=chain]")).to_have_text(re.compile(r"^Event log: Intact · [0-9a-f]{8}$"))
+    await opened.page.keyboard.press("Escape")
 
 
 async def test_open_replay_shows_it(opened: Phone) -> None:
@@ -306,7 +319,7 @@ async def test_a_phone_that_shares_no_files_shares_a_link(opened: Phone) -> None
     await sheet(opened).get_by_role("button", name="Share the link").tap()
     await expect(sheet(opened)).to_be_hidden()
     (shared,) = await opened.page.evaluate("window.shared")
-    assert shared["url"].endswith(f"/api/recordings/{name_of(5)}/file.mcap")
+    assert shared["url"].endswith(f"{AT_AGENT}/api/recordings/{name_of(5)}/file.mcap")
 
 
 async def test_a_phone_that_shares_files_is_handed_the_file(opened: Phone) -> None:
@@ -338,7 +351,7 @@ async def test_a_silent_server_is_said_and_the_list_is_not_passed_off_as_new(ope
 
 async def test_no_barrier_in_any_sheet_of_a_file(opened: Phone) -> None:
     button = row(opened, name_of(5)).get_by_role("button")
-    for action in ("Download", "Cut out an incident", "Rename", "Note and tags", "Delete"):
+    for action in ("Download", "Cut out an incident", "Verify", "Rename", "Note and tags", "Delete"):
         await button.tap()
         await sheet(opened).locator(".menu-list li", has_text=action).tap()
         await expect(sheet(opened).locator("h2")).to_contain_text(re.compile(action.split()[0]))

@@ -14,7 +14,7 @@ from playwright.async_api import Browser, Page
 from tests.page.conftest import PHONE
 from tests.page.processes import Process, running, server, simulate
 
-COLD_S, WARM_S = 0.8, 0.4
+COLD_S, WARM_S = 0.8, 0.6
 COLD_BYTES = 100_000
 SETTLES_MS = 3000  # a window of this browser loads two hundred files of its own when it opens
 ACCESS_POINT = {"offline": False, "latency": 5, "downloadThroughput": 20e6 / 8, "uploadThroughput": 20e6 / 8}

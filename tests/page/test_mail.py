@@ -16,7 +16,7 @@ from playwright.async_api import Locator, expect
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.conftest import Phone
 from tests.page.drives import steady
-from tests.page.processes import Process, replay, running, server
+from tests.page.processes import AT_AGENT, Process, replay, running, server
 from tests.server.mail.post import Post, posting
 from tests.server.recording.made import BEGAN_MS, record
 
@@ -81,9 +81,9 @@ async def test_mail_is_set_up_and_tried_in_settings(
     await expect(host).to_be_visible()
     await host.fill("127.0.0.1")
     await group(phone).get_by_role("button", name="TLS", exact=True).tap()
-    await expect(group(phone).get_by_label("Port")).to_have_value("465")
+    await expect(group(phone).get_by_label("Port", exact=True)).to_have_value("465")
     await group(phone).get_by_role("button", name="None").tap()
-    await group(phone).get_by_label("Port").fill(str(post.port))
+    await group(phone).get_by_label("Port", exact=True).fill(str(post.port))
     await group(phone).get_by_label("Sender’s address").fill("car@test.example, evil@x")
     await group(phone).get_by_role("button", name="Save").tap()
     await expect(group(phone).get_by_role("alert")).to_contain_text("is not one address")
@@ -173,7 +173,8 @@ async def test_the_phones_own_mail_program_gets_links_where_it_takes_no_files(
     await expect(sheet.get_by_role("status")).to_contain_text("gets links, because this phone cannot share files")
     asked = await phone.page.evaluate("window.asked")
     assert asked.startswith("mailto:ann@example.org?subject=")
-    assert f"Hello & <b>Ann</b>\r\n\r\n{watch.address}/api/recordings/{DRIVE}/file.mcap" in unquote(asked)
+    link = f"{watch.address}{AT_AGENT}/api/recordings/{DRIVE}/file.mcap"
+    assert f"Hello & <b>Ann</b>\r\n\r\n{link}" in unquote(asked)
 
 
 async def test_the_phones_own_mail_program_is_handed_the_file_where_it_takes_it(

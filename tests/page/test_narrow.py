@@ -7,6 +7,7 @@ from playwright.async_api import expect
 
 from tests.page.canned import Canned, Json, alarm, live, slowed
 from tests.page.conftest import Phone
+from tests.page.screenshots import car
 
 # What is wider or higher than its own room.
 CUT = """(names) => names.filter((name) => [...document.querySelectorAll(name)].some((one) => one.offsetParent
@@ -46,6 +47,34 @@ async def test_the_bar_shows_the_age_the_recording_and_who_is_in_control_side_by
             over = "el => el.scrollWidth - el.clientWidth"
             assert await phone.f("rec").evaluate(over) <= 0, (width, holder)
             assert await phone.f("link").evaluate(over) <= 0, (width, holder)
+
+
+async def test_the_bar_holds_a_long_recording_and_the_badge_of_the_other_cars(phone: Phone, canned: Canned) -> None:
+    """Twelve other cars need a person, the recording is over an hour old, the age has two digits."""
+    canned.vehicle = "Caracal"
+    drift: Json = {"title": "GPS drift", "priority": "critical", "state": "UNACKED"}
+    canned.cars = [car("Caracal", 4.2, holder="You"), *(car(f"Serval {n}", 0.0, **drift) for n in range(12))]
+    canned.state = live() | {"recording": {"state": "recording", "for_s": 3870.0}}
+    await phone.open(canned.address)
+    await phone.live()
+    await expect(phone.f("rec-for")).to_have_text("1:04 h")
+    await expect(phone.f("car-badge")).to_be_visible()
+    await expect(phone.f("car-count")).to_have_text("12")
+    for width in (412, 360, 320):
+        await phone.page.set_viewport_size({"width": width, "height": 800})
+        assert await phone.page.evaluate(CROSSING, "#monitor .top > *") == 0, width
+        names = [f'#monitor .top [data-f="{name}"]' for name in ("car-name", "who-name", "rec", "link", "rec-for")]
+        assert await phone.page.evaluate(CUT, names) == [], width
+        assert await phone.page.evaluate(OUTSIDE, "#monitor .top *") == 0, width
+
+
+async def test_the_strip_of_a_quiet_car_is_read_whole(phone: Phone, canned: Canned) -> None:
+    await phone.open(canned.address)
+    await phone.live()
+    await expect(phone.f("strip-text")).to_have_text("No alarms")
+    for width in (412, 360, 320):
+        await phone.page.set_viewport_size({"width": width, "height": 800})
+        assert await phone.page.evaluate(CUT, ['[data-f="strip-text"]', '[data-f="strip-end"]']) == [], width
 
 
 @pytest.mark.world(n=11)

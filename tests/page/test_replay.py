@@ -18,15 +18,10 @@ from tests.page import drives
 from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
+from tests.page.replay_places import LONG_ONE, PLACES
 from tests.page.touch import DRAWN
 
 OPENS_MS = 40_000
-PLACES = """() => ['.replay-top', '.top .menu', '.replay-date', '.replay-line', '#monitor .view',
-  '.time-line', '.tape-keys .clock', ...[1, 2, 3, 4, 5].map((n) => `.keysrow > :nth-child(${n})`)]
-  .map((selector) => {
-    const {left, right, top, bottom} = document.querySelector(selector).getBoundingClientRect();
-    return [selector, left, right, top, bottom];
-  })"""
 
 
 def speed(t: float) -> Any:
@@ -68,6 +63,7 @@ async def replayed(phone: Phone, watch: Watch, at_s: float, tab: str = "home") -
 async def shown(page: Page) -> None:
     await page.wait_for_selector('html[data-replay="on"]', state="attached", timeout=OPENS_MS)
     await expect(page.locator(".scrub .all")).to_have_attribute("d", re.compile("L"), timeout=OPENS_MS)
+    await expect(page.locator(".scrub .time-line:not([inert])")).to_be_visible()  # drawn once: it can be pressed
 
 
 def clock(page: Page) -> Any:
@@ -139,12 +135,12 @@ async def test_marks_stand_at_the_alarms_and_keys_lead_there(phone: Phone, watch
     page = await replayed(phone, watch, 10.0)
     await expect(page.locator(".marks .critical").first).to_be_attached(timeout=OPENS_MS)
     await expect(page.locator(".unread")).to_have_count(0, timeout=OPENS_MS)
-    await page.get_by_role("button", name="Next alarm").tap()
+    await page.get_by_role("button", name="Next event").tap()
     await expect(page.locator(".replay-line")).to_contain_text(re.compile("Speed above limit|Obstacle ahead"))
     await expect(clock(page)).to_have_text("00:20")
     await page.get_by_role("slider", name="Position in the recording").press("End")
     await expect(clock(page)).to_have_text("01:09")
-    await page.get_by_role("button", name="Previous alarm").tap()
+    await page.get_by_role("button", name="Previous event").tap()
     await expect(clock(page)).not_to_have_text("01:09")
 
 
@@ -334,15 +330,14 @@ async def test_nothing_overlaps_or_overflows_or_is_too_small(phone: Phone, watch
         .filter(([, box]) => box.width < 56 || box.height < 56).map(([text]) => text)"""
     )
     assert small == []
-    for width, height in ((320, 640), (915, 412), (1280, 800)):
+    for width, height in ((320, 640), (360, 780), (412, 915), (915, 412), (1280, 800)):
         await page.set_viewport_size({"width": width, "height": height})
+        assert await page.evaluate(LONG_ONE) <= 0, width
         await page.evaluate(DRAWN)
         boxes = await page.evaluate(PLACES)
         for selector, left, right, top, bottom in boxes:
-            assert -0.5 <= left, (selector, width)
-            assert right <= width + 0.5, (selector, width)
-            assert -0.5 <= top, (selector, width)
-            assert bottom <= height + 0.5, (selector, width)
+            assert -0.5 <= left <= right <= width + 0.5, (selector, width)
+            assert -0.5 <= top <= bottom <= height + 0.5, (selector, width)
         for i, (a, *one) in enumerate(boxes):
             for b, *two in boxes[i + 1 :]:
                 apart = one[1] <= two[0] + 1 or two[1] <= one[0] + 1 or one[3] <= two[2] + 1 or two[3] <= one[2] + 1

@@ -196,7 +196,8 @@ async def test_two_fingers_zoom_the_plot_and_leave_the_tab_where_it_is(phone: Ph
         box = await phone.f(key, "#panel-scan").bounding_box()
         assert min(box["width"], box["height"]) >= 56
     ten = phone.page.locator("[data-range='10']")
-    await ten.tap()
+    await phone.no_snackbar()
+    await phone.press_toggle(ten)
     await phone.f("farther", "#panel-scan").tap()
     assert await reach(phone) == pytest.approx(14.1, abs=0.1)
     await phone.f("farther", "#panel-scan").tap()
@@ -285,19 +286,20 @@ async def test_corridor_gap_and_stopping_distance_are_those_of_the_judge(phone: 
     inner, outer = centre_m - 1.2, np.hypot(2.5, centre_m) + 1.2
     assert np.minimum(np.abs(radius_m - inner), np.abs(radius_m - outer)).max() < 0.05
     await expect(phone.f("straight", "#panel-scan")).to_be_hidden()
-    await expect(phone.page.locator("#scan-told")).to_have_text(re.compile(r"invalid from \d+° right to \d+° right"))
+    await expect(phone.page.locator("#scan-described")).to_have_text(
+        re.compile(r"invalid from \d+° right to \d+° right")
+    )
 
 
 async def test_of_a_thread_that_draws_no_more_the_page_takes_over(phone: Phone, drive: Drive) -> None:
     """A picture that stands still is not shown as live meanwhile."""
     _, watch = drive
-    await phone.open(f"{watch.address}/#scan")
-    await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
-    thread = painter(phone)
+    thread = await painted_by_thread(phone, f"{watch.address}/#scan")
     assert await thread.evaluate("[...fonts].map((one) => one.status)") == ["loaded", "loaded"]
     await expect(phone.f("none", "#panel-scan")).to_be_hidden()
+    await phone.page.evaluate(NOTE_STALE)
     await thread.evaluate("onmessage = () => {}")
-    await expect(phone.f("none-words", "#panel-scan")).to_have_text(re.compile(r"STALE 1"))
+    await phone.page.wait_for_function("() => window.wasStale", timeout=8_000)
     await expect(phone.f("none", "#panel-scan")).to_be_hidden()
     assert phone.page.workers == []
     assert [said for said in phone.complaints if "now draws the scan itself" in said] != []
@@ -324,9 +326,30 @@ async def test_the_thread_draws_what_the_page_would(phone: Phone, tmp_path: Path
         phone.complaints.clear()
 
 
+# It is stale for half a second only, between 1 s and the page's taking over: who looks now and then may miss it.
+NOTE_STALE = """() => {
+  const words = document.querySelector('#panel-scan [data-f="none-words"]');
+  const note = () => { window.wasStale ||= words.checkVisibility() && words.textContent.startsWith('STALE 1'); };
+  const all = { subtree: true, childList: true, characterData: true, attributes: true };
+  new MutationObserver(note).observe(words.closest('#panel-scan'), all);
+}"""
+
+
 def painter(phone: Phone) -> Worker:
     (thread,) = [one for one in phone.page.workers if "scan-painter" in one.url]
     return thread
+
+
+async def painted_by_thread(phone: Phone, address: str) -> Worker:
+    """Opens the plot; anew where this machine halted for a second and the page took over from the thread at once."""
+    for _ in range(3):
+        await phone.open("about:blank")
+        phone.complaints.clear()
+        await phone.open(address)
+        await expect(phone.f("beams", "#panel-scan")).to_have_text(re.compile(r"of 18[01]"), timeout=12_000)
+        if phone.page.workers:
+            break
+    return painter(phone)
 
 
 async def pictures(phone: Phone) -> list[str]:
@@ -388,7 +411,7 @@ async def test_no_scan_is_too_odd(phone: Phone) -> None:
                 await expect(phone.f("beams", "#panel-scan")).to_contain_text(beams, timeout=12_000)
                 await phone.acknowledge_all()
                 await expect(phone.f("distance", "#panel-scan")).to_contain_text(distance)
-                await expect(phone.page.locator("#scan-told")).to_contain_text(told)
+                await expect(phone.page.locator("#scan-described")).to_contain_text(told)
                 await expect(phone.f("straight", "#panel-scan")).to_be_visible()
                 await phone.f("aim", "#panel-scan").tap(position={"x": 206, "y": 100})
                 await phone.f("aim", "#panel-scan").focus()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,7 @@ async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Proce
 @pytest_asyncio.fixture(loop_scope="session")
 async def api(watch: Process) -> AsyncIterator[httpx.AsyncClient]:
     """The server's own answers; at the end all settings are the defaults again, and what they raised is over."""
-    async with httpx.AsyncClient(base_url=watch.address, headers={"x-catgraph-name": "Another"}) as client:
+    async with httpx.AsyncClient(base_url=watch.console, headers={"x-catgraph-name": "Another"}) as client:
         yield client
         (await client.put("/api/settings.toml", content="")).raise_for_status()
         async with asyncio.timeout(20):
@@ -52,6 +53,14 @@ async def until_limit(api: httpx.AsyncClient, value: float, name: str = LIMIT) -
     async with asyncio.timeout(8):
         while await limit(api, name) != value:
             await asyncio.sleep(0.05)
+
+
+async def gets_below(api: httpx.AsyncClient, value: float, within_s: float = 4.0) -> bool:
+    """Whether the limit gets below this value in time."""
+    until_s = time.monotonic() + within_s
+    while not (is_below := await limit(api) < value) and time.monotonic() < until_s:
+        await asyncio.sleep(0.05)
+    return is_below
 
 
 async def settings(phone: Phone, watch: Process | Canned) -> None:
@@ -94,9 +103,13 @@ async def test_a_limit_dragged_below_the_speed_raises_the_alarm(
 ) -> None:
     await settings(phone, watch)
     await phone.page.evaluate("document.body.dispatchEvent(new Event('pointerup'))")
-    await drag(phone, slider(phone), 0.02)
-    await expect(phone.page.locator("#sheet-alarm[open]")).to_contain_text("Speed above limit", timeout=15_000)
+    for _ in range(3):  # as a person does where a dialog came up under the finger, or a busy browser dropped the stroke
+        await phone.no_snackbar()
+        await drag(phone, slider(phone), 0.02)
+        if await gets_below(api, 2.0):
+            break
     assert await limit(api) < 2.0
+    await expect(phone.page.locator("#sheet-alarm[open]")).to_contain_text("Speed above limit", timeout=15_000)
     await expect(phone.page.locator("#tab-settings")).to_have_attribute("aria-selected", "true")  # no tab was swiped
 
 

@@ -342,7 +342,8 @@ async def test_a_viewer_sees_all_of_it_and_orders_nothing(browser: Browser, car:
 
 async def test_when_the_server_falls_silent_nothing_is_armed_any_more(thumb: Thumb, car: Canned) -> None:
     car.silent = True
-    await expect(thumb.slide()).to_contain_text("the server does not answer")
+    await expect(thumb.slide()).to_contain_text("State unknown")
+    await expect(thumb.slide()).to_contain_text("no answer")
     await expect(thumb.phone.f("legend-car")).to_have_text("slow-down: not known")
     car.silent = False
     await expect(thumb.slide()).to_have_attribute("data-kind", "armed")
@@ -427,7 +428,7 @@ async def test_a_rule_counts_down_on_the_page_and_whoever_lets_it_run_has_slowed
     async with running(*simulate()) as sim, running(*server(tmp_path, sim.address)) as watch:
         thumb = await armed_by_hand(phone, watch.address)
         limits = {"slow_down.on_speed": 1.0, "slow_down.on_speed_after_s": 0.5, "speed_limit.max_mps": 2.0}
-        async with httpx.AsyncClient(base_url=watch.address) as client:
+        async with httpx.AsyncClient(base_url=watch.console) as client:
             assert (await client.patch("/api/settings", json={"values": limits})).is_success
             countdown = phone.page.locator("#sheet-countdown")
             await countdown.wait_for()

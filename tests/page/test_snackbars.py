@@ -100,3 +100,22 @@ async def test_a_warning_costs_a_wide_screen_nothing(phone: Phone, canned: Canne
     async with asyncio.timeout(8):
         while (await box.bounding_box() or {}).get("height") != under:  # it is laid out once the tab is there
             await asyncio.sleep(0.05)
+
+
+@pytest.mark.parametrize(("width", "height"), [(820, 1180), (1180, 820), (1440, 900)])
+async def test_a_snackbar_stands_beside_a_dialog_on_files(
+    phone: Phone, canned: Canned, width: int, height: int
+) -> None:
+    critical = alarm("speed", "Speed above limit", priority="critical", place="dialog", needs_ack=True, sound="high")
+    canned.state = live() | {"alarms": [alarm("phone_missing", "Phone position missing"), critical]}
+    await phone.page.set_viewport_size({"width": width, "height": height})
+    await phone.open(f"{canned.address}/#files")
+    snack, dialog = phone.page.locator("[data-f=warning]"), phone.page.locator("dialog.crit[open]")
+    await expect(snack).to_be_visible()
+    await expect(dialog).to_be_visible()
+    await phone.page.wait_for_timeout(600)  # the sheet slides in
+    left, right = await snack.bounding_box(), await dialog.bounding_box()
+    assert left is not None
+    assert right is not None
+    assert left["x"] + left["width"] <= right["x"]
+    assert left["width"] >= 300

@@ -61,7 +61,8 @@ LOOK = """(() => {
   const opacity = (selector) => one(selector) ? Number(getComputedStyle(one(selector)).opacity) : 0;
   const text = (selector) => (one(selector)?.textContent ?? '').trim();
   return JSON.stringify({
-    screen: document.body.dataset.screen, start: text('#start h1'), begun: !one('#panel-home [data-late][hidden]'),
+    screen: document.body?.dataset.screen ?? '', start: text('#start h1'),
+    begun: !one('#panel-home [data-late][hidden]'),
     undrawn: opacity('.undrawn'), words: text('.undrawn'), veil: opacity('.veil'), on: one('.veil')?.dataset.on ?? '',
     speed: text('.gauge .speed'), strip: text('[data-f="strip-text"]'), link: text('#monitor .top .link'),
     dialog: Boolean(one('#sheet-alarm[open]')), title: document.title,

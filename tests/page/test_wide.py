@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
 from playwright.async_api import Page, expect
 
 from tests.page.barriers import fits, no_barrier
@@ -16,21 +17,25 @@ EDGES = (346, 380, 700, 760, 1000, 1200, 1800)  # where the layout changes, as t
 WIDTHS = sorted({*range(320, 2561, 40), *(edge + by for edge in EDGES for by in (-1, 0, 1))})
 HEIGHTS = (480, 600, 900, 1059, 1180)
 EMPTY = 0.16  # of the window: a list of alarms without alarms is the largest part that may be empty
+LOW = 520  # up to it the gauge fills the height, as on a phone on its side
+FEW = 1.0  # a list of few files may leave all below it empty
 # Parts over each other, parts cut, words cut, and the largest empty rectangle.
 WRONG = Path(__file__).with_name("window_faults.js").read_text(encoding="utf-8").split("\n", 1)[1].rstrip().rstrip(";")
 DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
-async def walk(page: Page, sizes: list[tuple[int, int]]) -> dict[str, Any]:
+async def walk(page: Page, sizes: list[tuple[int, int]], empty: float = EMPTY) -> dict[str, Any]:
     """What is wrong at each of these sizes, where something is."""
     found = {}
     for width, height in sizes:
         await page.set_viewport_size({"width": width, "height": height})
         await page.evaluate(DRAWN)
-        wrong = await page.evaluate(WRONG, EMPTY)
+        wrong = await page.evaluate(WRONG, empty)
         if wrong:
             await page.wait_for_timeout(500)  # a part may be fetched, or begin to be drawn
-            wrong = await page.evaluate(WRONG, EMPTY)
+            wrong = await page.evaluate(WRONG, empty)
+        if height <= LOW:  # beside the gauge of a low window, what stands at the right continues under the rail
+            wrong = [one for one in wrong if not one.startswith("rail over")]
         if wrong:
             found[f"{width} × {height}"] = wrong
     return found
@@ -55,6 +60,21 @@ async def test_no_window_has_a_blank_a_sliced_or_a_covered_part(phone: Phone, ca
     await phone.page.set_viewport_size({"width": 412, "height": 915})
     await show(canned, phone.page, "replay")
     assert await walk(phone.page, [(width, HEIGHTS[n % 5]) for n, width in enumerate(WIDTHS[::3])]) == {}
+
+
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("what", ["home", "critical", "map", "scan", "files", "settings"])
+async def test_no_tab_and_no_alarm_overlaps_once_the_mark_key_is_there(phone: Phone, canned: Canned, what: str) -> None:
+    """Each tab, and a critical alarm, at the edges of the layout and on low windows, with all that comes late."""
+    if what == "critical":
+        canned.state = critical()
+    await phone.open("about:blank")
+    await phone.open(f"{canned.address}/#{'home' if what == 'critical' else what}")
+    await phone.live()
+    await expect(phone.page.locator("#monitor > .ledge > *").first).to_be_attached(timeout=15_000)
+    edges = sorted({edge + by for edge in EDGES for by in (-1, 0)} | {320, 412, 480, 820, 1440, 1920, 2560})
+    low = [(width, height) for width in (1200, 1440, 1920) for height in (480, 520, 521, 560)]
+    assert await walk(phone.page, [(width, HEIGHTS[n % 5]) for n, width in enumerate(edges)] + low, FEW) == {}
 
 
 def critical(**more: Any) -> Json:
@@ -256,3 +276,21 @@ async def test_files_of_a_desktop_show_the_chosen_recording_beside_the_list(phon
     await expect(dock).to_be_hidden()
     await rows.nth(0).click()
     await expect(page.locator(".file-sheet:modal")).to_contain_text("1.8 km")
+
+
+@pytest.mark.parametrize(("width", "height"), [(820, 1180), (1440, 900)])
+async def test_nothing_scrolls_the_speed_out_of_sight(phone: Phone, canned: Canned, width: int, height: int) -> None:
+    """Neither a script nor a find in the page: only panels scroll."""
+    await phone.page.set_viewport_size({"width": width, "height": height})
+    await phone.open(f"{canned.address}/#settings")
+    await phone.live()
+    speed = phone.page.locator(".gauge .speed")
+    await phone.page.locator('[data-part="departure"] summary').tap()
+    await expect(phone.f("sound-off")).to_be_hidden()
+    last = phone.page.locator('[data-part="departure"] .dep-edit > li').first
+    await expect(last).to_be_visible()
+    before = await speed.bounding_box()
+    for block in ("start", "center", "end"):
+        await last.evaluate("(one, block) => one.scrollIntoView({ block, inline: block })", block)
+        await phone.page.evaluate(DRAWN)
+        assert await speed.bounding_box() == before

@@ -36,7 +36,7 @@ TESTS = (
     "tests/monitor/checks/test_frozen.py",
     "tests/server/judge/test_oil.py",
     "tests/server/vehicle/test_recording_source.py",
-    "tests/server/vehicle/test_mark.py",  # over the socket and over HTTP
+    "tests/server/vehicle/test_remark.py",  # over the socket and over HTTP
     "tests/server/security/test_text.py::test_the_kinds_of_a_page_are_a_table",
     "tests/server/protocol/test_reference.py",
     "tests/server/web/routes/test_recordings.py::test_the_list",

@@ -23,35 +23,37 @@ class Ear:
     """Writes down what the link tells."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[str, Any]] = []
+        self.received: list[tuple[str, Any]] = []
 
     def link_opened(self) -> None:
-        self.told.append(("opened", None))
+        self.received.append(("opened", None))
 
     def link_closed(self, problem: Problem) -> None:
-        self.told.append(("closed", problem))
+        self.received.append(("closed", problem))
 
     def dial_failed(self, problem: Problem) -> None:
-        self.told.append(("failed", problem))
+        self.received.append(("failed", problem))
 
     def message_received(self, topic: str, message: Any, note: str | None) -> None:
-        self.told.append(("message", (topic, message, note)))
+        self.received.append(("message", (topic, message, note)))
 
     def status_received(self, level: str, text: str) -> None:
-        self.told.append(("status", (level, text)))
+        self.received.append(("status", (level, text)))
 
     def junk_received(self, why: str) -> None:
-        self.told.append(("junk", why))
+        self.received.append(("junk", why))
 
     def large_skipped(self, topic: str | None, size: int) -> None:
-        self.told.append(("large", (topic, size)))
+        self.received.append(("large", (topic, size)))
 
     def all(self, kind: str) -> list[Any]:
-        return [what for name, what in self.told if name == kind]
+        return [what for name, what in self.received if name == kind]
 
     async def hears(self, kind: str, count: int = 1, *, within_s: float = 5.0) -> Any:
-        """What was told the `count`-th time."""
-        await until(lambda: len(self.all(kind)) >= count, within_s=within_s, or_say=lambda: f"no {kind}: {self.told}")
+        """What was received the `count`-th time."""
+        await until(
+            lambda: len(self.all(kind)) >= count, within_s=within_s, or_say=lambda: f"no {kind}: {self.received}"
+        )
         return self.all(kind)[count - 1]
 
 
@@ -73,10 +75,10 @@ async def linked(address: str, ear: Ear) -> AsyncIterator[RosLink]:
         yield link
     finally:
         link.stop()
-        told = len(ear.told)
+        received = len(ear.received)
         for _ in range(10):
             await asyncio.sleep(0)
-        assert len(ear.told) == told
+        assert len(ear.received) == received
 
 
 class Bridge:

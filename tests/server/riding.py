@@ -89,7 +89,7 @@ class Rider:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class RideEvent:
     """One step in the life of an alarm of the phone or the receiver."""
 
     at_s: float
@@ -100,12 +100,12 @@ class Told:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ride:
-    told: list[Told]
+    events: list[RideEvent]
     briefs: dict[str, set[str]]  # what each check's tile ever said
 
     @property
     def raised(self) -> list[str]:
-        return [one.alarm for one in self.told if one.change == "raised"]
+        return [one.alarm for one in self.events if one.change == "raised"]
 
 
 def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[Planned] = ()) -> Ride:
@@ -118,13 +118,13 @@ def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[P
     )
     checks = [check for check in CHECKS if check.id in WATCHED]
     monitor, state, reception = Monitor(checks), State(), Reception()
-    told: list[Told] = []
+    events: list[RideEvent] = []
     briefs: dict[str, set[str]] = {check.id: set() for check in checks}
     start_s, tick_s = car.now_s, 0.0
 
     def judge(now_s: float, changed: tuple[str, ...] | None) -> None:
-        told.extend(
-            Told(at_s=t.at_s, alarm=t.alarm_id, change=t.change, text=t.text)
+        events.extend(
+            RideEvent(at_s=t.at_s, alarm=t.alarm_id, change=t.change, text=t.text)
             for t in pipeline.judge(monitor, state, now_s, changed)
         )
 
@@ -161,4 +161,4 @@ def ride(rider: Rider | None, seconds: float, *, seed: int = 1, plan: Sequence[P
                 if name in briefs:
                     briefs[name].add(finding.brief)
             tick_s += pipeline.TICK_S
-    return Ride(told=told, briefs=briefs)
+    return Ride(events=events, briefs=briefs)

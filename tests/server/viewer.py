@@ -12,14 +12,25 @@ from typing import Any
 
 import websockets
 
+from server.access.order_signer import OrderSigner
 from tests.frames import check_frame
 
 
 class Viewer:
     """Takes what it is offered and keeps it."""
 
-    def __init__(self, socket: websockets.ClientConnection, *, takes: bool = True) -> None:
+    def __init__(
+        self,
+        socket: websockets.ClientConnection,
+        *,
+        takes: bool = True,
+        name: str = "operator",
+        page: str | None = None,
+    ) -> None:
         self.socket = socket
+        self.name = name
+        self.page = page
+        self.signer = OrderSigner()  # of its orders, where the server passes them on to agents
         self.takes = takes
         self.states: list[dict[str, Any]] = []
         self.scans: list[bytes] = []
@@ -65,8 +76,33 @@ class Viewer:
     async def ask(self, *, within_s: float = 5.0, **command: Any) -> dict[str, Any]:
         """Sends a command and answers its reply."""
         identity = f"test {next(self._ids)}"
-        await self.send(command | {"id": identity})
+        await self.send(self.signed(command) | {"id": identity})
         return await self.until(lambda: next((r for r in self.other if r.get("id") == identity), None), within_s)
+
+    @property
+    def key(self) -> dict[str, Any]:
+        """What a status names where orders are signed."""
+        signs = any(one["kind"] == "hello" and one.get("signs") for one in self.other)
+        return {"key": self.signer.id} if signs else {}
+
+    def signed(self, command: dict[str, Any]) -> dict[str, Any]:
+        """The command as a page of this server sends it."""
+        vehicle = str(command.get("vehicle") or (self.states[-1]["vehicle"] if self.states else ""))
+        challenge = self.challenge(vehicle)
+        if not self.key or challenge is None:
+            return command
+        signed = self.signer.sign(command, vehicle=vehicle, by=self.name, challenge=challenge, page=self.page)
+        return {"kind": command["kind"], "vehicle": vehicle, "signed": signed}
+
+    def challenge(self, vehicle: str) -> str | None:
+        """The newest of the agent of a car."""
+        for one in reversed([*self.other, *self.states]):
+            if one["kind"] == "state" and one["vehicle"] == vehicle:
+                return str(one["server"].get("challenge") or "") or None
+            listed = [car for car in one.get("cars", ()) if one["kind"] == "cars" and car["name"] == vehicle]
+            if listed and listed[0]["summary"] is not None:
+                return listed[0]["summary"].get("challenge")
+        return None
 
     async def until(self, found: Callable[[], Any], within_s: float = 5.0) -> Any:
         """Waits for `found()` to be something and answers it."""
@@ -96,11 +132,14 @@ async def viewer(
     have_event: int | None = None,
     name: str | None = None,
     page: str | None = None,
+    fleet: bool = False,
+    key: str | None = None,
 ) -> AsyncIterator[Viewer]:
-    """A viewer that reads in the background; `base` is the server's http address."""
-    url = base.replace("http://", "ws://") + "/ws" + (f"?vehicle={vehicle}" if vehicle else "")
-    async with websockets.connect(url, max_size=2**24) as socket:
-        one = Viewer(socket)
+    """A viewer that reads in the background; `base` is the server's http address. `fleet`: of all cars."""
+    url = base.replace("http://", "ws://") + "/ws" + (f"?vehicle={vehicle}" if vehicle else "?fleet=1" if fleet else "")
+    headers = {} if key is None else {"Authorization": f"Bearer {key}"}
+    async with websockets.connect(url, max_size=2**24, additional_headers=headers) as socket:
+        one = Viewer(socket, name=name or "operator", page=page)
         named = {key: value for key, value in (("name", name), ("page", page)) if value}
         await one.send({"kind": "hello", "have_event": have_event} | named)
         reading = asyncio.create_task(one.read())

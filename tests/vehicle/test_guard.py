@@ -238,14 +238,14 @@ class Life(RuleBasedStateMachine):
         self.guard = Guard()
         self.now_s = 0.0
         self.count = 1
-        self.told: Command | None = None
+        self.last_command: Command | None = None
         self.was_held = False
         self.limit_mps = math.inf
         self.released = False
 
     def hear(self, command: Command | None) -> None:
         if command is not None:
-            self.told = command
+            self.last_command = command
 
     @rule(seconds=st.floats(0.0, 3.0))
     def time(self, seconds: float) -> None:
@@ -291,9 +291,9 @@ class Life(RuleBasedStateMachine):
 
     @invariant()
     def never_faster_while_held_and_never_let_go_by_itself(self) -> None:
-        if self.told is not None:
-            assert math.isfinite(self.told.speed_mps)
-            assert math.isfinite(self.told.angle_rad)
+        if self.last_command is not None:
+            assert math.isfinite(self.last_command.speed_mps)
+            assert math.isfinite(self.last_command.angle_rad)
         held = self.held
         if self.was_held and not self.released:
             assert held

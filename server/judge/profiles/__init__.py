@@ -6,9 +6,10 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from monitor import catalog
+from monitor.values import Mode
 
 SteeringUnit = Literal["percent", "tyre_angle", "unknown"]
 
@@ -20,10 +21,12 @@ class Profile:
     name: str
     title: str
     steering: SteeringUnit = "unknown"  # what torque.z of the steering topic means; its ratio is a threshold
+    modes: Mapping[str, Mode] = field(default_factory=dict)  # words and numbers of its mode topic, in lower case
     limits: Mapping[str, float] = field(default_factory=dict)  # thresholds that differ from the checks' own defaults
     has: tuple[str, ...] = ()  # topics that a car of this kind has, whatever the case of their letters
     lacks: tuple[str, ...] = ()
     ros: int | None = None
+    departure: tuple[Mapping[str, Any], ...] = ()  # items of its departure check; none: the usual one
 
     def fits(self, topics: frozenset[str], ros: int | None) -> bool:
         """Whether a car with these topics (lower case) may be of this kind."""
@@ -58,10 +61,12 @@ def _read(name: str, body: Mapping[str, Any]) -> Profile:
         name=name,
         title=body["title"],
         steering=body.get("steering", "unknown"),
+        modes={word.casefold(): mode for mode in get_args(Mode) for word in body.get("mode", {}).get(mode, ())},
         limits=limits,
         has=tuple(match.get("has", ())),
         lacks=tuple(match.get("lacks", ())),
         ros=match.get("ros"),
+        departure=tuple(body.get("departure", ())),
     )
 
 

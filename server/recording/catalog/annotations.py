@@ -1,25 +1,48 @@
-"""Title, note and tags of a recording, in a small file beside it, so that they survive the loss of the database."""
+"""Title, weather, note and tags of a recording, and marks that came too late for it, in a small file beside it: they
+survive the loss of the database. Voice notes and photos that came too late are in a folder beside it."""
 
 from __future__ import annotations
 
+import errno
+import logging
+import threading
 import unicodedata
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import orjson
 
+from server.protocol.driving_state import InterventionDescription
+from server.protocol.marks import DriveMark
+from server.recording.marks import described as descriptions
+from server.recording.marks import rows
+from server.recording.marks.rows import MARK_ID, row_of
 from server.storage import durable_file
 
 MAX_TITLE = 120  # letters
+MAX_WEATHER = 120
 MAX_NOTE = 4000
 MAX_TAG = 40
 MAX_TAGS = 20
-MAX_BYTES = 256 * 1024  # of the file: a larger one is not ours
+MAX_MARKS = 2500  # of people and of the car in one drive
+_LETTER = 4  # bytes of UTF-8; what JSON writes longer is cleaned away
+_ROW = 512  # bytes of a mark or a description besides its words: names, numbers, ids, blanks
+# Of the file: all that may be written fits, and a larger one is not ours.
+MAX_BYTES = (
+    _LETTER * (MAX_TITLE + MAX_WEATHER + MAX_NOTE + MAX_TAGS * (MAX_TAG + 4) + 100)
+    + MAX_MARKS * (2 * _ROW + _LETTER * (rows.MOST_WORDS + rows.MOST_CATEGORY + rows.MOST_NAME))
+    + descriptions.MOST
+    * (_ROW + _LETTER * (descriptions.MOST_WORDS + descriptions.MOST_CATEGORY + descriptions.MOST_NAME))
+)
+CHANGING = threading.RLock()  # marks and words come from different threads
 # Letters that turn the direction of what follows, that hide, or that end a line in one program and not in another.
 _UNSEEN = frozenset("\u200b\u200e\u200f\u061c\ufeff\u2028\u2029\u00ad")
 _TURNING = range(0x202A, 0x202F), range(0x2066, 0x206A)
+
+log = logging.getLogger("catgraph.recording")
 
 
 class BadAnnotation(ValueError):
@@ -37,14 +60,25 @@ class Annotations:
     title: str = ""
     note: str = ""
     tags: tuple[str, ...] = ()
+    weather: str = ""
+    marks: tuple[DriveMark, ...] = ()  # that the recording does not have, or has otherwise
+    removed: tuple[str, ...] = ()  # ids of marks that the recording has, and that were taken back
+    described: tuple[InterventionDescription, ...] = ()  # of interventions, what the recording does not say
 
 
+T = TypeVar("T")
 NONE = Annotations()
+LATE = ("marks", "removed", "described")  # came after the recording was complete
 
 
 def beside(recording: Path) -> Path:
     """The file of a recording's annotations: copied with it, they go with it."""
     return recording.with_name(recording.name + ".json")
+
+
+def media_beside(recording: Path) -> Path:
+    """The folder of voice notes and photos that the recording does not have."""
+    return recording.with_name(recording.name + ".marks")
 
 
 def read(recording: Path) -> Annotations:
@@ -57,34 +91,109 @@ def read(recording: Path) -> Annotations:
         body = None
     if not isinstance(body, dict):
         return NONE
-    tags = body.get("tags")
+    tags, marks, removed = (body.get(name) for name in ("tags", "marks", "removed"))
     return Annotations(
         title=line(body.get("title"))[:MAX_TITLE].strip(),
         note=text(body.get("note"))[:MAX_NOTE].strip(),
         tags=_unique([line(tag)[:MAX_TAG].strip() for tag in tags] if isinstance(tags, list) else [])[:MAX_TAGS],
+        weather=line(body.get("weather"))[:MAX_WEATHER].strip(),
+        marks=marks_of(marks),
+        removed=ids_of(removed),
+        described=descriptions.listed(body.get("described")),
     )
 
 
-def write(recording: Path, annotations: Annotations) -> None:
-    """Write them atomically; without any the file is deleted. Raises OSError."""
+def marks_of(listed: object) -> tuple[DriveMark, ...]:
+    """The marks in a value of a file; what is none is left out."""
+    found = [row_of(one) for one in listed[:MAX_MARKS] if isinstance(one, dict)] if isinstance(listed, list) else []
+    return tuple(row for row in found if row is not None)
+
+
+def ids_of(listed: object) -> tuple[str, ...]:
+    """The ids of marks in a value of a file."""
+    named = listed[:MAX_MARKS] if isinstance(listed, list) else []
+    return tuple(one for one in named if isinstance(one, str) and MARK_ID.fullmatch(one))
+
+
+def write(recording: Path, annotations: Annotations) -> Annotations:
+    """Write title, note and tags atomically, and answer them with the late words that are there; without any the file
+    is deleted. Raises OSError."""
+    with CHANGING:
+        there = read(recording)
+        new = replace(annotations, marks=there.marks, removed=there.removed, described=there.described)
+        _write(recording, new)
+    return new
+
+
+def write_marks(recording: Path, marks: Sequence[DriveMark], removed: Sequence[str]) -> bool:
+    """As `write`, of the marks; False: they are there already. Raises OSError."""
+    kept = _newest(recording, marks, MAX_MARKS, "marks", lambda row: row["marked_ms"])
+    return _change(recording, marks=kept, removed=_newest(recording, removed, MAX_MARKS, "marks taken back"))
+
+
+def write_described(recording: Path, described: Sequence[InterventionDescription]) -> bool:
+    """As `write_marks`, of what was said of interventions. Raises OSError."""
+    what = "words on interventions"
+    kept = _newest(recording, described, descriptions.MOST, what, lambda row: row["described_ms"])
+    return _change(recording, described=kept)
+
+
+def _newest(
+    recording: Path, said: Sequence[T], most: int, what: str, at_ms: Callable[[T], int] | None = None
+) -> tuple[T, ...]:
+    """As many as are kept, in their order; without a moment the last ones."""
+    if len(said) <= most:
+        return tuple(said)
+    log.warning("beside %s: %d %s, of which the newest %d are kept", recording.name, len(said), what, most)
+    kept = range(len(said)) if at_ms is None else sorted(range(len(said)), key=lambda n: at_ms(said[n]))
+    return tuple(said[n] for n in sorted(kept[-most:]))
+
+
+def _change(recording: Path, **late: Any) -> bool:
+    with CHANGING:
+        there = read(recording)
+        new = replace(there, **late)
+        if new == there:
+            return False
+        _write(recording, new)
+    return True
+
+
+def _write(recording: Path, annotations: Annotations) -> None:
     path = beside(recording)
     if annotations == NONE:
         path.unlink(missing_ok=True)
         return
+    said = {name: value for name, value in asdict(annotations).items() if value or name not in LATE}
+    body = orjson.dumps(said, option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+    if len(body) > MAX_BYTES:
+        sentence = f"{len(body)} bytes of words are more than the {MAX_BYTES} that are kept beside a recording"
+        raise OSError(errno.EFBIG, sentence, str(path))
     if path.exists() and not _is_ours(path):  # somebody else's: it is not lost
-        path.rename(path.with_name(f"{path.name}.other"))
-    body = orjson.dumps(asdict(annotations), option=orjson.OPT_INDENT_2 | orjson.OPT_APPEND_NEWLINE)
+        path.rename(next(name for name in _others(path) if not name.exists()))
     durable_file.write(path, body, mode=0o644)
 
 
+def _others(path: Path) -> Iterator[Path]:
+    yield path.with_name(f"{path.name}.other")
+    yield from (path.with_name(f"{path.name}.other-{number}") for number in count(2))
+
+
 def changed(
-    old: Annotations, *, title: str | None = None, note: str | None = None, tags: Sequence[str] | None = None
+    old: Annotations,
+    *,
+    title: str | None = None,
+    note: str | None = None,
+    tags: Sequence[str] | None = None,
+    weather: str | None = None,
 ) -> Annotations:
     """With what is given in place of the old; None leaves it. Raises BadAnnotation."""
-    return Annotations(
+    return replace(
+        old,
         title=old.title if title is None else _fitting("title", "A title", line(title), MAX_TITLE),
         note=old.note if note is None else _fitting("note", "A note", text(note), MAX_NOTE),
         tags=old.tags if tags is None else _tags(tags),
+        weather=old.weather if weather is None else _fitting("weather", "The weather", line(weather), MAX_WEATHER),
     )
 
 

@@ -7,6 +7,7 @@ process of its own (survey_worker.py), so that the event loop never waits for on
 from __future__ import annotations
 
 import asyncio
+import os
 import shutil
 import zlib
 from collections.abc import Callable, Sequence
@@ -16,15 +17,23 @@ from typing import Any
 
 import orjson
 
-from server.protocol.answers import Recording, RecordingNames, Total
+from server.protocol.answers import Recording, RecordingNames, Total, VerificationAnswer
+from server.protocol.logbook import LogbookDrive
 from server.recording.catalog import annotations as annotation_store
-from server.recording.catalog.catalog_db import Which
+from server.recording.catalog.catalog_db import Entry, Which
 from server.recording.catalog.entries import Entries
 from server.recording.catalog.errors import Refused
 from server.recording.catalog.folder_listing import FolderListing
 from server.recording.catalog.rows import Page, page_of, row_of
 from server.recording.catalog.survey_task import SurveyTask
 from server.recording.catalog.trash import Trash
+from server.recording.catalog.verifications import Verifications
+from server.recording.drive.course import with_marks
+from server.recording.drive.logbook import drives_of
+
+MOST_IN_LOGBOOK = 20_000  # recordings
+
+MAX_LATE = 200  # late marks of a recording that is asked for alone
 
 
 class Catalog:
@@ -35,7 +44,9 @@ class Catalog:
     ) -> None:
         """`folder` need not exist yet; `database` None: in memory."""
         self.folder = folder
+        self._wall_ms = wall_ms
         self._entries = Entries(database)
+        self._verifications = Verifications(folder)
         self._listing = FolderListing(folder, self._entries, wall_ms=wall_ms)
         self._trash = Trash(folder, self._entries, self._listing, wall_ms=wall_ms)
         self._survey = SurveyTask(folder, self._entries, self._listing, now=now)
@@ -86,7 +97,7 @@ class Catalog:
         Raises Refused where there is no such page.
         """
         self._listing.list_fresh()
-        return page_of(self._entries, which or Which(), cursor=cursor, limit=limit)
+        return page_of(self._entries, which or Which(), self._verifications, cursor=cursor, limit=limit)
 
     def row(self, id: str, *, is_trashed: bool = False) -> Recording | None:
         """One recording, with what was raised in it and its speed; None: it is not there."""
@@ -94,7 +105,22 @@ class Catalog:
         if entry is None:
             return None
         found = entry.found or {}
-        return {**row_of(entry), "raised": found.get("raised", []), "speed_mps": found.get("speed_mps", [])}
+        row: Recording = {
+            **self._row_of(entry),
+            "raised": found.get("raised", []),
+            "speed_mps": found.get("speed_mps", []),
+        }
+        if entry.annotations.marks:
+            row["late_marks"] = list(entry.annotations.marks[:MAX_LATE])
+        return row
+
+    def _row_of(self, entry: Entry) -> Recording:
+        return row_of(entry, self._verifications.of(entry))
+
+    def verify(self, id: str) -> VerificationAnswer:
+        """Whether it is as it was recorded; reads the whole file. Raises NotThere, Refused."""
+        entry = self._listing.need(id)
+        return self._verifications.verify(entry, self._wall_ms())
 
     def trends(self, id: str) -> dict[str, Any] | None:
         """The sketch of all its signals; None: it has not been read yet."""
@@ -104,11 +130,38 @@ class Catalog:
         found: dict[str, Any] | None = None if body is None else orjson.loads(zlib.decompress(body))
         return found
 
+    def course(self, id: str) -> bytes | None:
+        """The course of its drive as JSON, late marks among its events; None: it is not there, or not read yet."""
+        entry = self._listing.entry(id)
+        sha256 = (entry.found or {}).get("sha256") if entry is not None else None
+        body = self._entries.course(sha256) if sha256 is not None else None
+        if body is None or entry is None:
+            return None
+        whole = zlib.decompress(body)
+        said = entry.annotations
+        return orjson.dumps(with_marks(orjson.loads(whole), entry.marks)) if said.marks or said.removed else whole
+
+    def drives(self, which: Which) -> list[LogbookDrive]:
+        """The drives for the logbook, oldest first; those that are yet to be read are not among them."""
+        self._listing.list_fresh()
+        return drives_of(self._entries.figures(which, MOST_IN_LOGBOOK))
+
     def path(self, id: str) -> Path | None:
         """Its file; None: it is not there. No id leads out of the folder."""
         entry = self._listing.entry(id)
         path = self.folder / entry.path if entry is not None else None
         return path if path is not None and path.is_file() else None
+
+    def of_mark(self, vehicle: str, mark: str) -> list[Path]:
+        """The files in which, or beside which, a mark may be: those that name it, and those that are yet to be read."""
+        self._listing.list_fresh()
+        entries = self._entries.select(
+            "WHERE trashed_ms IS NULL AND vehicle = ? "
+            "AND (found IS NULL OR instr(found, ?) > 0 OR instr(marks, ?) > 0) "
+            "ORDER BY started_ms DESC LIMIT 5",
+            [vehicle, f'"mark":"{mark}"', f'"mark":"{mark}"'],
+        )
+        return [self.folder / entry.path for entry in entries]
 
     def totals(self, which: Which | None = None) -> Total:
         """How many recordings there are of some kind, and how large together."""
@@ -140,22 +193,47 @@ class Catalog:
     # -- what people do with it ----------------------------------------------------------------------------------------
 
     def annotate(
-        self, id: str, *, title: str | None = None, note: str | None = None, tags: Sequence[str] | None = None
+        self,
+        id: str,
+        *,
+        title: str | None = None,
+        note: str | None = None,
+        tags: Sequence[str] | None = None,
+        weather: str | None = None,
     ) -> Recording:
-        """Another title, note or tags; None leaves it. Raises NotThere, Refused, BadAnnotation."""
+        """Another title, note, weather or tags; None leaves it. Raises NotThere, Refused, BadAnnotation."""
         with self._entries.lock:
             entry = self._listing.need(id)
-            new = annotation_store.changed(entry.annotations, title=title, note=note, tags=tags)
+            new = annotation_store.changed(entry.annotations, title=title, note=note, tags=tags, weather=weather)
             try:
-                annotation_store.write(self.folder / entry.path, new)
+                new = annotation_store.write(self.folder / entry.path, new)
             except OSError as why:
                 raise Refused(f"It cannot be stored: {(why.strerror or str(why)).lower()}.") from None
             self._entries.put([replace(entry, annotations=new)])
-            return row_of(replace(entry, annotations=new))
+            return self._row_of(replace(entry, annotations=new))
+
+    def reread_annotations(self, path: Path) -> None:
+        """Marks were written beside a file: its row has them from now on."""
+        with self._entries.lock:
+            inside = path.relative_to(self.folder).as_posix()
+            known = self._entries.select("WHERE path = ?", [os.fsencode(inside)])
+            self._entries.put([replace(entry, annotations=annotation_store.read(path)) for entry in known])
 
     def delete(self, id: str) -> Recording:
         """Into the trash, where it stays until somebody empties it. Raises NotThere, Refused."""
         return row_of(self._trash.delete(id))
+
+    def put_in_trash(self, id: str) -> Entry:
+        """As `delete`: the entry that was moved, for `put_back` and `destroy_entry`. Raises NotThere, Refused."""
+        return self._trash.delete(id)
+
+    def put_back(self, trashed: Entry) -> None:
+        """Exactly this one out of the trash. Raises NotThere, Refused."""
+        self._trash.put_back(trashed)
+
+    def destroy_entry(self, trashed: Entry) -> None:
+        """Exactly this one of the trash, for good. Raises Refused."""
+        self._trash.destroy_entries([trashed])
 
     def restore(self, id: str) -> Recording:
         """Out of the trash, to where it was. Raises NotThere, Refused."""

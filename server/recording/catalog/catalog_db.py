@@ -13,7 +13,10 @@ from typing import Any
 
 import orjson
 
-from server.recording.catalog.annotations import NONE, Annotations
+from server.protocol.marks import DriveMark
+from server.recording.catalog.annotations import LATE, NONE, Annotations, ids_of, marks_of
+from server.recording.marks import described as descriptions
+from server.recording.marks.rows import merged
 
 log = logging.getLogger("catgraph.catalog")
 
@@ -30,18 +33,22 @@ CREATE TABLE IF NOT EXISTS recording (
     title TEXT NOT NULL DEFAULT '',
     note TEXT NOT NULL DEFAULT '',
     tags TEXT NOT NULL DEFAULT '[]',
-    words TEXT NOT NULL DEFAULT ''
+    words TEXT NOT NULL DEFAULT '',
+    weather TEXT NOT NULL DEFAULT '',
+    marks TEXT NOT NULL DEFAULT '{{}}'
 ) WITHOUT ROWID;
 CREATE INDEX IF NOT EXISTS recording_kept ON recording (trashed_ms, started_ms DESC, id DESC);
 CREATE INDEX IF NOT EXISTS recording_id ON recording (id);
 CREATE TABLE IF NOT EXISTS trends (sha256 TEXT PRIMARY KEY, body BLOB NOT NULL) WITHOUT ROWID;
-PRAGMA user_version = {(VERSION := 1)};
+CREATE TABLE IF NOT EXISTS course (sha256 TEXT PRIMARY KEY, body BLOB NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS figures (sha256 TEXT PRIMARY KEY, body TEXT NOT NULL) WITHOUT ROWID;
+PRAGMA user_version = {(VERSION := 2)};
 """
 # Of files that are gone. A file that is being moved is forgotten for a moment, so this is done at the start only.
-_FORGET_TRENDS = """
-DELETE FROM trends WHERE sha256 NOT IN (SELECT found ->> 'sha256' FROM recording WHERE found ->> 'sha256' IS NOT NULL)
+_FORGET = """
+DELETE FROM {table} WHERE sha256 NOT IN (SELECT found ->> 'sha256' FROM recording WHERE found ->> 'sha256' IS NOT NULL)
 """
-COLUMNS = "path, id, trashed_ms, vehicle, started_ms, size, changed_ns, found, title, note, tags"
+COLUMNS = "path, id, trashed_ms, vehicle, started_ms, size, changed_ns, found, title, note, tags, weather, marks"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +65,12 @@ class Entry:
     found: dict[str, Any] | None = None  # by the survey; None: it has not been read yet
     annotations: Annotations = NONE
 
+    @property
+    def marks(self) -> list[DriveMark]:
+        """Those in the file, as far as it has been read, and those beside it."""
+        recorded = marks_of((self.found or {}).get("marks"))
+        return merged(recorded, self.annotations.marks, self.annotations.removed)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Which:
@@ -65,7 +78,7 @@ class Which:
 
     vehicle: str | None = None
     tag: str | None = None
-    text: str | None = None  # in title, note, tags, vehicle or name
+    text: str | None = None  # in title, note, tags, marks, vehicle or name
     since_ms: int | None = None  # started then or later
     until_ms: int | None = None  # started before
     is_trashed: bool = False
@@ -98,7 +111,8 @@ def _open(name: str) -> sqlite3.Connection:
         database.execute("PRAGMA synchronous=OFF")  # after a power loss it is rebuilt from the files
         database.executescript(_SCHEMA)
         database.execute("PRAGMA quick_check").fetchone()
-        database.execute(_FORGET_TRENDS)
+        for table in ("trends", "figures", "course"):
+            database.execute(_FORGET.format(table=table))
         return database
     except BaseException:
         database.close()
@@ -107,7 +121,8 @@ def _open(name: str) -> sqlite3.Connection:
 
 def entry(row: Sequence[Any]) -> Entry:
     """Of a row with COLUMNS."""
-    path, id, trashed_ms, vehicle, started_ms, size, changed_ns, found, title, note, tags = row
+    path, id, trashed_ms, vehicle, started_ms, size, changed_ns, found, title, note, tags, weather, marks = row
+    late = orjson.loads(marks)
     return Entry(
         path=os.fsdecode(path),
         id=id,
@@ -117,7 +132,15 @@ def entry(row: Sequence[Any]) -> Entry:
         size=size,
         changed_ns=changed_ns,
         found=orjson.loads(found) if found is not None else None,
-        annotations=Annotations(title=title, note=note, tags=tuple(orjson.loads(tags))),
+        annotations=Annotations(
+            title=title,
+            note=note,
+            tags=tuple(orjson.loads(tags)),
+            weather=weather,
+            marks=marks_of(late.get("marks")),
+            removed=ids_of(late.get("removed")),
+            described=descriptions.listed(late.get("described")),
+        ),
     )
 
 
@@ -127,13 +150,16 @@ def put(database: sqlite3.Connection, entries: Iterable[Entry]) -> None:
         (
             *(os.fsencode(e.path), e.id, e.trashed_ms, e.vehicle, e.started_ms, e.size, e.changed_ns),
             None if e.found is None else orjson.dumps(e.found).decode(),
-            *(e.annotations.title, e.annotations.note, orjson.dumps(e.annotations.tags).decode(), _words(e)),
+            *(e.annotations.title, e.annotations.note, orjson.dumps(e.annotations.tags).decode()),
+            e.annotations.weather,
+            _late(e.annotations),
+            _words(e),
         )
         for e in entries
     ]
     database.execute("BEGIN IMMEDIATE")
     try:
-        database.executemany(f"INSERT OR REPLACE INTO recording ({COLUMNS}, words) VALUES (?{', ?' * 11})", rows)
+        database.executemany(f"INSERT OR REPLACE INTO recording ({COLUMNS}, words) VALUES (?{', ?' * 13})", rows)
         database.execute("COMMIT")
     except BaseException:
         database.execute("ROLLBACK")
@@ -155,10 +181,44 @@ def trends(database: sqlite3.Connection, sha256: str) -> bytes | None:
     return row[0] if row is not None else None
 
 
+def put_course(database: sqlite3.Connection, sha256: str, body: bytes) -> None:
+    """Keeps the course of a drive, as its trends."""
+    database.execute("INSERT OR REPLACE INTO course VALUES (?, ?)", (sha256, body))
+
+
+def course(database: sqlite3.Connection, sha256: str) -> bytes | None:
+    row = database.execute("SELECT body FROM course WHERE sha256 = ?", (sha256,)).fetchone()
+    return row[0] if row is not None else None
+
+
+def put_figures(database: sqlite3.Connection, sha256: str, figures: dict[str, Any]) -> None:
+    """Keeps the figures of a drive by the content of its file, as its trends."""
+    database.execute("INSERT OR REPLACE INTO figures VALUES (?, ?)", (sha256, orjson.dumps(figures).decode()))
+
+
+def figures(database: sqlite3.Connection, which: Which, most: int) -> list[tuple[Any, ...]]:
+    """Of each drive, oldest first: id, vehicle, began, title, tags, session, part, figures, what came beside it later,
+    then the marks in it and the ids of interventions that nobody described in it, where something came. Clips are no
+    drives."""
+    where, values = condition(which)
+    how = (
+        "SELECT id, vehicle, started_ms, title, tags, found ->> 'session', found ->> 'part', body, marks, "
+        "CASE marks WHEN ? THEN NULL ELSE found ->> 'marks' END, found ->> 'undescribed' FROM recording "
+        f"JOIN figures ON sha256 = found ->> 'sha256' WHERE {where} AND NOT found ->> 'is_clip' "
+        "ORDER BY started_ms DESC, id DESC LIMIT ?"
+    )
+    return database.execute(how, [_late(NONE), *values, most]).fetchall()[::-1]
+
+
+def _late(annotations: Annotations) -> str:
+    return orjson.dumps({name: getattr(annotations, name) for name in LATE}).decode()
+
+
 def _words(e: Entry) -> str:
     """The searchable text; each tag is on its own line, so that a search can match whole tags."""
     tags = "".join(f"\n#{tag}\n" for tag in e.annotations.tags)
-    return f"{e.annotations.title}\n{e.annotations.note}\n{e.vehicle}\n{e.id}{tags}".casefold()
+    marks = "".join(f"\n{mark['category'] or ''}\n{mark['words']}" for mark in e.marks)
+    return f"{e.annotations.title}\n{e.annotations.note}\n{e.vehicle}\n{e.id}{tags}{marks}".casefold()
 
 
 def condition(which: Which) -> tuple[str, list[Any]]:

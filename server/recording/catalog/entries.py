@@ -71,6 +71,28 @@ class Entries:
         with self.lock:
             return None if self._is_closed else catalog_db.trends(self._database, sha256)
 
+    def put_figures(self, sha256: str, figures: dict[str, Any]) -> None:
+        """Keeps the figures of a drive for the logbook."""
+        with self.lock:
+            if not self._is_closed:
+                self._write(lambda database: catalog_db.put_figures(database, sha256, figures))
+
+    def put_course(self, sha256: str, body: bytes) -> None:
+        """Keeps the course of a drive, for comparisons."""
+        with self.lock:
+            if not self._is_closed:
+                self._write(lambda database: catalog_db.put_course(database, sha256, body))
+
+    def course(self, sha256: str) -> bytes | None:
+        """What `put_course` kept; None: nothing."""
+        with self.lock:
+            return None if self._is_closed else catalog_db.course(self._database, sha256)
+
+    def figures(self, which: Which, most: int) -> list[tuple[Any, ...]]:
+        """The newest drives of some kind, oldest first: see catalog_db.figures."""
+        with self.lock:
+            return [] if self._is_closed else catalog_db.figures(self._database, which, most)
+
     def totals(self, which: Which | None = None) -> Total:
         """How many recordings there are of some kind, and how large together."""
         where, values = catalog_db.condition(which or Which())

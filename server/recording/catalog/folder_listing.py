@@ -106,12 +106,17 @@ class FolderListing:
         )
 
     def list_fresh(self) -> None:
-        """Lists what was added since."""
-        entries = []
-        while self._fresh:
-            with contextlib.suppress(IndexError, ValueError):  # another thread took it, or it is elsewhere
-                entry = self.look(self._fresh.popleft(), None)
-                if entry is not None:
-                    entries.append(entry)
-        if entries:
-            self._entries.put(entries)
+        """Lists what was added since; when it returns, that is listed, whichever thread did it."""
+        with self._entries.lock:
+            paths = list(self._fresh)
+            entries = []
+            for path in paths:
+                with contextlib.suppress(ValueError):  # it is elsewhere
+                    entry = self.look(path, None)
+                    if entry is not None:
+                        entries.append(entry)
+            if entries:
+                self._entries.put(entries)
+            for path in paths:
+                with contextlib.suppress(ValueError):  # more were added than are kept
+                    self._fresh.remove(path)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.protocol.answers import Recording
+import orjson
+
+from server.protocol.answers import Recording, VerificationAnswer
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import catalog_db
+from server.recording.catalog.annotations import LATE
 from server.recording.catalog.catalog_db import Entry, Which
 from server.recording.catalog.entries import Entries
 from server.recording.catalog.errors import Refused
+from server.recording.catalog.verifications import Verifications
 from server.recording.folder import DAMAGED, FINISHED
 
 MAX_ROWS = 200  # a page
@@ -26,7 +31,7 @@ class Page:
     next: str | None
 
 
-def page_of(entries: Entries, which: Which, *, cursor: str | None, limit: int) -> Page:
+def page_of(entries: Entries, which: Which, verifications: Verifications, *, cursor: str | None, limit: int) -> Page:
     """Newest first; those deleted last first among the deleted. Raises Refused."""
     where, values = catalog_db.condition(which)
     order = "trashed_ms" if which.is_trashed else "started_ms"
@@ -43,17 +48,23 @@ def page_of(entries: Entries, which: Which, *, cursor: str | None, limit: int) -
     last = page[-1] if page else None
     at_ms = (last.trashed_ms if which.is_trashed else last.started_ms) if last else None
     return Page(
-        rows=[row_of(entry) for entry in page],
+        rows=[row_of(entry, verifications.of(entry)) for entry in page],
         next=f"{at_ms}.{last.id}" if more and last else None,
     )
 
 
-def row_of(entry: Entry) -> Recording:
+def _digest_of_late(entry: Entry) -> str:
+    """Of the marks and descriptions beside the file; none: empty."""
+    late = [getattr(entry.annotations, name) for name in LATE]
+    return hashlib.sha256(orjson.dumps(late)).hexdigest()[:16] if any(late) else ""
+
+
+def row_of(entry: Entry, verified: VerificationAnswer | None = None) -> Recording:
     """A recording as docs/protocol.md has it."""
     found = entry.found or {}
     problem = found.get("problem")
     name = Path(entry.path).name
-    return {
+    row: Recording = {
         "id": entry.id,
         "vehicle": entry.vehicle,
         "session": found.get("session"),
@@ -66,7 +77,9 @@ def row_of(entry: Entry) -> Recording:
         "alarms": found.get("alarms"),
         "title": entry.annotations.title,
         "note": entry.annotations.note,
+        "weather": entry.annotations.weather,
         "tags": list(entry.annotations.tags),
+        "marks": len(entry.marks),
         "state": "waiting" if entry.found is None else "unreadable" if problem else "read",
         "problem": problem,
         "damage": found.get("damage", []),
@@ -82,7 +95,12 @@ def row_of(entry: Entry) -> Recording:
         "file": annotation_store.line(name),
         "format": "mcap" if name.endswith((FINISHED, DAMAGED)) else Path(name).suffix[1:],
         "sha256": found.get("sha256"),
+        "head": found.get("head"),
+        "verified": verified,
         "thumbnail": f"/api/recordings/{entry.id}/track.svg",
         "sketch": found.get("sketch"),
         "trashed_ms": entry.trashed_ms,
     }
+    if late := _digest_of_late(entry):
+        row["late"] = late
+    return row

@@ -15,6 +15,7 @@ import resource
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,15 +28,22 @@ from server.judge.drive import Drive
 from server.judge.offline import Observer, OfflineRun
 from server.judge.speed_trace import SpeedTrace
 from server.protocol.drive_trends import DriveFacts, DriveTrendsAnswer, Wanted, answer
-from server.recording.catalog.annotations import line
+from server.protocol.marks import DriveMark
+from server.recording.catalog.annotations import MAX_MARKS, line
 from server.recording.catalog.sketch import sketch
+from server.recording.drive.course import course_of
+from server.recording.drive.facts import facts_of, figures_of, limits_of, undescribed_of
+from server.recording.drive.motion import Motion
 from server.recording.event_channels import read_recorded_events
+from server.recording.marks.of_drive import in_recording
+from server.recording.mcap.chain import read_head
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 
-VERSION = 5  # of what is found: with another one, files are read again
+VERSION = 8  # of what is found: with another one, files are read again
 PRIORITIES = ("critical", "warning", "advisory")
 MAX_RAISED = 200  # alarms listed one by one; all are counted
 MAX_SENTENCES = 10
+MAX_MARK_WORDS = 400  # letters that a search finds
 SKETCH_BUCKETS = 360
 DRAWN = tuple(name for name in CHARTED if name != "scan")  # a laser's messages take longer than all others together
 _MEMORY_BYTES = 4 << 30  # a damaged length must not take the machine's
@@ -55,12 +63,15 @@ def survey(path: Path) -> dict[str, Any]:
     except MemoryError:
         return {"problem": _sentence(f"{path} has a part that is larger than this machine's memory", path)}
     found["sha256"] = _digest(path)
+    head = read_head(path, "")
+    found["head"] = head.digest if head is not None else None
     return found
 
 
 def _read(recording: Recording, path: Path) -> dict[str, Any]:
     metadata: Mapping[str, str] = recording.metadata
     state, motion, broke_off = _drive(recording)
+    facts = replace(facts_of(recording, motion.motion), limits=motion.limits)
     events, has_alarms = _raised(recording)
     snapshot = state.snapshot(recording.duration_s + 1.0)
     drawn = sketch(snapshot.track, [(at_s - recording.start_s, event.get("priority", "")) for at_s, event in events])
@@ -83,7 +94,7 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "top_speed_mps": None if motion.top_mps is None else round(motion.top_mps, 2),
         "speed_mps": [] if motion.top_mps is None else motion.trace.rounded(),
         "alarms": {name: counts.get(name, 0) for name in PRIORITIES} if has_alarms else None,
-        "raised": [_told(at_s, event) for at_s, event in events[:MAX_RAISED]],
+        "raised": [_raised_entry(at_s, event) for at_s, event in events[:MAX_RAISED]],
         "ended": _text(metadata.get("ended")),
         "ended_why": _text(metadata.get("why")),
         "is_clip": "clip_of" in metadata,
@@ -94,7 +105,11 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "not_received_count": _count(metadata, "not_received"),
         "damage": damage[:MAX_SENTENCES],
         "sketch": None if drawn is None else drawn.as_json(),
+        "marks": _marks(recording),
         "trends": motion.sketch(recording),
+        "figures": figures_of(facts),
+        "undescribed": [] if facts.log is None else undescribed_of(facts.log),
+        "course": course_of(facts),
     }
 
 
@@ -111,16 +126,24 @@ def _count(metadata: Mapping[str, str], name: str) -> int:
 class _Motion(Observer):
     """The highest speed of a run, its course, and that of all other signals."""
 
-    def __init__(self, speed: str, length_s: float) -> None:
+    def __init__(self, speed: str, drive: Drive) -> None:
         """`speed`: the signal that has it."""
+        length_s = drive.length_s
+        self.limits = limits_of(drive)
         self.top_mps: float | None = None
         self.trace = SpeedTrace(length_s)
+        self.motion = Motion(length_s, speed=speed)
         self._speed = speed
         self._trends = DriveTrends(0.0)
 
     def signals_changed(self, changed: tuple[str, ...], state: State, now_s: float) -> None:
-        """Keeps the trends."""
+        """Keeps the trends, and the distance."""
         self._trends.receive(changed, state, now_s)
+        self.motion.signals_changed(changed, state, now_s)
+
+    def message_received(self, topic: str, now_s: float) -> None:
+        """Notes when nothing came."""
+        self.motion.message_received(topic, now_s)
 
     def sketch(self, recording: Recording) -> DriveTrendsAnswer:
         """The whole drive in so few buckets that a chart shows it at once."""
@@ -130,6 +153,7 @@ class _Motion(Observer):
 
     def value_decoded(self, signal: str, value: Any, now_s: float, stamp_s: float | None) -> None:
         """Compares the speed; NaN and what no car drives are no speed."""
+        self.motion.value_decoded(signal, value, now_s, stamp_s)
         speed_mps = getattr(value, "speed_mps", None) if signal == self._speed else None
         if speed_mps is not None and abs(speed_mps) < 1000.0:
             self.top_mps = max(self.top_mps or 0.0, abs(speed_mps))
@@ -145,7 +169,7 @@ def _drive(recording: Recording) -> tuple[State, _Motion, list[str]]:
     recorded = read_recorded_events(recording)
     drive = Drive(recording, recorded, signals=DRAWN)
     has_speed = any("speed" in epoch.published for epoch in drive.epochs)
-    motion = _Motion("speed" if has_speed else "odometry", drive.length_s)
+    motion = _Motion("speed" if has_speed else "odometry", drive)
     run = OfflineRun(recording, drive, observer=motion, with_checks=False)
     broke_off = []
     try:
@@ -159,16 +183,22 @@ def _drive(recording: Recording) -> tuple[State, _Motion, list[str]]:
 
 def _raised(recording: Recording) -> tuple[list[tuple[float, dict[str, Any]]], bool]:
     """The raised alarms, oldest first; and whether the file has an alarm log."""
-    tells = bool(recording.metadata)
+    has_log = bool(recording.metadata)
     found = []
     for at_s, event in recording.own(_ALARMS):
-        tells = True
+        has_log = True
         if event.get("change") == "raised" and event.get("priority") in PRIORITIES:
             found.append((at_s, event))
-    return sorted(found, key=lambda one: one[0]), tells
+    return sorted(found, key=lambda one: one[0]), has_log
 
 
-def _told(at_s: float, event: Mapping[str, Any]) -> dict[str, Any]:
+def _marks(recording: Recording) -> list[DriveMark]:
+    """For the list and its search; the catalog adds those beside the file."""
+    found = sorted(in_recording(recording), key=lambda row: row["marked_ms"])[:MAX_MARKS]
+    return [{**row, "words": row["words"][:MAX_MARK_WORDS]} for row in found]
+
+
+def _raised_entry(at_s: float, event: Mapping[str, Any]) -> dict[str, Any]:
     entry = {name: (_text(event.get(name)) or "")[:300] for name in ("alarm", "title", "text")}
     return {"at_ms": round(at_s * 1000), "priority": event["priority"], **entry}
 
@@ -215,9 +245,12 @@ def main() -> None:
     os.nice(15)
     with contextlib.suppress(ValueError, OSError):
         resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
-    for line_of_one in _answers(sys.stdin):
-        sys.stdout.buffer.write(line_of_one + b"\n")
-        sys.stdout.buffer.flush()
+    try:
+        for line_of_one in _answers(sys.stdin):
+            sys.stdout.buffer.write(line_of_one + b"\n")
+            sys.stdout.buffer.flush()
+    except BrokenPipeError:  # the server was killed: nobody reads the answer
+        os._exit(1)  # no last flush, which would fail like this one
 
 
 if __name__ == "__main__":

@@ -105,6 +105,12 @@ class SurveyTask:
             trends = found.pop("trends", None)  # beside the row: a list reads every row, and needs none of it
             if trends is not None:
                 self._entries.put_trends(found["sha256"], zlib.compress(orjson.dumps(trends), 6))
+            course = found.pop("course", None)
+            if course is not None:
+                self._entries.put_course(found["sha256"], zlib.compress(orjson.dumps(course), 6))
+            figures = found.pop("figures", None)
+            if figures is not None:
+                self._entries.put_figures(found["sha256"], figures)
             found = {**found, "survey": VERSION}
             origin = entry.path.split("/", 2)[2] if entry.trashed_ms is not None else entry.path
             new = replace(

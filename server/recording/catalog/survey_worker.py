@@ -33,7 +33,7 @@ class Surveyor:
             process = await self._running()
             assert process.stdin is not None
             assert process.stdout is not None
-            process.stdin.write(os.fsencode(path).hex().encode() + b"\n")  # a name may hold anything
+            process.stdin.write(_question(path))
             await process.stdin.drain()
             async with asyncio.timeout(LONGEST_S):
                 answer = await process.stdout.readline()
@@ -73,3 +73,8 @@ class Surveyor:
                 )
             )
         return await asyncio.shield(self._starting)
+
+
+def _question(path: Path) -> bytes:
+    """In hex, as a name may hold anything; absolute, as the process has another working directory."""
+    return os.fsencode(path.absolute()).hex().encode() + b"\n"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,7 +42,11 @@ class Trash:
     def restore(self, id: str) -> Entry:
         """Out of the trash, to where it was. Raises NotThere, Refused."""
         with self._entries.lock:
-            entry = self._listing.need(id, is_trashed=True)
+            return self.put_back(self._listing.need(id, is_trashed=True))
+
+    def put_back(self, entry: Entry) -> Entry:
+        """Exactly this one. Raises NotThere, Refused."""
+        with self._entries.lock:
             back = replace(entry, path=entry.path.split("/", 2)[2], trashed_ms=None)
             if (self._folder / back.path).exists():
                 raise Refused("A recording of that name exists: rename its file first.")
@@ -57,12 +61,18 @@ class Trash:
                 if id
                 else self._entries.select("WHERE trashed_ms IS NOT NULL", [])
             )
+            return self.destroy_entries(chosen)
+
+    def destroy_entries(self, chosen: Sequence[Entry]) -> Total:
+        """Exactly these of the trash. Raises Refused."""
+        with self._entries.lock:
             gone: list[Entry] = []
             try:
                 for entry in chosen:
                     path = self._folder / entry.path
                     path.unlink(missing_ok=True)
                     annotation_store.beside(path).unlink(missing_ok=True)
+                    atomic_move.remove_folder(annotation_store.media_beside(path))
                     gone.append(entry)
             except OSError as why:
                 raise Refused(f"It cannot be deleted: {(why.strerror or str(why)).lower()}.") from None

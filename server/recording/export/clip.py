@@ -16,9 +16,13 @@ from typing import Any
 
 import orjson
 
-from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
+from server.protocol.marks import DriveMark
+from server.recording.export.later import described_event
+from server.recording.export.outcome import NothingRecorded, Outcome, Progress, nothing
 from server.recording.export.raw import OWN, Raw, raw_messages, span_ns
 from server.recording.folder import WRITING, id_of
+from server.recording.marks.of_drive import described_late, marks_of, media_of
+from server.recording.marks.rows import entry
 from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema
 from server.recording.read.errors import RecordingUnreadable
@@ -29,8 +33,9 @@ from server.recording.standing import Stood, read_standing
 
 BEFORE_S = AFTER_S = 30.0
 LONGEST_S = 3600.0  # before and after: beyond that it is a drive and no clip
-_ALARMS, _SETTINGS, _LINK = f"{OWN}alarms", f"{OWN}settings", f"{OWN}link"
+_ALARMS, _SETTINGS, _LINK, _MARKS = f"{OWN}alarms", f"{OWN}settings", f"{OWN}link", f"{OWN}marks"
 _HELD = 5000  # messages written and not yet handed to the system: a few MB
+_OF_THE_FILE = ("ended", "why", "closed_ms", "previous", "previous_record", "previous_head")  # not of a clip
 _LATCHED = {"offered_qos_profiles": "- durability: transient_local"}  # in the form that the readers expect
 
 
@@ -56,11 +61,11 @@ def write_clip(
 ) -> Outcome:
     """Writes the clip to `path`, which must not be there and ends in .mcap; until it is whole it ends in .writing.
 
-    Raises ExportRefused where nothing was recorded then, RecordingUnreadable, OSError.
+    Raises NothingRecorded where nothing was recorded then, RecordingUnreadable, OSError.
     """
     first_ns, last_ns = span_ns(recording)
     if not last_ns or window.to_ns < first_ns or window.from_ns > last_ns:
-        raise ExportRefused(f"Nothing was recorded from {_clock(window.from_ns)} to {_clock(window.to_ns)} UTC.")
+        raise NothingRecorded(f"Nothing was recorded from {_clock(window.from_ns)} to {_clock(window.to_ns)} UTC.")
     before = _before(recording, max(window.from_ns, first_ns), progress)
     file = PartFile(path, profile=f"ros{recording.ros_version}", metadata=_metadata(recording, window, before, clip_of))
     try:
@@ -132,17 +137,42 @@ def _copy(recording: Recording, file: PartFile, window: Window, before: _Before,
             )
         file.add(number, at_ns, raw.data)
 
-    begin_ns = max(window.from_ns, span_ns(recording)[0])
+    first_ns, last_ns = span_ns(recording)
+    begin_ns, end_ns = max(window.from_ns, first_ns), min(window.to_ns, last_ns)
+    said = {row["intervention"]: row for row in described_late(recording)}
+    held: set[str] = set()  # interventions of the minute of which something was said later
+    _add_marks(recording, file, window)
     for raw in before.latest.values():
         add(raw, begin_ns)  # what held then; when it was said stands in the message where it has a stamp
     for raw in _within(recording, window, progress):
+        if raw.channel.topic == _MARKS:
+            continue
+        if raw.channel.topic == _ALARMS and said:
+            held.update(name for name in said if name.encode() in raw.data)
         add(raw, raw.time_ns)
         outcome.entries += 1
         if outcome.entries % _HELD == 0:
             file.flush()
+    for row in (said[name] for name in said if name in held):
+        file.add(file.channel(_ALARMS, own_schema("alarms")), end_ns, orjson.dumps(described_event(row)))
     if not outcome.entries:
-        raise ExportRefused(f"Nothing was recorded from {_clock(window.from_ns)} to {_clock(window.to_ns)} UTC.")
+        raise NothingRecorded(f"Nothing was recorded from {_clock(window.from_ns)} to {_clock(window.to_ns)} UTC.")
     return outcome
+
+
+def _add_marks(recording: Recording, file: PartFile, window: Window) -> None:
+    """The marks of the minute as they are by now, whenever they came, with their voice notes and photos."""
+    marks = {row["mark"]: row for row in marks_of(recording) if _is_within(row, window)}
+    for row in marks.values():
+        channel = file.channel(_MARKS, own_schema("marks"))
+        file.add(channel, row["marked_ms"] * 1_000_000, orjson.dumps(entry(row, "mark")))
+    for name, data in media_of(recording):
+        if name.mark in marks:
+            file.attach(name.attachment, name.media_type, marks[name.mark]["marked_ms"] * 1_000_000, data)
+
+
+def _is_within(row: DriveMark, window: Window) -> bool:
+    return window.from_ns <= row["marked_ms"] * 1_000_000 <= window.to_ns
 
 
 def _within(recording: Recording, window: Window, progress: Progress) -> Iterator[Raw]:
@@ -177,7 +207,7 @@ def _schema(recording: Recording, channel: Channel, books: dict[int, TypeBook]) 
 
 
 def _metadata(recording: Recording, window: Window, before: _Before, clip_of: str) -> dict[str, str]:
-    kept = {name: text for name, text in recording.metadata.items() if name not in ("ended", "why", "closed_ms")}
+    kept = {name: text for name, text in recording.metadata.items() if name not in _OF_THE_FILE}
     return {
         "vehicle": "car",
         **kept,

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from server.protocol.answers import ExportJob, ExportState
+from server.recording.catalog import annotations as annotation_store
 from server.recording.export.clip import Window
 from server.recording.export.formats import CLIP, FORMATS
 from server.recording.export.outcome import ExportRefused
@@ -28,6 +29,7 @@ from server.recording.space import why
 
 log = logging.getLogger("catgraph.export")
 
+MOST_BESIDE = 10_000  # files beside a recording that are looked at
 MOST_WAITING = 20  # jobs that are not done
 MOST_KEPT = 100  # jobs that are
 KEEP_S = 3600.0  # the file of a job that is done
@@ -137,7 +139,7 @@ class Exports:
     async def begin(self, of: str, format: str) -> Job:
         """Exports a recording, or answers the job that does so already. Raises NoSuchRecording, TooMany."""
         source = await asyncio.to_thread(self._source, of)
-        changed = await asyncio.to_thread(_stat, source)
+        changed = await asyncio.to_thread(_state_of, source)
         return self._begin(of, format, (of, format, changed), lambda job: self._export(job, source))
 
     async def clip(self, of: str, window: Window) -> Job:
@@ -292,13 +294,21 @@ class Exports:
             removing.add_done_callback(self._removing.discard)
 
 
-def _stat(path: Path) -> tuple[int, int]:
-    """Another value: another content."""
+def _state_of(path: Path) -> tuple[tuple[str, int, int], ...]:
+    """Another value: another content of the file, or of what is beside it: words, late marks, their files."""
     try:
         stat = path.stat()
     except OSError:
         raise NoSuchRecording("There is no such recording.") from None
-    return stat.st_size, stat.st_mtime_ns
+    found = [("", stat.st_size, stat.st_mtime_ns)]
+    folder = annotation_store.media_beside(path)
+    with contextlib.suppress(OSError):
+        listed = sorted(folder.iterdir())[:MOST_BESIDE] if folder.is_dir() else []
+        for file in (annotation_store.beside(path), *listed):
+            with contextlib.suppress(FileNotFoundError):
+                beside = file.stat()
+                found.append((file.name, beside.st_size, beside.st_mtime_ns))
+    return tuple(found)
 
 
 def _keep(clip: Path, folder: Path, id: str) -> Path:

@@ -12,6 +12,10 @@ class ExportRefused(RuntimeError):
     """There is nothing to export in this form, or it cannot be written. The text is one sentence for a person."""
 
 
+class NothingRecorded(ExportRefused):
+    """The recording has nothing of the time that is asked for."""
+
+
 @dataclass(slots=True)
 class Outcome:
     """A file was written."""

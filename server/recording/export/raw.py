@@ -11,7 +11,7 @@ from server.recording.read.read import Recording
 from server.recording.read.source import Channel, FileSource
 
 OWN = "/catgraph/"  # topics that catgraph itself wrote: alarms, phone, settings …
-TOLD_EVERY = 2000  # messages
+PROGRESS_EVERY = 2000  # messages
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ def raw_messages(
     for count, raw in enumerate(merged):
         if raw.time_ns > until_ns:
             return
-        if count % TOLD_EVERY == 0:
+        if count % PROGRESS_EVERY == 0:
             progress(min(max((raw.time_ns - begin_ns) / length_ns, 0.0), 1.0))
         yield raw
 

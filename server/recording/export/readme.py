@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from monitor.signals import SIGNALS
 from server.recording.export.columns import OWN_TABLES
 from server.recording.export.decoded_drive import DecodedDrive
+from server.recording.verification import of_files
 from server.version import catgraph_version
 
 
@@ -31,6 +32,7 @@ def readme(drive: DecodedDrive, tables: Sequence[Written], notes: Sequence[str])
         *([f"Car:        {metadata['address']}"] if metadata.get("address") else []),
         f"Kind:       {drive.profile.title}, ROS {recording.ros_version}",
         *([f"Ended:      {_ended(metadata)}"] if metadata.get("ended") else []),
+        *(f"Event log:  {one.short}. {one.sentence}" for one in of_files(recording)),
         "",
         "Every table is comma-separated UTF-8 with one line of headings; units are in brackets.",
         "  time                            when the message was received, UTC, ISO 8601",
@@ -66,6 +68,8 @@ def readme(drive: DecodedDrive, tables: Sequence[Written], notes: Sequence[str])
 def _what(name: str) -> str:
     if name == "alarms.csv":
         return "Every event of the alarm log: raised, acknowledged, cleared, and events of the monitoring itself."
+    if name == "marks.csv":
+        return "Moments that somebody marked, late ones too; voice notes and photos are in the folder marks."
     signal = SIGNALS.get(name.removesuffix(".csv"))
     if signal is not None:
         return signal.about

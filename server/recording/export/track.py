@@ -13,6 +13,7 @@ from typing import Any
 from monitor.values import GpsFix
 from server.recording.export.decoded_drive import DecodedDrive
 from server.recording.export.outcome import ExportRefused, Progress, nothing
+from server.recording.marks.of_drive import marks_of, title_of
 
 GAP_S = 5.0  # after this time without a position a new track starts, as on the map
 NEAR_S = 5.0  # an alarm is active where the car was, if it was known within so long
@@ -55,7 +56,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where the car was when an alarm was raised."""
+    """Where the car was when an alarm was raised, or somebody marked the moment."""
 
     at_s: float
     lat_deg: float
@@ -84,12 +85,17 @@ class Tracks:
     car: Track = field(default_factory=Track)
     phones: dict[str, Track] = field(default_factory=dict)
     alarms: list[Place] = field(default_factory=list)
+    marks: list[Place] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)  # what is not in it
     notices: list[str] = field(default_factory=list)
 
     @property
     def points(self) -> int:
-        return len(self.car.at_s) + sum(len(track.at_s) for track in self.phones.values()) + len(self.alarms)
+        return len(self.car.at_s) + sum(len(track.at_s) for track in self.phones.values()) + self.places
+
+    @property
+    def places(self) -> int:
+        return len(self.alarms) + len(self.marks)
 
 
 def tracks_of(drive: DecodedDrive, progress: Progress = nothing) -> Tracks:
@@ -108,6 +114,7 @@ def tracks_of(drive: DecodedDrive, progress: Progress = nothing) -> Tracks:
     if not tracks.car.at_s:
         tracks.notices.append("The car published no position: only that of the phone is in the file.")
     _alarms(drive, tracks)
+    _marks(drive, tracks)
     tracks.notes += drive.losses()
     return tracks
 
@@ -149,23 +156,36 @@ def _alarms(drive: DecodedDrive, tracks: Tracks) -> None:
     for at_s, event in drive.recording.own("/catgraph/alarms"):
         if event.get("alarm") is None or event.get("change") not in _RAISED:
             continue
-        index = tracks.car.near(at_s)
-        if index is None:
+        place = _place(tracks.car, at_s, event)
+        if place is None:
             nowhere += 1
-            continue
-        car = tracks.car
-        tracks.alarms.append(
-            Place(
-                at_s=at_s,
-                lat_deg=car.lat_deg[index],
-                lon_deg=car.lon_deg[index],
-                alt_m=car.alt_m[index],
-                event=event,
-            )
-        )
+        else:
+            tracks.alarms.append(place)
     if nowhere:
         what = "1 alarm was" if nowhere == 1 else f"{nowhere} alarms were"
         tracks.notes.append(f"{what} raised while the car's position was unknown, and cannot be drawn.")
+
+
+def _marks(drive: DecodedDrive, tracks: Tracks) -> None:
+    """Each with its category or its first words as its title."""
+    nowhere = 0
+    for mark in marks_of(drive.recording):
+        place = _place(tracks.car, mark["marked_ms"] / 1000, {**mark, "title": title_of(mark), "text": mark["words"]})
+        if place is None:
+            nowhere += 1
+        else:
+            tracks.marks.append(place)
+    if nowhere:
+        what = "1 mark was" if nowhere == 1 else f"{nowhere} marks were"
+        tracks.notes.append(f"{what} made while the car's position was unknown, and cannot be drawn.")
+
+
+def _place(car: Track, at_s: float, event: Mapping[str, Any]) -> Place | None:
+    """Where the car was then; None: that is not known."""
+    index = car.near(at_s)
+    if index is None:
+        return None
+    return Place(at_s=at_s, lat_deg=car.lat_deg[index], lon_deg=car.lon_deg[index], alt_m=car.alt_m[index], event=event)
 
 
 def _is_place(lat_deg: float, lon_deg: float) -> bool:

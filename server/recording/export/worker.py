@@ -13,7 +13,7 @@ from typing import Any
 
 import orjson
 
-from server.recording.export.outcome import ExportRefused, Progress
+from server.recording.export.outcome import ExportRefused, NothingRecorded, Progress
 
 log = logging.getLogger("catgraph.export")
 
@@ -33,8 +33,8 @@ class Made:
 
 
 async def run_worker(arguments: Sequence[str], progress: Progress) -> Made:
-    """Runs `catgraph export` with these arguments. Raises ExportRefused with its sentence, OSError; ends the process
-    where this is cancelled."""
+    """Runs `catgraph export` with these arguments. Raises ExportRefused (NothingRecorded) with its sentence, OSError;
+    ends the process where this is cancelled."""
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "server", "export", "--background", *arguments),
         stdin=asyncio.subprocess.PIPE,  # never written to: its end signals the end of the server
@@ -56,7 +56,7 @@ async def run_worker(arguments: Sequence[str], progress: Progress) -> Made:
     if "refused" in answer:
         if said:
             log.error("export failed: %s", said)
-        raise ExportRefused(str(answer["refused"]))
+        raise (NothingRecorded if answer.get("is_nothing") is True else ExportRefused)(str(answer["refused"]))
     return Made(
         path=Path(answer["done"]),
         entries=int(answer["entries"]),

@@ -10,7 +10,7 @@ import struct
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO
 
 from mcap.opcode import Opcode
 from mcap.records import ChunkIndex
@@ -43,7 +43,7 @@ class ChunkIndexes:
         """All that was appended, which must be in the file. Raises OSError, also where the file has fewer."""
         found = 0
         with self._path.open("rb") as file:
-            for index in _read(file):
+            for index in read_indexes(file):
                 found += 1
                 yield index
                 if found == self._count:
@@ -54,7 +54,7 @@ class ChunkIndexes:
             raise OSError(f"{self._path.name} has {found} chunks instead of {self._count}")
 
 
-def _read(file: BinaryIO) -> Iterator[ChunkIndex]:
+def read_indexes(file: IO[bytes]) -> Iterator[ChunkIndex]:
     """The index of each chunk, in the order of the file."""
     at = len(MAGIC)
     file.seek(at)

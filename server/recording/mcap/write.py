@@ -12,13 +12,17 @@ import errno
 import fcntl
 import os
 import threading
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
 
+from mcap.data_stream import RecordBuilder
+from mcap.records import DataEnd
 from mcap.writer import CompressionType, Writer
 
 from server.recording.folder import writing_path
+from server.recording.mcap.chain import DATA_END_BYTES, LIBRARY_MARK, RECORD_BYTES, ChainWriter, Head
 from server.recording.mcap.chunk_index import ChunkIndexes
 from server.recording.own import LIBRARY, METADATA
 from server.recording.read.schemas import Schema
@@ -26,6 +30,7 @@ from server.storage.durable_file import sync_folder
 from server.version import catgraph_version
 
 CHUNK_BYTES = 32 * 1024
+_CRC = "_Writer__data_section_crc"  # of the library's writer; there is no public name for it
 
 
 class PartFile:
@@ -39,6 +44,7 @@ class PartFile:
         self._channels: dict[tuple[str, str, str], int] = {}  # topic, encoding, type → number
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._sequence: dict[int, int] = {}
+        self._newest_ns = 0
         self.failed: OSError | None = None  # what the disk said of keeping it; the next flush raises it
         self._closing = threading.Lock()
         self._is_named = False  # the disk knows that the file is there
@@ -58,8 +64,9 @@ class PartFile:
                 enable_data_crcs=True,
             )
             vars(self._writer)["_Writer__chunk_indices"] = ChunkIndexes(self._writing)  # there is no public name for it
-            self._writer.start(profile=profile, library=f"{LIBRARY} {catgraph_version()}")
+            self._writer.start(profile=profile, library=f"{LIBRARY} {catgraph_version()} {LIBRARY_MARK}")
             self._writer.add_metadata(METADATA, self._metadata)
+            self._link()
             self._stream.drain()  # what came meanwhile waits: the disk is waited for by `sync`
         except BaseException:
             os.close(self._fd)
@@ -87,8 +94,13 @@ class PartFile:
 
     def add(self, channel: int, at_ns: int, data: bytes) -> None:
         """One message; `at_ns` is the time of day when it came."""
+        self._newest_ns = max(self._newest_ns, at_ns)
         sequence = self._sequence[channel] = self._sequence.get(channel, 0) + 1
         self._writer.add_message(channel, at_ns, data, publish_time=at_ns, sequence=sequence)
+
+    def attach(self, name: str, media_type: str, at_ns: int, data: bytes) -> None:
+        """A file that belongs to the moment `at_ns`."""
+        self._writer.add_attachment(at_ns, at_ns, name, media_type, data)  # between two chunks, as `note`
 
     def note(self, **more: str) -> None:
         """What is known of the drive by now, besides what was known when it began: a kill does not lose it."""
@@ -100,6 +112,7 @@ class PartFile:
         if self.failed is not None:
             raise self.failed
         self._writer.flush()
+        self._link()
         self._stream.drain()
 
     def sync(self) -> None:
@@ -123,8 +136,9 @@ class PartFile:
         try:
             self._writer.flush()
             self._writer.add_metadata(METADATA, self._metadata | ended)
+            self._link()
             self._stream.drain()  # `finish` reads the chunks' index from the file
-            self._writer.finish()
+            self._finish()
             self._stream.drain()
             os.fsync(self._fd)
         except BaseException:
@@ -134,6 +148,29 @@ class PartFile:
         os.rename(self._writing, self.path)
         sync_folder(self.path.parent)
         return self.path
+
+    def head(self, id: str) -> Head:
+        """The newest record of its chain; of a closed file the seal. `id`: what the recording is called."""
+        chain = self._stream.chain
+        return Head(id=id, number=chain.number, digest=chain.head.hex())
+
+    def _link(self) -> None:
+        """Adds a chain record where there are bytes that none covers."""
+        if self._stream.chain.has_unlinked:
+            raw = self._stream.chain.link(self._newest_ns)
+            vars(self._writer)[_CRC] = zlib.crc32(raw, vars(self._writer)[_CRC])
+            self._stream.add(raw)
+
+    def _finish(self) -> None:
+        """Has the end of the file written, which follows a chain record, and the seal before it."""
+        crc = vars(self._writer)[_CRC]
+        self._stream.add(bytes(RECORD_BYTES))  # the place of the seal, which is made of what comes behind it
+        self._writer.finish()
+        end = self._stream.take_back()[RECORD_BYTES:]
+        seal = self._stream.chain.seal(self._newest_ns, end[DATA_END_BYTES:])
+        builder: Any = RecordBuilder()
+        DataEnd(zlib.crc32(seal, crc)).write(builder)
+        self._stream.add(seal + builder.end() + end[DATA_END_BYTES:])
 
     def abandon(self) -> None:
         """Leaves what the disk took, to be recovered when the server starts again."""
@@ -155,12 +192,25 @@ class _Stream:
         self._waiting: list[bytes] = []
         self._size = 0
         self.drained = 0
+        self.chain = ChainWriter()
 
     def write(self, data: bytes) -> int:
         if data:
-            self._waiting.append(data)
-            self._size += len(data)
+            self.chain.feed(data)
+            self.add(data)
         return len(data)
+
+    def add(self, data: bytes) -> None:
+        """Bytes that are part of the chain already."""
+        self._waiting.append(data)
+        self._size += len(data)
+
+    def take_back(self) -> bytes:
+        """All that waits, which is not written now."""
+        data = b"".join(self._waiting)
+        self._waiting.clear()
+        self._size -= len(data)
+        return data
 
     def tell(self) -> int:
         return self._size

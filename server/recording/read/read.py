@@ -13,9 +13,10 @@ from typing import Any, Self
 import orjson
 
 from server.judge.message import Json, Message, RosVersion
+from server.recording.mcap import truncated
 from server.recording.mcap.mcap_file import McapFile, is_bag2
-from server.recording.mcap.truncated import CutMcapFile, is_cut
 from server.recording.own import PREFIX
+from server.recording.read import rosbag1_truncated
 from server.recording.read.decode import Decode, compile_decoder
 from server.recording.read.definitions import definitions_of
 from server.recording.read.errors import RecordingUnreadable, Undecodable
@@ -125,7 +126,7 @@ class Recording:
         """Like `messages`, as tuples: time, topic, type, content.
 
         With `topics`, messages of other topics are empty, because decoding is most of the work. What cannot
-        be decoded is left out and counted in `rejected`, what is damaged is left out where the rest can be told from
+        be decoded is left out and counted in `rejected`, what is damaged is left out where the rest can be read without
         it, and named in `damage`. Raises RecordingUnreadable where it cannot, or nothing is whole.
         """
         start_ns = self._start_ns + round(start_s * 1e9)
@@ -225,13 +226,13 @@ def _nothing(raw: bytes) -> dict[str, Any]:
 def _open(path: Path, kind: Kind) -> FileSource:
     try:
         if kind == "bag":
-            return Bag1(path)
-        if kind == "mcap" and is_cut(path):
-            return CutMcapFile(path)
+            return rosbag1_truncated.CutBag1(path) if rosbag1_truncated.is_cut(path) else Bag1(path)
+        if kind == "mcap" and truncated.is_cut(path):
+            return truncated.CutMcapFile(path)
         if kind == "mcap" and not is_bag2(path):
             return McapFile(path)
         return Bag2(path, kind)
-    except RecordingUnreadable:
+    except (RecordingUnreadable, MemoryError):  # what is too large is not damaged
         raise
     except Exception as error:  # as above
         raise RecordingUnreadable(_what_is_wrong(path, error)) from None
@@ -252,8 +253,6 @@ def _what_is_wrong(path: Path, error: Exception) -> str:
     said = " ".join(str(error).split()).rstrip(".")
     if isinstance(error, PartTooLarge):
         return f"{path} cannot be read: of a part of it, {said}"
-    if "not indexed" in said:
-        return f"{path} was not closed properly and has no index: repair it with `rosbag reindex`"
     if any(words in said for words in _ENDS_EARLY):
         return f"{path} is not complete: it ends too early"
     if not said or len(said) > 200 or isinstance(error, KeyError | AssertionError | TypeError | IndexError):

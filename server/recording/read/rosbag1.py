@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, cast
+from typing import Any, BinaryIO, NamedTuple, Protocol, cast
 
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag1 import Reader, ReaderError
@@ -22,6 +22,7 @@ from server.recording.read.source import Channel, Damage
 from server.recording.read.unpack import PartTooLarge, unpack
 
 CACHE_BYTES = 64_000_000  # unpacked chunks kept: chunks may overlap in time
+MOST_CONNECTIONS = 1000  # records of them that may stand before one message
 _CONNECTION = 7  # the op of a record that may stand before a message in its chunk
 _OP = b"\x04\x00\x00\x00op="
 _OP_BYTES = len(_OP)
@@ -31,10 +32,10 @@ _ENTRY = struct.Struct("<III")  # seconds, nanoseconds, place in the chunk
 _length = struct.Struct("<I").unpack_from
 
 
-_Entry = tuple[int, int, int, int]  # of an index: ns, chunk, place in it, connection
+Entry = tuple[int, int, int, int]  # of an index: ns, chunk, place in it, connection
 
 
-class _Packed(NamedTuple):
+class Packed(NamedTuple):
     """One chunk and its header."""
 
     datasize: int
@@ -43,17 +44,47 @@ class _Packed(NamedTuple):
     size: int  # unpacked
 
 
+class BagIndex(Protocol):
+    """What a bag holds and where, once it is open."""
+
+    bio: BinaryIO | None
+    indexes: dict[int, list[Entry]]  # by connection, in order
+    chunks: dict[int, Packed]  # by place in the file
+
+    @property
+    def channels(self) -> Sequence[Channel]: ...
+
+    @property
+    def start_time(self) -> int:
+        """Of the earliest message [ns]."""
+        ...
+
+    @property
+    def end_time(self) -> int:
+        """After the latest message [ns]."""
+        ...
+
+    def open(self) -> None: ...
+
+    def close(self) -> None: ...
+
+
 class _Reader(Reader):
     """The library's, but for the entries of the index: made one by one they take longer than all else of opening."""
 
-    indexes: dict[int, list[_Entry]]  # type: ignore[assignment]  # by connection, in order
-    chunks: dict[int, _Packed]  # type: ignore[assignment]  # by place in the file
+    indexes: dict[int, list[Entry]]  # type: ignore[assignment]  # by connection, in order
+    chunks: dict[int, Packed]  # type: ignore[assignment]  # by place in the file
 
     def __init__(self, path: Path, on_first_chunk: Callable[[int], None]) -> None:
         super().__init__(path)
         self._on_first_chunk: Callable[[int], None] | None = on_first_chunk
+        self._indexed: set[tuple[int, int]] = set()  # chunk and connection
 
-    def read_chunk(self) -> _Packed:  # type: ignore[override]
+    @property
+    def channels(self) -> Sequence[Channel]:
+        return [_channel(connection) for connection in self.connections]
+
+    def read_chunk(self) -> Packed:  # type: ignore[override]
         """The header of the chunk at the current place, with its size: the library's own keeps none."""
         file = cast("BinaryIO", self.bio)
         header = Header.read(file, RecordType.CHUNK)
@@ -63,34 +94,40 @@ class _Reader(Reader):
         file.seek(packed, os.SEEK_CUR)
         if compression not in ("none", "bz2", "lz4"):
             raise ReaderError(f"Compression {compression[:20]!r} is not supported.")
-        return _Packed(packed, place, compression, size)
+        return Packed(packed, place, compression, size)
 
     def read_index_data(self, pos: int, indexes: dict[int, list[Any]]) -> None:
         """One record of a connection's messages in the chunk at `pos`. Raises ReaderError where it is none."""
         file = cast("BinaryIO", self.bio)
         if self._on_first_chunk is not None:
-            tell, self._on_first_chunk, place = self._on_first_chunk, None, file.tell()
-            tell(pos)
+            notify, self._on_first_chunk, place = self._on_first_chunk, None, file.tell()
+            notify(pos)
             file.seek(place)
-        header = _fields(file.read(_length(file.read(4))[0]))
+        header = fields_of(file.read(_length(file.read(4))[0]))
         entries = file.read(_length(file.read(4))[0])
         count = _length(header[b"count"])[0]
         if header[b"op"] != _INDEX or header[b"ver"] != _INDEX_1 or len(entries) != count * _ENTRY.size:
             raise ReaderError("An index record is damaged.")
         number = _length(header[b"conn"])[0]
+        if (pos, number) in self._indexed:  # a small bag could hold any number of messages
+            raise ReaderError("The index names a part twice.")
+        self._indexed.add((pos, number))
         indexes[number] += [
             (seconds * 10**9 + nanoseconds, pos, place, number)
             for seconds, nanoseconds, place in _ENTRY.iter_unpack(entries)
         ]
 
 
-def _fields(header: bytes) -> dict[bytes, bytes]:
-    """Of a record's header: each "name=value" after its length."""
-    found, at = {}, 0
+def fields_of(header: bytes) -> dict[bytes, bytes]:
+    """Of a record's header: each "name=value" after its length. Raises ValueError or struct.error where it is none."""
+    found: dict[bytes, bytes] = {}
+    at = 0
     while at < len(header):
         end = at + 4 + _length(header, at)[0]
+        if end > len(header):
+            raise ValueError("A field is longer than its header.")
         name, _, value = header[at + 4 : end].partition(b"=")
-        found[name] = value
+        found.setdefault(name, value)
         at = end
     return found
 
@@ -100,26 +137,27 @@ class Bag1:
 
     ros_version: RosVersion = 1
     distro: str | None = None
+    is_cut = False
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.damage = Damage()  # none that is left out: the format has no checksums
+        self.damage = Damage(is_cut=self.is_cut)  # else none that is left out: the format has no checksums
         self._chunks: OrderedDict[int, bytes] = OrderedDict()
         self._chunk_bytes = 0
         self._ahead = ThreadPoolExecutor(1, "bag")
         self._coming: dict[int, Future[bytes]] = {}  # at most one
-        self._reader = _Reader(path, self._begin_unpacking)  # a bag is usually read from its start after opening
+        self._reader = self._reader_of(path)
         try:
             self._reader.open()
         except BaseException:
             self._ahead.shutdown(cancel_futures=True)
             raise
-        self.channels: Sequence[Channel] = [_channel(connection) for connection in self._reader.connections]
+        self.channels: Sequence[Channel] = self._reader.channels
         self.start_ns = self._reader.start_time
         self.end_ns = self._reader.end_time - 1
 
     def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-        entries: list[_Entry] = []
+        entries: list[Entry] = []
         for number in numbers:
             entries += _since(start_ns, self._reader.indexes.get(number, ()))
         entries.sort()  # by time, then by place in the file
@@ -145,6 +183,9 @@ class Bag1:
         self._chunks.clear()
         self._reader.close()
 
+    def _reader_of(self, path: Path) -> BagIndex:
+        return _Reader(path, self._begin_unpacking)  # a bag is usually read from its start after opening
+
     def _begin_unpacking(self, position: int) -> None:
         """A chunk is unpacked beside the reader: that takes as long as judging what is in it."""
         header, file = self._reader.chunks[position], cast("BinaryIO", self._reader.bio)
@@ -158,7 +199,7 @@ class Bag1:
             failed.set_exception(error)
             self._coming[position] = failed
         else:
-            self._coming[position] = self._ahead.submit(_unpacked, header, packed)
+            self._coming[position] = self._ahead.submit(unpacked, header, packed)
 
     def _chunk(self, position: int) -> bytes:
         cached = self._chunks.get(position)
@@ -182,13 +223,13 @@ class Bag1:
         return chunk
 
 
-def _since(start_ns: int, index: Sequence[_Entry]) -> Sequence[_Entry]:
+def _since(start_ns: int, index: Sequence[Entry]) -> Sequence[Entry]:
     """The entries of one connection from a moment on."""
     first = bisect_left(index, start_ns, key=itemgetter(0))
     return index[first:] if first else index
 
 
-def _unpacked(header: _Packed, packed: bytes) -> bytes:
+def unpacked(header: Packed, packed: bytes) -> bytes:
     if len(packed) < header.datasize:
         raise EOFError
     return unpack(header.compression, packed, header.size if header.compression != "none" else len(packed))
@@ -196,7 +237,7 @@ def _unpacked(header: _Packed, packed: bytes) -> bytes:
 
 def _message(chunk: bytes, offset: int) -> bytes:
     """The data of the message record at `offset`. Raises struct.error or IndexError where there is none."""
-    while True:
+    for _ in range(MOST_CONNECTIONS):
         head = offset + 4
         data = head + _length(chunk, offset)[0]
         begin = data + 4
@@ -208,6 +249,7 @@ def _message(chunk: bytes, offset: int) -> bytes:
             offset = end
             continue
         return chunk[begin:end]
+    raise IndexError
 
 
 def _channel(connection: Any) -> Channel:

@@ -36,6 +36,7 @@ class Damage:
 
     too_large: int = 0  # of the lost ones: larger, unpacked, than may be read
     is_cut: bool = False  # its end is missing too, of unknown length
+    pieces: int = 0  # without checksums or times of their own, that could not be read either
 
     def leave_out(self, start_ns: int, end_ns: int, why: Exception) -> None:
         """One part cannot be read."""
@@ -65,6 +66,9 @@ class Damage:
                 f"{name} {what}: {which} of {self.parts}, between {first_s:.1f} s and {last_s:.1f} s, "
                 f"{'is' if len(self.lost) == 1 else 'are'} left out"
             )
+        if self.pieces:
+            which = "1 piece of it is" if self.pieces == 1 else f"{self.pieces} pieces of it are"
+            said.append(f"{name} is damaged: {which} left out")
         if self.is_cut:
             said.append(
                 f"{name} was never closed: it is read to its last whole part, {(end_ns - origin_ns) / 1e9:.1f} s"

@@ -53,8 +53,8 @@ async def call(bridge: ServiceHost, name: str, args: Any) -> Any:
         if bridge.ros_version == 2:
             bridge.end_node(service.node)
             raise NoAnswer from None
-        told = f"error processing request: {error}".encode()
-        raise Failure(f"service [{full}] responded with an error: {told!r}") from None
+        text = f"error processing request: {error}".encode()
+        raise Failure(f"service [{full}] responded with an error: {text!r}") from None
 
 
 def _resolved(bridge: ServiceHost, name: str) -> str:

@@ -13,9 +13,10 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 FOLDER = "built"  # in static/, beside js/ and css/, so that what they name by ../ is found from here too
 STYLES = (
@@ -30,9 +31,12 @@ STYLES = (
     "slowing",
     "wide",
     "watch",
+    "ledge",
     "wall",
 )  # in this order
 ENTRY = "main.js"
+FLEET_STYLES = ("tokens", "frame", "topbar", "sheets", "fleet")
+FLEET_ENTRY = "shell/fleet.js"  # joined for itself, so that the page of one car is no larger by it
 EARLY = "boot/early.js"  # inline in the page
 THREADS = ("scan/scan-painter",)  # scripts of threads, each joined for itself
 _LIST = "built.json"  # written last
@@ -41,14 +45,21 @@ _CONFIG = Path(__file__).with_name("rollup.config.mjs")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Built:
-    """The joined files that the page begins with, as paths within static/."""
+class Entry:
+    """The joined files that a page begins with, as paths within static/."""
 
     script: str
     style: str
     needed: tuple[str, ...]  # scripts that `script` imports at once
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Built(Entry):
+    """Those of the page of one car, and what all pages share."""
+
     early: str  # the text of the script that runs before all others
     name: str  # of this build: other sources have another
+    fleet: Entry  # the page of all cars
 
 
 def join(tools: Path, static: Path) -> None:
@@ -62,33 +73,46 @@ def join(tools: Path, static: Path) -> None:
     for old in into.iterdir():
         old.unlink()
     with tempfile.TemporaryDirectory(prefix="catgraph-page-") as folder:
-        joined, style = Path(folder, "joined"), Path(folder, "page.css")
-        small = ["--minify", f"--target={_TARGET}", f"--outdir={into}", "--log-level=error"]
-        own = ["--bundle", "--entry-names=[name]-[hash]"]
+        esbuild, small = str(tools / "esbuild"), _small(into)
         threads = [str(static / "js" / f"{name}.js") for name in THREADS]
-        _run([str(tools / "esbuild"), *threads, *own, "--format=esm", *small])
-        entry = {
-            "CATGRAPH_ENTRY": str(static / "js" / ENTRY),
-            "CATGRAPH_INTO": str(joined),
-            "CATGRAPH_THREADS": json.dumps(
-                {f"../{name}.js": next(path.name for path in into.glob(f"{Path(name).name}-*.js")) for name in THREADS}
-            ),
-        }
-        _run([str(tools / "rollup"), "--config", str(_CONFIG), "--silent"], {**os.environ, **entry})
-        told = json.loads((joined / "joined.json").read_text(encoding="utf-8"))
-        _run([str(tools / "esbuild"), *map(str, sorted(joined.glob("*.js"))), "--format=esm", *small])
-        early = _run([str(tools / "esbuild"), str(static / "js" / EARLY), "--minify", f"--target={_TARGET}"])
-        imports = (f"@import {json.dumps(str(static / 'css' / f'{name}.css'))};" for name in STYLES)
-        style.write_text("\n".join(imports), encoding="utf-8")
-        _run([str(tools / "esbuild"), str(style), *own, "--external:../fonts/*", *small])
-    listed = {
-        "sources": sources,
-        "script": f"{FOLDER}/{told['script']}",
-        "style": f"{FOLDER}/{next(path.name for path in into.glob('page-*.css'))}",
-        "needed": [f"{FOLDER}/{name}" for name in told["needed"]],
-        "early": early.strip(),
-    }
+        _run([esbuild, *threads, *_OWN, "--format=esm", *small])
+        page = _join_entry(tools, static, ENTRY, STYLES, Path(folder, "page"))
+        fleet = _join_entry(tools, static, FLEET_ENTRY, FLEET_STYLES, Path(folder, "fleet"))
+        early = _run([esbuild, str(static / "js" / EARLY), "--minify", f"--target={_TARGET}"])
+    listed = {"sources": sources, **asdict(page), "early": early.strip(), "fleet": asdict(fleet)}
     (into / _LIST).write_text(json.dumps(listed), encoding="utf-8")
+
+
+_OWN = ("--bundle", "--entry-names=[name]-[hash]")
+
+
+def _small(into: Path) -> list[str]:
+    return ["--minify", f"--target={_TARGET}", f"--outdir={into}", "--log-level=error"]
+
+
+def _join_entry(tools: Path, static: Path, script: str, styles: tuple[str, ...], folder: Path) -> Entry:
+    """Join the modules and styles of one page; `folder` has its name, and is made."""
+    into, esbuild = static / FOLDER, str(tools / "esbuild")
+    folder.mkdir()
+    threads = {f"../{name}.js": next(path.name for path in into.glob(f"{Path(name).name}-*.js")) for name in THREADS}
+    entry = {
+        "CATGRAPH_ENTRY": str(static / "js" / script),
+        "CATGRAPH_INTO": str(folder / "joined"),
+        "CATGRAPH_THREADS": json.dumps(threads),
+    }
+    _run([str(tools / "rollup"), "--config", str(_CONFIG), "--silent"], {**os.environ, **entry})
+    joined = json.loads((folder / "joined" / "joined.json").read_text(encoding="utf-8"))
+    _run([esbuild, *map(str, sorted((folder / "joined").glob("*.js"))), "--format=esm", *_small(into)])
+    style = folder / f"{folder.name}.css"
+    style.write_text(
+        "\n".join(f"@import {json.dumps(str(static / 'css' / f'{name}.css'))};" for name in styles), encoding="utf-8"
+    )
+    _run([esbuild, str(style), *_OWN, "--external:../fonts/*", *_small(into)])
+    return Entry(
+        script=f"{FOLDER}/{joined['script']}",
+        style=f"{FOLDER}/{next(path.name for path in into.glob(f'{folder.name}-*.css'))}",
+        needed=tuple(f"{FOLDER}/{name}" for name in joined["needed"]),
+    )
 
 
 def find(static: Path) -> Built | None:
@@ -103,7 +127,9 @@ def find(static: Path) -> Built | None:
 
 def digest_of_sources(static: Path) -> str:
     """Hash of all that the joined files are made of, and of how."""
-    digest = hashlib.sha256(f"{STYLES} {_TARGET} {sys.modules[__name__].__doc__}".encode() + _CONFIG.read_bytes())
+    digest = hashlib.sha256(
+        f"{STYLES} {FLEET_STYLES} {_TARGET} {sys.modules[__name__].__doc__}".encode() + _CONFIG.read_bytes()
+    )
     for path in _sources(static):
         digest.update(path.relative_to(static).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
@@ -114,13 +140,17 @@ def _find(static: Path, stamps: tuple[tuple[str, int], ...], listed_ns: int) -> 
     # The times are arguments only to invalidate the cache; they decide nothing, because a clone has none.
     try:
         listed = json.loads((static / FOLDER / _LIST).read_text(encoding="utf-8"))
-        needed, name = tuple(listed["needed"]), listed["sources"][:12]
-        script, style, early = listed["script"], listed["style"], listed["early"]
-        found = Built(script=script, style=style, needed=needed, early=early, name=name)
-        is_whole = all((static / name).is_file() for name in (found.script, found.style, *found.needed))
+        page, fleet = _entry_of(listed), _entry_of(listed["fleet"])
+        found = Built(**asdict(page), early=listed["early"], name=listed["sources"][:12], fleet=fleet)
+        files = [name for one in (page, fleet) for name in (one.script, one.style, *one.needed)]
+        is_whole = all((static / name).is_file() for name in files)
         return found if is_whole and listed["sources"] == digest_of_sources(static) else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def _entry_of(listed: dict[str, Any]) -> Entry:
+    return Entry(script=listed["script"], style=listed["style"], needed=tuple(listed["needed"]))
 
 
 def _sources(static: Path) -> list[Path]:

@@ -69,8 +69,8 @@ def draw(modules: Path, static: Path) -> str | None:
     try:
         into.mkdir()
         wanted = [{"of": str(_source(static, i)), "side": i.side, "into": str(into / i.name)} for i in ICONS]
-        told = json.dumps({"modules": str(modules.resolve()), "icons": wanted})
-        command = [node, "--input-type=module", "-e", _PROGRAM, told]
+        job = json.dumps({"modules": str(modules.resolve()), "icons": wanted})
+        command = [node, "--input-type=module", "-e", _PROGRAM, job]
         done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=_LONGEST_S)
         if done.returncode:
             lines = [line for line in done.stderr.splitlines() if "Error" in line] or ["no reason was given"]

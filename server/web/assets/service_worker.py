@@ -34,14 +34,14 @@ class Shell:
 
     def worker(self, static: Path) -> str:
         """The script of the worker."""
-        told = {
+        shell = {
             "version": self.version,
             "build": self.build,
             "named": self.named,
             "plain": self.plain,
             "offline": f"{OFFLINE}?v={self.version}",
         }
-        return f"self.SHELL = {json.dumps(told)};\n{_script(static, 'worker')}"
+        return f"self.SHELL = {json.dumps(shell)};\n{_script(static, 'worker')}"
 
 
 def build_of(built: Built | None) -> str:

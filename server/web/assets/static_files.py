@@ -53,12 +53,12 @@ def answer(file: Packed, headers: Headers, media_type: str, keep: str) -> Respon
     """The whole, or 304 where the browser has it."""
     is_small = "gzip" in headers.get("accept-encoding", "")
     etag = f'"{file.etag}{"-gz" if is_small else ""}"'
-    told = {"ETag": etag, "Cache-Control": keep, "Vary": "Accept-Encoding"}
+    sent_headers = {"ETag": etag, "Cache-Control": keep, "Vary": "Accept-Encoding"}
     if etag in headers.get("if-none-match", ""):
-        return Response(status_code=304, headers=told)
+        return Response(status_code=304, headers=sent_headers)
     if is_small:
-        return Response(file.small, media_type=media_type, headers=told | {"Content-Encoding": "gzip"})
-    return Response(file.plain, media_type=media_type, headers=told)
+        return Response(file.small, media_type=media_type, headers=sent_headers | {"Content-Encoding": "gzip"})
+    return Response(file.plain, media_type=media_type, headers=sent_headers)
 
 
 class StaticText(StaticFiles):

@@ -48,10 +48,10 @@ class DaemonThreads:
                 failed = why
             loop = answer.get_loop()
             if not loop.is_closed():
-                loop.call_soon_threadsafe(_tell, answer, found, failed)
+                loop.call_soon_threadsafe(_resolve, answer, found, failed)
 
 
-def _tell(answer: asyncio.Future[Any], found: Any, failed: BaseException | None) -> None:
+def _resolve(answer: asyncio.Future[Any], found: Any, failed: BaseException | None) -> None:
     if answer.done():
         return
     if failed is not None:

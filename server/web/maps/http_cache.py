@@ -19,9 +19,9 @@ MOST, WITHIN_S = 1200, 600.0  # tiles: two a second on end is what driving with 
 
 def fresh_for_s(headers: Mapping[str, str], wall_s: float) -> float | None:
     """How long an answer holds from now [s]; None: it must not be kept."""
-    told = {name.lower(): value for name, value in headers.items()}
+    fields = {name.lower(): value for name, value in headers.items()}
     words: dict[str, str] = {}
-    for part in told.get("cache-control", "").lower().split(","):
+    for part in fields.get("cache-control", "").lower().split(","):
         name, _, value = part.strip().partition("=")
         words.setdefault(name, value.strip('" '))
     if "no-store" in words:
@@ -30,9 +30,9 @@ def fresh_for_s(headers: Mapping[str, str], wall_s: float) -> float | None:
         return 0.0
     for name in ("s-maxage", "max-age"):  # several phones are served from what is kept
         if name in words:
-            return _bounded((_number(words[name]) or 0.0) - (_number(told.get("age", "")) or 0.0))
-    if "expires" in told:
-        expires_s, date_s = _date_s(told["expires"]), _date_s(told.get("date", ""))
+            return _bounded((_number(words[name]) or 0.0) - (_number(fields.get("age", "")) or 0.0))
+    if "expires" in fields:
+        expires_s, date_s = _date_s(fields["expires"]), _date_s(fields.get("date", ""))
         return 0.0 if expires_s is None else _bounded(expires_s - (wall_s if date_s is None else date_s))
     return UNSAID_S
 

@@ -96,9 +96,9 @@ class MapFile:
         names = {row[0] for row in self._rows.execute("SELECT name FROM sqlite_master WHERE type IN ('table', 'view')")}
         if "tiles" not in names:
             raise MapRefused(f"{self._path} is not an MBTiles file: it has no tiles.")
-        told: dict[str, str] = {}
+        metadata: dict[str, str] = {}
         if "metadata" in names:
-            told = {
+            metadata = {
                 str(name): str(value)
                 for name, value in self._rows.execute(f"SELECT name, value FROM metadata LIMIT {MOST_METADATA}")
             }
@@ -106,7 +106,7 @@ class MapFile:
         if one is None:
             raise MapRefused(f"The map {self._path} has no tiles.")
         data = one[0] if isinstance(one[0], bytes) else b""
-        if told.get("format", "").lower() in _VECTOR or data.startswith(_GZIP):
+        if metadata.get("format", "").lower() in _VECTOR or data.startswith(_GZIP):
             raise MapRefused(
                 f"The map {self._path} has vector tiles; catgraph draws raster tiles: export it as png or jpg."
             )
@@ -116,17 +116,17 @@ class MapFile:
         mark = f"{self._path.resolve()} {stat.st_size} {stat.st_mtime_ns}"
         return Layer(
             name=hashlib.sha256(mark.encode()).hexdigest()[:12],
-            title=plain_text(told.get("name") or self._path.stem),
-            attribution=plain_text(told.get("attribution", "")),
-            zoom=self._zoom(told),
-            bounds=_bounds(told.get("bounds")),
+            title=plain_text(metadata.get("name") or self._path.stem),
+            attribution=plain_text(metadata.get("attribution", "")),
+            zoom=self._zoom(metadata),
+            bounds=_bounds(metadata.get("bounds")),
         )
 
-    def _zoom(self, told: dict[str, str]) -> tuple[int, int]:
+    def _zoom(self, metadata: dict[str, str]) -> tuple[int, int]:
         least: Any
         deepest: Any
         try:
-            least, deepest = int(told["minzoom"]), int(told["maxzoom"])
+            least, deepest = int(metadata["minzoom"]), int(metadata["maxzoom"])
         except (KeyError, ValueError):
             least, deepest = self._rows.execute("SELECT min(zoom_level), max(zoom_level) FROM tiles").fetchone()
         if not (isinstance(least, int) and isinstance(deepest, int) and 0 <= least <= deepest <= DEEPEST):

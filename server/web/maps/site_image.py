@@ -72,7 +72,7 @@ def site_image(path: Path) -> SiteImage:
             f"The site image {path} has {width} × {height} pixels; a phone can draw {MOST_PIXELS // 10**6} million."
         )
     try:
-        told = _Beside.model_validate(bounded_toml.loads(_beginning(beside)))
+        sidecar = _Beside.model_validate(bounded_toml.loads(_beginning(beside)))
     except OSError as why:
         raise MapRefused(f"The corners of the site image must be in {beside}: {why.strerror or why}.") from None
     except ValidationError as why:
@@ -85,14 +85,14 @@ def site_image(path: Path) -> SiteImage:
         raise MapRefused(
             f"The corners of the site image in {beside} are not usable: {str(why).removesuffix('.')}."
         ) from None
-    corners = (told.corners.top_left, told.corners.top_right, told.corners.bottom_left)
+    corners = (sidecar.corners.top_left, sidecar.corners.top_right, sidecar.corners.bottom_left)
     _check(corners, beside)
     return SiteImage(
         name=hashlib.sha256(data).hexdigest()[:12],
         data=data,
         media_type=kind,
         corners=corners,
-        attribution=plain_text(told.attribution),
+        attribution=plain_text(sidecar.attribution),
     )
 
 

@@ -63,16 +63,16 @@ class TileCache:
         self._lock = threading.Lock()
         self._is_open = True  # a fetch may end after the server did
         path.parent.mkdir(parents=True, exist_ok=True)
-        told = {"name": title, "attribution": attribution, "type": "baselayer", "version": "1"}
-        told["description"] = "Tiles that catgraph fetched when they were viewed."
+        metadata = {"name": title, "attribution": attribution, "type": "baselayer", "version": "1"}
+        metadata["description"] = "Tiles that catgraph fetched when they were viewed."
         try:
-            self._rows = self._open(told)
+            self._rows = self._open(metadata)
         except sqlite3.DatabaseError as why:
             log.warning("tile cache damaged, set aside: path=%s error=%s", path, why)
             for end in ("-wal", "-shm"):
                 path.with_name(path.name + end).unlink(missing_ok=True)
             path.replace(path.with_name(path.name + ".damaged"))
-            self._rows = self._open(told)
+            self._rows = self._open(metadata)
 
     @property
     def size_bytes(self) -> int:
@@ -161,7 +161,7 @@ class TileCache:
         with self._rows:
             yield True
 
-    def _open(self, told: dict[str, str]) -> sqlite3.Connection:
+    def _open(self, metadata: dict[str, str]) -> sqlite3.Connection:
         rows = sqlite3.connect(self.path, check_same_thread=False, timeout=5.0)
         try:
             rows.execute("PRAGMA journal_mode = wal")
@@ -169,7 +169,7 @@ class TileCache:
             rows.execute(f"PRAGMA application_id = {APPLICATION_ID}")
             rows.executescript(_TABLES)
             with rows:
-                rows.executemany("INSERT OR REPLACE INTO metadata VALUES (?, ?)", told.items())
+                rows.executemany("INSERT OR REPLACE INTO metadata VALUES (?, ?)", metadata.items())
             self._bytes = int(rows.execute("SELECT coalesce(sum(bytes), 0) FROM catgraph_kept").fetchone()[0])
             self._zoom = rows.execute("SELECT min(zoom_level), max(zoom_level) FROM tiles").fetchone()
         except BaseException:
@@ -203,10 +203,10 @@ class TileCache:
         if least is not None and least <= zoom <= deepest:
             return
         self._zoom = (zoom, zoom) if least is None else (min(least, zoom), max(deepest, zoom))
-        told = {"minzoom": str(self._zoom[0]), "maxzoom": str(self._zoom[1]), "bounds": "-180,-85,180,85"}
+        metadata = {"minzoom": str(self._zoom[0]), "maxzoom": str(self._zoom[1]), "bounds": "-180,-85,180,85"}
         if least is None:
-            told["format"] = _FORMATS.get(media_type(data) or "", "png")
-        self._rows.executemany("INSERT OR REPLACE INTO metadata VALUES (?, ?)", told.items())
+            metadata["format"] = _FORMATS.get(media_type(data) or "", "png")
+        self._rows.executemany("INSERT OR REPLACE INTO metadata VALUES (?, ?)", metadata.items())
 
     def _describe(self) -> None:
         """Zoom levels and bounds of what is there."""
@@ -220,9 +220,9 @@ class TileCache:
         n = 1 << deepest
         degrees = (_lon_deg(west, n), _lat_deg(south, n), _lon_deg(east + 1, n), _lat_deg(north + 1, n))
         bounds = ",".join(f"{one:.6f}" for one in degrees)
-        told = {"minzoom": str(least), "maxzoom": str(deepest), "bounds": bounds}
+        metadata = {"minzoom": str(least), "maxzoom": str(deepest), "bounds": bounds}
         with self._rows:
-            self._rows.executemany("INSERT OR REPLACE INTO metadata VALUES (?, ?)", told.items())
+            self._rows.executemany("INSERT OR REPLACE INTO metadata VALUES (?, ?)", metadata.items())
 
     def _say(self, why: sqlite3.Error) -> None:
         if self.problem is None:

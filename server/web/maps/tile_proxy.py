@@ -91,7 +91,7 @@ class Upstream:
         self._source.close()
         self._cache.close()
 
-    def told(self) -> dict[str, Any]:
+    def description(self) -> dict[str, Any]:
         """The layer's description for a page, without the address, which may contain a key."""
         return {
             "host": self._source.host,
@@ -177,6 +177,9 @@ class Upstream:
     def _fetch(self, place: Place, kept: Kept | None) -> Kept:
         """In a thread. Raises SourceTrouble."""
         wall_s = self._wall_s()
+        newest = self._cache.get(place, wall_s)
+        if newest is not None and newest.until_s > wall_s:  # fetched between the look into the cache and this wish
+            return newest
         etag, modified = (kept.etag, kept.modified) if kept is not None and kept.data is not None else (None, None)
         got = self._source.fetch(*place, wall_s=wall_s, etag=etag, modified=modified)
         until_s = wall_s + (got.fresh_s or 0.0)

@@ -12,6 +12,8 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
+from server.bus.bus import NotServed
+
 log = logging.getLogger("catgraph.web")
 
 
@@ -43,6 +45,10 @@ def install(app: FastAPI) -> None:
         answer = problem(error.status_code, str(error.detail), **getattr(error, "more", {}))
         answer.headers.update(error.headers or {})
         return answer
+
+    @app.exception_handler(NotServed)
+    async def of_agent(_: Request, error: NotServed) -> JSONResponse:
+        return problem(503, f"{str(error)[:1].upper()}{str(error)[1:]}.")
 
     @app.exception_handler(RequestValidationError)
     async def of_validation(_: Request, error: RequestValidationError) -> JSONResponse:

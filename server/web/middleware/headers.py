@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -20,6 +21,7 @@ POLICY = "; ".join(
         "style-src 'self'",
         "img-src 'self' data:",
         "font-src 'self'",
+        "media-src 'self' blob:",  # the voice of a mark: stored, or still in this page
         "connect-src 'self'",
         "manifest-src 'self'",
         "worker-src 'self'",
@@ -40,18 +42,27 @@ def policy_of(script: str) -> str:
 
 
 POLICY_OF_DATA = "default-src 'none'; base-uri 'none'; object-src 'none'; frame-ancestors 'none'; sandbox"
+# A report is a document of its own: it has its style and script in itself, and is kept apart from our pages as if it
+# came from elsewhere, for at a web node it comes from an agent.
+POLICY_OF_REPORT = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; font-src data:; img-src data:; "
+    "media-src data:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
+    "sandbox allow-scripts allow-modals"
+)
 POLICY_OF_PARTS = "default-src 'none'; base-uri 'none'; object-src 'none'"  # a dozen come with a page: short
 _DATA = (
     "/api/",
+    "/agents/",
     "/map/",
     "/metrics",
     "/openapi.json",
 )  # never documents of ours, and opened as one they can do nothing
+_REPORT = re.compile(r"(/agents/[^/]{1,100})?/api/recordings/[^/]{1,100}/report")
 _PARTS = "/static/"  # decided by the path and not by the kind: a 304 has no kind, and replaces what is kept
 # What a browser does not know it complains of in its console: sharing and Bluetooth, which Chromium has not everywhere.
-_SELF = ("autoplay", "clipboard-write", "fullscreen", "geolocation", "screen-wake-lock")
+_SELF = ("autoplay", "clipboard-write", "fullscreen", "geolocation", "microphone", "screen-wake-lock")
 _NOBODY = (
-    *("accelerometer", "camera", "display-capture", "gyroscope", "hid", "magnetometer", "microphone"),
+    *("accelerometer", "camera", "display-capture", "gyroscope", "hid", "magnetometer"),
     *("midi", "payment", "serial", "usb", "xr-spatial-tracking"),
 )
 PERMISSIONS = ", ".join([*(f"{name}=(self)" for name in _SELF), *(f"{name}=()" for name in _NOBODY)])
@@ -84,14 +95,14 @@ class SecurityHeaders:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        told = FOR_ALL | _of(scope["path"])
+        added = FOR_ALL | _of(scope["path"])
         if self._is_strict and scope["scheme"] in ("https", "wss") and not _is_of_this_machine(scope):
-            told = told | STRICT
+            added = added | STRICT
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] in _STARTS:
                 headers = MutableHeaders(scope=message)
-                for name, value in told.items():
+                for name, value in added.items():
                     headers.setdefault(name, value)
             await send(message)
 
@@ -107,4 +118,6 @@ def _is_of_this_machine(scope: Scope) -> bool:
 def _of(path: str) -> dict[str, str]:
     if path.startswith(_PARTS):
         return {"Content-Security-Policy": POLICY_OF_PARTS}
-    return {"Content-Security-Policy": POLICY_OF_DATA} if path.startswith(_DATA) else FOR_DOCUMENTS
+    if path.startswith(_DATA):
+        return {"Content-Security-Policy": POLICY_OF_REPORT if _REPORT.fullmatch(path) else POLICY_OF_DATA}
+    return FOR_DOCUMENTS

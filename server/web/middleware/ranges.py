@@ -35,24 +35,26 @@ def file_answer(request: Request, path: Path, *, name: str, media_type: str) -> 
     except OSError as why:
         raise HTTPException(503, f"The file cannot be read: {why.strerror or why}.") from None
     try:
-        status, first, last, told = _asked(request, os.fstat(file.fileno()))
+        status, first, last, sent_headers = _asked(request, os.fstat(file.fileno()))
     except BaseException:
         file.close()
         raise
-    told["Content-Disposition"] = disposition(name)
+    sent_headers["Content-Disposition"] = disposition(name)
     if request.method == "HEAD" or status == 304:
         file.close()
         if status == 304:
-            del told["Content-Length"]
-        return Response(status_code=status, headers=told, media_type=media_type)
-    return StreamingResponse(_portions(file, first, last), status_code=status, headers=told, media_type=media_type)
+            del sent_headers["Content-Length"]
+        return Response(status_code=status, headers=sent_headers, media_type=media_type)
+    return StreamingResponse(
+        _portions(file, first, last), status_code=status, headers=sent_headers, media_type=media_type
+    )
 
 
 def _asked(request: Request, stat: os.stat_result) -> tuple[int, int, int, dict[str, str]]:
     """Status, first byte, last byte and headers of the answer."""
     size = stat.st_size
     etag, changed = f'"{size:x}-{stat.st_mtime_ns:x}"', formatdate(stat.st_mtime, usegmt=True)
-    told = {
+    sent_headers = {
         "ETag": etag,
         "Last-Modified": changed,
         "Accept-Ranges": "bytes",
@@ -60,31 +62,31 @@ def _asked(request: Request, stat: os.stat_result) -> tuple[int, int, int, dict[
         "Content-Length": str(size),
     }
     if _names(request.headers.get("if-none-match", ""), etag):
-        return 304, 0, -1, told
+        return 304, 0, -1, sent_headers
     wish = request.headers.get("range")
     condition = request.headers.get("if-range")
     if wish is None or request.method != "GET" or (condition is not None and condition not in (etag, changed)):
-        return 200, 0, size - 1, told
+        return 200, 0, size - 1, sent_headers
     if _SEVERAL.match(wish):
         raise HTTPException(
             416, "Several ranges at once are not supported: request one.", headers={"Content-Range": f"bytes */{size}"}
         )
     part = _RANGE.fullmatch(wish.replace(" ", ""))
     if part is None or part.group(1) == part.group(2) == "":
-        return 200, 0, size - 1, told  # another unit, or no range at all: as if it were not there
+        return 200, 0, size - 1, sent_headers  # another unit, or no range at all: as if it were not there
     begin, end = part.groups()
     first = int(begin) if begin else max(0, size - int(end))
     last = min(int(end), size - 1) if begin and end else size - 1
     if begin and end and int(end) < int(begin):
-        return 200, 0, size - 1, told  # no range either
+        return 200, 0, size - 1, sent_headers  # no range either
     if first >= size or (not begin and int(end) == 0):
         raise HTTPException(
             416,
             f"The file ends at byte {size}.",
             headers={"Content-Range": f"bytes */{size}", "Accept-Ranges": "bytes"},
         )
-    told |= {"Content-Range": f"bytes {first}-{last}/{size}", "Content-Length": str(last - first + 1)}
-    return 206, first, last, told
+    sent_headers |= {"Content-Range": f"bytes {first}-{last}/{size}", "Content-Length": str(last - first + 1)}
+    return 206, first, last, sent_headers
 
 
 def _names(condition: str, etag: str) -> bool:

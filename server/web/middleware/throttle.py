@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import re
 from collections.abc import Callable
 
 from starlette.exceptions import HTTPException
@@ -14,6 +15,7 @@ from server.protocol.rate_limit import Allowance, Limits, Rate
 from server.web.middleware.errors import problem
 
 SLOW_DOWN_PATH = "/api/slow-down/"
+_UPLOAD = re.compile(r"(/agents/[^/]+)?/api/marks/[^/]+/(voice|photo)")
 _KEPT = 2000  # devices whose rate is known; addresses of strangers among them
 _LAST = {"Connection": "close"}  # what is still on its way is not read
 
@@ -40,16 +42,22 @@ class Throttle:
             await answer(scope, receive, send)  # a WebSocket is refused with the same words
             return
         if scope["type"] == "http":
+            most, within_s = self._room(scope)
             length = _length(scope)
-            if length is None or length > self._limits.body_bytes:
-                await _too_long(self._limits.body_bytes)(scope, receive, send)
+            if length is None or length > most:
+                await _too_long(most)(scope, receive, send)
                 return
-            receive = self._bounded(receive)
+            receive = self._bounded(receive, most, within_s)
         await self._app(scope, receive, send)
 
-    def _bounded(self, receive: Receive) -> Receive:
+    def _room(self, scope: Scope) -> tuple[int, float]:
+        """How long a body may be [B], and how long it may take [s]."""
+        if scope["method"] == "POST" and is_upload(scope["path"]):
+            return self._limits.upload_bytes, self._limits.upload_s
+        return self._limits.body_bytes, self._limits.body_s
+
+    def _bounded(self, receive: Receive, most: int, within_s: float) -> Receive:
         """Ends a body that is longer or takes longer than it may."""
-        most, within_s = self._limits.body_bytes, self._limits.body_s
         loop = asyncio.get_running_loop()
         due_s = loop.time() + within_s
         got = 0
@@ -106,10 +114,15 @@ def _length(scope: Scope) -> int | None:
     return 0
 
 
+def is_upload(path: str) -> bool:
+    """Whether a file is sent there: a voice note or a photo of a mark."""
+    return _UPLOAD.fullmatch(path) is not None
+
+
 def _too_long(most: int) -> ASGIApp:
     # The connection is not closed on what is still on its way, or the sender would never see why it was refused.
     return problem(413, _longest(most))
 
 
 def _longest(most: int) -> str:
-    return f"At most {most // 1024} kB are taken."
+    return f"At most {most // 1024} kB are taken." if most < 1 << 20 else f"At most {most >> 20} MB are taken."

@@ -9,7 +9,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body, Path, Request
 from pydantic import BaseModel, ConfigDict, create_model
 
-from server.protocol.commands import BY_KIND, SLOW_DOWN, Command, OfCar
+from server.protocol.command_base import OfCar
+from server.protocol.commands import BY_KIND, SLOW_DOWN, Command
 from server.web.routes.session_request import Done, MeantVehicle, VehicleName, ask, meant_vehicle
 
 router = APIRouter()

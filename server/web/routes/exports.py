@@ -47,7 +47,7 @@ class ClipRequest(BaseModel):
 def exports(request: Request) -> Exports:
     found: Exports | None = services(request).exports
     if found is None:
-        raise HTTPException(404, "This server stores nothing: start it with --data FOLDER for recordings.")
+        raise HTTPException(404, services(request).where_kept())
     return found
 
 
@@ -76,9 +76,15 @@ async def clip(request: Request, id: Id, body: Annotated[ClipRequest, Body()]) -
 async def exported(request: Request, id: Id, format: Format) -> Response:
     """Made first where it is not there, which may take a minute for an hour of driving: where a person waits, begin it
     as a job and show how far it is."""
-    job = await _begun(request, id, format)
-    await job.finished.wait()
-    return await _file(request, job)
+    return await _file(request, await _done(await _begun(request, id, format)))
+
+
+@router.get("/api/recordings/{id}/report", summary="The drive's report, to be looked at", response_class=Response)
+async def report(request: Request, id: Id) -> Response:
+    """The export `html`, opened by a browser and not saved; made first where it is not there."""
+    answer = await _file(request, await _done(await _begun(request, id, "html")))
+    answer.headers["Content-Disposition"] = answer.headers["Content-Disposition"].replace("attachment", "inline", 1)
+    return answer
 
 
 @router.get("/api/exports", summary="The exports that wait, run, or can be downloaded")
@@ -115,6 +121,11 @@ async def _begun(request: Request, id: str, format: str) -> Job:
         raise HTTPException(404, str(why)) from None
     except TooMany as why:
         raise HTTPException(429, str(why), headers={"Retry-After": "30"}) from None
+
+
+async def _done(job: Job) -> Job:
+    await job.finished.wait()
+    return job
 
 
 def _found(request: Request, id: str) -> Job:

@@ -89,7 +89,7 @@ async def log_page(
 @router.get("/api/log.csv", tags=["alarms"], summary="The alarm log as CSV, oldest first")
 async def log_csv(request: Request, which: Wanted, vehicle: VehicleName = None) -> StreamingResponse:
     app = services(request)
-    name = vehicle_of(app, vehicle)
+    name = await _answering(app, vehicle)
     return StreamingResponse(
         _csv(_all(app.bus, name, which), _named(app, name)),
         media_type="text/csv; charset=utf-8",
@@ -100,12 +100,19 @@ async def log_csv(request: Request, which: Wanted, vehicle: VehicleName = None) 
 @router.get("/api/log.json", tags=["alarms"], summary="The alarm log as JSON, oldest first")
 async def log_json(request: Request, which: Wanted, vehicle: VehicleName = None) -> StreamingResponse:
     app = services(request)
-    name = vehicle_of(app, vehicle)
+    name = await _answering(app, vehicle)
     return StreamingResponse(
         _json(_all(app.bus, name, which), _named(app, name)),
         media_type="application/json",
         headers=_attachment(f"catgraph-log-{name}.json"),
     )
+
+
+async def _answering(app: Services, vehicle: str | None) -> str:
+    """The vehicle whose log is meant. Raises NotServed where it cannot be read, before the answer begins."""
+    name = vehicle_of(app, vehicle)
+    await app.bus.events_after(name, 0, 1)
+    return name
 
 
 async def _page(
@@ -148,7 +155,7 @@ async def _all(bus: PageBus, vehicle: str, which: Which) -> AsyncIterator[list[d
 
 def _named(app: Services, vehicle: str) -> dict[str, str]:
     """What each exported event says of its car: its name where the server has several, so that files can be joined."""
-    return {"vehicle": vehicle} if len(app.sessions) > 1 else {}
+    return {"vehicle": vehicle} if len(app.vehicles) > 1 else {}
 
 
 async def _csv(portions: AsyncIterator[list[dict[str, Any]]], named: dict[str, str]) -> AsyncIterator[str]:

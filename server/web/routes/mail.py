@@ -14,7 +14,7 @@ from server.control import display_name
 from server.mail import address, header_text
 from server.mail.mail_folder import MailRefused
 from server.mail.mailer import Mailer
-from server.mail.order import Format, Letter, Order, Recipient, State, TooLarge, Way
+from server.mail.order import Format, Letter, Order, State, TooLarge, Way
 from server.mail.settings import BadMailSetting, MailSettings, Security
 from server.mail.test_mail import MailTestFailed, Trial, try_out
 from server.web.middleware.errors import Problem
@@ -121,6 +121,9 @@ class MailSettingsIn(BaseModel):
         examples=[["example.org", "*.example.org", "ann@example.com"]],
         description="Who may be written to: addresses, domains, all below a domain; empty: everyone",
     )
+    report_to: list[Line] = Field(
+        default_factory=list, max_length=20, description="Who gets the report of each drive by itself; empty: nobody"
+    )
     limit_mb: float = Field(18.0, description="What is attached to one mail at most [10⁶ bytes], before it is encoded")
     link_base: str = Field(
         "", max_length=300, description="This server as who gets a link reaches it; empty: as the page"
@@ -139,6 +142,7 @@ class MailSettingsOut(BaseModel):
     sender: str
     sender_name: str
     allowed: list[str]
+    report_to: list[str]
     limit_mb: float
     link_base: str
     ca: str
@@ -280,7 +284,7 @@ async def resend(request: Request, n: Number) -> MailOut:
 def _mailer(request: Request) -> Mailer:
     found: Mailer | None = services(request).mailer
     if found is None:
-        raise Problem(404, "This server stores nothing: start it with --data FOLDER to send mail.")
+        raise Problem(404, services(request).where_kept("to send mail"))
     return found
 
 
@@ -289,18 +293,16 @@ def _problem(why: MailRefused) -> Problem:
 
 
 def _base(request: Request) -> str:
-    """The server's address in the request, for links; empty if it is not valid."""
-    host = request.headers.get("host", "")
-    return f"{request.url.scheme}://{host}" if _HOST.fullmatch(host) else ""
+    """The server's address in the request, for links; empty if it is not valid. At a web node that of the agent."""
+    host, before = request.headers.get("host", ""), request.scope.get("root_path", "")
+    return f"{request.url.scheme}://{host}{before}" if _HOST.fullmatch(host) else ""
 
 
 def _settings_out(settings: MailSettings, complaints: list[str]) -> MailSettingsOut:
-    body: dict[str, Any] = {name: value for name, value in asdict(settings).items() if name != "password"}
+    lists = {"allowed": list(settings.allowed), "report_to": list(settings.report_to)}
+    body: dict[str, Any] = {name: value for name, value in asdict(settings).items() if name != "password"} | lists
     return MailSettingsOut(
-        **(body | {"allowed": list(settings.allowed)}),
-        has_password=bool(settings.password),
-        is_complete=settings.is_complete,
-        complaints=complaints,
+        **body, has_password=bool(settings.password), is_complete=settings.is_complete, complaints=complaints
     )
 
 
@@ -334,12 +336,11 @@ def _out(mailer: Mailer, letter: Letter) -> MailOut:
                 next_ms=mail.next_ms if mail.state == "queued" else None,
                 done_ms=mail.done_ms,
                 size_bytes=mail.size_bytes,
-                recipients=[_recipient(one) for one in mail.recipients],
+                recipients=[
+                    RecipientOut(address=address.parse(one.address).shown, state=one.state, said=one.said)
+                    for one in mail.recipients
+                ],
             )
             for mail in letter.mails
         ],
     )
-
-
-def _recipient(one: Recipient) -> RecipientOut:
-    return RecipientOut(address=address.parse(one.address).shown, state=one.state, said=one.said)

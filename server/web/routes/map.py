@@ -22,15 +22,15 @@ _NUMBER = re.compile(r"[0-9]{1,9}")  # more digits are no tile's, and turning th
 async def ground(request: Request) -> dict[str, Any]:
     under = services(request).ground
     image, fetched = under.image, under.upstream
-    layers = [] if fetched is None else [_told(fetched.layer) | {"upstream": fetched.told()}]
+    layers = [] if fetched is None else [_description(fetched.layer) | {"upstream": fetched.description()}]
     return {
-        "layers": [*layers, *(_told(one.layer) for one in under.maps.values())],
+        "layers": [*layers, *(_description(one.layer) for one in under.maps.values())],
         "image": image
         and {"source": f"/map/site/{image.name}", "corners": image.corners, "attribution": image.attribution},
     }
 
 
-def _told(layer: Layer) -> dict[str, Any]:
+def _description(layer: Layer) -> dict[str, Any]:
     return {
         "title": layer.title,
         "tiles": f"/map/{layer.name}/{{z}}/{{x}}/{{y}}",

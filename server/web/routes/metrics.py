@@ -33,20 +33,25 @@ async def metrics(request: Request) -> PlainTextResponse:
         [("", app.hub.skipped)],
     )
     add("up_seconds", "gauge", "Seconds since the server started.", [("", app.now() - app.started_s)])
+    if app.link is not None:
+        connected = float(app.link.complaint is None)
+        add("broker_connected", "gauge", "1 while the broker is connected.", [("", connected)])
+        heard = float(sum(app.bus.trouble(name) is None for name in app.vehicles))
+        add("vehicles_heard", "gauge", "Vehicles of which something comes.", [("", heard)])
     if app.recordings is not None:
         for name, help, rows in await asyncio.to_thread(_recorded, app.recordings):  # it reads a disk
             add(name, "gauge", help, rows)
     received, rejected, open_, lag, load, chattering, kept, phones = [], [], [], [], [], [], [], []
     for name, session in app.sessions.items():
         vehicle = f'vehicle="{name}"'
-        for signal, tally in session.tallies().items():
+        for signal, tally in session.judgement.reception.by_signal.items():
             received.append((f'{{{vehicle},signal="{signal}"}}', float(tally.received)))
             rejected.append((f'{{{vehicle},signal="{signal}"}}', float(tally.rejected)))
         open_.append((f"{{{vehicle}}}", float(session.phase == "monitoring")))
-        phones.append((f"{{{vehicle}}}", float(session.phones)))
+        phones.append((f"{{{vehicle}}}", float(session.judgement.state.phones(app.now()))))
         lag.append((f"{{{vehicle}}}", session.lag_s))
-        load.append((f"{{{vehicle}}}", float(session.alarm_load.in_10_min)))
-        chattering.append((f"{{{vehicle}}}", float(len(session.alarm_load.chattering))))
+        load.append((f"{{{vehicle}}}", float(session.judgement.load.in_10_min)))
+        chattering.append((f"{{{vehicle}}}", float(len(session.judgement.load.chattering))))
         kept.append((f"{{{vehicle}}}", float(session.log_trouble is None)))
     add("messages_received_total", "counter", "Messages of the car, proper or not, since it was connected.", received)
     add(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from fastapi import APIRouter, WebSocket
 
 from server.access.identity import principal_of
@@ -14,15 +16,27 @@ router = APIRouter()
 
 @router.websocket("/ws")
 async def page_socket(
-    socket: WebSocket, vehicle: str | None = None, replay: str | None = None, t: str | None = None
+    socket: WebSocket,
+    vehicle: str | None = None,
+    replay: str | None = None,
+    t: str | None = None,
+    fleet: str | None = None,
 ) -> None:
-    """The page's socket; docs/protocol.md. `replay`: the recording it begins with, `t` seconds after its beginning."""
+    """The page's socket; docs/protocol.md. `replay`: the recording it begins with, `t` seconds after its beginning.
+    `fleet` "1": of a page of all cars."""
     app = services(socket)
-    name = vehicle if vehicle is not None else next(iter(app.sessions))
-    if name not in app.sessions:
-        await socket.close(code=1008, reason="no such vehicle")
-        return
     principal = principal_of(socket)
     role: RoleName = "operator" if principal.is_operator else "viewer"
-    hello: Hello = {**app.hello(name), "who": {"id": principal.id, "name": principal.name, "role": role}}
-    await app.hub.serve(socket, name, hello, principal=principal, replay=replay_commands.opening(replay, t))
+
+    def hello(name: str) -> Hello:
+        return {**app.hello(name), "who": {"id": principal.id, "name": principal.name, "role": role}}
+
+    if fleet == "1":
+        await app.hub.serve_fleet(socket, partial(hello, ""), principal=principal)
+        return
+    name = vehicle if vehicle is not None else next(iter(app.vehicles), None)
+    if name is None or not app.may_be(name):
+        await socket.close(code=1008, reason="no such vehicle")
+        return
+    opening = replay_commands.opening(replay, t)
+    await app.hub.serve(socket, name, partial(hello, name), principal=principal, replay=opening)

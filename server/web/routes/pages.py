@@ -18,28 +18,30 @@ from starlette.responses import FileResponse
 
 from server.access.identity import is_known
 from server.system.page_files import check_vendor, static_dir, templates_dir
-from server.web.assets.bundle import EARLY, ENTRY, STYLES, Built, find
+from server.web.assets.bundle import EARLY, ENTRY, FLEET_ENTRY, FLEET_STYLES, STYLES, Built, find
 from server.web.assets.icons import FOLDER as DRAWN
 from server.web.assets.icons import WITHOUT, are_drawn
 from server.web.assets.manifest import manifest as manifest_of
 from server.web.assets.service_worker import OFFLINE, WORKER, Shell, build_of, shell_of, withdrawn
 from server.web.assets.static_files import StaticText, answer, packed
 from server.web.middleware.headers import policy_of
-from server.web.routes.session_request import vehicle_of
 from server.web.services import services
 from server.web.tabs import TABS
 
 log = logging.getLogger("catgraph.page")
 
 _HTML = "text/html; charset=utf-8"
+FLEET = "fleet.html"
 
 
-def parts_of(built: Built | None, asset: Callable[[str], str]) -> dict[str, object]:
-    """What the page begins with: its tabs, and the addresses of few joined files, or of all that there are."""
+def parts_of(built: Built | None, asset: Callable[[str], str], *, is_fleet: bool = False) -> dict[str, object]:
+    """What a page begins with: its tabs, and the addresses of few joined files, or of all that there are."""
     if built is None:
-        styles = [asset(f"css/{name}.css") for name in STYLES]
-        return {"tabs": TABS, "styles": styles, "script": asset(f"js/{ENTRY}"), "needed": []}
-    style, script, *needed = (f"/static/{name}" for name in (built.style, built.script, *built.needed))
+        styles = [asset(f"css/{name}.css") for name in (FLEET_STYLES if is_fleet else STYLES)]
+        script = asset(f"js/{FLEET_ENTRY if is_fleet else ENTRY}")
+        return {"tabs": TABS, "styles": styles, "script": script, "needed": []}
+    entry = built.fleet if is_fleet else built
+    style, script, *needed = (f"/static/{name}" for name in (entry.style, entry.script, *entry.needed))
     return {"tabs": TABS, "styles": [style], "script": script, "needed": needed}
 
 
@@ -67,7 +69,8 @@ class PageFiles:
 
     def render(self, template: str, request: Request, built: Built | None, **context: object) -> bytes:
         """A template as HTML; `built` None: with single modules."""
-        context |= parts_of(built, self.asset) | {"build": build_of(built), "icons": are_drawn(self.static)}
+        parts = parts_of(built, self.asset, is_fleet=template == FLEET)
+        context |= parts | {"build": build_of(built), "icons": are_drawn(self.static)}
         context["early"] = Markup(early_of(built, self.static))
         return bytes(self._templates.TemplateResponse(request, template, context).body)
 
@@ -110,15 +113,25 @@ def _page_routes(files: PageFiles) -> APIRouter:
         one, built = services(request), find(static)
         one.build = build_of(built)
         access = "open" if one.access.is_open else "paired"
-        names = list(one.sessions) if is_known(request) else []
-        if vehicle is not None and vehicle not in one.sessions:
-            body = files.render("no_car.html", request, built, name=vehicle[:40], vehicles=names)
+        names = list(one.vehicles) if is_known(request) else []
+        if not one.may_be(vehicle) if vehicle is not None else not one.vehicles:
+            body = files.render("no_car.html", request, built, name=(vehicle or "")[:40], vehicles=names)
             answered = files.response(body, request, built)
-            answered.status_code = 404
+            answered.status_code = 404 if one.vehicles else 503
             return answered
-        context = {"version": one.version, "vehicle": vehicle_of(one, vehicle), "access": access, "vehicles": names}
-        body = files.render("page.html", request, built, worker=built is not None and one.keeps_shell, **context)
+        context = {"version": one.version, "vehicle": vehicle or one.vehicles[0], "access": access, "vehicles": names}
+        worker = built is not None and one.keeps_shell
+        parts = {"worker": worker, "at_agents": one.agents is not None, "has_store": one.stored is not None}
+        body = files.render("page.html", request, built, **parts, **context)
         return files.response(body, request, built)
+
+    @router.get("/fleet", response_class=HTMLResponse)
+    def fleet(request: Request) -> Response:
+        """All cars for one person. Its socket is let in as that of one car is."""
+        one, built = services(request), find(static)
+        one.build = build_of(built)
+        access = "open" if one.access.is_open else "paired"
+        return files.response(files.render(FLEET, request, built, version=one.version, access=access), request, built)
 
     @router.get(OFFLINE, response_class=HTMLResponse)
     def offline(request: Request, v: str | None = None) -> Response:

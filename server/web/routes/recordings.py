@@ -11,7 +11,7 @@ from fastapi import APIRouter, Body, HTTPException, Query, Request, Response
 from fastapi import Path as InPath
 from pydantic import BaseModel, ConfigDict, Field
 
-from server.protocol.answers import ExportFormat, RecordingList
+from server.protocol.answers import ExportFormat, RecordingList, VerificationAnswer
 from server.recording.catalog import sketch
 from server.recording.catalog.annotations import BadAnnotation
 from server.recording.catalog.catalog import Catalog
@@ -38,6 +38,7 @@ class AnnotationsChange(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
     title: str | None = Field(None, max_length=20_000, description="At most 120 letters; empty: called by its time")
     note: str | None = Field(None, max_length=20_000, description="At most 4000 letters")
+    weather: str | None = Field(None, max_length=20_000, description="At most 120 letters, for the drive's report")
     tags: list[Annotated[str, Field(max_length=20_000)]] | None = Field(
         None, max_length=100, description="At most 20 of at most 40 letters; each once"
     )
@@ -46,7 +47,7 @@ class AnnotationsChange(BaseModel):
 def catalog(request: Request) -> Catalog:
     found: Catalog | None = services(request).recordings
     if found is None:
-        raise HTTPException(404, "This server stores nothing: start it with --data FOLDER for recordings.")
+        raise HTTPException(404, services(request).where_kept())
     return found
 
 
@@ -87,7 +88,11 @@ def listed(
     which = Which(vehicle=vehicle, tag=tag, text=text, since_ms=since_ms, until_ms=until_ms)
     recordings.look_again()
     page = _asked(lambda: recordings.rows(which, cursor=cursor, limit=limit))
-    free = recordings.free_bytes()
+    uploader = services(request).uploader
+    if uploader is not None:
+        for row in page.rows:
+            row["stored"] = uploader.copy_of(row)
+    free, names = recordings.free_bytes(), recordings.names()
     found: RecordingList = {
         "recordings": page.rows,
         "next": page.next,
@@ -97,8 +102,11 @@ def listed(
         "free_bytes": None if free is None else free - free % 10_000_000,  # the same for a while: see ETag
         "waiting": recordings.waiting,
         "formats": listed_formats(),
-        **recordings.names(),
+        "vehicles": names["vehicles"],
+        "tags": names["tags"],
     }
+    if uploader is not None:
+        found["store"] = uploader.facts()
     return _json(request, found)
 
 
@@ -119,16 +127,26 @@ def rescan(request: Request) -> dict[str, Any]:
 
 @router.get("/api/recordings/{id}", summary="One recording, with the alarms that were raised in it")
 def one(request: Request, id: Id) -> Response:
-    row = catalog(request).row(id)
+    row, uploader = catalog(request).row(id), services(request).uploader
     if row is None:
         raise HTTPException(404, "There is no such recording.")
+    if uploader is not None:
+        row["stored"] = uploader.copy_of(row)
     return _json(request, row)
+
+
+@router.get("/api/recordings/{id}/verify", summary="Verify its hash chain: whether it is as it was recorded")
+def verify(request: Request, id: Id) -> VerificationAnswer:
+    """Reads the whole file, which can take a minute; one recording at a time, otherwise 409."""
+    recordings = catalog(request)
+    return _asked(lambda: recordings.verify(id))
 
 
 @router.patch("/api/recordings/{id}", summary="Give it another title, note or tags")
 def annotate(request: Request, id: Id, body: Annotated[AnnotationsChange, Body()]) -> Response:
     recordings = catalog(request)
-    return _json(request, _asked(lambda: recordings.annotate(id, title=body.title, note=body.note, tags=body.tags)))
+    said = {"title": body.title, "note": body.note, "weather": body.weather}
+    return _json(request, _asked(lambda: recordings.annotate(id, tags=body.tags, **said)))
 
 
 @router.delete("/api/recordings/{id}", summary="Into the trash; it stays there until the trash is emptied")

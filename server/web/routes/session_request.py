@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import logging
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -10,13 +13,22 @@ from fastapi import HTTPException, Query, Request, Response
 from pydantic import BaseModel
 
 from server.access.identity import principal_of
+from server.access.people import device_key
 from server.bus.bus import NotServed
 from server.control import display_name
+from server.protocol import messages
+from server.protocol.command_base import PAGE
 from server.replay.manager import NoReplay
+from server.system import log_context
 from server.web.middleware.errors import Problem
 from server.web.services import Services, services
 
+log = logging.getLogger("catgraph.web")
+
 NAME_HEADER = "x-catgraph-name"  # what the caller wants to be called in the log
+TRACE_HEADER = "x-catgraph-trace"  # the id of the command in the logs; one is made where it is left out
+SIGNED_HEADER = "x-catgraph-signed"  # the command, signed by the program's own key: base64 of JSON
+PAGE_HEADER = "x-catgraph-page"  # of a page of this machine: which one, as its hello says
 FENCE_HEADER = "x-catgraph-fence"  # the number of the lease of control by which a page orders
 VehicleName = Annotated[str | None, Query(description="Which vehicle; the first where it is left out", max_length=40)]
 MeantVehicle = Annotated[
@@ -32,17 +44,20 @@ class Done(BaseModel):
 
 
 def vehicle_of(app: Services, name: str | None) -> str:
+    if not app.vehicles:
+        raise HTTPException(503, "No vehicle has been heard at the broker yet.")
     if name is None:
-        return next(iter(app.sessions))
-    if name not in app.sessions:
+        return app.vehicles[0]
+    if name not in app.vehicles:
         raise HTTPException(404, f"No vehicle is named {name[:40]}.")
     return name
 
 
 def meant_vehicle(request: Request, name: str | None) -> str | None:
     """The vehicle that a command acts on: it must be named where there are several."""
-    names = services(request).sessions
-    if name is None and len(names) > 1:
+    app = services(request)
+    names = app.vehicles
+    if name is None and (len(names) > 1 or app.bus.grows):  # of a web node's cars only some may have been heard yet
         raise HTTPException(
             422, f"This server has several cars: name the one that is meant by ?vehicle= ({', '.join(names)})."
         )
@@ -55,17 +70,42 @@ async def ask(request: Request, vehicle: str | None, message: dict[str, Any]) ->
     Who gave the order is in the log as the header X-Catgraph-Name has it, else as "api" and the program's name.
     """
     app = services(request)
-    by = display_name.clean(request.headers.get(NAME_HEADER)) or display_name.of_program(
-        request.headers.get("user-agent")
-    )
+    sender = sent_by(request)
+    sent, by = message | _signed(request) | sender, sender["by"]
+    is_order = request.method not in ("GET", "HEAD")
     try:
-        answer = await app.bus.request(vehicle_of(app, vehicle), message | _sender(request) | {"by": by})
+        with log_context.tracing(request.headers.get(TRACE_HEADER)):
+            answer = await app.bus.request(vehicle_of(app, vehicle), sent)
+            if is_order and app.bus.grows:  # else the session has logged it
+                log.info("command_passed_on kind=%s by=%s ok=%s", message.get("kind"), by, answer.get("ok", True))
     except NotServed as why:
-        raise HTTPException(503, f"{str(why).capitalize()}.") from None
+        if not is_order:
+            raise
+        found = messages.not_served(why)
+        raise Problem(503, str(found["reason"]), outcome=why.outcome, cut=why.cut) from None
     if answer.get("ok") is False:
         more = {name: value for name, value in answer.items() if name not in ("ok", "reason")}
         raise Problem(422 if "field" in answer else 409, str(answer.get("reason")), **more)
     return answer
+
+
+def sent_by(request: Request) -> dict[str, Any]:
+    """The sender of a request, as the session gets it."""
+    by = display_name.clean(request.headers.get(NAME_HEADER)) or display_name.of_program(
+        request.headers.get("user-agent")
+    )
+    return _sender(request) | {"by": by}
+
+
+def _signed(request: Request) -> dict[str, Any]:
+    """The signed command of a request, for the agent that carries it out."""
+    text = request.headers.get(SIGNED_HEADER)
+    if text is None:
+        return {}
+    try:
+        return {"signed": orjson.loads(base64.b64decode(text, validate=True))}
+    except ValueError:
+        raise HTTPException(422, "The header X-Catgraph-Signed is no base64 of JSON.") from None
 
 
 def _sender(request: Request) -> dict[str, Any]:
@@ -73,10 +113,17 @@ def _sender(request: Request) -> dict[str, Any]:
     fence = request.headers.get(FENCE_HEADER, "")
     return {
         "who": principal_of(request).id,
+        **services(request).people.sent(device_of(request)),
         "page": None,
         "fence": int(fence) if fence.isascii() and fence.isdigit() and len(fence) < 16 else None,
         "console": services(request).is_open,
     }
+
+
+def device_of(request: Request) -> str | None:
+    """The key under which somebody is on duty at the device that sent a request; None: nobody can be."""
+    page = request.headers.get(PAGE_HEADER, "")
+    return device_key(principal_of(request), page if re.fullmatch(PAGE, page) else None)
 
 
 async def ask_either(

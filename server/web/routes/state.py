@@ -7,36 +7,59 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 
 from monitor.signals import CHARTED
 from server.access.identity import is_known
+from server.bus.bus import NotServed
 from server.protocol.drive_trends import LEAST_BUCKETS, MOST_BUCKETS, MOST_SIGNALS
 from server.web.middleware.errors import Problem
-from server.web.routes.session_request import ReplayToken, VehicleName, as_json, ask, ask_either
+from server.web.routes.session_request import ReplayToken, VehicleName, as_json, ask, ask_either, vehicle_of
 from server.web.services import Services, services
 
 router = APIRouter()
+AGENT_WITHIN_S = 1.0  # an agent that has not answered then is called lost
 COUNTED_WITHIN_S = 2.0  # a health check must work while the disk hangs
 
 
 @router.get("/api/health", tags=["server"], summary="Is the server well?")
 async def health(request: Request) -> Response:
-    """200 and "ok", or 503 and "impaired" with the problems. A caller who is not known gets status and version only."""
+    """200 and "ok"; 200 and "cars lost" where the server is well and cars are not heard, because another server would
+    not hear them either; 503 and "impaired" with the problems. A caller who is not known gets status and version only.
+    """
     app = services(request)
-    found = app.problems()
+    found, lost = app.problems(), app.lost()
     recordings = await _counted(app, found) if is_known(request) else None
-    body: dict[str, Any] = {"status": "impaired" if found else "ok", "version": app.version}
+    status = "impaired" if found else "cars lost" if lost else "ok"
+    body: dict[str, Any] = {"status": status, "version": app.version}
     if is_known(request):
         body |= {
             "problems": found,
+            "lost": lost,
+            "off": sorted(app.off.names),
             "boot": app.boot,
             "up_for_s": round(app.now() - app.started_s, 1),
-            "vehicles": {name: session.phase for name, session in app.sessions.items()},
+            "vehicles": {one["name"]: one["phase"] for one in await _listed(app)},
             "pages": app.hub.pages,
             "recordings": recordings,
         }
     return Response(orjson.dumps(body), status_code=503 if found else 200, media_type="application/json")
+
+
+async def _listed(app: Services) -> list[dict[str, Any]]:
+    """Name, address and phase of each vehicle; one whose agent does not answer is lost."""
+
+    async def one(name: str) -> dict[str, Any]:
+        session = app.sessions.get(name)
+        if session is not None:
+            return {"name": name, "address": session.address_url or session.configured, "phase": session.phase}
+        try:
+            remote = (await app.bus.request(name, {"kind": "state"}, deadline_s=AGENT_WITHIN_S))["session"]
+            return {"name": name, "address": remote["address"], "phase": remote["phase"]}
+        except (NotServed, KeyError, TypeError):
+            return {"name": name, "address": None, "phase": "lost"}
+
+    return list(await asyncio.gather(*map(one, app.vehicles)))
 
 
 async def _counted(app: Services, problems: list[str]) -> Mapping[str, object] | None:
@@ -56,10 +79,7 @@ async def _counted(app: Services, problems: list[str]) -> Mapping[str, object] |
 async def vehicles(request: Request) -> dict[str, Any]:
     app = services(request)
     return {
-        "vehicles": [
-            {"name": name, "address": session.address_url or session.configured, "phase": session.phase}
-            for name, session in app.sessions.items()
-        ],
+        "vehicles": await _listed(app),
         "found": [{"name": vehicle.name, "address": vehicle.address} for vehicle in app.found],
     }
 
@@ -72,6 +92,34 @@ async def state(request: Request, vehicle: VehicleName = None) -> Response:
 @router.get("/api/signals", tags=["vehicle"], summary="Topics for each signal and beyond, what was rejected and why")
 async def signals(request: Request, vehicle: VehicleName = None) -> Response:
     return as_json(await ask(request, vehicle, {"kind": "signals"}))
+
+
+@router.get("/api/driving", tags=["vehicle"], summary="Time and distance in each mode, interventions and alarms a km")
+async def driving(request: Request, vehicle: VehicleName = None) -> Response:
+    return as_json(await ask(request, vehicle, {"kind": "driving"}))
+
+
+@router.get("/api/interventions/{intervention}", tags=["vehicle"], summary="One intervention, with the 16 s about it")
+async def intervention(
+    request: Request, intervention: Annotated[str, Path(max_length=40)], vehicle: VehicleName = None
+) -> Response:
+    return as_json(await ask(request, vehicle, {"kind": "intervention", "intervention": intervention}))
+
+
+@router.get("/api/departure", tags=["vehicle"], summary="The departure check: its list, what became of it, who signed")
+async def departure(request: Request, vehicle: VehicleName = None) -> Response:
+    return as_json(await ask(request, vehicle, {"kind": "departure"}))
+
+
+@router.get("/api/departure.toml", tags=["vehicle"], summary="The list of the departure check, as a TOML file")
+async def departure_list(request: Request, vehicle: VehicleName = None) -> Response:
+    body = await ask(request, vehicle, {"kind": "departure"})
+    name = f"{vehicle_of(services(request), vehicle)}.departure.toml"
+    return Response(
+        body["toml"],
+        media_type="application/toml; charset=utf-8",
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
 
 
 @router.get("/api/track", tags=["vehicle"], summary="The track since connecting, as GeoJSON")

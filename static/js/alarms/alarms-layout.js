@@ -144,3 +144,16 @@ export function noneWords({ isSilent, isReplay, isPaused, isChecked }) {
   if (!isChecked) return isReplay ? 'Nothing recorded yet: nothing is checked.' : 'No message from the car: nothing is checked.';
   return isReplay ? 'No alarms at this moment of the recording.' : 'No alarms.';
 }
+
+/**
+ * What was lately, beneath a list in which nothing waits: which alarm ended last, and how many were announced.
+ * @param {import('../core/event-log.js').Row[]} log newest first
+ * @param {number | undefined} in_10_min
+ */
+export function latelyWords(log, in_10_min) {
+  const last = log.find(({ event }) => event?.alarm && event.change === 'cleared')?.event;
+  return [
+    last ? `Last: ${last.title ?? last.alarm}, ended ${timeOfDay(last.at_ms)}.` : '',
+    in_10_min ? `In 10 min: ${in_10_min} ${in_10_min === 1 ? 'alarm' : 'alarms'}.` : '',
+  ].filter(Boolean).join(' ');
+}

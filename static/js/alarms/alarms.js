@@ -1,8 +1,9 @@
 // The list of alarms behind the strip: every one that stands, has returned, is shelved or suppressed, with its keys.
 
-import { countWords, noneWords, rowsOf, together } from './alarms-layout.js';
+import { countWords, latelyWords, noneWords, rowsOf, together } from './alarms-layout.js';
 import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
+import { cameAt, Meant } from '../core/meant.js';
 import { openScreen } from '../core/open-screen.js';
 import { PagedList } from './pager.js';
 import { openShelve } from './shelve.js';
@@ -12,7 +13,7 @@ import { speedUnit, speedWords } from '../core/units.js';
 /**
  * @typedef {import('./alarms-layout.js').Row} Row
  * @typedef {import('../core/protocol-types.js').StandingAlarm} Alarm
- * @typedef {{element: HTMLElement, words: HTMLElement, state: HTMLElement}} Drawn
+ * @typedef {{element: HTMLElement, words: HTMLElement, state: HTMLElement, meant: Meant, place: number}} Drawn
  */
 
 const LABELS = { silence: 'Silence', acknowledge: 'Acknowledge', shelve: 'Shelve', unshelve: 'Unshelve' };
@@ -27,8 +28,8 @@ export function mount(root, store, { close, inHead = () => null } = {}) {
   list.draw();
   const stops = [
     store.on('draw', () => list.draw()),
-    listen(list.parts.ended, 'click', () => list.acknowledgeEnded()),
-    listen(list.parts.these, 'click', () => list.acknowledgeThese()),
+    listen(list.parts.ended, 'click', (event) => list.acknowledgeEnded(event)),
+    listen(list.parts.these, 'click', (event) => list.acknowledgeThese(event)),
     ...(close ? [listen(list.parts.close, 'click', close)] : []),
   ];
   return () => {
@@ -45,14 +46,19 @@ class AlarmList {
   #order = '';
   /** @type {Row[]} */
   #rows = [];
+  /** @type {Meant} */
+  #ended;
   /** Since when each row is in sight, by its key [ms]. @type {Map<string, number>} */
   #since = new Map();
+  /** What "Acknowledge all that ended" stands for, by their keys. @type {string[]} */
+  #returned = [];
 
   /** @param {HTMLElement} root @param {import('../core/store.js').Store} store @param {boolean} isAlone @param {() => string | null} inHead */
   constructor(root, store, isAlone, inHead) {
     this.store = store;
     this.inHead = inHead;
     this.parts = build(root);
+    this.#ended = new Meant(this.parts.ended);
     show(this.parts.close, isAlone);
     this.pager = new PagedList(this.parts.list, () => this.#turned());
     this.parts.foot.append(this.pager.element);
@@ -63,18 +69,21 @@ class AlarmList {
     return !store.isViewer && !store.replaying && !store.isSilent;
   }
 
-  acknowledgeEnded() {
+  /** @param {Event} event */
+  acknowledgeEnded(event) {
+    if (!this.#ended.by(event)) return;
     for (const { kind, alarm } of this.#rows) if (kind === 'returned' && alarm) void this.#command('acknowledge', alarm);
   }
 
-  acknowledgeThese() {
-    const { alarms, isReady } = this.#together();
+  /** @param {Event} event */
+  acknowledgeThese(event) {
+    const { alarms, isReady } = this.#together(performance.now() - cameAt(event));
     if (isReady) for (const alarm of alarms) void this.#command('acknowledge', alarm);
   }
 
   draw() {
     const { store, mayAct } = this;
-    const { count, speed, unit, load, note, none } = this.parts;
+    const { count, speed, unit, load, note, none, lately } = this.parts;
     const { frame } = store;
     const head = this.inHead();
     const rows = frame ? rowsOf(frame.alarms, frame.suppressed ?? [], mayAct) : [];
@@ -93,25 +102,30 @@ class AlarmList {
       isSilent: store.isSilent, isReplay: store.replaying, isPaused: frame?.session.paused === true,
       isChecked: frame?.replay ? frame.replay.silent_s !== null : store.chain.word === 'Live',
     }));
+    const isQuiet = !store.isSilent && !store.replaying && !rows.some(({ kind }) => kind === 'unacknowledged' || kind === 'returned');
+    setWords(lately, isQuiet ? latelyWords(store.log.rows, frame?.alarm_load?.in_10_min) : '');
     this.#drawFoot(mayAct);
   }
 
   /** @param {boolean} mayAct */
   #drawFoot(mayAct) {
     const { ended, these } = this.parts;
-    const returned = this.#rows.filter(({ kind }) => kind === 'returned').length;
-    setWords(ended, `Acknowledge all that ended${returned ? ` ${returned}` : ''}`);
+    const returned = this.#rows.filter(({ kind }) => kind === 'returned').map(({ key }) => key);
+    if (returned.some((key) => !this.#returned.includes(key))) this.#ended.moved();
+    this.#returned = returned;
+    setWords(ended, `Acknowledge all that ended${returned.length ? ` ${returned.length}` : ''}`);
     show(ended, !this.store.replaying);
-    setAttribute(ended, 'disabled', !mayAct || returned === 0);
+    setAttribute(ended, 'disabled', !mayAct || returned.length === 0);
     const { alarms, isReady } = this.#together();
     show(these, mayAct && alarms.length > 1);
     setWords(these, `Acknowledge these ${alarms.length}`);
     setAttribute(these, 'disabled', !isReady);
   }
 
-  #together() {
+  /** @param {number} [ago_ms] as of then */
+  #together(ago_ms = 0) {
     const [from, to] = this.pager.shown;
-    return together(this.#rows.slice(from, to), this.#since, this.store.now());
+    return together(this.#rows.slice(from, to), this.#since, this.store.now() - ago_ms);
   }
 
   /** Another page is shown, or other rows: what came in sight begins to be looked at. */
@@ -133,6 +147,11 @@ class AlarmList {
       for (const [name, row] of keyed) if (!drawn.has(name)) drawn.set(name, this.#build(row));
       this.parts.list.replaceChildren(...[...keyed.keys()].map((name) => /** @type {Drawn} */ (drawn.get(name)).element));
       this.#order = order;
+      [...keyed.keys()].forEach((name, place) => {
+        const at = /** @type {Drawn} */ (drawn.get(name));
+        if (at.place !== place) at.meant.moved();
+        at.place = place;
+      });
     }
     for (const [name, row] of keyed) {
       const at = drawn.get(name);
@@ -149,12 +168,13 @@ class AlarmList {
   /** @param {Row} row @returns {Drawn} */
   #build(row) {
     const [words, state] = [html('span', { class: 'm' }), html('span', { class: 's' })];
+    const meant = new Meant();
     const keys = row.keys.map((name) => {
       const key = html('button', { type: 'button', class: name === 'acknowledge' ? 'key solid' : 'key', 'data-do': name }, LABELS[name]);
       key.setAttribute('aria-label', `${LABELS[name]}: ${row.title}`);
-      key.addEventListener('click', () => {
+      key.addEventListener('click', (event) => {
         const { alarm } = row;
-        if (!alarm) return;
+        if (!alarm || (event.detail !== 0 && !meant.by(event))) return; // a key with the focus keeps it wherever it moves
         if (name === 'shelve') openShelve(this.store, alarm, (sentence) => setWords(this.parts.says, sentence));
         else void this.#command(name, alarm);
       });
@@ -172,7 +192,8 @@ class AlarmList {
     const answers = [...(row.silent ? [silent] : []), ...keys];
     const element = html('li', { 'data-kind': row.kind, 'data-priority': row.priority, 'data-waits': isWaiting }, mark, text,
       ...(answers.length ? [html('div', { class: 'ac' }, ...answers)] : []));
-    return { element, words, state };
+    meant.element = element;
+    return { element, words, state, meant, place: -1 };
   }
 
   /** @param {'acknowledge' | 'silence' | 'unshelve'} kind @param {Alarm} alarm */
@@ -192,6 +213,7 @@ function build(root) {
   const note = html('p', { class: 'sec', 'data-f': 'alarms-note' });
   const list = html('ul', { class: 'alarms', 'data-f': 'alarms' });
   const none = html('p', { class: 'state', 'data-f': 'alarms-none' });
+  const lately = html('p', { class: 'lately', 'data-f': 'alarms-lately' });
   const says = html('p', { class: 'note-line bad', role: 'alert', 'data-f': 'alarms-says' });
   const ended = html('button', { type: 'button', class: 'key', 'data-f': 'alarms-ended' });
   const these = html('button', { type: 'button', class: 'key', 'data-f': 'alarms-these', hidden: true });
@@ -200,8 +222,8 @@ function build(root) {
     html('div', { class: 'alarms-head' }, html('h2', { tabindex: -1 }, 'Alarms'), count,
       html('span', { class: 'alarms-speed', 'aria-label': 'Speed' }, speed, unit),
       html('button', { type: 'button', class: 'btn', 'aria-label': 'Alarm log', 'data-screen': 'log' }, icon('clock')), close),
-    load, note, none, list, says, foot));
-  return { count, speed, unit, close, load, note, list, none, says, ended, these, foot };
+    load, note, none, list, lately, says, foot));
+  return { count, speed, unit, close, load, note, list, none, lately, says, ended, these, foot };
 }
 
 /** Why nothing can be acknowledged here now; empty where it can. @param {import('../core/store.js').Store} store */

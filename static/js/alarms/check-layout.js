@@ -154,18 +154,3 @@ export function gapsOf(values) {
   });
   return gaps;
 }
-
-/** So far from the middle of a mark that is not OK a finger may be [px]. */
-const REACH = 24;
-
-/**
- * Which mark a finger means on a row of small ones: what is not OK draws it from farther.
- * @param {number} at_px of the finger, from the left end of the row
- * @param {('ok' | string)[]} kinds of the marks
- * @param {number} width of a mark
- */
-export function markAt(at_px, kinds, width) {
-  const far = (/** @type {number} */ i) => Math.abs((i + 0.5) * width - at_px);
-  const near = kinds.flatMap((kind, i) => (kind !== 'ok' && far(i) <= REACH ? [i] : [])).sort((a, b) => far(a) - far(b));
-  return near[0] ?? Math.min(kinds.length - 1, Math.max(0, Math.floor(at_px / width)));
-}

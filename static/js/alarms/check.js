@@ -14,6 +14,7 @@ import { openScreen } from '../core/open-screen.js';
 import { speedUnit, speedWords } from '../core/units.js';
 import { showInTrends } from '../home/drive-choice.js';
 import { colours } from '../home/spark.js';
+import { styled } from '../core/style-sheet.js';
 import { settingsOf } from '../settings/settings-model.js';
 import { SettingsRow } from '../settings/settings-row.js';
 
@@ -118,7 +119,8 @@ class CheckView {
   /** @param {boolean} isKnown */
   #drawAlarm(isKnown) {
     const { store, alarm, parts } = this;
-    show(parts.alarm, alarm !== null);
+    const { title = '', suppressed_by: causes = [] } = (isKnown && !alarm && this.feed.answer) || {}; // not listed while another explains it
+    show(parts.alarm, alarm !== null || causes.length > 0);
     const mayAct = !store.isViewer && !store.replaying && !store.isSilent;
     const keys = alarm && mayAct ? keysOf(alarm) : [];
     if (alarm && mayAct && alarm.state === 'UNACKED' && alarm.actions.includes('shelve')) keys.unshift('shelve');
@@ -126,6 +128,11 @@ class CheckView {
     if (key !== this.#keys) {
       parts.keys.replaceChildren(...keys.map((name) => this.#key(name)));
       this.#keys = key;
+    }
+    if (causes.length) {
+      setText(parts.alarmTitle, title);
+      setWords(parts.state, 'suppressed');
+      setWords(parts.story, `Cause: ${causes.join(', ')}. It is announced if it stands when that is over.`);
     }
     if (!alarm) return;
     setText(parts.alarmTitle, alarm.title);
@@ -177,6 +184,7 @@ class CheckView {
     if (!names.length || !model.body) return;
     model.look();
     if (!this.#rows.length) {
+      void styled('limits');
       this.#rows = names.flatMap((name) => (model.body?.schema[name] ? [new SettingsRow(model, name, model.body.schema[name])] : []));
       parts.rows.replaceChildren(...this.#rows.map(({ element }) => element));
     }

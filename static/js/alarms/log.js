@@ -162,7 +162,7 @@ function drawRow({ event, gap }, all) {
     return html('li', { class: 'gap hatched' }, html('span'), html('span', { class: 'tag' }, icon('link-off', 's'), ...words(gapWords(gap))));
   }
   const { icon: glyph, kind, title, text } = eventWords(event);
-  const told = [text, tookWords(event, all)].filter(Boolean).join(' · ');
+  const details = [text, tookWords(event, all)].filter(Boolean).join(' · ');
   return html('li', {}, icon(glyph, kind), html('span', { class: 't' }, ...words(title)), html('span', { class: 'n h' }, timeOfDay(event.at_ms)),
-    html('span', { class: 'm' }, ...words(told)));
+    html('span', { class: 'm' }, ...words(details)));
 }

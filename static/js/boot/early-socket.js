@@ -1,8 +1,8 @@
 // The socket that was dialled before this script was here (early.js), as the page's own: what came meanwhile is heard first.
 
 /**
- * @typedef {{type: 'open' | 'message' | 'close', data?: string | ArrayBuffer, at_ms: number}} Told at_ms: when it came, monotonic
- * @typedef {{told: Told[], hear: ((told: Told) => void) | null, socket: WebSocket | null}} Early
+ * @typedef {{type: 'open' | 'message' | 'close', data?: string | ArrayBuffer, at_ms: number}} SocketEvent at_ms: when it came, monotonic
+ * @typedef {{queue: SocketEvent[], handle: ((event: SocketEvent) => void) | null, socket: WebSocket | null}} Early
  */
 
 /** The one that was dialled, once; null where there is none any more, or it failed. @returns {import('../core/socket.js').Socket | null} */
@@ -10,7 +10,7 @@ export function takeEarly() {
   const scope = /** @type {{catgraphEarly?: Early}} */ (globalThis);
   const early = scope.catgraphEarly;
   delete scope.catgraphEarly;
-  return early && !early.told.some(({ type }) => type === 'close') ? new EarlySocket(early) : null;
+  return early && !early.queue.some(({ type }) => type === 'close') ? new EarlySocket(early) : null;
 }
 
 export class EarlySocket {
@@ -30,8 +30,8 @@ export class EarlySocket {
   constructor(early) {
     this.early = early;
     queueMicrotask(() => { // by then whoever dialled listens
-      for (const told of early.told.splice(0)) this.#hear(told);
-      early.hear = (told) => this.#hear(told);
+      for (const event of early.queue.splice(0)) this.#handle(event);
+      early.handle = (event) => this.#handle(event);
     });
   }
 
@@ -45,8 +45,8 @@ export class EarlySocket {
     this.early.socket?.close();
   }
 
-  /** @param {Told} told */
-  #hear({ type, data, at_ms }) {
+  /** @param {SocketEvent} event */
+  #handle({ type, data, at_ms }) {
     if (type === 'open' && this.#isClosed) this.early.socket?.close(); // given up while its ticket was under way
     else if (type === 'open') this.onopen?.();
     else if (type === 'message') this.onmessage?.({ data, at_ms });

@@ -15,9 +15,9 @@
   if (!new URLSearchParams(location.search).has('vehicle')) root.dataset.vehicle = ownCar() ?? root.dataset.vehicle;
   const { vehicle } = root.dataset;
   /** @type {import('./early-socket.js').Early} */
-  const early = { told: [], hear: null, socket: null };
+  const early = { queue: [], handle: null, socket: null };
   /** @type {any} */ (globalThis).catgraphEarly = early;
-  ticketOf(access).then(dial).catch(() => tell('close'));
+  ticketOf(access).then(dial).catch(() => pass('close'));
 
   /** The car that this phone opened last, where the server still has it. */
   function ownCar() {
@@ -46,15 +46,15 @@
     const socket = new WebSocket(address);
     early.socket = socket;
     socket.binaryType = 'arraybuffer';
-    socket.onopen = () => tell('open');
-    socket.onmessage = ({ data }) => tell('message', data);
-    socket.onclose = () => tell('close');
+    socket.onopen = () => pass('open');
+    socket.onmessage = ({ data }) => pass('message', data);
+    socket.onclose = () => pass('close');
   }
 
   /** @param {'open' | 'message' | 'close'} type @param {string | ArrayBuffer} [data] */
-  function tell(type, data) {
-    const told = { type, data, at_ms: performance.now() };
-    if (early.hear) early.hear(told);
-    else early.told.push(told);
+  function pass(type, data) {
+    const event = { type, data, at_ms: performance.now() };
+    if (early.handle) early.handle(event);
+    else early.queue.push(event);
   }
 })();

@@ -6,11 +6,11 @@ const MARK = '#pair=';
 /** @type {string | null} */
 let token = taken();
 
-/** The token this page was opened with; it lets in once, so it is told once. */
+/** The token this page was opened with; it lets in once, so it is handed out once. */
 export function linkToken() {
-  const told = token;
+  const once = token;
   token = null;
-  return told;
+  return once;
 }
 
 /** A link that is scanned while the page is open changes its fragment only. @param {() => void} came */
@@ -29,7 +29,7 @@ export function onLink(came) {
  * @param {string} [here]
  */
 export function thenOf(then, here = location.origin) {
-  if (!then || !/^\/(api\/|docs$|metrics$)/.test(then)) return null;
+  if (!then || !/^\/(api\/|agents\/|docs$|fleet$|metrics$)/.test(then)) return null;
   const url = new URL(then, here);
   return url.origin === here ? url.pathname + url.search : null;
 }

@@ -101,6 +101,7 @@ export class Shell {
     if (store.heard_ms !== null && !store.isSilent && now_ms - this.#noted_ms >= NOTE_EVERY_MS) {
       this.#noted_ms = now_ms;
       note({ at_ms: store.heard_ms, isMonitoring: store.isMonitoring });
+      this.#registration?.waiting?.postMessage({ kind: 'take' }); // a page that was just closed may have kept it waiting
     }
     const isNew = this.build !== '' && store.build !== '' && store.build !== this.build;
     if (isNew && !this.#isNew) this.#registration?.update().catch(() => {});

@@ -14,8 +14,9 @@ export function mount(root, store) {
     if (root.hidden) return;
     const { chain: view, isSilent } = store;
     drawBigChain(chain, isSilent ? view : { ...view, nodes: view.nodes.map((node, i) => (i === 1 ? { ...node, mark: 'connecting', isBad: false } : node)) });
-    setText(title, isSilent ? 'The server does not answer' : 'Reaching the server');
-    setWords(text, isSilent ? 'No value and no alarm can be shown. This page keeps trying.' : '');
+    const isCarLost = isSilent && view.isUnserved;
+    setText(title, isCarLost ? 'The car cannot be reached' : isSilent ? 'The server does not answer' : 'Reaching the server');
+    setWords(text, isCarLost ? `${view.sentence} No value and no alarm of it can be shown. This page keeps trying.` : isSilent ? 'No value and no alarm can be shown. This page keeps trying.' : '');
   }
 
   draw();

@@ -1,5 +1,6 @@
 // What the page says of control and of who would hear an alarm: pure functions of the newest frame and of events.
 
+import { initialsOf } from './duty-layout.js';
 import { counted, fixed } from '../core/format.js';
 
 /**
@@ -13,12 +14,15 @@ import { counted, fixed } from '../core/format.js';
  * @param {ControlNow | null} control null: nobody has told yet
  * @param {string} page this page
  * @param {boolean} isSilent
+ * @param {import('../core/protocol-types.js').Duty | null} [duty] who is on duty at this device
  */
-export function chipOf(control, page, isSilent) {
+export function chipOf(control, page, isSilent, duty = null) {
   if (isSilent || !control) return { text: '?', label: 'Control: the server does not answer, so it is unknown who is in control', is: 'unknown' };
-  if (control.page && control.page === page) return { text: 'You', label: 'You are in control', is: 'you' };
+  const me = duty?.me;
+  if (control.page && control.page === page) return { text: me ? `${initialsOf(me.name)} controls` : 'You', label: me ? `You are in control, on duty as ${me.name}` : 'You are in control', is: 'you' };
   if (control.holder) return { text: control.holder, label: `${control.holder} is in control`, is: 'other' };
-  return { text: 'No one', label: 'No one is in control', is: 'free' };
+  if (me) return { text: `${initialsOf(me.name)} on duty`, label: `No one is in control. You are on duty as ${me.name}`, is: 'free' };
+  return duty?.people ? { text: 'Sign on', label: 'No one is in control. Nobody is on duty here', is: 'free' } : { text: 'No one', label: 'No one is in control', is: 'free' };
 }
 
 /**

@@ -61,7 +61,7 @@ class ControlSheet {
   #personRow({ page, name, can, why_text }) {
     const hearing = can ? 'can hear alarms' : `cannot hear alarms: ${why_text ?? 'unknown'}`;
     const button = html('button', { type: 'button', 'data-page': page }, icon('operator'), html('span', {}, `Hand over to ${name}`, html('br'), html('span', { class: 'small sub' }, hearing)));
-    button.addEventListener('click', () => void this.#order('hand_over', { to: page }));
+    button.addEventListener('click', () => void this.control.handOver(page).then(({ ok }) => ok && this.sheet.close()));
     return html('li', {}, button);
   }
 

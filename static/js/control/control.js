@@ -1,6 +1,8 @@
 // Who is in control: the request that its holder must answer, what happened to control, and the way to its sheet. The chip: cars.js.
 
 import { askedOf, noticeOf, seconds } from './control-layout.js';
+import { openHandover } from './duty.js';
+import { partOf } from './duty-layout.js';
 import { html, icon, listen, need, setAttribute, setWords } from '../core/dom.js';
 
 /** A refusal is answered with a key for so long: another one of the same words is another [ms]. */
@@ -36,8 +38,20 @@ export class Control {
     return answer;
   }
 
+  /** Gives control to another page: who is on duty has it read back first. @param {string} to */
+  async handOver(to) {
+    if (!this.store.duty?.me) return this.order('hand_over', { to });
+    const answer = await this.store.ask('offer_control', { to, vehicle: this.store.vehicle });
+    if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Not handed over');
+    return answer;
+  }
+
   /** Opens who is in control, how this page gets it or gives it away. */
   openSheet() {
+    if (partOf(this.store.control?.handover, this.store.page)) {
+      openHandover(this.store, this.say);
+      return;
+    }
     import('./control-sheet.js').then(({ openControl }) => openControl(this.store, this)).catch(() => this.say('The list of operators could not be loaded.', 'Not opened'));
   }
 
@@ -80,7 +94,7 @@ export function mount(snacks, store, control) {
   }
 
   /** @param {import('../core/protocol-types.js').LogEvent[]} events */
-  function tell(events) {
+  function announce(events) {
     const now_ms = store.frame?.server.time_ms ?? Infinity; // a page that was just loaded is told old news: who has control now, the bar says
     const notice = events.filter((event) => event.change === 'control' && now_ms - event.at_ms <= FRESH_MS).map((event) => noticeOf(event, store.page)).findLast((one) => one !== null);
     if (notice) news = { notice, at_ms: store.now() };
@@ -100,16 +114,16 @@ export function mount(snacks, store, control) {
   }
 
   draw();
-  tell(store.log.events); // what came before there was anybody to tell
+  announce(store.log.events); // what came before there was anybody to tell
   const stops = [
     store.on('draw', draw),
-    store.on('log', tell),
+    store.on('log', announce),
     store.on('switch', () => {
       news = null;
       asks.remove();
     }),
     listen(keep, 'click', () => void control.order('keep', { to: asking })),
-    listen(give, 'click', () => void control.order('hand_over', { to: asking })),
+    listen(give, 'click', () => void control.handOver(asking)),
   ];
   return () => stops.forEach((stop) => stop());
 }

@@ -6,8 +6,8 @@ const EVERY_MS = 1000;
 const MOST_LAG_S = 86_400;
 
 export class Presence {
-  #told_ms = -Infinity;
-  #told = '';
+  #sent_ms = -Infinity;
+  #sent = '';
 
   /**
    * @param {import('../core/store.js').Store} store
@@ -22,9 +22,10 @@ export class Presence {
     this.deviceStatus = deviceStatus;
     const look = () => this.#look();
     store.on('tick', look);
+    store.on('duty', look); // who is on duty is logged with the next word
     store.on('beat', look); // while the page is hidden frames come and its timers hardly run
     store.sync.whenOpen(() => {
-      this.#told_ms = -Infinity;
+      this.#sent_ms = -Infinity;
       look();
     });
     store.on('leave', () => this.#send({ ...this.#word(), leaves: true }));
@@ -49,16 +50,18 @@ export class Presence {
 
   #look() {
     const word = this.#word();
-    const key = JSON.stringify(word);
+    const key = JSON.stringify([word, this.store.duty]);
     const now_ms = this.store.now();
-    if (key === this.#told && now_ms - this.#told_ms < EVERY_MS) return;
+    if (key === this.#sent && now_ms - this.#sent_ms < EVERY_MS) return;
     if (!this.#send(word)) return;
-    this.#told = key;
-    this.#told_ms = now_ms;
+    this.#sent = key;
+    this.#sent_ms = now_ms;
   }
 
   /** @param {object} word */
   #send(word) {
-    return this.store.socket.send({ kind: 'present', ...word, lag_s: Math.min(MOST_LAG_S, this.store.lag_s) });
+    const { named } = this.store.seal;
+    if (!named) return false;
+    return this.store.socket.send({ kind: 'present', ...word, ...named, lag_s: Math.min(MOST_LAG_S, this.store.lag_s) });
   }
 }

@@ -1,7 +1,7 @@
 // What a viewer sees: every key that would change something is greyed, and a press on it says why. The server refuses the
 // same by itself; this is so that nobody is surprised.
 
-import { styled } from '../pairing/access-style.js';
+import { styled } from '../core/style-sheet.js';
 import { need } from '../core/dom.js';
 import { isAsked } from '../shell/sheet.js';
 
@@ -21,7 +21,7 @@ const KEYS = [
  * @param {(sentence: string, title?: string) => void} say
  */
 export function mountViewer(store, say) {
-  styled();
+  styled('access');
   const acknowledge = need(document, '#sheet-alarm [data-f="acknowledge"]');
   const word = acknowledge.lastChild;
   const usual = word?.textContent ?? '';

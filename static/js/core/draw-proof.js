@@ -25,3 +25,32 @@ function textOf(node) {
   const first = node?.firstChild;
   return first ? /** @type {Text} */ (first).data : /** @type {Text | undefined} */ (node)?.data;
 }
+
+/**
+ * To be called after each complete drawing: restarts the delay of 2 s after which CSS covers the page, where a fresh frame was drawn.
+ * Throws where nothing was written.
+ * @param {{painter: import('./painter.js').Painter, deadMan: import('./dead-man.js').DeadMan}} page
+ * @param {() => object | null} newest the frame that was drawn
+ */
+export function rewinder({ painter, deadMan }, newest) {
+  const proof = new DrawProof();
+  let drawn = 0;
+  let beat = 0; // of its own: where every second drawing has a fresh frame, the other one would not turn over
+  /** @type {object | null} */
+  let seen = null;
+  return () => {
+    if (!proof.isDrawn()) {
+      painter.drawing.distrust();
+      throw new Error('What was written is not there');
+    }
+    drawn = 1 - drawn;
+    const { dataset } = document.documentElement;
+    dataset['drawn'] = String(drawn);
+    if (dataset['drawn'] !== String(drawn)) throw new Error('The covers are not rewound');
+    const frame = newest();
+    if (deadMan.covered || frame === seen) return;
+    seen = frame;
+    beat = 1 - beat;
+    dataset['beat'] = String(beat);
+  };
+}

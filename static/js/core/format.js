@@ -107,3 +107,14 @@ export function pieces(sentence) {
   if (from < sentence.length) found.push({ text: sentence.slice(from), isNumber: false });
   return found;
 }
+
+/**
+ * A distance as it is read: "10.4 m", "320 m", "4.2 km".
+ * @param {number} value_m
+ * @returns {[string, string]} number and unit
+ */
+export function distanceWords(value_m) {
+  if (value_m < 99.95) return [fixed(value_m), 'm'];
+  if (value_m < 999.5) return [fixed(value_m, 0), 'm'];
+  return [fixed(value_m / 1000, value_m < 99_950 ? 1 : 0), 'km'];
+}

@@ -27,10 +27,17 @@ export class Known {
   replaying = false;
   /** Who this page is to the server. @type {import('./protocol-types.js').Hello['who'] | null} */
   who = null;
+  /** Who is on duty at this device; null: the server has not told. @type {import('./protocol-types.js').Duty | null} */
+  duty = null;
+  /** The build of the page that the server has now; '' where it cannot say. */
+  build = '';
+  /** Why nothing comes from the car's agent although the server answers; '' where nothing is known of it. */
+  unserved = '';
 
   /** Nothing is known yet of the car that is shown from now on. @param {string} vehicle */
   turnTo(vehicle) {
     this.vehicle = vehicle;
+    this.unserved = '';
     this.frame = this.heard_ms = null;
     this.replaying = false;
   }
@@ -40,16 +47,23 @@ export class Known {
     const isFirst = this.frame === null;
     this.frame = frame;
     this.heard_ms = heard_ms;
+    this.unserved = '';
     return isFirst;
   }
 
+  /** The list of all cars came; a web node hears of more of them as time goes on. @param {import('./protocol-types.js').Cars} cars */
+  list(cars) {
+    this.cars = cars;
+    this.vehicles = cars.cars.map(({ name }) => name);
+  }
+
   /** The server greets. @param {import('./protocol-types.js').Hello} hello @returns {boolean} whether for the car that is shown */
-  greet({ vehicle, vehicles, who }) {
+  greet({ vehicle, vehicles, who, build }) {
     if (this.vehicle && vehicle !== this.vehicle) {
       console.warn('The server answers for another car:', vehicle);
       return false;
     }
-    Object.assign(this, { vehicle, vehicles, who: who ?? null });
+    Object.assign(this, { vehicle, vehicles, who: who ?? null, build: build ?? '' });
     return true;
   }
 
@@ -61,6 +75,11 @@ export class Known {
   /** This device was let in to look, and no more. */
   get isViewer() {
     return this.who?.role === 'viewer';
+  }
+
+  /** The name under which this page's orders are logged; '' where the server has not told. */
+  get signs() {
+    return this.duty?.signs ?? '';
   }
 
   /** What must be heard of: the live car, also while a recording is shown. @returns {State | null} */

@@ -14,11 +14,13 @@ import { age, timeOfDay } from './format.js';
  * @property {Node[]} nodes phone, server, bridge, car
  * @property {string} sentence what fell silent
  * @property {string} detail what is known beside it
+ * @property {boolean} [isUnserved] the server answers, and has nothing of the car
  */
 
 /** A car that has said nothing for so long after the bridge answered is called silent [s]. */
 const FIRST_WORD_S = 2;
 const NAMES = ['Phone', 'Server', 'Bridge', 'Car'];
+const BY_AGENT = ['Phone', 'Server', 'Agent', 'Car'];
 
 /**
  * The chain as the page sees it now.
@@ -28,10 +30,12 @@ const NAMES = ['Phone', 'Server', 'Bridge', 'Car'];
  * @param {number} seen.silence_s for how long [s]
  * @param {number} seen.lag_s age of the frame at the glass [s]
  * @param {number | null} seen.heard_ms wall clock of the last fresh frame
+ * @param {string} [seen.unserved] why nothing comes from the car's agent although the server answers
  * @returns {ChainView}
  */
-export function chainOf({ frame, isSilent, silence_s, lag_s, heard_ms }) {
+export function chainOf({ frame, isSilent, silence_s, lag_s, heard_ms, unserved = '' }) {
   if (isSilent && frame && silence_s <= 2) return waking(silence_s);
+  if (isSilent && unserved) return agentSilent(unserved, silence_s, heard_ms);
   if (isSilent || !frame) return serverSilent(silence_s, heard_ms);
   const { session, link } = frame;
   if (frame.replay) return { word: 'Replay', age_s: frame.replay.silent_s, cut: null, since_ms: null, nodes: nodesOf(null, []), sentence: 'A recording is shown.', detail: '' };
@@ -108,12 +112,30 @@ function serverSilent(silence_s, heard_ms) {
 }
 
 /**
+ * The server answers, and has nothing of the car: its agent, or the broker between, is lost.
+ * @param {string} why
+ * @param {number} silence_s
+ * @param {number | null} heard_ms
+ * @returns {ChainView}
+ */
+function agentSilent(why, silence_s, heard_ms) {
+  const wasHeard = heard_ms !== null;
+  return {
+    word: 'Lost', age_s: wasHeard ? silence_s : null, cut: 1, since_ms: heard_ms, isUnserved: true,
+    nodes: nodesOf(1, ['here', 'answers', wasHeard ? `silent ${age(silence_s)} s` : 'no answer', 'unknown'], BY_AGENT),
+    sentence: why,
+    detail: wasHeard ? `Last data at ${timeOfDay(heard_ms)}. The server answers.` : 'The server answers.',
+  };
+}
+
+/**
  * @param {0 | 1 | 2 | null} cut
  * @param {string[]} marks
+ * @param {string[]} [names]
  * @returns {Node[]}
  */
-function nodesOf(cut, marks) {
-  return NAMES.map((name, i) => ({
+function nodesOf(cut, marks, names = NAMES) {
+  return names.map((name, i) => ({
     name, mark: marks[i] ?? '', isBad: cut !== null && i === cut + 1, isKnown: cut === null || i <= cut,
   }));
 }

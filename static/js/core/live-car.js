@@ -10,6 +10,11 @@ export function liveOf(frame) {
   return live ? { ...frame, alarms: live.alarms, recording: live.recording, decelerate, session: { ...frame.session, phase: live.phase, paused: live.paused } } : null;
 }
 
+/** What is signed with an order to the live car. @param {State | null} frame */
+export function challengeOf(frame) {
+  return frame?.replay ? frame.live?.challenge : frame?.server.challenge;
+}
+
 /** Who is in control. @param {State | null} frame */
 export function controlOf(frame) {
   return (frame?.replay ? frame.live?.control : frame?.control) ?? null;

@@ -21,6 +21,8 @@ export class Painter {
   #isMoved = false;
   #urgent = '';
   #isUrgent = false;
+  /** What waits for a picture of its own. @type {Set<() => void>} */
+  #turns = new Set();
   #emitter;
 
   /** @param {import('./emitter.js').Emitter<import('./store.js').Topic>} emitter gets `move`, `draw` and `drawn` */
@@ -31,6 +33,22 @@ export class Painter {
   /** Draw with the next picture; what it throws is a failure of drawing. @param {() => void} draw */
   picture(draw) {
     requestAnimationFrame(() => this.#emitter.guard(draw));
+  }
+
+  /** Draw with a picture of its own, after those that wait: together they would take longer than one picture. @param {() => void} draw */
+  inTurn(draw) {
+    this.#turns.add(draw);
+    if (this.#turns.size === 1) this.#turn();
+  }
+
+  #turn() {
+    this.picture(() => {
+      const [draw] = this.#turns;
+      if (!draw) return;
+      this.#turns.delete(draw);
+      if (this.#turns.size) this.#turn();
+      draw();
+    });
   }
 
   /**
@@ -65,6 +83,7 @@ export class Painter {
     if (!wasFailed) console.error('Nothing was drawn for 1 s');
     this.undrawn?.show();
     this.#isMoved = false; // a picture that was asked for may never come
+    this.#turns.clear();
   }
 
   /** Without frames a timer sets the pace. @param {number} now_ms @param {number} heard_ms when the last fresh frame came */

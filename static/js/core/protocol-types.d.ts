@@ -6,6 +6,16 @@ export interface AccelerationValue {
   source: "topic" | "speed";
 }
 
+/** Takes control over. Refused while a line is not confirmed, or where the list is another one by now. */
+export interface AcceptControlCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "accept_control";
+  /** of the list that was read back, as the state names it */
+  version: string;
+}
+
 /** The operator has seen this occurrence. */
 export interface AcknowledgeCommand {
   id?: string | null;
@@ -30,7 +40,16 @@ export interface AlarmLoad {
 
 export type AlarmState = "NORMAL" | "UNACKED" | "ACKED" | "RTN_UNACKED" | "SHELVED" | "SUPPRESSED" | "OUT_OF_SERVICE";
 
-export type Answers = SettingsAnswer | SignalsAnswer | CheckAnswer | TrackPoints | RecordingList | ExportJob | DeviceList | DriveTrendsAnswer;
+/** Accepts or declines an offered item; only by who was asked. */
+export interface AnswerItemCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "answer_item";
+  accept: boolean;
+}
+
+export type Answers = SettingsAnswer | SignalsAnswer | CheckAnswer | TrackPoints | RecordingList | LogbookAnswer | Course | VerificationAnswer | StoredList | ExportJob | DeviceList | DriveTrendsAnswer | PeopleList | InterventionAnswer | DrivingAnswer | MarkList | DepartureAnswer;
 
 /** Slow-down may be ordered from now on. */
 export interface ArmCommand {
@@ -40,9 +59,49 @@ export interface ArmCommand {
   kind: "arm";
 }
 
+/** What became of a command whose answer was lost. One that did not arrive yet is not carried out any more. */
+export interface AskOutcomeCommand {
+  id?: string | null;
+  kind: "outcome";
+  /** the `id` of the command */
+  of: string;
+  /** since it was asked for, at most */
+  ago_s: number;
+}
+
+/** An operator who asks for control of the car, and whom nobody has answered yet. */
+export interface AskedControl {
+  page: string;
+  name: string;
+  /** until silence grants it */
+  left_s: number;
+}
+
+/** Why a car needs a person, and who has it. Its session alone decides. */
+export interface AttentionItem {
+  /** the car needs a person without a break since then */
+  since_ms: number;
+  assigned: ItemHolder | null;
+  offered: ItemOffer | null;
+  /** when it goes on to the supervisor; null: no timer runs */
+  escalates_ms: number | null;
+  /** when it went on to the supervisor */
+  escalated_ms: number | null;
+  /** who is on duty as such now, 3 at most; null: not known, or by an older agent */
+  supervisors?: Array<string> | null;
+}
+
 export interface BearingValue {
   /** counter-clockwise, 0 ahead; null: unknown */
   bearing_rad: number | null;
+}
+
+/** Begins the departure check, or begins it again: all its results are gone. */
+export interface BeginDepartureCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "begin_departure";
 }
 
 /** The recording that is shown beside the one that the page replays, at its own moment. */
@@ -72,6 +131,8 @@ export interface CarAlarm {
   raised_ms: number;
   /** none while it is silenced */
   sound: Sound;
+  /** value against limit, in words */
+  text?: string;
 }
 
 /** What the chain of a car is made of, as in LinkState and SessionState. */
@@ -83,6 +144,16 @@ export interface CarLink {
   connected_for_s: number | null;
 }
 
+/** Where a car is by its own GPS, WGS84. */
+export interface CarPlace {
+  lat_deg: number;
+  lon_deg: number;
+  /** counter-clockwise from east */
+  heading_rad: number | null;
+  freshness: SignalFreshness;
+  age_s: number | null;
+}
+
 export interface CarSpeed {
   value_mps: number | null;
   freshness: SignalFreshness;
@@ -90,7 +161,7 @@ export interface CarSpeed {
   horizon_s: number | null;
 }
 
-/** One car, as its session states it. */
+/** One car, as its session states it. What is not required came later: an older agent does not state it. */
 export interface CarSummary {
   phase: "idle" | "connecting" | "failed" | "monitoring" | "lost";
   paused: boolean;
@@ -107,6 +178,20 @@ export interface CarSummary {
   recording: "off" | "recording" | "saving" | "held" | "stopped";
   recording_for_s: number | null;
   slow_down: "not_available" | "safe" | "armed" | "ordered" | "holding";
+  /** when it was made, by the clock that its other times are of */
+  time_ms?: number;
+  /** null: it needs nobody */
+  attention?: AttentionItem | null;
+  /** null: no position was received */
+  place?: CarPlace | null;
+  /** of battery or fuel */
+  energy_percent?: number | null;
+  /** who asks for control, the oldest first, 3 at most */
+  requests?: Array<AskedControl>;
+  /** to whom its item can be handed over, 20 at most */
+  people?: Array<PagePerson>;
+  /** as `challenge` of a state */
+  challenge?: string;
 }
 
 /** All cars of a server that watches several: twice a second, and at once when the alarms of one change. */
@@ -234,6 +319,8 @@ export interface ControlState {
   former?: FormerHolder | null;
   /** who asks for control, the oldest first */
   requests?: Array<ControlRequest>;
+  /** null: control is not being handed over */
+  handover?: HandoverState | null;
 }
 
 /** A slow-down that begins by itself, unless it is vetoed. */
@@ -242,6 +329,46 @@ export interface Countdown {
   title: string;
   text: string;
   left_s: number;
+}
+
+/** `GET /api/recordings/{id}/course`. */
+export interface Course {
+  start_ms: number;
+  length_s: number;
+  /** null: not known; then `way` is empty */
+  length_m: number | null;
+  /** between two points of `way` */
+  step_m: number;
+  /** between two points of `time` */
+  step_s: number;
+  way: CoursePoints;
+  time: CoursePoints;
+  events: Array<CourseEvent>;
+  /** the speed limit at the beginning; null: not recorded */
+  limit_mps: number | null;
+}
+
+/** An alarm, a mark or an intervention. */
+export interface CourseEvent {
+  t: number;
+  m: number | null;
+  /** critical · warning · advisory · mark · intervention */
+  kind: string;
+  text: string;
+}
+
+/** Numbers at evenly spaced places or moments; null: not known there. */
+export interface CoursePoints {
+  /** s since the recording began */
+  t: Array<number>;
+  /** distance driven */
+  m: Array<number | null>;
+  /** m/s */
+  speed: Array<number | null>;
+  /** %, negative = left */
+  steering: Array<number | null>;
+  lat: Array<number | null>;
+  lon: Array<number | null>;
 }
 
 /** Slows the car, once armed; refused where it took longer than 300 ms on its way. */
@@ -254,6 +381,128 @@ export interface DecelerateCommand {
   pressed_ago_s?: number;
   heard_ms?: number | null;
   held_s?: number;
+}
+
+/** `GET /api/departure`. */
+export interface DepartureAnswer {
+  done: number;
+  failed: number;
+  not_applicable: number;
+  /** items of the list */
+  of: number;
+  /** none: it was not begun in this drive */
+  state: "none" | "open" | "signed";
+  /** who signed it, or began it */
+  by: string | null;
+  /** when that was */
+  at_ms: number | null;
+  /** null: not begun */
+  check: string | null;
+  items: Array<DepartureItem>;
+  signature: DepartureSignature | null;
+  /** the list is the one of the vehicle profile */
+  is_default: boolean;
+  /** why the stored list cannot be used, as a sentence */
+  complaint: string | null;
+  kinds: Array<DepartureKindRow>;
+  /** the list as a file */
+  toml: string;
+}
+
+/** One item of the list, and what became of it. */
+export interface DepartureItem {
+  id: string;
+  title: string;
+  kind: "manual" | "check" | "topic" | "recorder" | "sound" | "disk" | "clock" | "brake" | "accelerator" | "steering" | "slow_down";
+  /** manual: by a person; automatic: turns by itself; active: do it, and it is seen */
+  group: "manual" | "automatic" | "active";
+  /** the check or the topic; "": none */
+  of: string;
+  /** at least so much; of a clock at most */
+  need: number | null;
+  unit: string;
+  /** what to do where it fails */
+  fix: string;
+  /** due again after so many days; null: at each departure, or by distance */
+  every_days: number | null;
+  /** due again after so far; null: at each departure, or by time */
+  every_km: number | null;
+  result: "open" | "done" | "failed" | "not_applicable";
+  /** what was seen */
+  value: string;
+  /** why it failed or is not applicable, in a person's words */
+  note: string;
+  /** whose word it is; null: it turned by itself, or is open */
+  by: string | null;
+  /** when it turned */
+  at_ms: number | null;
+  /** it had failed in this check */
+  is_fixed: boolean;
+  /** of an active item: the value now */
+  now: number | null;
+  /** of an active item: the highest since the check began */
+  peak: number | null;
+}
+
+/** A kind of item, for who edits the list. */
+export interface DepartureKindRow {
+  kind: "manual" | "check" | "topic" | "recorder" | "sound" | "disk" | "clock" | "brake" | "accelerator" | "steering" | "slow_down";
+  group: "manual" | "automatic" | "active";
+  title: string;
+  /** what `of` names; "": it has none */
+  of: string;
+  unit: string;
+  need: number | null;
+  lowest: number;
+  highest: number;
+}
+
+export interface DepartureSignature {
+  done: number;
+  failed: number;
+  not_applicable: number;
+  /** items of the list */
+  of: number;
+  by: string;
+  /** title of who is on duty; "": nobody is */
+  role: string;
+  at_ms: number;
+  /** items that had failed first */
+  fixed: number;
+  /** SHA-256 of `document` [hex] */
+  hash: string;
+  /** canonical JSON of the list and its results; "": signed before a restart */
+  document: string;
+}
+
+/** The departure check of this drive, in short. */
+export interface DepartureState {
+  done: number;
+  failed: number;
+  not_applicable: number;
+  /** items of the list */
+  of: number;
+  /** none: it was not begun in this drive */
+  state: "none" | "open" | "signed";
+  /** who signed it, or began it */
+  by: string | null;
+  /** when that was */
+  at_ms: number | null;
+}
+
+/** Says what made somebody intervene; sent again it replaces what was said before. */
+export interface DescribeInterventionCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "describe_intervention";
+  /** its id, as the state names it */
+  intervention: string;
+  /** in words; empty where the category says enough */
+  what?: string;
+  category?: string | null;
+  /** where the data say otherwise; null: as they say */
+  initiated_by?: "driver" | "operator" | "system" | "unknown" | null;
 }
 
 /** `GET /api/devices`. */
@@ -302,6 +551,38 @@ export interface DistanceValue {
   none_in_range: boolean;
 }
 
+/** One moment that somebody marked. */
+export interface DriveMark {
+  /** the mark's id */
+  mark: string;
+  /** the moment that was marked, by the server's clock */
+  marked_ms: number;
+  category: string | null;
+  /** what was said of the moment; "": nothing */
+  words: string;
+  /** a voice note belongs to it */
+  voice: boolean;
+  /** a photo belongs to it */
+  photo: boolean;
+  /** what marked: a page, a program, or the car's own button */
+  source: "page" | "http" | "car";
+  by: string | null;
+  /** of a recording: since it began */
+  at_s?: number;
+  /** of a recording: it came, or was changed, after the recording was complete */
+  late?: boolean;
+}
+
+/** The car at one moment about an intervention. */
+export interface DriveSample {
+  /** since the intervention; negative: before it */
+  at_s: number;
+  /** null: not known */
+  speed_mps: number | null;
+  /** null: not known */
+  brake_percent: number | null;
+}
+
 /** One signal of the drive in buckets. */
 export interface DriveTrend {
   /** of each bucket; null: no number in it */
@@ -337,6 +618,66 @@ export interface DriveTrendsAnswer {
   /** of the part that is answered; at most 100, the most urgent */
   marks: Array<TrendMark>;
   marks_left_out: number;
+}
+
+/** A time in one mode. */
+export interface DrivenSpan {
+  /** autonomous · manual · unknown */
+  mode: string;
+  from_s: number;
+  to_s: number;
+}
+
+/** `GET /api/driving`: totals since this car was dialled. */
+export interface DrivingAnswer {
+  /** time and distance in each mode */
+  modes: Record<string, ModeTotal>;
+  interventions: number;
+  alarms: number;
+  per_km: PerKilometre;
+}
+
+/** Who is on duty at this device: after the page's hello, and whenever it changes. */
+export interface Duty {
+  kind: "duty";
+  /** null: not signed on */
+  me: DutyState | null;
+  /** the name under which this page's orders are logged */
+  signs: string;
+  /** shown until it is dismissed, or somebody signs on */
+  ended: DutyEnded | null;
+  /** how many are in the list of people; 0: nobody can sign on */
+  people: number;
+  /** everybody, at whatever device */
+  on_duty: Array<DutyState>;
+}
+
+/** How the last duty at this device ended. */
+export interface DutyEnded {
+  /** one sentence */
+  text: string;
+  at_ms: number;
+}
+
+/** A person who is on duty. */
+export interface DutyState {
+  /** id in the list of people */
+  person: string;
+  name: string;
+  role: "operator" | "safety_driver" | "supervisor" | "test_engineer";
+  /** of the role */
+  title: string;
+  /** name of the device at which they signed on */
+  device: string;
+  since_ms: number;
+}
+
+/** Declines the offer, or takes it back: by who takes over, or by who offered. */
+export interface EndOfferCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "end_offer";
 }
 
 /** Events of the log, at most 100. */
@@ -388,6 +729,18 @@ export interface Fix {
   held_s: number;
 }
 
+/** To a page of all cars: what happened to the item of one, the newest 20 first, then each new one. */
+export interface FleetEvent {
+  kind: "fleet_event";
+  vehicle: string;
+  /** its number in the log of the car */
+  n: number;
+  time_ms: number;
+  text: string;
+  /** who did it, where a person did */
+  by: string | null;
+}
+
 export interface FormerHolder {
   name: string;
   page: string;
@@ -406,6 +759,45 @@ export interface GuardState {
   why: string;
   hold: number;
   age_s: number;
+}
+
+/** For the web node: control was handed over, so who had it is not on duty there any more. */
+export interface HandedOver {
+  /** under which somebody was on duty */
+  device: string;
+  to: string;
+  /** of `outcome`: how long ago */
+  ago_s?: number;
+}
+
+/** One thing that stands, to be read back. */
+export interface HandoverLine {
+  key: string;
+  kind: "alarm" | "shelved" | "limit" | "rides" | "driving" | "departure" | "slow_down" | "paused";
+  title: string;
+  text: string;
+  /** of an alarm */
+  priority: Priority | null;
+  since_ms: number | null;
+  /** of what is shelved */
+  until_ms: number | null;
+  /** who takes over has confirmed it */
+  read: boolean;
+}
+
+/** Control is being handed over: it changes once every line is read back. */
+export interface HandoverState {
+  by: string;
+  by_page: string;
+  /** who takes over */
+  name: string;
+  page: string;
+  since_ms: number;
+  lines: Array<HandoverLine>;
+  /** lines that are not confirmed */
+  left: number;
+  /** of the list */
+  version: string;
 }
 
 /** The page has the events that were sent. */
@@ -441,6 +833,8 @@ export interface Hello {
   last_event: number;
   /** without a message for so long a page covers its values */
   veil_after_s: number;
+  /** of a web node: orders are signed, as agents require it */
+  signs?: boolean;
   who: Identity;
 }
 
@@ -456,6 +850,48 @@ export interface ImportCommand {
   id?: string | null;
   kind: "import";
   toml: string;
+}
+
+/** `GET /api/interventions/{intervention}`. */
+export interface InterventionAnswer {
+  id: string;
+  at_ms: number;
+  kind_of: "to_manual" | "brake" | "steer";
+  speed_mps: number;
+  lat_deg: number | null;
+  lon_deg: number | null;
+  initiated_by: "driver" | "operator" | "system" | "unknown";
+  /** the most, where the brake was pressed against the command */
+  brake_percent: number | null;
+  /** brake or wheel so long before the mode changed */
+  acted_before_s: number | null;
+  /** titles of the alarms that were active, at most 20 */
+  active: Array<string>;
+  /** since the newest alarm before it began; null: none, or not known */
+  last_alarm_ago_s: number | null;
+  /** from 10 s before to 6 s after; of before a restart: no later ones */
+  samples: Array<DriveSample>;
+  /** as it was described last; null: not yet */
+  what: string | null;
+  category: string | null;
+  described_by: string | null;
+  /** interventions that nobody has described yet */
+  left: number;
+}
+
+/** Who has the item of a car in the attention queue. */
+export interface ItemHolder {
+  name: string;
+  page: string;
+  since_ms: number;
+}
+
+/** Who is asked to take the item over; it stays where it is until they accept. */
+export interface ItemOffer {
+  by: string;
+  name: string;
+  page: string;
+  since_ms: number;
 }
 
 /** Back to live. */
@@ -495,6 +931,10 @@ export interface ListedCar {
   age_s: number | null;
   /** null: its session has stopped, and nothing is known of the car now */
   summary: CarSummary | null;
+  /** which part is silent, as a sentence; null: none */
+  trouble?: string | null;
+  /** who said that a car that is silent is off; null: nobody */
+  off?: OffOnPurpose | null;
 }
 
 /** What is live while a page replays. */
@@ -511,18 +951,24 @@ export interface LiveSummary {
   /** at most 8 */
   alarms: Array<StandingAlarm>;
   alarms_in_all: number;
+  /** as `challenge` of a live state */
+  challenge?: string;
 }
 
 /** One event of the log. */
 export interface LogEvent {
-  /** what happened to control; below */
+  /** who was on duty at the device that did it; left out: nobody */
+  person?: string;
+  /** of that person */
+  role?: "operator" | "safety_driver" | "supervisor" | "test_engineer";
+  /** what happened to control, or to the item; below */
   act?: string;
   by_page?: string | null;
-  /** who is in control now */
+  /** who is in control now, or to whom the item is assigned */
   holder?: string | null;
   page?: string | null;
-  /** who was in control until now */
-  before?: string | null;
+  /** the one before, where that is another; of an intervention: the 10 s before it, twice a second */
+  before?: string | Array<DriveSample> | null;
   before_page?: string | null;
   fence?: number | null;
   /** ordered · sent · slows · not_confirmed · released …; of reduced: how far */
@@ -539,6 +985,47 @@ export interface LogEvent {
   trigger?: string;
   /** number of the guard's hold */
   hold?: number;
+  mode?: "autonomous" | "manual" | "unknown";
+  /** the topic, "commands" or "" */
+  mode_source?: string;
+  /** when it happened; it is logged a moment later */
+  moment_ms?: number;
+  /** single changes of a mode that flickers, which are not events of their own */
+  flickers?: number;
+  /** its id */
+  intervention?: string;
+  kind_of?: "to_manual" | "brake" | "steer";
+  speed_mps?: number | null;
+  lat_deg?: number | null;
+  lon_deg?: number | null;
+  initiated_by?: "driver" | "operator" | "system" | "unknown";
+  /** ids of the alarms that were active */
+  active?: Array<string>;
+  brake_percent?: number | null;
+  /** brake or wheel so long before the mode changed */
+  acted_before_s?: number | null;
+  /** the description of an intervention */
+  what?: string;
+  /** id of the departure check */
+  check?: string;
+  /** id of the item that turned */
+  item?: string;
+  item_title?: string;
+  result?: "open" | "done" | "failed" | "not_applicable";
+  /** what was seen */
+  value?: string;
+  note?: string;
+  /** items of the departure check; so are `failed`, `not_applicable` and `of` */
+  done?: number;
+  failed?: number;
+  not_applicable?: number;
+  of?: number;
+  /** items that had failed first */
+  fixed?: number;
+  /** of a signed departure check: its items that have an interval */
+  recurring?: Array<RecurringItem>;
+  /** SHA-256 of the list and its results [hex]; with an item: of what it asks */
+  hash?: string;
   address?: string;
   /** all that are in force, as monitoring begins */
   settings?: Record<string, any>;
@@ -550,6 +1037,21 @@ export interface LogEvent {
   phone?: string | null;
   /** when the pause began */
   since_ms?: number;
+  /** monitoring goes on after the server was started again: the drive is the same */
+  resumes?: boolean;
+  /** the mark's id */
+  mark?: string;
+  /** the moment that was marked, by the server's clock */
+  marked_ms?: number;
+  category?: string | null;
+  /** what was said of the moment; "": nothing */
+  words?: string;
+  /** a voice note belongs to it */
+  voice?: boolean;
+  /** a photo belongs to it */
+  photo?: boolean;
+  /** what marked: a page, a program, or the car's own button */
+  source?: "page" | "http" | "car";
   at_ms: number;
   /** null: of no alarm */
   alarm: string | null;
@@ -578,6 +1080,139 @@ export interface LogEvent {
   n: number;
 }
 
+/** `GET /api/logbook`. */
+export interface LogbookAnswer {
+  totals: LogbookTotals;
+  weeks: Array<LogbookWeek>;
+  /** alarms by what they are about, most first */
+  components: Record<string, number>;
+  /** the newest 200, newest first; the CSV has all */
+  drives: Array<LogbookDrive>;
+  /** to choose among */
+  people: Array<string>;
+  /** of each car, over all its drives */
+  checks: Array<LogbookCheck>;
+  /** recordings that are yet to be read: their drives are missing */
+  unread: number;
+}
+
+/** The newest signed departure check of a car, whatever drives were asked for. */
+export interface LogbookCheck {
+  vehicle: string;
+  /** null: no drive has one */
+  signed_ms: number | null;
+  by: string;
+  /** items that had failed when it was signed */
+  failed: number;
+  /** as far as the recording names them */
+  failed_items: Array<string>;
+  /** driven since, the drive it was made for among it; null: not known */
+  distance_m: number | null;
+  /** of those drives, whose distance is not known: it was farther */
+  unmeasured: number;
+  /** since, without a signed check: that for which it was made is none of them */
+  drives: number;
+  /** of those, whose recording does not say whether they were checked */
+  not_known: number;
+  /** items with an interval, as the newest signed list has them; most late first */
+  recurring: Array<LogbookDue>;
+}
+
+/** One drive; its parts are recordings of one session, and of those that went on after a restart of the server. */
+export interface LogbookDrive {
+  /** of its first recording */
+  id: string;
+  parts: number;
+  vehicle: string;
+  started_ms: number;
+  title: string;
+  tags: Array<string>;
+  /** who was on duty, or gave an order */
+  people: Array<string>;
+  /** null: neither positions nor a speed */
+  distance_m: number | null;
+  /** how long was recorded */
+  driven_s: number;
+  /** by autonomous, manual, unknown */
+  modes_m: Record<string, number | null>;
+  modes_s: Record<string, number>;
+  /** null: the mode of the car was not recorded, in a part at least */
+  interventions: number | null;
+  /** interventions that nobody has described; null: not known */
+  undescribed: number | null;
+  /** raised; null: no log was recorded, in a part at least */
+  alarms: number | null;
+  /** those that came later too */
+  marks: number | null;
+  /** without a message for longer than 1 s, all together */
+  blind_s: number;
+  /** the departure check; null: not known */
+  departure: "none" | "open" | "signed" | null;
+  /** when it was signed */
+  departure_ms: number | null;
+  /** who signed; "": not signed, or not known */
+  departure_by: string;
+  /** items that had failed when it was signed */
+  departure_failed: number;
+  /** those, as far as the recording names them; at most 20 */
+  failed_items: Array<string>;
+  /** items of the signed check that have an interval */
+  recurring: Array<RecurringItem>;
+  /** alarms by what they are about */
+  components: Record<string, number>;
+}
+
+/** When an item of the departure check that has an interval is due again. */
+export interface LogbookDue {
+  item: string;
+  title: string;
+  every_days: number | null;
+  every_km: number | null;
+  /** the newest signed check in which it was done; null: in none */
+  done_ms: number | null;
+  /** driven since; null: not known, or never done */
+  distance_m: number | null;
+  /** it was farther: the distance of a drive since is not known */
+  is_least: boolean;
+  /** whole days left, negative: late; null: not due by time, or never done */
+  due_days: number | null;
+  /** distance left, negative: late; null: not due by distance, or not known */
+  due_km: number | null;
+  /** late by time or distance, or never done */
+  is_overdue: boolean;
+}
+
+/** Over all drives that were asked for. */
+export interface LogbookTotals {
+  drives: number;
+  distance_m: number;
+  driven_s: number;
+  modes_m: Record<string, number>;
+  modes_s: Record<string, number>;
+  /** per 100 km, over the drives that know their mode */
+  interventions: number | null;
+  /** per 100 km, over the drives with a log */
+  alarms: number | null;
+  /** drives without a signed departure check */
+  checks_missing: number;
+  /** of so many drives */
+  checks_known: number;
+}
+
+/** A week from Monday, UTC. */
+export interface LogbookWeek {
+  from_ms: number;
+  drives: number;
+  modes_m: Record<string, number>;
+  /** per 100 km; null: not known, or less than 100 m */
+  interventions: number | null;
+  /** the same */
+  alarms: number | null;
+  /** of this and the four weeks before, without a week of no drives */
+  interventions_median: number | null;
+  alarms_median: number | null;
+}
+
 /** An announcement of an alarm in a recording. */
 export interface Mark {
   at_s: number;
@@ -589,7 +1224,39 @@ export interface Mark {
   duration_s: number | null;
 }
 
-export type Message = Hello | Offer | State | Cars | Events | Reply | Problem | Timeline | Beside | BesideEnded | ReplayEnded;
+/** Marks, the newest moment last. */
+export interface MarkList {
+  marks: Array<DriveMark>;
+}
+
+export type Message = Hello | Offer | State | Cars | Events | Reply | Problem | Timeline | Beside | BesideEnded | ReplayEnded | Unserved | FleetEvent | Duty;
+
+/** Who drives. */
+export interface ModeState {
+  mode: "autonomous" | "manual" | "unknown";
+  /** why it is unknown; null: it is known */
+  why: "no_source" | "silent" | "flickers" | "unclear" | null;
+  /** null: nothing was known before, or of a recording */
+  since_ms: number | null;
+  /** driven in this mode since then; null: not known */
+  way_m: number | null;
+  /** the topic; "commands": by the rule; "": none */
+  source: string;
+  /** to be described, the oldest first, at most 20 */
+  open: Array<OpenIntervention>;
+}
+
+export interface ModeTotal {
+  s: number;
+  m: number;
+}
+
+export interface ModeValue {
+  /** of a plain number always unknown: what it means is a setting */
+  mode: "autonomous" | "manual" | "unknown";
+  /** in the car's own words */
+  said: string;
+}
 
 export interface NearestState {
   /** null while standing */
@@ -604,11 +1271,37 @@ export interface OdometryValue {
   speed_mps: number | null;
 }
 
+/** A person said that a car is off; it holds until the car's agent is heard again. */
+export interface OffOnPurpose {
+  by: string;
+  since_ms: number;
+}
+
 /** Something newer than the page has. */
 export interface Offer {
   kind: "offer";
   seq: number;
   of: Array<"state" | "scan" | "timeline" | "cars" | "beside">;
+}
+
+/** Offers control to another page, whose operator reads back what stands; control stays where it is until then. */
+export interface OfferControlCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "offer_control";
+  /** the page that is to get it */
+  to: string;
+}
+
+/** Asks another person to take the car's item over; it stays assigned as it is until they accept. */
+export interface OfferItemCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "offer_item";
+  /** the page of that person, as `people` of the summary names it */
+  to: string;
 }
 
 /** Opens a second recording beside the one that is replayed, to compare both. */
@@ -618,6 +1311,13 @@ export interface OpenBeside {
   do: "beside";
   recording: string;
   at_s?: number;
+}
+
+/** An intervention that nobody has described yet. */
+export interface OpenIntervention {
+  id: string;
+  at_ms: number;
+  kind_of: "to_manual" | "brake" | "steer";
 }
 
 /** Opens a recording by its id, at a moment [s since its beginning]. */
@@ -650,7 +1350,13 @@ export interface PageHello {
   page?: string;
 }
 
-export type PageMessage = PageHello | Take | Have | Watch | OpenReplay | OpenBeside | CloseBeside | LeaveReplay | SeekReplay | PlayReplay | PauseReplay | SetReplayRate | SeekReplayAlarm | ConnectCommand | RetryCommand | DisconnectCommand | PauseCommand | ResumeCommand | RecordCommand | AcknowledgeCommand | SilenceCommand | ShelveCommand | UnshelveCommand | SetCommand | ImportCommand | PositionCommand | RideCommand | TakeControlCommand | ArmCommand | DisarmCommand | DecelerateCommand | ReleaseCommand | VetoCommand | PresentWordCommand;
+export type PageMessage = PageHello | Take | Have | Watch | OpenReplay | OpenBeside | CloseBeside | LeaveReplay | SeekReplay | PlayReplay | PauseReplay | SetReplayRate | SeekReplayAlarm | ConnectCommand | RetryCommand | DisconnectCommand | PauseCommand | ResumeCommand | RecordCommand | AcknowledgeCommand | SilenceCommand | ShelveCommand | UnshelveCommand | SetCommand | ImportCommand | PositionCommand | RideCommand | TakeControlCommand | TakeItemCommand | ReleaseItemCommand | OfferItemCommand | AnswerItemCommand | WithdrawItemCommand | OfferControlCommand | ReadBackCommand | AcceptControlCommand | EndOfferCommand | PlaceMarkCommand | RemoveMarkCommand | BeginDepartureCommand | SetDepartureItemCommand | SignDepartureCommand | ReopenDepartureCommand | SetDepartureListCommand | ArmCommand | DisarmCommand | DecelerateCommand | ReleaseCommand | VetoCommand | DescribeInterventionCommand | PresentWordCommand | AskOutcomeCommand;
+
+/** An operator's page that announces the alarms of this car. */
+export interface PagePerson {
+  page: string;
+  name: string;
+}
 
 /** One page of an operator. */
 export interface PagePresence {
@@ -686,6 +1392,36 @@ export interface PauseReplay {
 
 export interface PedalValue {
   percent: number | null;
+}
+
+/** The answer of `GET /api/people`, and of each change. */
+export interface PeopleList {
+  people: Array<PersonRow>;
+  roles: Array<RoleRow>;
+  /** a duty ends by itself after so long */
+  ends_after_h: number;
+  /** id of the new person, where one was added */
+  added?: string;
+  me: DutyState | null;
+}
+
+export interface PerKilometre {
+  /** on a kilometre driven by itself; null: no such distance */
+  interventions: number | null;
+  /** announced, on a kilometre; null: no distance */
+  alarms: number | null;
+}
+
+/** One of the list of people. */
+export interface PersonRow {
+  id: string;
+  name: string;
+  /** of the last time */
+  role: "operator" | "safety_driver" | "supervisor" | "test_engineer";
+  /** when they signed on last; null: never */
+  last_ms: number | null;
+  /** null: not on duty */
+  duty: DutyState | null;
 }
 
 /** The phone that is compared with the car. */
@@ -758,6 +1494,19 @@ export interface PhoneListed {
 
 export type Place = "dialog" | "snackbar" | "list";
 
+/** Marks a moment. The same `mark` again changes what is given; without any change nothing happens. */
+export interface PlaceMarkCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "mark";
+  /** its id, made up by who marks; the same again changes it */
+  mark: string;
+  at_ms?: number | null;
+  category?: string | null;
+  words?: string | null;
+}
+
 /** Goes on; from the beginning where it stands at the end. */
 export interface PlayReplay {
   kind: "replay";
@@ -802,6 +1551,8 @@ export interface PresentWordCommand {
   charging?: boolean | null;
   /** age of its newest state */
   lag_s?: number;
+  /** id of the key by which the page signs its orders */
+  key?: string | null;
   /** it is closed, or another page takes its place */
   leaves?: boolean;
   /** the other cars whose next alarm would be heard from it */
@@ -855,6 +1606,18 @@ export interface ReachState {
   left_out: number;
 }
 
+/** Confirms one line of what stands; only by who takes over. */
+export interface ReadBackCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "read_back";
+  /** its key, as the state names it */
+  line: string;
+  /** false: taken back */
+  is_read?: boolean;
+}
+
 /** Begins or ends a recording by hand; refused with the reason, the disk's too. */
 export interface RecordCommand {
   id?: string | null;
@@ -886,6 +1649,8 @@ export interface RecordedState {
   recording: RecordingState;
   /** the slow-down */
   decelerate: SlowDownState;
+  /** who drives */
+  mode: ModeState;
   control: ControlState;
   /** whom an alarm would reach; null: of a recording */
   reach: ReachState | null;
@@ -893,6 +1658,8 @@ export interface RecordedState {
   phone: PhoneCompared | null;
   /** all that share a position, at most 12, the one compared first */
   phones: Array<PhoneListed>;
+  /** how many marks this drive has, or a recording up to the moment shown */
+  marks: number;
 }
 
 /** A row of `GET /api/recordings`. */
@@ -913,7 +1680,15 @@ export interface Recording {
   alarms: Record<string, number> | null;
   title: string;
   note: string;
+  /** for the report of the drive; "": nobody said */
+  weather: string;
   tags: Array<string>;
+  /** how many; their words are found by a search */
+  marks: number;
+  /** another value: other marks or descriptions came after it was complete; left out: none did */
+  late?: string;
+  /** of one recording: those that came after it was complete, at most 200 */
+  late_marks?: Array<DriveMark>;
   /** waiting: listed by its name, and read soon */
   state: "waiting" | "read" | "unreadable";
   /** why it cannot be read, as a sentence */
@@ -938,10 +1713,16 @@ export interface Recording {
   /** mcap · bag · db3 */
   format: string;
   sha256: string | null;
+  /** SHA-256 of the last record of its hash chain [hex], not verified; null: none */
+  head: string | null;
+  /** null: this file was not verified since the server started */
+  verified: VerificationAnswer | null;
   thumbnail: string;
   /** null: no position */
   sketch: SketchAnswer | null;
   trashed_ms: number | null;
+  /** where the server has a store */
+  stored?: StoredCopy;
   /** of a recording that is asked for alone; at most 200 */
   raised?: Array<RaisedAlarm>;
   /** of a recording that is asked for alone: the highest speed of at most 361 equal parts; empty: none */
@@ -962,6 +1743,8 @@ export interface RecordingList {
   /** files that are yet to be read */
   waiting: number;
   formats: Array<ExportFormat>;
+  /** where the server has one */
+  store?: StoreFacts;
 }
 
 /** The recording; a replay's has `state` and `for_s` only. */
@@ -996,6 +1779,17 @@ export interface RecordingState {
   reason?: string | null;
 }
 
+/** An item that has an interval, as a check was signed. */
+export interface RecurringItem {
+  item: string;
+  title: string;
+  /** due again after so long; null: no matter how long */
+  every_days: number | null;
+  /** due again after so far; null: no matter how far */
+  every_km: number | null;
+  is_done: boolean;
+}
+
 export interface RefusedAddress {
   code: string;
   /** one sentence */
@@ -1018,11 +1812,47 @@ export interface ReleaseCommand {
   number: number;
 }
 
+/** Gives the car's item back to the queue; only by who has it. */
+export interface ReleaseItemCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "release_item";
+}
+
+/** Takes a mark back. */
+export interface RemoveMarkCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "remove_mark";
+  /** the id of the mark */
+  mark: string;
+}
+
+/** Takes the signature back; the results stay. */
+export interface ReopenDepartureCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "reopen_departure";
+}
+
 /** The page's replay is over, or could not begin; what follows is live. */
 export interface ReplayEnded {
   kind: "replay";
   /** one sentence */
   ended: string;
+}
+
+/** An intervention in a recording. */
+export interface ReplayIntervention {
+  at_s: number;
+  /** as of the event; of another version it may be another word */
+  kind_of: string;
+  category: string | null;
+  /** its description, also one that came later; "" and no category: nobody described it */
+  what: string;
 }
 
 export interface ReplayState {
@@ -1063,6 +1893,12 @@ export interface ReplayState {
 /** The answer to one command. */
 export interface Reply {
   ok: boolean;
+  /** of one that is not ok: refused where left out; not_delivered: it never will be; unknown: it may be */
+  outcome?: "refused" | "not_delivered" | "unknown";
+  /** where it was lost, where known */
+  cut?: "server-broker" | "broker-agent" | "agent-car" | null;
+  /** of `outcome`; never: nor will it be */
+  became?: "done" | "refused" | "never" | "under_way" | "not_known";
   /** one sentence */
   reason?: string;
   /** of an address that cannot be dialled */
@@ -1075,6 +1911,10 @@ export interface Reply {
   version?: number;
   /** number of the lease that the page has */
   fence?: number;
+  /** what stands now, where a read-back was refused */
+  handover?: HandoverState | null;
+  /** not sent to pages */
+  handed_over?: HandedOver;
   /** who is in control instead */
   held_by?: string | null;
   kind: "reply";
@@ -1100,6 +1940,11 @@ export interface RideCommand {
   kind: "ride";
   /** null: none is chosen, one is found */
   phone: string | null;
+}
+
+export interface RoleRow {
+  role: "operator" | "safety_driver" | "supervisor" | "test_engineer";
+  title: string;
 }
 
 export interface SavedFile {
@@ -1146,6 +1991,8 @@ export interface ServerState {
   /** replaced by newer ones before a page took them */
   frames_skipped: number;
   loop_lag_ms?: number;
+  /** of an agent: what a device signs with its next order */
+  challenge?: string;
 }
 
 export interface SessionState {
@@ -1186,6 +2033,29 @@ export interface SetCommand {
   profile?: string | null;
   /** refused where the settings are no longer at this version */
   version?: number | null;
+}
+
+/** A person's word on one item; refused where it turns by itself, or the check is signed. */
+export interface SetDepartureItemCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "set_departure_item";
+  item: string;
+  /** open: taken back */
+  result: "open" | "done" | "failed" | "not_applicable";
+  /** why; required of failed and not_applicable */
+  note?: string;
+}
+
+/** Replaces the list of the car; an item that asks the same as before keeps its result. */
+export interface SetDepartureListCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "set_departure_list";
+  /** as in the file; null: the list of the vehicle profile again */
+  items: Array<Record<string, any>> | null;
 }
 
 /** The pace: 0.25, 0.5, 1, 2, 4, 8 or 16. */
@@ -1234,6 +2104,16 @@ export interface ShelveCommand {
   alarm: string;
   occurrence: number;
   minutes?: number;
+}
+
+/** Signs the check; refused while an item is failed or open, or where it is another check by now. */
+export interface SignDepartureCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "sign_departure";
+  /** its id, as the page shows it */
+  check: string;
 }
 
 export type SignalFreshness = "fresh" | "ageing" | "stale" | "never" | "not_published";
@@ -1288,6 +2168,7 @@ export interface Signals {
   diagnostics: SignalState<DiagnosticsValue>;
   command: SignalState<CommandValue>;
   fuel: SignalState<FuelValue>;
+  mode: SignalState<ModeValue>;
 }
 
 /** `GET /api/signals`. */
@@ -1428,6 +2309,8 @@ export interface State {
   recording: RecordingState;
   /** the slow-down */
   decelerate: SlowDownState;
+  /** who drives */
+  mode: ModeState;
   control: ControlState;
   /** whom an alarm would reach; null: of a recording */
   reach: ReachState | null;
@@ -1435,7 +2318,11 @@ export interface State {
   phone: PhoneCompared | null;
   /** all that share a position, at most 12, the one compared first */
   phones: Array<PhoneListed>;
+  /** how many marks this drive has, or a recording up to the moment shown */
+  marks: number;
   server: ServerState;
+  /** the departure check; left out of a recording's state */
+  departure?: DepartureState;
   /** of a recording only */
   replay?: ReplayState;
   /** of a recording only: what is live meanwhile */
@@ -1450,6 +2337,69 @@ export interface SteeringValue {
 }
 
 export type Step = number | "none" | null;
+
+/** The store of a server. */
+export interface StoreFacts {
+  address: string;
+  /** why nothing is uploaded now, as a sentence */
+  problem: string | null;
+}
+
+export interface StoredClip {
+  name: string;
+  /** the alarm it is about */
+  at_ms: number;
+  size_bytes: number;
+}
+
+/** The copy of a recording in the store. */
+export interface StoredCopy {
+  /** of the whole file */
+  state: "none" | "waiting" | "uploading" | "stored" | "failed";
+  /** of the whole file that is in the store, 0 to 1; null: none is being uploaded */
+  share: number | null;
+  /** when the copy was read back and was the same */
+  checked_ms: number | null;
+  /** why it is not there, or why it failed; empty: nothing to say */
+  sentence: string;
+  /** clips around alarms that are in the store */
+  clips: number;
+  /** a person's request stands, which can be taken back */
+  is_asked: boolean;
+  /** it is deleted here once the copy was read back, by request or setting */
+  is_deletion_asked: boolean;
+}
+
+/** `GET /api/stored`. */
+export interface StoredList {
+  store: string;
+  recordings: Array<StoredRecording>;
+  /** the `cursor` of the page after this one */
+  next: string | null;
+  count: number;
+}
+
+/** A row of `GET /api/stored`, as the agent wrote it into the store. */
+export interface StoredRecording {
+  id: string;
+  vehicle: string;
+  /** of the vehicle, in addresses */
+  folder: string;
+  title: string;
+  started_ms: number;
+  length_s: number | null;
+  distance_m: number | null;
+  top_speed_mps: number | null;
+  alarms: Record<string, number> | null;
+  sketch: SketchAnswer | null;
+  /** its name, if the whole file is stored and was verified */
+  file: string | null;
+  /** of the whole file in the store */
+  size_bytes: number | null;
+  sha256: string | null;
+  checked_ms: number | null;
+  clips: Array<StoredClip>;
+}
 
 /** Not announced, because others explain it. */
 export interface SuppressedAlarm {
@@ -1474,6 +2424,16 @@ export interface TakeControlCommand {
   do: "take" | "take_over" | "release" | "request" | "withdraw" | "hand_over" | "keep";
   /** of hand_over: the page that gets it; of keep: whose request is refused */
   to?: string | null;
+}
+
+/** Assigns the car's item to who sends it; refused where it is assigned to another, or the car needs nobody. */
+export interface TakeItemCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "take_item";
+  /** true: also from another */
+  over?: boolean;
 }
 
 /** One tile of Home: a check, or several of one thing. */
@@ -1511,6 +2471,12 @@ export interface Timeline {
   marks: Array<Mark>;
   marks_left_out: number;
   kind: "timeline";
+  /** moments that somebody marked, oldest first; at most 400, words shortened */
+  flags: Array<DriveMark>;
+  /** oldest first, at most 400 */
+  interventions: Array<ReplayIntervention>;
+  /** who drove when, without a gap, at most 400; empty: not recorded */
+  modes: Array<DrivenSpan>;
   /** what is to be said of the file */
   notes: Array<string>;
 }
@@ -1574,6 +2540,13 @@ export interface Trends {
   highest: Record<string, Array<Step>>;
 }
 
+/** Of web nodes, twice a second while nothing comes from the vehicle's session; over with the next state. */
+export interface Unserved {
+  kind: "unserved";
+  /** one sentence */
+  why: string;
+}
+
 /** Ends the shelving of an alarm. */
 export interface UnshelveCommand {
   id?: string | null;
@@ -1582,6 +2555,40 @@ export interface UnshelveCommand {
 }
 
 export type Verdict = "ok" | "fault" | "unknown";
+
+/** Whether a recording is as it was recorded. */
+export interface VerificationAnswer {
+  /** unfinished: it ends before its seal; no chain: recorded by an older version */
+  state: "intact" | "broken" | "unfinished" | "no chain" | "unreadable";
+  /** broken or unfinished, or a recording beside it names another hash */
+  is_broken: boolean;
+  /** a few words, as *Intact · 3f9a12bc* or *Broken at record 57* */
+  short: string;
+  sentence: string;
+  records: number;
+  /** SHA-256 of the last record [hex]; null: there is none, or it is broken */
+  head: string | null;
+  broken: VerificationBreak | null;
+  /** the recorder was interrupted, and the file completed later */
+  is_recovered: boolean;
+  /** the recording that it names as the one before it */
+  previous: string | null;
+  previous_missing: boolean;
+  /** what recordings beside it object, a sentence each */
+  problems: Array<string>;
+  /** when it was verified */
+  at_ms: number;
+}
+
+/** Where a hash chain breaks: the record whose hash does not hold, and what it covers. */
+export interface VerificationBreak {
+  record: number;
+  from_byte: number;
+  to_byte: number;
+  /** ns since 1970; 0: not known */
+  from_ns: number;
+  to_ns: number;
+}
 
 /** Stops a count-down: the car is not slowed by itself this time. */
 export interface VetoCommand {
@@ -1597,6 +2604,14 @@ export interface VetoCommand {
 export interface Watch {
   kind: "watch";
   scan: boolean;
+}
+
+/** Takes an offer back; only by who made it. */
+export interface WithdrawItemCommand {
+  id?: string | null;
+  /** the car that the page named to its operator; refused by any other */
+  vehicle?: string | null;
+  kind: "withdraw_item";
 }
 
 export interface Worst {

@@ -1,7 +1,14 @@
-// What the page asked the server for, until it is answered.
+// What the page asked the server for, until it is answered; and of what was not answered, what became of it.
 
-/** A command is for now: without an answer by then it counts as refused [ms]. */
+import { maybe } from './outcome.js';
+
+/** A command is for now: without an answer by then it is not known what became of it [ms]. */
 const REPLY_MS = 4000;
+/** What became of a command that was not answered is asked so often [ms], and for so long. */
+const LOOKS_EVERY_MS = 1500;
+const LOOKS_FOR_MS = 60_000;
+/** So many of them at most; the oldest is given up. */
+const MOST_LOST = 20;
 
 /**
  * @template {string} Kind
@@ -10,24 +17,46 @@ const REPLY_MS = 4000;
  */
 
 /**
- * @typedef {{ok: boolean, reason?: string, suggestion?: string, version?: number, isConflict?: boolean, heldBy?: string}} Answer suggestion: an address
- *   that would do; version: of the settings, once changed; isConflict: somebody else changed them in between; heldBy: who is in control instead
+ * @typedef {import('./outcome.js').Outcome} Outcome
+ * @typedef {import('./outcome.js').Became} Became
+ * @typedef {{ok: boolean, reason?: string, outcome?: Outcome, suggestion?: string, version?: number, isConflict?: boolean, heldBy?: string}} Answer
+ *   outcome: of one that is not ok; where it is left out, it was refused. suggestion: an address that would do; version: of the settings, once changed;
+ *   isConflict: somebody else changed them in between; heldBy: who is in control instead
+ * @typedef {{kind: string, became: Became, reason: string}} Found what became of a command that was not answered
+ * @typedef {{kind: string, vehicle: unknown, at_ms: number}} Lost
+ * @typedef {{kind: string, vehicle: unknown, at_ms: number, isSent: boolean, resolve: (answer: Answer) => void}} Waiting at_ms: when it was asked for
  */
+
+const NOT_SENT = { ok: false, outcome: /** @type {const} */ ('not_delivered'), reason: 'Not sent: the server does not answer.' };
+const NOT_SIGNED = { ...NOT_SENT, reason: 'Not sent: this device could not sign it.' };
+/** Kinds whose loss changes nothing, or that are sent again until they are answered. */
+const ONLY_OF_PAGE = new Set(['replay', 'outcome', 'mark', 'remove_mark']);
 
 export class Requests {
   #asked = 0;
-  /** @type {Map<string, (answer: Answer) => void>} */
+  /** Begins each id: those of another visit of this page are others. */
+  #visit = [...crypto.getRandomValues(new Uint8Array(4))].map((byte) => byte.toString(16).padStart(2, '0')).join('');
+  /** @type {Map<string, Waiting>} */
   #waiting = new Map();
+  /** By id. @type {Map<string, Lost>} */
+  #lost = new Map();
+  #looked_ms = -Infinity;
   #send;
   #refused;
+  #seal;
+  #found;
 
   /**
    * @param {(message: object) => boolean} send false: it could not be sent
    * @param {(answer: Answer) => void} refused called for each that was sent and refused
+   * @param {(message: {kind: string, id: string}) => Promise<object> | null} [seal] the message as it is sent, where it must be signed first
+   * @param {(found: Found) => void} [found] called with what became of one that was not answered
    */
-  constructor(send, refused) {
+  constructor(send, refused, seal = () => null, found = () => {}) {
     this.#send = send;
     this.#refused = refused;
+    this.#seal = seal;
+    this.#found = found;
   }
 
   /**
@@ -40,22 +69,82 @@ export class Requests {
    */
   ask(kind, fields, within_ms = REPLY_MS) {
     this.#asked += 1;
-    const id = `p${this.#asked}`;
-    if (!this.#send({ kind, id, ...fields })) return Promise.resolve({ ok: false, reason: 'Not sent: the server does not answer.' });
-    return new Promise((resolve) => {
-      this.#waiting.set(id, resolve);
-      setTimeout(() => this.#settle(id, { ok: false, reason: 'The server did not answer in time.' }), within_ms);
+    const id = `${this.#visit}-${this.#asked}`;
+    const message = { kind, id, ...fields };
+    const asked_ms = performance.now();
+    const sealed = this.#seal(message);
+    if (sealed === null && !this.#send(message)) return Promise.resolve(NOT_SENT);
+    const answer = new Promise((/** @type {(answer: Answer) => void} */ resolve) => {
+      const { vehicle = null } = /** @type {{vehicle?: unknown}} */ (fields);
+      this.#waiting.set(id, { kind, vehicle, at_ms: asked_ms, isSent: sealed === null, resolve });
+      setTimeout(() => this.#lose(id, 'The server did not answer in time.', NOT_SIGNED), within_ms);
     });
+    sealed?.then((whole) => this.#sendSealed(id, whole), () => this.#settle(id, NOT_SIGNED));
+    return answer;
+  }
+
+  /** @param {string} id @param {object} message */
+  #sendSealed(id, message) {
+    const waiting = this.#waiting.get(id);
+    if (!waiting) return; // given up meanwhile
+    waiting.isSent = this.#send(message);
+    if (!waiting.isSent) this.#settle(id, NOT_SENT);
   }
 
   /** The server answered one of them. @param {import('./protocol-types.js').Reply} reply */
   answered(reply) {
-    this.#settle(reply.id, answerOf(reply));
+    if (reply.id.endsWith('?')) {
+      if (reply.ok && reply.became && reply.became !== 'under_way') this.#tell(reply.id.slice(0, -1), reply.became, reply.reason);
+      return;
+    }
+    const answer = answerOf(reply);
+    const waiting = this.#waiting.get(reply.id);
+    if (answer.outcome === 'unknown' && waiting) this.#keep(reply.id, waiting);
+    if (waiting) this.#settle(reply.id, answer);
+    else if (answer.outcome !== 'unknown') this.#tell(reply.id, answer.ok ? 'done' : answer.outcome === 'not_delivered' ? 'never' : 'refused', reply.reason);
   }
 
   /** The connection broke: none of them is answered any more. */
   broke() {
-    for (const id of [...this.#waiting.keys()]) this.#settle(id, { ok: false, reason: 'The connection to the server broke.' });
+    for (const id of [...this.#waiting.keys()]) this.#lose(id, 'The connection to the server broke.');
+  }
+
+  /** Another car is shown: what became of commands to the one before is not asked here. */
+  forget() {
+    this.#lost.clear();
+  }
+
+  /** Time passes: ask what became of those that were not answered. @param {number} now_ms */
+  look(now_ms) {
+    if (this.#lost.size === 0 || now_ms - this.#looked_ms < LOOKS_EVERY_MS) return;
+    this.#looked_ms = now_ms;
+    for (const [id, { at_ms, vehicle }] of this.#lost) {
+      if (now_ms - at_ms > LOOKS_FOR_MS) this.#tell(id, 'not_known');
+      else this.#send({ kind: 'outcome', id: `${id}?`, of: id, ago_s: (now_ms - at_ms) / 1000, ...(vehicle === null ? {} : { vehicle }) });
+    }
+  }
+
+  /** Nothing came. @param {string} id @param {string} why @param {Answer} [unsent] of one that was not signed yet */
+  #lose(id, why, unsent = NOT_SENT) {
+    const waiting = this.#waiting.get(id);
+    if (!waiting) return;
+    if (!waiting.isSent) return this.#settle(id, unsent);
+    this.#keep(id, waiting);
+    this.#settle(id, { ok: false, outcome: 'unknown', reason: maybe(why) });
+  }
+
+  /** @param {string} id @param {Waiting} waiting */
+  #keep(id, { kind, vehicle, at_ms }) {
+    if (ONLY_OF_PAGE.has(kind)) return;
+    this.#lost.set(id, { kind, vehicle, at_ms });
+    if (this.#lost.size > MOST_LOST) this.#lost.delete([...this.#lost.keys()][0] ?? '');
+  }
+
+  /** @param {string} id @param {Became} became @param {string} [reason] */
+  #tell(id, became, reason = '') {
+    const lost = this.#lost.get(id);
+    this.#lost.delete(id);
+    if (lost) this.#found({ kind: lost.kind, became, reason });
   }
 
   /**
@@ -63,9 +152,10 @@ export class Requests {
    * @param {Answer} answer
    */
   #settle(id, answer) {
-    if (!answer.ok && this.#waiting.has(id)) this.#refused(answer);
-    this.#waiting.get(id)?.(answer);
+    const waiting = this.#waiting.get(id);
     this.#waiting.delete(id);
+    if (!answer.ok && waiting) this.#refused(answer);
+    waiting?.resolve(answer);
   }
 }
 
@@ -73,9 +163,9 @@ export class Requests {
  * @param {import('./protocol-types.js').Reply} reply
  * @returns {Answer}
  */
-function answerOf({ ok, reason, problem, version, conflict, held_by }) {
+function answerOf({ ok, reason, outcome, problem, version, conflict, held_by }) {
   return {
-    ok, ...(reason ? { reason } : {}), ...(problem?.suggestion ? { suggestion: problem.suggestion } : {}),
+    ok, ...(reason ? { reason } : {}), ...(outcome ? { outcome } : {}), ...(problem?.suggestion ? { suggestion: problem.suggestion } : {}),
     ...(version === undefined ? {} : { version }), ...(conflict ? { isConflict: true } : {}), ...(held_by ? { heldBy: held_by } : {}),
   };
 }

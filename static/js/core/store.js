@@ -7,13 +7,14 @@ import { EventLog } from './event-log.js';
 import { freshnessStyle } from './freshness.js';
 import { chainOf } from './link.js';
 import { Known } from './known.js';
-import { fenceOf } from './live-car.js';
+import { challengeOf, fenceOf } from './live-car.js';
 import { LogSync } from './log-sync.js';
 import { PageWatch } from './page-watch.js';
 import { DRAW_EVERY_MS, Painter } from './painter.js';
 import { readMessage } from './protocol.js';
 import { Requests } from './requests.js';
 import { ScanFeed } from './scan-feed.js';
+import { Seal } from './signer.js';
 import { PageSocket } from './socket.js';
 
 /**
@@ -21,24 +22,20 @@ import { PageSocket } from './socket.js';
  * @typedef {import('./protocol-types.js').Signals} Signals
  * @typedef {import('./protocol-types.js').LogEvent} AlarmEvent
  * @typedef {import('./event-log.js').Gap} Gap
- * @typedef {'move' | 'draw' | 'drawn' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open' | 'replay' | 'refused' | 'switch' | 'leave' | 'cars'} Topic
- *   switch: another car is shown from now on, and nothing is known of it yet · leave: the socket to the car before is about to be closed · cars: the list of cars came ·
- *   move: a fresh frame is to be drawn · draw: five times a second, seen or not by a frame · drawn: all of it was, and nothing failed · scan: a new scan ·
+ * @typedef {'move' | 'draw' | 'drawn' | 'scan' | 'beat' | 'tick' | 'log' | 'gap' | 'open' | 'replay' | 'refused' | 'switch' | 'leave' | 'cars' | 'became' | 'duty'} Topic
+ *   switch: another car is shown from now on, and nothing is known of it yet · leave: the socket to the car before is about to be closed · cars: the list of cars came · duty: who is on duty changed ·
+ *   became: what became of an order that was not answered · move: a fresh frame is to be drawn · draw: five times a second, seen or not by a frame · drawn: all of it was, and nothing failed · scan: a new scan ·
  *   beat: a fresh frame came (also while the page is hidden) · tick: time passed (seldom while it is hidden) · log: new events · gap: a blind time is over · open: connected · refused: an order was, with its answer · replay: its time line, the recording beside it, or an end
  * @typedef {import('./requests.js').Answer} Answer
  */
 
 export class Store extends Known {
-  /** Frames and scans that could not be read. */
-  unreadable = 0;
+  unreadable = 0; // frames and scans that could not be read
   log = new EventLog();
   #cars_ms = -Infinity;
-  /** The build of the page that the server has now; '' where it cannot say. */
-  build = '';
   deadMan = new DeadMan();
   #clock = new ServerClock();
-  /** How long the newest frame was under way [ms]. */
-  #delay_ms = 0;
+  #delay_ms = 0; // how long the newest frame was under way
   #started_ms = 0;
   /** What an answer said of this page's lease, until the frames have it. @type {number | null} */
   #granted = null;
@@ -46,7 +43,8 @@ export class Store extends Known {
   #emitter = new Emitter((error) => this.painter.failed(error));
   painter = new Painter(this.#emitter);
   #send = (/** @type {object} */ message) => this.socket.send(message);
-  #requests = new Requests(this.#send, (answer) => this.#emitter.emit('refused', answer));
+  seal = new Seal(() => this);
+  #requests = new Requests(this.#send, (answer) => this.#emitter.emit('refused', answer), (message) => this.seal.sealed(message, this.vehicle, challengeOf(this.frame)), (found) => this.#emitter.emit('became', found));
   scans = new ScanFeed(this.#send);
   sync = new LogSync(this.log, this.#send, this.#emitter);
   #watch = new PageWatch({
@@ -55,8 +53,7 @@ export class Store extends Known {
     online: () => this.socket.hurry(),
   });
 
-  #nameOf;
-  #pageOf;
+  #self;
 
   /**
    * @param {() => import('./socket.js').Socket} dial
@@ -65,21 +62,18 @@ export class Store extends Known {
    */
   constructor(dial, name = () => '', page = () => '') {
     super();
-    this.#nameOf = name;
-    this.#pageOf = page;
+    this.#self = { name, page };
     this.socket = new PageSocket(
       {
         opened: () => this.#emitter.guard(() => {
           this.#granted = null;
+          this.unserved = '';
           this.#clock.reset();
           this.scans.opened();
         }),
         text: (text, at_ms) => this.#emitter.guard(() => this.#heard(text, at_ms)),
         bytes: (bytes) => this.#emitter.guard(() => this.#heardScan(bytes)),
-        closed: () => this.#emitter.guard(() => {
-          this.sync.closed();
-          this.#requests.broke();
-        }),
+        closed: () => this.#emitter.guard(() => this.#broke()),
       },
       dial,
     );
@@ -87,12 +81,12 @@ export class Store extends Known {
 
   /** What this phone is called in the log. */
   get name() {
-    return this.#nameOf();
+    return this.#self.name();
   }
 
   /** By which the server knows this page; '' where it does not. */
   get page() {
-    return this.#pageOf();
+    return this.#self.page();
   }
 
   /** Begin to dial and to draw. */
@@ -116,13 +110,18 @@ export class Store extends Known {
     if (vehicle === this.vehicle) return;
     this.#emitter.emit('leave');
     this.socket.hangUp();
-    this.sync.closed();
-    this.#requests.broke();
+    this.#broke();
+    this.#requests.forget();
     this.turnTo(vehicle);
     this.#forget();
     this.#emitter.emit('switch');
     this.painter.draw();
     this.socket.look(this.now());
+  }
+
+  #broke() {
+    this.sync.closed();
+    this.#requests.broke();
   }
 
   #forget() {
@@ -166,7 +165,7 @@ export class Store extends Known {
 
   /** The chain as it stands now. */
   get chain() {
-    return chainOf({ frame: this.frame, isSilent: this.isSilent, silence_s: this.silence_s, lag_s: this.lag_s, heard_ms: this.heard_ms });
+    return chainOf({ frame: this.frame, isSilent: this.isSilent, silence_s: this.silence_s, lag_s: this.lag_s, heard_ms: this.heard_ms, unserved: this.socket.isOpen ? this.unserved : '' });
   }
 
   /** Age of the list of cars at the glass [s]. */
@@ -199,10 +198,7 @@ export class Store extends Known {
   /** @param {string} text @param {number} [at_ms] when it came */
   #heard(text, at_ms = this.now()) {
     const message = readMessage(text);
-    if (!message) {
-      this.unreadable += 1;
-      return;
-    }
+    if (!message) return void (this.unreadable += 1);
     switch (message.kind) {
       case 'hello':
         return this.#greeted(message, at_ms);
@@ -211,19 +207,23 @@ export class Store extends Known {
       case 'state':
         return this.#state(message, at_ms);
       case 'cars':
-        this.cars = message;
+        this.list(message);
         this.#cars_ms = at_ms - this.#clock.note(message.time_ms, at_ms);
         return this.#emitter.emit('cars');
+      case 'duty':
+        this.duty = message;
+        return this.#emitter.emit('duty');
       case 'events':
         return this.sync.take(message.events);
-      case 'replay':
-        this.replaying = false; // it ended: what comes now is live
-        return this.#emitter.emit('replay', message);
-      case 'timeline': case 'beside': case 'beside_ended':
+      case 'timeline': case 'beside': case 'beside_ended': case 'replay':
+        if (message.kind === 'replay') this.replaying = false; // it ended: what comes now is live
         return this.#emitter.emit('replay', message);
       case 'reply':
         this.#granted = message.fence ?? null;
         return this.#requests.answered(message);
+      case 'unserved':
+        this.unserved = message.why;
+        return this.socket.proof(at_ms);
       case 'problem':
         return console.warn('The server did not understand:', message.reason);
     }
@@ -232,8 +232,8 @@ export class Store extends Known {
   /** @param {import('./protocol-types.js').Hello} hello @param {number} at_ms when it came */
   #greeted(hello, at_ms) {
     if (!this.greet(hello)) return;
+    this.seal.greeted(hello);
     this.#clock.note(hello.time_ms, at_ms);
-    this.build = hello.build ?? '';
     this.sync.greeted(hello, { name: this.name, ...(this.page ? { page: this.page } : {}) }, this.heard_ms === null ? 0 : this.silence_s);
   }
 
@@ -267,6 +267,7 @@ export class Store extends Known {
     if (this.#watch.slept_ms(now_ms) > 2000 && this.frame) this.deadMan.cover();
     this.deadMan.look(now_ms);
     this.socket.look(now_ms);
+    if (this.socket.isOpen) this.#requests.look(now_ms);
     if (!document.hidden) this.painter.keepUp(now_ms, this.deadMan.heard_ms);
     this.#emitter.emit('tick');
   }

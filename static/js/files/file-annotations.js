@@ -1,7 +1,7 @@
-// What people say of a recording: its name, a note, tags.
+// What people say of a recording: its name, the weather, a note, tags.
 
 import { nameOf, tagsOf } from './files-layout.js';
-import { sentenceOf } from './files-model.js';
+import { sentenceOf } from '../control/request.js';
 import { html, listen, setWords } from '../core/dom.js';
 
 /**
@@ -28,10 +28,11 @@ export function rename(dialog, model, row) {
 export function annotate(dialog, model, row) {
   const note = /** @type {HTMLTextAreaElement} */ (html('textarea', { id: 'file-note', maxlength: 4000, rows: 4, dir: 'auto' }));
   note.value = row.note;
+  const weather = /** @type {HTMLInputElement} */ (html('input', { type: 'text', id: 'file-weather', value: row.weather ?? '', maxlength: 120, autocomplete: 'off', dir: 'auto' }));
   const tags = /** @type {HTMLInputElement} */ (html('input', { type: 'text', id: 'file-tags', value: row.tags.join(', '), autocomplete: 'off', dir: 'auto' }));
   const refused = html('p', { class: 'bad', role: 'alert' });
-  dialog.show(`Note and tags of ${nameOf(row, Date.now())}`, [refused], [html('div', { class: 'form-lines' }, html('label', { for: 'file-note' }, 'Note'), note, html('label', { for: 'file-tags' }, 'Tags, separated by commas'), tags)],
-    [dialog.key('Save', () => keep(dialog, model, row, { note: note.value, tags: tagsOf(tags.value) }, refused), 'main')], 'Cancel');
+  dialog.show(`Note and tags of ${nameOf(row, Date.now())}`, [refused], [html('div', { class: 'form-lines' }, html('label', { for: 'file-note' }, 'Note'), note, html('label', { for: 'file-weather' }, 'Weather, for the report'), weather, html('label', { for: 'file-tags' }, 'Tags, separated by commas'), tags)],
+    [dialog.key('Save', () => keep(dialog, model, row, { note: note.value, weather: weather.value, tags: tagsOf(tags.value) }, refused), 'main')], 'Cancel');
   note.focus();
 }
 
@@ -39,7 +40,7 @@ export function annotate(dialog, model, row) {
  * @param {FileDialog} dialog
  * @param {FilesModel} model
  * @param {Recording} row
- * @param {{title?: string, note?: string, tags?: string[]}} annotations
+ * @param {{title?: string, note?: string, weather?: string, tags?: string[]}} annotations
  * @param {HTMLElement} refused where a refusal is said
  */
 async function keep(dialog, model, row, annotations, refused) {

@@ -4,7 +4,7 @@ import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
 import { html, icon, listen, setAttribute, setText, words } from '../core/dom.js';
 
 /** What only an operator may do with a recording, by its icon. */
-const CHANGES = ['mail', 'crit', 'edit', 'info', 'trash'];
+const CHANGES = ['mail', 'crit', 'edit', 'info', 'trash', 'upload'];
 
 export class FileDialog {
   /** @param {HTMLElement} dock where it stands on a desktop, beside the list; elsewhere that is not shown */

@@ -2,7 +2,9 @@
 
 import { FileJob, save } from './files-job.js';
 import { nameOf, sizeWords } from './files-layout.js';
-import { addressOf, request, sentenceOf } from './files-model.js';
+import { keptAt } from '../core/kept-at.js';
+import { request, sentenceOf } from '../control/request.js';
+import { addressOf } from './files-model.js';
 import { html, icon, listen, setWords, words } from '../core/dom.js';
 import { timeOfDay } from '../core/format.js';
 
@@ -42,7 +44,7 @@ export class FileMaker {
   download(row, back) {
     const name = nameOf(row, Date.now());
     const kind = KINDS[row.format] ?? ['File', 'as it is'];
-    const asItIs = html('a', { href: addressOf(row.id, '/file.mcap'), download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, kind[0]), html('small', {}, kind[1])), html('span', { class: 'end' }, ...words(sizeWords(row.size_bytes))));
+    const asItIs = html('a', { href: keptAt(addressOf(row.id, '/file.mcap')), download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, kind[0]), html('small', {}, kind[1])), html('span', { class: 'end' }, ...words(sizeWords(row.size_bytes))));
     listen(asItIs, 'click', () => setTimeout(() => this.#dialog.close()));
     const made = row.state === 'read' ? (this.#model.listing.formats ?? []).filter(({ name, ros_version }) => name !== row.format && (ros_version === null || ros_version === row.ros_version)) : [];
     this.#dialog.show(`Download ${name}`, [html('p', { class: 'sub' }, 'Other formats are made on request.')], [html('ul', { class: 'menu-list' }, html('li', {}, asItIs),
@@ -55,7 +57,7 @@ export class FileMaker {
 
   /** @param {Recording} row @param {string} format @param {string} label @param {() => void} back */
   async #make(row, format, label, back) {
-    const job = new FileJob(addressOf(row.id, '/exports'), { format }, (told) => bar.tell(told));
+    const job = new FileJob(addressOf(row.id, '/exports'), { format }, (job) => bar.update(job));
     const bar = this.#progress(`Preparing the ${label}`, job);
     const over = await job.run();
     if (this.#job !== job || !this.#dialog.isOpen) return;
@@ -75,8 +77,8 @@ export class FileMaker {
     setWords(said, 'The server is starting.');
     this.#dialog.show(title, [], [html('div', { class: 'progress' }, bar, said)], [this.#dialog.key('Cancel', () => job.giveUp())]);
     return {
-      /** @param {import('./files-job.js').Job} told */
-      tell: ({ progress, sentence }) => {
+      /** @param {import('./files-job.js').Job} job */
+      update: ({ progress, sentence }) => {
         if (progress !== null) bar.value = progress;
         setWords(said, sentence ?? `${Math.round((progress ?? 0) * 100)} % done.`);
       },
@@ -109,7 +111,7 @@ export class FileMaker {
 
   /** @param {Recording} row @param {number} at_ms @param {() => void} back */
   async #cut(row, at_ms, back) {
-    const job = new FileJob(addressOf(row.id, '/clip'), { at_ms, before_s: CLIP_S, after_s: CLIP_S }, (told) => bar.tell(told));
+    const job = new FileJob(addressOf(row.id, '/clip'), { at_ms, before_s: CLIP_S, after_s: CLIP_S }, (job) => bar.update(job));
     const bar = this.#progress('Cutting out the incident', job);
     const over = await job.run();
     if (this.#job !== job || !this.#dialog.isOpen) return;

@@ -1,7 +1,7 @@
 // Recordings into the trash, back out of it, or gone for good.
 
 import { nameOf, sizeWords } from './files-layout.js';
-import { sentenceOf } from './files-model.js';
+import { sentenceOf } from '../control/request.js';
 import { html, words } from '../core/dom.js';
 
 /** @typedef {import('./files-layout.js').Recording} Recording */

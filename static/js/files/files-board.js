@@ -30,7 +30,7 @@ export function openSaved(store, say, router) {
   }
   const stops = [
     listen(back, 'click', () => history.back()),
-    listen(window, 'popstate', close), // the phone's back key too
+    listen(window, 'popstate', () => board.inert || close()), // the phone's back key too; of what lies over it, that
     store.on('draw', () => {
       if (router.isMonitorShown) close(); // a car is monitored, or a recording is shown
     }),

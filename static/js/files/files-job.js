@@ -1,6 +1,7 @@
 // What the server makes of a recording while the operator waits: asked for, followed, cancelled, and then fetched.
 
-import { request, sentenceOf } from './files-model.js';
+import { keptAt } from '../core/kept-at.js';
+import { request, sentenceOf } from '../control/request.js';
 
 /**
  * @typedef {object} Job as the server tells of it
@@ -26,7 +27,8 @@ export class FileJob {
    * @param {(job: Job) => void} onChange
    */
   constructor(path, body, onChange) {
-    this.path = path;
+    this.path = keptAt(path);
+    this.exports = keptAt('/api/exports');
     this.body = body;
     this.onChange = onChange;
   }
@@ -39,10 +41,10 @@ export class FileJob {
       let misses = 0;
       while (!this.#isGivenUp) {
         try {
-          const told = /** @type {Job} */ (await request(`/api/exports/${encodeURIComponent(this.id)}`));
+          const job = /** @type {Job} */ (await request(`${this.exports}/${encodeURIComponent(this.id)}`));
           misses = 0;
-          this.onChange(told);
-          if (OVER.includes(told.state)) return told;
+          this.onChange(job);
+          if (OVER.includes(job.state)) return job;
         } catch (error) {
           misses += 1; // a radio gap does not end what the server is at
           if (misses > 25) throw error;
@@ -52,7 +54,7 @@ export class FileJob {
     } catch (error) {
       if (!this.#isGivenUp) return { state: 'failed', progress: null, sentence: sentenceOf(error) };
     }
-    if (this.id !== null) await request(`/api/exports/${encodeURIComponent(this.id)}`, { method: 'DELETE' }).catch(() => {});
+    if (this.id !== null) await request(`${this.exports}/${encodeURIComponent(this.id)}`, { method: 'DELETE' }).catch(() => {});
     return { state: 'cancelled', progress: null, sentence: null };
   }
 
@@ -63,7 +65,7 @@ export class FileJob {
 
   /** Where what it made can be fetched. */
   get address() {
-    return `/api/exports/${encodeURIComponent(this.id ?? '')}/file`;
+    return `${this.exports}/${encodeURIComponent(this.id ?? '')}/file`;
   }
 }
 

@@ -104,6 +104,22 @@ export function factWords(row) {
   ].filter(Boolean).join(', ')}.`;
 }
 
+/** Where its copy in the store is; empty where the server has no store. @param {Recording['stored']} stored */
+export function storedWords(stored) {
+  if (!stored) return '';
+  const { state, share, checked_ms, sentence } = stored;
+  if (state === 'uploading') return `uploading ${Math.floor(100 * (share ?? 0))} %`;
+  if (state === 'stored') return `stored (checked ${checked_ms === null ? NOTHING : clockOf(checked_ms)})${sentence ? `. Failed since: ${sentence}` : ''}`;
+  if (state === 'failed') return `not stored, failed: ${sentence}`;
+  return state === 'waiting' ? 'not stored, waits for its upload' : 'not stored';
+}
+
+/** "14:03" by this phone's clock. @param {number} at_ms */
+function clockOf(at_ms) {
+  const at = new Date(at_ms);
+  return `${two(at.getHours())}:${two(at.getMinutes())}`;
+}
+
 /** What else there is to say of it, in sentences. @param {Recording} row */
 export function warningWords(row) {
   const why = row.ended_why ?? 'the server stopped during the recording.';

@@ -1,6 +1,9 @@
 // The recordings as the server lists them: asked for again while they are looked at, a page at a time, by what is wished for.
 
+import { request, sentenceOf } from '../control/request.js';
+import { keptVehicle } from '../core/kept-at.js';
 import { queryOf } from './files-layout.js';
+import { listingOf, storedQueryOf } from './stored-list.js';
 
 /**
  * @typedef {import('./files-layout.js').Recording} Recording
@@ -10,35 +13,14 @@ import { queryOf } from './files-layout.js';
 
 const PAGE = 50; // recordings a request
 const MOST = 200; // as the server has it
-const SILENT = 'The server does not answer.';
-
-/**
- * Asks the server; a refusal is an Error with its sentence.
- * @param {string} path
- * @param {{method?: string, body?: object, signal?: AbortSignal}} [how]
- * @returns {Promise<any>}
- */
-export async function request(path, { method = 'GET', body, signal } = {}) {
-  /** @type {Response} */
-  let answer;
-  try {
-    answer = await fetch(path, {
-      method, cache: 'no-cache', ...(signal ? { signal } : {}), ...(body ? { body: JSON.stringify(body), headers: { 'content-type': 'application/json' } } : {}),
-    });
-  } catch (error) {
-    if (error instanceof DOMException && error.name === 'AbortError') throw error;
-    throw new Error(SILENT);
-  }
-  const told = await answer.json().catch(() => null);
-  if (!answer.ok) throw new Error(typeof told?.detail === 'string' ? told.detail : `The server refused the request (${answer.status}).`);
-  return told;
-}
+const NO_LIST = 404;
+const ELSEWHERE = [NO_LIST, 422, 503]; // no list here, no car named at a node, the car's agent does not answer
 
 /** The address of one recording. @param {string} id @param {string} [rest] */
 export const addressOf = (id, rest = '') => `/api/recordings/${encodeURIComponent(id)}${rest}`;
 
-/** @param {unknown} error */
-export const sentenceOf = (error) => (error instanceof Error ? error.message : SILENT);
+/** Whether this server has a store that it could list. */
+const hasStore = () => globalThis.document?.documentElement.dataset['stored'] !== undefined;
 
 export class FilesModel {
   /** @type {Recording[]} */
@@ -51,6 +33,8 @@ export class FilesModel {
   problem = null;
   /** When the list was last true, by this phone's clock [ms]. @type {number | null} */
   at_ms = null;
+  /** The name of the store, where the list is of what agents stored there and not of recordings that can be reached. @type {string | null} */
+  inStore = null;
   isTrash = false;
   text = '';
   /** @type {Choice} */
@@ -84,6 +68,17 @@ export class FilesModel {
     return this.refresh();
   }
 
+  /** Nothing is known of the recordings, and what is being asked for is none of them. */
+  forget() {
+    this.#turn += 1;
+    this.#isAsking = false;
+    this.rows = [];
+    this.listing = {};
+    this.isTrash = false;
+    this.next = this.at_ms = this.problem = null;
+    this.onChange();
+  }
+
   /** The rows that are shown, as they are now. */
   async refresh() {
     await this.#ask(null, Math.min(MOST, Math.max(PAGE, this.rows.length)), (listing) => {
@@ -115,7 +110,7 @@ export class FilesModel {
     this.#isAsking = true;
     try {
       const query = queryOf({ text: this.isTrash ? '' : this.text, choice: this.isTrash ? { kind: 'all', value: '' } : this.choice, cursor, limit }, Date.now());
-      const listing = await request(`/api/${this.isTrash ? 'trash' : 'recordings'}?${query}`);
+      const listing = await this.#list(query, cursor, limit);
       if (turn !== this.#turn) return;
       take(listing);
       const { recordings: _, ...rest } = listing;
@@ -132,7 +127,31 @@ export class FilesModel {
     }
   }
 
-  /** @param {Recording} row @param {{title?: string, note?: string, tags?: string[]}} remarks @returns {Promise<Recording>} */
+  /**
+   * The list of the server, or of the store where the server has none.
+   * @param {string} query
+   * @param {string | null} cursor
+   * @param {number} limit
+   * @returns {Promise<Listing>}
+   */
+  async #list(query, cursor, limit) {
+    try {
+      const listing = await request(`/api/${this.isTrash ? 'trash' : 'recordings'}?${query}`);
+      this.inStore = null;
+      return listing;
+    } catch (error) {
+      const status = /** @type {{status?: number}} */ (error).status ?? 0;
+      if (this.isTrash || !hasStore() || !ELSEWHERE.includes(status)) throw error;
+      const wanted = storedQueryOf(this.inStore === null ? null : cursor, limit, this.choice, keptVehicle());
+      const stored = await request(`/api/stored?${wanted}`).catch(() => {
+        throw error; // nor does the store answer
+      });
+      this.inStore = stored.store;
+      return listingOf(stored, status === NO_LIST ? null : sentenceOf(error));
+    }
+  }
+
+  /** @param {Recording} row @param {{title?: string, note?: string, weather?: string, tags?: string[]}} remarks @returns {Promise<Recording>} */
   async remark(row, remarks) {
     const said = await request(addressOf(row.id), { method: 'PATCH', body: remarks });
     await this.refresh();

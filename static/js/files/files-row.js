@@ -1,6 +1,6 @@
 // One recording in the list: its track, its name, whose it is, length, size and alarms; pressed anywhere it offers what can be done.
 
-import { alarmWords, countsOf, lengthWords, nameOf, originWords, pointsOf, sizeWords } from './files-layout.js';
+import { alarmWords, countsOf, lengthWords, nameOf, originWords, pointsOf, sizeWords, storedWords } from './files-layout.js';
 import { html, icon, listen, svg, words } from '../core/dom.js';
 
 /** @typedef {import('./files-layout.js').Recording} Recording */
@@ -53,8 +53,9 @@ export function drawRow(row, now_ms, onPress) {
     : row.state === 'waiting' ? [html('span', {}, ...words(sizeWords(row.size_bytes))), html('span', {}, 'being read')]
       : [html('span', {}, ...words(lengthWords(row.length_s))), html('span', {}, ...words(sizeWords(row.size_bytes))), html('span', { class: 'counts' }, ...counts(row))];
   const tags = row.tags.length ? [html('div', { class: 'm tags' }, ...row.tags.map((tag) => html('bdi', { class: 'file-tag' }, tag)))] : [];
+  const stored = row.stored ? [html('div', { class: 'm stored', 'data-state': row.stored.state }, ...words(storedWords(row.stored)))] : [];
   const item = html('li', { class: 'file', 'data-id': row.id, 'data-state': row.state }, thumbnail(row),
-    html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm' }, originWords(row, now_ms)), html('div', { class: 'm facts-line' }, ...third), ...tags),
+    html('div', { class: 'tx' }, html('div', { class: 't', dir: 'auto' }, name), html('div', { class: 'm' }, originWords(row, now_ms)), html('div', { class: 'm facts-line' }, ...third), ...stored, ...tags),
     more);
   pressed(item, () => onPress(row, more));
   return item;

@@ -3,9 +3,12 @@
 import { annotate, rename } from './file-annotations.js';
 import { FileDialog } from './file-dialog.js';
 import { FileMaker, KINDS, PRIORITY_ICONS } from './file-maker.js';
+import { storeActions, storeItem } from './file-store.js';
 import { FileTrash } from './file-trash.js';
+import { chainLines, verify } from './file-verify.js';
 import { factWords, nameOf, warningWords } from './files-layout.js';
 import { addressOf } from './files-model.js';
+import { keptAt } from '../core/kept-at.js';
 import { share } from './files-share.js';
 import { thumbnail } from './files-row.js';
 import { duration } from '../core/format.js';
@@ -61,7 +64,8 @@ export class FileSheet {
   /** @param {Recording} row */
   open(row) {
     this.#row = row;
-    if (row.trashed_ms === null) this.#actions();
+    if (this.model.inStore !== null) storeActions(this.#dialog, /** @type {import('./stored-list.js').StoredRow} */ (row), this.name, this.#about());
+    else if (row.trashed_ms === null) this.#actions();
     else this.#trash.show(row, this.#about());
     this.#dialog.open();
   }
@@ -99,6 +103,7 @@ export class FileSheet {
     const { row } = this;
     return [
       html('p', {}, ...words(factWords(row))),
+      ...chainLines(row),
       ...warningWords(row).map((sentence) => html('p', { class: 'bad' }, ...words(sentence))),
       ...(row.note ? [html('p', { class: 'note-text', dir: 'auto' }, row.note)] : []),
       ...(row.tags.length ? [html('p', {}, ...row.tags.map((tag) => html('bdi', { class: 'file-tag' }, tag)))] : []),
@@ -112,15 +117,23 @@ export class FileSheet {
     const back = () => this.#actions();
     const { isDocked } = this.#dialog;
     const seen = isDocked && isRead ? [html('div', { class: 'file-way' }, thumbnail(row)), this.#raised(row)] : [];
-    this.#dialog.show(this.name, this.#about(), [...seen, html('ul', { class: 'menu-list', 'data-f': 'file-actions' },
+    this.#dialog.show(this.name, this.#about(), [...seen, ...(isRead && row.marks ? [this.#marks(row)] : []), html('ul', { class: 'menu-list', 'data-f': 'file-actions' },
       ...(isRead ? [this.#dialog.item('replay', 'Open replay', () => this.#replay()), ...this.#beside()] : []),
+      ...(isRead ? [this.#report(), this.#dialog.item('fit', 'Compare along the way', () => this.#compare())] : []),
       this.#dialog.item('share', 'Share', () => this.#share()),
       ...(isRead ? [this.#dialog.item('mail', 'E-mail', () => this.#mail())] : []),
       this.#dialog.item('download', 'Download', () => this.#maker.download(row, back), isRead ? `${kind[0]} · bag · CSV …` : kind[0]),
       ...(isRead && row.alarms ? [this.#dialog.item('crit', 'Cut out an incident', () => this.#maker.incidents(row, back))] : []),
+      ...(row.head ? [this.#dialog.item('ok', 'Verify', () => verify(this.#dialog, this.model, row, back))] : []),
+      ...storeItem(this.#dialog, this.model, row, this.name, back),
       this.#dialog.item('edit', 'Rename', () => rename(this.#dialog, this.model, row)),
       this.#dialog.item('info', 'Note and tags', () => annotate(this.#dialog, this.model, row)),
       this.#dialog.item('trash', 'Delete', () => this.#trash.askDelete(row, back), 'asks first'))]);
+  }
+
+  /** The drive's report as a page of its own, which can be printed and saved. */
+  #report() {
+    return html('li', {}, html('a', { href: keptAt(addressOf(this.row.id, '/report')), target: '_blank', rel: 'noopener', 'data-f': 'file-report' }, icon('files'), 'Drive report', html('span', { class: 'end' }, 'A4 · offline')));
   }
 
   get isAtActions() {
@@ -135,11 +148,19 @@ export class FileSheet {
     return list;
   }
 
-  async #replay() {
+  /** What people marked in it, once that is fetched. @param {Recording} row */
+  #marks({ id }) {
+    const place = html('div', { class: 'file-marked' });
+    import('../drive/recorded-marks.js').then(({ listOf }) => listOf(id, this.say, (at_s) => void this.#replay(at_s))).then((list) => list && place.replaceChildren(list), () => {});
+    return place;
+  }
+
+  /** @param {number} [at_s] */
+  async #replay(at_s = 0) {
     const { id } = this.row;
     const { openReplay } = await this.#module(() => import('../replay/replay.js'));
     this.#dialog.close();
-    openReplay(id, this.store, this.say);
+    openReplay(id, this.store, this.say, { at_s });
   }
 
   /** A second recording beside the one that is replayed, or in a line why not. */
@@ -155,9 +176,16 @@ export class FileSheet {
     })];
   }
 
+  async #compare() {
+    const { id, vehicle } = this.row;
+    const { openCompareWay } = await this.#module(() => import('../drive/compare-way.js'));
+    this.#dialog.close();
+    void openCompareWay(vehicle, id, this.store);
+  }
+
   async #mail() {
     const { id } = this.row;
-    const { openMail } = await this.#module(() => import('../mail/mail.js'));
+    const { openMail } = await this.#module(() => import('./mail.js'));
     this.#dialog.close();
     openMail([id], this.store, this.say);
   }
@@ -179,7 +207,7 @@ export class FileSheet {
 
   async #share() {
     const { row } = this;
-    const address = new URL(addressOf(row.id, '/file.mcap'), location.href).href;
+    const address = new URL(keptAt(addressOf(row.id, '/file.mcap')), location.href).href;
     const said = html('p', { role: 'status' }, 'Getting ready to share.');
     this.#dialog.show(`Share ${this.name}`, [said], []);
     await share({ row, name: this.name, address, say: (sentence) => setWords(said, sentence), offer: (label, act) => this.#dialog.what.replaceChildren(html('div', { class: 'keys' }, this.#dialog.key(label, act, 'main'))),

@@ -8,6 +8,7 @@ import { FilesModel } from './files-model.js';
 import { drawRow } from './files-row.js';
 import { html, icon, listen, setAttribute, setText, setWords, show, words } from '../core/dom.js';
 import { counted, timeOfDay } from '../core/format.js';
+import { styled } from '../core/style-sheet.js';
 
 const SOON_S = 2; // while something is being read or has just ended
 const SELDOM_S = 10;
@@ -53,11 +54,15 @@ class FilesTab {
     this.search = new FilesSearch(model);
     this.live = new FilesLive(store, say);
     const { older, trash, back, clear } = this.parts = build(panel, this.search.element, this.live.element, dock);
-    loadStyle(/** @type {HTMLElement} */ (panel.firstElementChild));
+    const files = /** @type {HTMLElement} */ (panel.firstElementChild);
+    show(files, false);
+    void styled('files').then(() => show(files, true));
     this.stops = [
       store.on('draw', () => this.#beat()),
+      store.on('switch', () => this.#turned()),
       ...this.search.stops,
       listen(older, 'click', () => model.more()),
+      listen(this.parts.logbook, 'click', () => this.#openLogbook(say)),
       listen(trash, 'click', () => this.#turnTo(true)),
       listen(back, 'click', () => this.#turnTo(false)),
       listen(clear, 'click', () => sheet.askEmpty(model.listing.trash ?? { count: model.rows.length, bytes: 0 })),
@@ -70,6 +75,24 @@ class FilesTab {
     this.live.stop();
     this.sheet.stop();
     this.panel.replaceChildren();
+  }
+
+  /** All drives of a car. @param {(sentence: string, title?: string) => void} say */
+  async #openLogbook(say) {
+    const { vehicles = [], tags = [] } = this.model.listing;
+    try {
+      const { openLogbook } = await import('../drive/logbook.js');
+      await openLogbook({ vehicles, tags, vehicle: this.model.rows[0]?.vehicle ?? '', store: this.store });
+    } catch {
+      say('The logbook could not be loaded from the server. Try again.', 'Not opened');
+    }
+  }
+
+  /** Another car is shown, whose agent has other recordings. */
+  #turned() {
+    if (document.documentElement.dataset['kept'] !== 'agents') return;
+    this.model.forget();
+    this.refresh(true);
   }
 
   /** Fetches the list when it is due. @param {boolean} [isForced] */
@@ -117,15 +140,17 @@ class FilesTab {
   }
 
   #drawHead() {
-    const { model, parts: { count, free, state, older, trash, back, clear } } = this;
+    const { model, parts: { count, free, logbook, state, older, trash, back, clear } } = this;
     const { listing, isTrash } = model;
     const shown = isTrash ? listing.trash : model.isFiltered ? listing.found : listing.all;
     const total = shown ? `${counted(shown.count, 'recording')}${model.isFiltered && !isTrash ? ` of ${listing.all?.count ?? 0}` : ''}, ${sizeWords(shown.bytes)}` : '';
-    setWords(count, isTrash ? `Trash: ${total}` : total);
+    const inStore = model.inStore !== null && shown ? `${counted(shown.count, 'recording')} in the store ${model.inStore}` : null;
+    setWords(count, inStore ?? (isTrash ? `Trash: ${total}` : total));
     setWords(free, listing.free_bytes === null || listing.free_bytes === undefined ? '' : `${sizeWords(listing.free_bytes)} free`);
     setWords(state, this.#stateWords());
-    setAttribute(state, 'data-bad', model.problem !== null || this.store.isSilent);
+    setAttribute(state, 'data-bad', model.problem !== null || Boolean(listing.store?.problem) || this.store.isSilent);
     this.search.draw();
+    show(logbook, !isTrash && model.inStore === null && model.rows.length > 0);
     show(older, model.next !== null);
     show(trash, !isTrash && (listing.trash?.count ?? 0) > 0);
     if (listing.trash) setWords(/** @type {HTMLElement} */ (trash.lastElementChild), `Trash: ${counted(listing.trash.count, 'recording')}, ${sizeWords(listing.trash.bytes)}`);
@@ -134,9 +159,10 @@ class FilesTab {
   }
 
   #stateWords() {
-    const { model: { at_ms, problem }, store } = this;
+    const { model: { at_ms, listing, problem }, store } = this;
     if (store.isSilent) return `The server does not answer: nothing can be opened.${at_ms === null ? '' : ` This was the list at ${timeOfDay(at_ms)}.`}`;
     if (problem !== null) return problem;
+    if (listing.store?.problem) return listing.store.problem;
     return at_ms === null ? 'Loading the recordings…' : '';
   }
 
@@ -185,6 +211,7 @@ class FilesTab {
 /** Builds the parts of the tab in `panel`. @param {HTMLElement} panel @param {HTMLElement} search @param {HTMLElement} live @param {HTMLElement} dock */
 function build(panel, search, live, dock) {
   const [count, free] = [html('span'), html('span')];
+  const logbook = html('button', { type: 'button', class: 'key', 'data-f': 'files-logbook' }, 'Logbook');
   const state = html('p', { class: 'state', role: 'status', 'data-f': 'files-state' });
   const list = html('ul', { class: 'list', 'data-f': 'recordings', 'aria-label': 'Recordings' });
   const [emptyTitle, emptyWords] = [html('h2'), html('p')];
@@ -195,15 +222,6 @@ function build(panel, search, live, dock) {
   const clear = html('button', { type: 'button', class: 'key wide', 'data-f': 'files-empty' }, icon('trash'), html('span', {}, 'Empty the trash'));
   const heads = html('div', { class: 'files-heads', 'aria-hidden': 'true' }, ...['Track', 'Recording', 'Car', 'Length', 'Size', 'Alarms'].map((name) => html('span', {}, name)));
   panel.replaceChildren(html('div', { class: 'files' },
-    html('div', { class: 'files-side' }, html('div', { class: 'sec' }, count, free), search, state, heads, live, list, empty, html('div', { class: 'files-foot' }, older, trash, back, clear)), dock));
-  return { count, free, state, list, empty, emptyTitle, emptyWords, older, trash, back, clear };
-}
-
-/** Loads the style sheet of the tab once; until then the tab is hidden. @param {HTMLElement} files */
-function loadStyle(files) {
-  if (document.querySelector('link[data-files]')) return;
-  const style = /** @type {HTMLLinkElement} */ (html('link', { rel: 'stylesheet', href: '/static/css/files.css', 'data-files': true }));
-  style.onload = style.onerror = () => show(files, true);
-  show(files, false);
-  document.head.append(style);
+    html('div', { class: 'files-side' }, html('div', { class: 'sec' }, count, free, logbook), search, state, heads, live, list, empty, html('div', { class: 'files-foot' }, older, trash, back, clear)), dock));
+  return { count, free, logbook, state, list, empty, emptyTitle, emptyWords, older, trash, back, clear };
 }

@@ -8,7 +8,7 @@ import { DriveFeed } from './drive-feed.js';
 import { mountGestures } from './drive-gestures.js';
 import { foundAt, foundWords, placedMarks, specFor, viewAfter } from './drive-layout.js';
 import { Panes } from './drive-panes.js';
-import { RANGES, build, styled } from './drive-parts.js';
+import { RANGES, build, chartStyles } from './drive-parts.js';
 import { DriveView, stateWords } from './drive-view.js';
 import { nowOf } from './trend-feed.js';
 
@@ -34,7 +34,7 @@ export function mount(root, page) {
   let isOver = false;
   /** @type {DriveChart | null} */
   let chart = null;
-  void styled().then(() => {
+  void chartStyles().then(() => {
     if (!isOver) chart = new DriveChart(root, page);
   });
   return () => {
@@ -51,9 +51,9 @@ class DriveChart {
   /** @type {number | null} */
   #hover_s = null;
   #context = '';
-  /** What of the picture was drawn last. */
-  #drawn = '';
+  #drawn = ''; // what of the picture was drawn last
   #isOver = false;
+  #turn = () => this.#isOver || this.#look();
   /** @type {import('./trends-layout.js').Spec[]} */
   #specs = [];
 
@@ -75,9 +75,9 @@ class DriveChart {
     this.resize.observe(plots);
     const anew = () => this.#rebuild();
     this.stops = [
-      store.on('draw', () => store.painter.picture(() => this.#isOver || this.#look())), // with the next picture: what is drawn now takes one long enough
+      store.on('draw', () => store.painter.inTurn(this.#turn)),
       ...ranges.map((key, i) => listen(key, 'click', () => this.#follow(RANGES[i]?.[1]))),
-      listen(signals, 'click', () => void pick({ store, say, seen: () => ({ answer: this.feed.answer, specs: this.#specs, view: this.view }), picture: () => this.panes.picture() })),
+      listen(signals, 'click', () => void pick({ store, say, seen: () => ({ answer: this.feed.answer, specs: this.#specs, view: this.view }), panes: this.panes, head: this.parts.head })),
       listen(now, 'click', () => this.#follow()),
       mountGestures(stage, {
         box: () => this.panes.box,

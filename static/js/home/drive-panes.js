@@ -46,30 +46,6 @@ export class Panes extends PaneStack {
   move() {
     for (const { plot } of this.panes) plot.redraw(true, true);
   }
-
-  /** Everything that is seen, as one picture. @returns {HTMLCanvasElement} */
-  picture() {
-    const ratio = devicePixelRatio || 1;
-    const whole = this.root.getBoundingClientRect();
-    const canvas = document.createElement('canvas');
-    [canvas.width, canvas.height] = [Math.round(whole.width * ratio), Math.round(whole.height * ratio)];
-    const g = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
-    g.fillStyle = this.palette.panel;
-    g.fillRect(0, 0, canvas.width, canvas.height);
-    g.scale(ratio, ratio);
-    g.textBaseline = 'top';
-    for (const { plot, element, label, value, unit } of this.panes) {
-      const box = plot.ctx.canvas.getBoundingClientRect();
-      const top = element.getBoundingClientRect().top - whole.top;
-      g.drawImage(plot.ctx.canvas, box.left - whole.left, box.top - whole.top, box.width, box.height);
-      g.fillStyle = this.palette.ink2;
-      g.font = `14px ${getComputedStyle(label).fontFamily}`;
-      g.fillText(`${label.textContent}`, 4, top + 6);
-      g.fillStyle = this.palette.ink;
-      g.fillText(`${value.textContent} ${unit.textContent}`, 4, top + 26);
-    }
-    return canvas;
-  }
 }
 
 class Pane {

@@ -1,6 +1,7 @@
 // The elements of the chart of a drive, and its style sheets.
 
 import { html, icon, svg } from '../core/dom.js';
+import { fetchStyle, styled } from '../core/style-sheet.js';
 
 /** The times in view that have a key [s]. */
 export const RANGES = /** @type {const} */ ([['60 s', 60], ['6 min', 360], ['Drive', Infinity]]);
@@ -22,16 +23,5 @@ export function build(root) {
   return { element, ranges, signals, count, state, held, now, head, plots, stage };
 }
 
-/** The style sheets of the chart, once. @returns {Promise<void[]>} */
-export function styled() {
-  const sheets = ['/static/css/trends.css', new URL('../../vendor/uPlot.min.css', import.meta.url).href];
-  return Promise.all(sheets.map((href) => {
-    if (document.querySelector(`link[data-chart="${href}"]`)) return Promise.resolve();
-    return /** @type {Promise<void>} */ (new Promise((resolve) => {
-      const link = html('link', { rel: 'stylesheet', href, 'data-chart': href });
-      link.addEventListener('load', () => resolve());
-      link.addEventListener('error', () => resolve()); // it lacks beauty, not truth
-      document.head.append(link);
-    }));
-  }));
-}
+/** The style sheets of the chart; without them it lacks its look, not its truth. */
+export const chartStyles = () => Promise.all([styled('trends'), fetchStyle(new URL('../../vendor/uPlot.min.css', import.meta.url).href).catch(() => {})]);

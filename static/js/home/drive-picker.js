@@ -4,6 +4,7 @@ import { html, icon, listen, setAttribute, setText } from '../core/dom.js';
 import { addSheet, openSheet } from '../shell/sheet.js';
 import { MOST, chooseSignals, chosenSignals } from './drive-choice.js';
 import { csvOf } from './drive-layout.js';
+import { pictureOf, titleOf } from './drive-picture.js';
 import { shownIn } from '../core/units.js';
 
 /**
@@ -11,11 +12,12 @@ import { shownIn } from '../core/units.js';
  * @property {import('../core/store.js').Store} store
  * @property {(sentence: string, title?: string) => void} say
  * @property {() => {answer: import('./drive-layout.js').Answer | null, specs: import('./trends-layout.js').Spec[], view: import('./drive-layout.js').View}} seen
- * @property {() => HTMLCanvasElement} picture
+ * @property {import('./drive-panes.js').Panes} panes
+ * @property {SVGElement} head
  */
 
 /** @param {Chart} chart */
-export function openPicker({ seen, say, picture, store }) {
+export function openPicker({ seen, say, panes, head, store }) {
   const says = html('p', { class: 'sub', role: 'status' }, `Up to ${MOST} signals`);
   const boxes = Object.entries(seen().answer?.offered ?? {}).map(([name, { label, unit, has_data }]) => {
     const box = /** @type {HTMLInputElement} */ (html('input', { type: 'checkbox', value: name }));
@@ -41,13 +43,18 @@ export function openPicker({ seen, say, picture, store }) {
       chooseSignals(box.checked ? [...names, box.value] : names);
       look();
     })),
-    listen(png, 'click', () => picture().toBlob((blob) => (blob ? save(blob, `${nameOf(store)}.png`) : say('This browser cannot make a picture.', 'Not saved')))),
+    listen(png, 'click', () => {
+      const { answer, view } = seen();
+      if (!answer) return;
+      const title = titleOf(store.frame?.vehicle ?? 'car', answer, view, store.replaying);
+      pictureOf({ panes, head, title }).toBlob((blob) => (blob ? save(blob, `${nameOf(store)}.png`) : say('This browser cannot make a picture.', 'Not saved')));
+    }),
     listen(csv, 'click', () => {
       const { answer, specs, view } = seen();
       if (answer) save(new Blob([csvOf(answer, specs, view)], { type: 'text/csv' }), `${nameOf(store)}.csv`);
     }),
   ];
-  setAttribute(csv, 'disabled', seen().answer === null);
+  for (const key of [png, csv]) setAttribute(key, 'disabled', seen().answer === null);
   sheet.addEventListener('close', () => stops.reverse().forEach((stop) => stop()), { once: true });
   look();
   openSheet(sheet);

@@ -71,7 +71,7 @@ export function mount(root, store) {
   }
 
   if (store.frame) draw(); // before the first frame it is not shown
-  return store.on('draw', draw);
+  return store.on('draw', () => store.painter.inTurn(draw));
 }
 
 /**

@@ -2,8 +2,7 @@
 
 import { field, setAttribute, setText, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
-import { fixed, heading } from '../core/format.js';
-import { distanceWords } from '../map/map-text.js';
+import { distanceWords, fixed, heading } from '../core/format.js';
 
 /**
  * @param {HTMLElement} root
@@ -47,7 +46,7 @@ export function mount(root, store) {
   }
 
   if (store.frame) draw(); // before the first frame it is not shown
-  return store.on('draw', draw);
+  return store.on('draw', () => store.painter.inTurn(draw));
 }
 
 /** Six decimals are 0.1 m. @param {unknown} value */

@@ -10,8 +10,8 @@ import { fixed } from '../core/format.js';
 import { shownIn } from '../core/units.js';
 import { floorQuery, isFloor } from '../shell/layout.js';
 
-/** A sparkline of 162 px a minute moves by about one pixel in this time [ms]. */
-const DRAW_EVERY_MS = 400;
+/** Drawn at every second drawing, 400 ms: in that time a sparkline of 162 px a minute moves by about one pixel. */
+const TURNS = 2;
 /** A pane of a wide screen that is as high has room for the chart itself [px]. */
 const CHART_PX = 240;
 
@@ -28,21 +28,21 @@ export function mount(root, store, say) {
   /** @type {import('./spark.js').Palette} */
   let palette = colours(root);
   let isSeen = false;
-  let drew_ms = -Infinity;
+  let isOver = false;
+  let turn = 0;
 
   const watcher = new IntersectionObserver(([entry]) => {
     isSeen = entry?.isIntersecting ?? false;
-    drew_ms = -Infinity;
-    if (isSeen) draw();
+    if (isSeen) redraw();
   });
   watcher.observe(list);
   const redraw = () => {
     palette = colours(root);
-    drew_ms = -Infinity;
     draw();
+    for (const row of isSeen ? rows.values() : []) drawSketch(row, trends, store, palette);
   };
   const stops = [
-    store.on('draw', draw),
+    store.on('draw', () => store.painter.inTurn(draw)),
     listen(window, 'catgraph-theme', redraw),
     listen(matchMedia('(prefers-color-scheme: light)'), 'change', redraw),
     listen(window, 'catgraph-units', redraw),
@@ -60,22 +60,22 @@ export function mount(root, store, say) {
   }
 
   function draw() {
-    if (!isSeen || document.hidden) return;
+    if (isOver || !isSeen || document.hidden) return;
     for (const name of Object.keys(store.frame?.trends?.lowest ?? {})) {
       const signal = store.signal(name);
       if (signal && !rows.has(name)) add(specOf(name, signal));
     }
     for (const row of rows.values()) drawText(row, store);
-    if (store.now() - drew_ms < DRAW_EVERY_MS) return;
-    drew_ms = store.now();
-    for (const { spec, canvas, scale } of rows.values()) {
-      const ends = drawSpark(canvas, spec, trends, store, palette);
-      [ends?.[1], ends?.[0]].forEach((end, i) => setText(/** @type {Element} */ (scale[i]), endWords(end, spec)));
-    }
+    turn = (turn + 1) % TURNS;
+    const due = [...rows.values()].filter((_, i) => i % TURNS === turn);
+    store.painter.inTurn(() => {
+      for (const row of isOver ? [] : due) drawSketch(row, trends, store, palette);
+    });
   }
 
-  draw();
+  redraw();
   return () => {
+    isOver = true;
     watcher.disconnect();
     for (const stop of stops) stop();
   };
@@ -98,6 +98,17 @@ function drawText({ spec, label, value, key }, store) {
   setText(label, spec.name === 'acceleration' ? spec.label : `${spec.label} ${unit}`); // its unit has no room beside it
   write(value, ink, text);
   setAttribute(key, 'aria-label', `${spec.title}: ${ink === 'stale' ? 'stale, last ' : ''}${text} ${unit}; open the chart of the drive`);
+}
+
+/**
+ * @param {ReturnType<typeof buildRow>} row
+ * @param {ReturnType<typeof trendsOf>} trends
+ * @param {import('../core/store.js').Store} store
+ * @param {import('./spark.js').Palette} palette
+ */
+function drawSketch({ spec, canvas, scale }, trends, store, palette) {
+  const ends = drawSpark(canvas, spec, trends, store, palette);
+  [ends?.[1], ends?.[0]].forEach((end, i) => setText(/** @type {Element} */ (scale[i]), endWords(end, spec)));
 }
 
 /** An end of the scale; '': there is none. @param {number | undefined} end of the wire @param {import('./trends-layout.js').Spec} spec */

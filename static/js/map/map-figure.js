@@ -3,10 +3,11 @@
 
 import { offsetOf, placeAt, turned } from '../core/geodesy.js';
 import { setAttribute, svg } from '../core/dom.js';
+import { distanceWords } from '../core/format.js';
 import { gridPaths, groundMatrix, pixelOf, round, scaleBar_m, turnedPixels } from './map-layout.js';
 import { OtherPhones } from './map-others.js';
 import { trackPaths } from './map-track.js';
-import { bearingWords, distanceWords } from './map-text.js';
+import { bearingWords } from './map-text.js';
 
 /**
  * @typedef {import('../core/geodesy.js').Place} Place
@@ -31,6 +32,8 @@ const TAIL_M = 60;
 const LETTER_PX = 7.6;
 /** So wide is the column of keys at the right [px]. */
 const KEYS_PX = 70;
+/** Lower, the compass and the scale are one above the other [px]. */
+const LOW_PX = 120;
 /** Marks nearer than this leave no room for a number between them [px]. */
 const ROOM_PX = 70;
 
@@ -182,13 +185,13 @@ export class Figure {
     const isCarAbove = !carAt || !phoneAt || phoneAt[1] >= carAt[1]; // the names stand away from each other
     const carRoom = Math.max(28, car.isLive && car.ellipse ? reachUp(car.ellipse, view) : 0);
     const phoneRoom = Math.max(18, phone.isLive ? (phone.accuracy_m ?? 0) / view.mpp : 0);
-    this.#scale_px = scaleBar_m(view.mpp) / view.mpp;
+    this.#scaleEnd_px = scaleLeft(size) + scaleBar_m(view.mpp) / view.mpp;
     this.#drawName(this.carName, size, carAt, car.label, isCarAbove, carRoom);
     this.#drawName(this.phoneName, size, phoneAt, phone.label, !isCarAbove, phoneRoom);
   }
 
-  /** How long the bar of the scale is. */
-  #scale_px = 0;
+  /** Where the bar of the scale ends. */
+  #scaleEnd_px = 0;
 
   /** @param {SVGElement} text @param {Size} size @param {Pixel | null} at @param {string} words @param {boolean} isAbove @param {number} room */
   #drawName(text, size, at, words, isAbove, room) {
@@ -199,7 +202,7 @@ export class Figure {
     const half = (words.length * LETTER_PX) / 2 + 8;
     const y = isAbove ? at[1] - room - 10 : at[1] + room + 20;
     const x = Math.min(size.width - KEYS_PX - half, Math.max(half, at[0]));
-    const isBesideScale = x - half > this.#scale_px + 24;
+    const isBesideScale = x - half > this.#scaleEnd_px + 8;
     place(text, x, Math.min(size.height - (isBesideScale ? 8 : 44), Math.max(20, y)));
   }
 
@@ -208,11 +211,15 @@ export class Figure {
     const length_m = scaleBar_m(view.mpp);
     const [number, unit] = length_m >= 1000 ? [String(length_m / 1000), 'km'] : [String(length_m), 'm'];
     const y = size.height - 26;
-    setAttribute(this.bar, 'd', `M16 ${y}v8h${round(length_m / view.mpp)}v-8`);
+    const left = scaleLeft(size);
+    setAttribute(this.bar, 'd', `M${left} ${y}v8h${round(length_m / view.mpp)}v-8`);
     write(this.barText, `${number} ${unit}`);
-    place(this.barText, 18, y - 5);
+    place(this.barText, left + 2, y - 5);
   }
 }
+
+/** On a low map the compass stands above the bar. @param {Size} size */
+const scaleLeft = (size) => (size.height < LOW_PX ? 72 : 16);
 
 /** How far an ellipse reaches up on the map [px]. @param {import('./map-layout.js').Ellipse} ellipse @param {View} view */
 function reachUp({ major_m, minor_m, bearing_deg }, view) {

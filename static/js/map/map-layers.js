@@ -2,6 +2,7 @@
 // and Leaflet is fetched only where the server has tiles.
 
 import { html, setAttribute } from '../core/dom.js';
+import { fetchStyle } from '../core/style-sheet.js';
 import { MERCATOR_END_DEG, pictureMatrix, tileScale } from './map-layout.js';
 
 /**
@@ -11,7 +12,7 @@ import { MERCATOR_END_DEG, pictureMatrix, tileScale } from './map-layout.js';
  * @typedef {{title: string, tiles: string, min_zoom: number, max_zoom: number, bounds: [number, number, number, number], attribution: string,
  *   upstream?: {host: string, problem: string | null, kept_bytes: number, limit_bytes: number, evicted: number}}} Layer upstream: where its tiles are fetched
  * @typedef {{source: string, corners: [number, number][], attribution: string}} Picture
- * @typedef {{layers: Layer[], image: Picture | null}} Told as GET /api/map has it
+ * @typedef {{layers: Layer[], image: Picture | null}} MapGround as GET /api/map has it
  */
 
 const LEAFLET = '../../vendor/leaflet.js';
@@ -31,7 +32,7 @@ export class Ground {
   /** @type {Layer[]} */
   #layers = [];
   /** @type {Picture | null} */
-  #told = null;
+  #image = null;
   /** @type {ReturnType<typeof setTimeout> | null} */
   #asking = null;
   #asked_ms = -Infinity;
@@ -52,16 +53,16 @@ export class Ground {
   async load() {
     const answer = await fetch('/api/map');
     if (!answer.ok) throw new Error(`status ${answer.status}`);
-    const told = /** @type {Told} */ (await answer.json());
-    this.#layers = told.layers;
-    this.#told = told.image;
-    if (told.image) this.#lay(told.image);
-    if (told.layers.length) await this.#tile(told.layers);
-    this.isThere = told.layers.length > 0 || told.image !== null;
+    const ground = /** @type {MapGround} */ (await answer.json());
+    this.#layers = ground.layers;
+    this.#image = ground.image;
+    if (ground.image) this.#lay(ground.image);
+    if (ground.layers.length) await this.#tile(ground.layers);
+    this.isThere = ground.layers.length > 0 || ground.image !== null;
     this.onChange();
   }
 
-  /** @param {Picture} told */
+  /** @param {Picture} image */
   #lay({ source, corners }) {
     const element = /** @type {HTMLImageElement} */ (html('img', { class: 'site', alt: '', src: source, draggable: 'false' }));
     this.#picture = { element, corners: corners.map(([lat_deg, lon_deg]) => ({ lat_deg, lon_deg })) };
@@ -71,7 +72,7 @@ export class Ground {
 
   /** @param {Layer[]} layers */
   async #tile(layers) {
-    await Promise.all([import(LEAFLET), styled()]);
+    await Promise.all([import(LEAFLET), fetchStyle(new URL('../../vendor/leaflet.css', import.meta.url).href)]);
     const L = /** @type {typeof import('leaflet')} */ (/** @type {any} */ (globalThis).L);
     // It moves nothing by itself: the view is this map's own, and Leaflet is told of it.
     this.#map = L.map(this.tiles, {
@@ -101,7 +102,7 @@ export class Ground {
       const was = this.#problem;
       try {
         const answer = await fetch('/api/map');
-        if (answer.ok) this.#layers = /** @type {Told} */ (await answer.json()).layers;
+        if (answer.ok) this.#layers = /** @type {MapGround} */ (await answer.json()).layers;
       } catch {
         // the server itself is gone: others say so
       }
@@ -134,7 +135,7 @@ export class Ground {
    */
   words(view) {
     if (!this.isThere) return '';
-    const names = [...new Set([...this.#layers, ...(this.#told ? [this.#told] : [])].map(({ attribution }) => attribution).filter(Boolean))].join(' · ');
+    const names = [...new Set([...this.#layers, ...(this.#image ? [this.#image] : [])].map(({ attribution }) => attribution).filter(Boolean))].join(' · ');
     const problem = this.#missing.size ? this.#problem : null;
     const here = this.#layers.length && !this.#layers.some((layer) => covers(layer, view)) ? 'No map tiles here.' : '';
     return [problem, here, names].filter(Boolean).join(' ');
@@ -199,14 +200,4 @@ export class Ground {
 function covers({ min_zoom, bounds: [west, south, east, north] }, { centre, mpp, up_deg }) {
   const { lat_deg, lon_deg } = centre;
   return lat_deg >= south && lat_deg <= north && lon_deg >= west && lon_deg <= east && tileScale({ centre, mpp, up_deg }).zoom >= min_zoom;
-}
-
-/** Leaflet's style sheet, once. @returns {Promise<void>} */
-function styled() {
-  return new Promise((resolve, reject) => {
-    const link = /** @type {HTMLLinkElement} */ (html('link', { rel: 'stylesheet', href: new URL('../../vendor/leaflet.css', import.meta.url).href }));
-    link.addEventListener('load', () => resolve());
-    link.addEventListener('error', () => reject(new Error('no style sheet')));
-    document.head.append(link);
-  });
 }

@@ -2,9 +2,9 @@
 
 import { field, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { write } from '../core/ink.js';
-import { bearingWords, distanceWords } from './map-text.js';
+import { bearingWords } from './map-text.js';
 import { phonesLine } from '../phone/phones-layout.js';
-import { age, fixed } from '../core/format.js';
+import { age, distanceWords, fixed } from '../core/format.js';
 
 export class MapPanel {
   #announced = '';

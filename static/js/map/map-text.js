@@ -3,7 +3,7 @@
 import { bearing_deg, distance_m, placeOf } from '../core/geodesy.js';
 import { ellipseOf } from './map-layout.js';
 import { nameOf } from '../phone/phones-layout.js';
-import { age, fixed, heading } from '../core/format.js';
+import { age, distanceWords, fixed, heading } from '../core/format.js';
 
 /**
  * @typedef {import('../core/geodesy.js').Place} Place
@@ -113,23 +113,12 @@ export function phoneOf(frame, lag_s, page = '') {
  */
 export function apartOf(frame, lag_s, car, phone) {
   if (!car.isLive || !phone.isLive || !car.place || !phone.place) return null;
-  const told = frame.phone;
-  if (told?.used && typeof told.apart_m === 'number' && typeof told.bearing_deg === 'number' && (told.compared_age_s ?? Infinity) + lag_s <= COMPARED_LIVES_S) {
+  const compared = frame.phone;
+  if (compared?.used && typeof compared.apart_m === 'number' && typeof compared.bearing_deg === 'number' && (compared.compared_age_s ?? Infinity) + lag_s <= COMPARED_LIVES_S) {
     const least_m = frame.limits['phone_car.least_m'];
-    return { distance_m: told.apart_m, bearing_deg: told.bearing_deg, allowed_m: told.explained_m === null ? null : Math.max(told.explained_m, typeof least_m === 'number' ? least_m : 0) };
+    return { distance_m: compared.apart_m, bearing_deg: compared.bearing_deg, allowed_m: compared.explained_m === null ? null : Math.max(compared.explained_m, typeof least_m === 'number' ? least_m : 0) };
   }
   return { distance_m: distance_m(phone.place, car.place), bearing_deg: bearing_deg(phone.place, car.place), allowed_m: null };
-}
-
-/**
- * A distance as it is read: "10.4 m", "320 m", "4.2 km".
- * @param {number} value_m
- * @returns {[string, string]} number and unit
- */
-export function distanceWords(value_m) {
-  if (value_m < 99.95) return [fixed(value_m), 'm'];
-  if (value_m < 999.5) return [fixed(value_m, 0), 'm'];
-  return [fixed(value_m / 1000, value_m < 99_950 ? 1 : 0), 'km'];
 }
 
 /** A bearing as it is read: "323° NW". @param {number} bearing */

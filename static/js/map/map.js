@@ -42,6 +42,7 @@ export function mount(root, { store, say, isFront }) {
     if (map.size.width && map.size.height) tab.draw();
   });
   sized.observe(at('box'));
+  const read = () => tab.read();
   const stops = [
     () => sized.disconnect(),
     mountGestures(at('box'), { isFree: () => map.isFree, pan: (dx, dy) => tab.moveTo(panned(map.view, dx, dy)), zoom: (factor, dx, dy) => tab.zoom(factor, dx, dy) }),
@@ -54,7 +55,7 @@ export function mount(root, { store, say, isFront }) {
     listen(at('follow'), 'click', () => tab.choose(() => map.choose(map.mode === 'follow' ? 'free' : 'follow'))),
     listen(at('north'), 'click', () => tab.choose(() => map.turnNorth(tab.known?.car))),
     store.on('move', () => tab.look()),
-    store.on('draw', () => store.painter.picture(() => tab.read())), // with the next picture, as the chart
+    store.on('draw', () => store.painter.inTurn(read)),
     store.on('switch', () => tab.forget()),
   ];
   tab.press();

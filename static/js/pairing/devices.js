@@ -1,8 +1,8 @@
 // Who is paired with the server: each device with its role, a key that removes it, and a way to pair another.
 
-import { styled } from './access-style.js';
+import { styled } from '../core/style-sheet.js';
 import { leftWords, removalWords, seenWords } from './devices-layout.js';
-import { request, sentenceOf } from '../files/files-model.js';
+import { request, sentenceOf } from '../control/request.js';
 import { html, icon, listen, setText, setWords, show } from '../core/dom.js';
 import { pinShown } from './pairing-layout.js';
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
@@ -24,7 +24,7 @@ const ROLES = /** @type {const} */ ([['viewer', 'Viewer'], ['operator', 'Operato
  * @param {(words: string) => void} head says at the group's head what holds
  */
 export async function mount(place, group, store, say, head) {
-  await styled();
+  await styled('access');
   if (store.isViewer) {
     place.replaceChildren(html('p', { class: 'state' }, `This phone is paired as a viewer, under the name ${store.who?.name ?? ''}. An operator sees who is paired, and can make it an operator.`));
     return;

@@ -1,6 +1,6 @@
 // The screen before all others where devices are paired: this phone's name, the PIN from the server's terminal, one key.
 
-import { styled } from './access-style.js';
+import { styled } from '../core/style-sheet.js';
 import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { linkToken, onLink } from '../boot/pairing-token.js';
 import { digitsOf, PIN_DIGITS, pinShown, reasonWords, triedWords, waitWords } from './pairing-layout.js';
@@ -17,7 +17,7 @@ const TRY_MS = 8000;
 /** @param {HTMLElement} root @param {Pairing} pairing */
 export function openPairing(root, pairing) {
   const screen = new PairingScreen(root, pairing);
-  styled().then(() => screen.draw(), () => screen.draw());
+  styled('access').then(() => screen.draw(), () => screen.draw());
   screen.draw();
   /** @type {HTMLElement | null} */ (root.querySelector('h1'))?.focus({ preventScroll: true });
 }

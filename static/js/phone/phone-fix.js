@@ -4,7 +4,7 @@
  * @typedef {'denied' | 'unavailable' | 'timeout' | 'insecure' | 'hidden' | 'off'} Why
  * @typedef {{latitude: number, longitude: number, accuracy: number, altitude: number | null, speed: number | null, heading: number | null}} Coords
  * @typedef {{lat_deg: number, lon_deg: number, accuracy_m: number, alt_m: number | null, speed_mps: number | null, heading_deg: number | null, at_ms: number, age_s: number}} Fix
- * @typedef {{fix: Fix} | {why: Why}} Word
+ * @typedef {{fix: Fix} | {why: Why}} PositionReport
  */
 
 /** A position at most so often [ms]. */
@@ -48,8 +48,8 @@ function known(value) {
   return typeof value === 'number' && Number.isFinite(value) ? value : null;
 }
 
-/** Decides what is to be told now. Times are the page's monotonic clock [ms] but where `wall_ms` stands. */
-export class Teller {
+/** Decides what of the position is to be sent now. Times are the page's monotonic clock [ms] but where `wall_ms` stands. */
+export class PositionReporter {
   #clock = new FixClock();
   /** @type {{coords: Coords, stamp_ms: number, age_ms: number} | null} */
   #newest = null;
@@ -58,9 +58,9 @@ export class Teller {
   #isNew = false;
   /** @type {Why | null} what stands until a fix comes */
   #failure = null;
-  #told_ms = -Infinity;
+  #sent_ms = -Infinity;
   /** @type {Why | null} */
-  #toldWhy = null;
+  #sentWhy = null;
   isHidden = false;
 
   /** Positions are asked for from now on. @param {number} now_ms */
@@ -72,7 +72,7 @@ export class Teller {
 
   /** @param {Coords} coords @param {number} stamp_ms @param {number} now_ms @param {number} wall_ms */
   fix(coords, stamp_ms, now_ms, wall_ms) {
-    if (this.#newest?.stamp_ms === stamp_ms) return; // told again: it is no younger for that
+    if (this.#newest?.stamp_ms === stamp_ms) return; // the same again: it is no younger for that
     this.#newest = { coords, stamp_ms, age_ms: this.#clock.note(stamp_ms, wall_ms) };
     this.#heard_ms = now_ms;
     this.#isNew = true;
@@ -97,11 +97,11 @@ export class Teller {
     return this.#failure ?? 'timeout';
   }
 
-  /** What is to be told now, or null. @param {number} now_ms @returns {Word | null} */
+  /** What is to be sent now, or null. @param {number} now_ms @returns {PositionReport | null} */
   due(now_ms) {
     const why = this.why(now_ms);
-    if (why) return why !== this.#toldWhy || now_ms - this.#told_ms >= WHY_EVERY_MS ? { why } : null;
-    if (!this.#newest || !this.#isNew || (!this.#toldWhy && now_ms - this.#told_ms < FIX_EVERY_MS)) return null;
+    if (why) return why !== this.#sentWhy || now_ms - this.#sent_ms >= WHY_EVERY_MS ? { why } : null;
+    if (!this.#newest || !this.#isNew || (!this.#sentWhy && now_ms - this.#sent_ms < FIX_EVERY_MS)) return null;
     const { coords, stamp_ms, age_ms } = this.#newest;
     return {
       fix: {
@@ -117,17 +117,17 @@ export class Teller {
     };
   }
 
-  /** It went out. @param {Word} word @param {number} now_ms */
-  told(word, now_ms) {
-    this.#told_ms = now_ms;
-    this.#toldWhy = 'why' in word ? word.why : null;
-    if ('fix' in word) this.#isNew = false;
+  /** It went out. @param {PositionReport} report @param {number} now_ms */
+  sent(report, now_ms) {
+    this.#sent_ms = now_ms;
+    this.#sentWhy = 'why' in report ? report.why : null;
+    if ('fix' in report) this.#isNew = false;
   }
 
   /** Nobody has heard anything: another connection. */
   forget() {
-    this.#told_ms = -Infinity;
-    this.#toldWhy = null;
+    this.#sent_ms = -Infinity;
+    this.#sentWhy = null;
   }
 }
 

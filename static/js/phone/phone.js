@@ -1,7 +1,7 @@
 // This phone's position: asked of the browser once the operator armed it, told to the server while a car is monitored.
 
 import { ownName } from '../control/own-name.js';
-import { Teller, whyOf } from './phone-fix.js';
+import { PositionReporter, whyOf } from './phone-fix.js';
 
 /** @typedef {import('../boot/arming.js').Armed} Armed */
 
@@ -37,7 +37,7 @@ function keep(name, value) {
 
 export class Phone {
   #name = ownName();
-  #teller = new Teller();
+  #reporter = new PositionReporter();
   #isPossible = window.isSecureContext && 'geolocation' in navigator;
   #isArmed = kept(ARMED) !== null;
   #armed_ms = -Infinity;
@@ -53,12 +53,12 @@ export class Phone {
   /** @param {import('../core/store.js').Store} store */
   constructor(store) {
     this.store = store;
-    if (!this.#isPossible) this.#teller.fail(window.isSecureContext ? 'unavailable' : 'insecure');
+    if (!this.#isPossible) this.#reporter.fail(window.isSecureContext ? 'unavailable' : 'insecure');
     const look = () => this.#look();
     store.on('tick', look);
     store.on('beat', look); // while the page is hidden frames come and its timers hardly run
     store.on('open', () => {
-      this.#teller.forget();
+      this.#reporter.forget();
       look();
     });
     document.addEventListener('visibilitychange', () => this.#turn());
@@ -75,7 +75,7 @@ export class Phone {
   /** How the position stands before anything is connected. @returns {Armed} */
   get armed() {
     if (!this.#isPossible) return 'missing';
-    if (this.#permission === 'denied' || this.#teller.why(this.store.now()) === 'denied') return 'refused';
+    if (this.#permission === 'denied' || this.#reporter.why(this.store.now()) === 'denied') return 'refused';
     return this.#hasFix || this.#permission === 'granted' ? 'ready' : 'asks';
   }
 
@@ -96,14 +96,14 @@ export class Phone {
       if (was !== null) this.#again(); // the watch ended with the permission, whatever it says
     } else if (was === 'granted') {
       this.#stop();
-      this.#teller.fail('denied');
+      this.#reporter.fail('denied');
     }
     this.#look();
   }
 
   #start() {
     if (!this.#isPossible || this.#watch !== null) return;
-    this.#teller.begin(this.store.now());
+    this.#reporter.begin(this.store.now());
     this.#watch = navigator.geolocation.watchPosition((found) => this.#found(found), (error) => this.#failed(error), OPTIONS);
   }
 
@@ -118,7 +118,7 @@ export class Phone {
     if (this.#watch === null) return; // an answer to what is not asked any more
     this.#isNudged = false;
     this.#hasFix = true;
-    this.#teller.fix(coords, timestamp, this.store.now(), Date.now());
+    this.#reporter.fix(coords, timestamp, this.store.now(), Date.now());
     this.#tell();
   }
 
@@ -126,7 +126,7 @@ export class Phone {
   #failed({ code }) {
     if (this.#watch === null) return;
     this.#isNudged = false;
-    this.#teller.fail(whyOf(code));
+    this.#reporter.fail(whyOf(code));
     if (code === 1) this.#stop();
     this.#tell();
   }
@@ -138,8 +138,8 @@ export class Phone {
     const phase = store.heeded?.session.phase;
     const isWanted = (phase !== undefined && phase !== 'idle') || now_ms - this.#armed_ms < DIALLING_MS;
     if (!isWanted) this.#stop();
-    else if (this.#watch === null && !document.hidden && this.#teller.why(now_ms) !== 'denied') this.#start();
-    if (this.#watch !== null && !this.#isNudged && !document.hidden && this.#teller.silence_ms(now_ms) > NUDGE_MS) {
+    else if (this.#watch === null && !document.hidden && this.#reporter.why(now_ms) !== 'denied') this.#start();
+    if (this.#watch !== null && !this.#isNudged && !document.hidden && this.#reporter.silence_ms(now_ms) > NUDGE_MS) {
       this.#isNudged = true;
       navigator.geolocation.getCurrentPosition((found) => this.#found(found), (error) => this.#failed(error), OPTIONS);
     }
@@ -152,10 +152,10 @@ export class Phone {
     const { frame } = store;
     const held_ms = now_ms - store.deadMan.heard_ms;
     if (!this.#isArmed || !frame || held_ms > ECHO_MS || !WATCHED.includes(store.heeded?.session.phase ?? '')) return;
-    const word = this.#teller.due(now_ms);
-    if (!word) return;
-    const said = 'fix' in word ? { fix: { ...word.fix, heard_ms: frame.server.time_ms, held_s: held_ms / 1000 } } : word;
-    if (this.#send(said)) this.#teller.told(word, now_ms);
+    const report = this.#reporter.due(now_ms);
+    if (!report) return;
+    const said = 'fix' in report ? { fix: { ...report.fix, heard_ms: frame.server.time_ms, held_s: held_ms / 1000 } } : report;
+    if (this.#send(said)) this.#reporter.sent(report, now_ms);
   }
 
   /** @param {object} said */
@@ -166,7 +166,7 @@ export class Phone {
 
   /** In the background a phone gives no position; in front again its watch may be dead without saying so. */
   #turn() {
-    this.#teller.isHidden = document.hidden;
+    this.#reporter.isHidden = document.hidden;
     this.#again();
     this.#look();
   }
@@ -174,12 +174,12 @@ export class Phone {
   /** What was refused may be allowed by now. */
   #again() {
     this.#stop();
-    if (this.#isPossible) this.#teller.begin(this.store.now());
+    if (this.#isPossible) this.#reporter.begin(this.store.now());
   }
 
   #leave() {
     this.#stop();
     if (this.#isArmed && this.store.isMonitoring) this.#send({ why: 'off' });
-    this.#teller.forget();
+    this.#reporter.forget();
   }
 }

@@ -18,6 +18,7 @@ import { age, fixed } from '../core/format.js';
  * @property {boolean} isApple an iPhone or iPad
  * @property {boolean} isSecure the page came over HTTPS, or from this machine
  * @property {boolean} isReplaying
+ * @property {string | null} [key] by which agents know this device; '' where it cannot sign its orders; null: nobody asks for it
  *
  * @typedef {{icon: string, what: string, tag: string, kind: 'plain' | 'warn' | 'unk', says: string}} Row
  */
@@ -39,7 +40,15 @@ export function verdictOf(facts) {
 
 /** @param {PhoneFacts} facts @returns {Row[]} */
 export function rowsOf(facts) {
-  return [soundRow(facts), screenRow(facts), vibrationRow(facts), batteryRow(facts), networkRow(facts), positionRow(facts)];
+  return [soundRow(facts), screenRow(facts), vibrationRow(facts), batteryRow(facts), networkRow(facts), positionRow(facts), ...keyRow(facts)];
+}
+
+/** @param {PhoneFacts} facts @returns {Row[]} */
+function keyRow({ key = null }) {
+  const row = { icon: 'operator', what: 'Signed orders' };
+  if (key === null) return [];
+  if (!key) return [{ ...row, tag: 'Not available', kind: 'warn', says: 'This page cannot sign orders, which needs HTTPS. Cars may refuse them.' }];
+  return [{ ...row, tag: key.slice(1, 9), kind: 'plain', says: `The log of a car names this device by these digits. Its whole key: ${key}` }];
 }
 
 /** @param {PhoneFacts} facts @returns {Row} */

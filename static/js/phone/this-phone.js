@@ -28,7 +28,7 @@ export function openThisPhone(store, arming, deviceStatus) {
     return {
       ...arms, sound: alarmSound.isInterrupted ? /** @type {const} */ ('interrupted') : arms.sound, positionSays: mine?.why_text ? `${mine.why_text}.` : '', rides: mine?.chosen === true,
       vibrates: deviceStatus.vibrates, battery: deviceStatus.battery, charging: deviceStatus.charging, isOnline: deviceStatus.isOnline, network: deviceStatus.network, lag_s: store.lag_s,
-      isApple: deviceStatus.isApple, isSecure: window.isSecureContext, isReplaying: store.replaying,
+      isApple: deviceStatus.isApple, isSecure: window.isSecureContext, isReplaying: store.replaying, key: store.seal.key,
     };
   }
 

@@ -7,20 +7,6 @@ export const RANGES = /** @type {const} */ ([['60 s', 60], ['6 min', 360], ['All
 /** The steps by which B is moved along the time line [s]. */
 export const STEPS = /** @type {const} */ ([['−1 s', -1], ['−0.1', -0.1], ['+0.1', 0.1], ['+1 s', 1]]);
 
-/** Its style sheet is fetched with the first one. @returns {Promise<void>} */
-export function styled() {
-  if (document.querySelector('link[data-compare]')) return Promise.resolve();
-  const link = /** @type {HTMLLinkElement} */ (html('link', { rel: 'stylesheet', href: '/static/css/compare.css', 'data-compare': true }));
-  return new Promise((resolve, reject) => {
-    link.onload = () => resolve();
-    link.onerror = () => {
-      link.remove();
-      reject(new Error('The style sheet of the comparison could not be loaded'));
-    };
-    document.head.append(link);
-  });
-}
-
 export function build() {
   const title = html('h2', { tabindex: -1 }, 'Compare');
   const seg = (/** @type {string} */ label, /** @type {HTMLElement[]} */ keys) => html('div', { class: 'seg', role: 'group', 'aria-label': label }, ...keys);

@@ -9,13 +9,14 @@ import { SideFeed } from './compare-feed.js';
 import { lineByKey, shiftByKey, shiftWords } from './compare-layout.js';
 import { CompareLine } from './compare-line.js';
 import { Pace } from './compare-pace.js';
-import { RANGES, STEPS, build, styled } from './compare-parts.js';
+import { RANGES, STEPS, build } from './compare-parts.js';
 import { openPicker } from './compare-picker.js';
 import { NO_ROOM, WIDE, hasRoom } from './compare-room.js';
 import { CompareView } from './compare-view.js';
 import { Figures, SideCard, placesOf, remarksOf } from './compare-side.js';
 import { markBeside } from './replay-layout.js';
-import { styled as chartStyled } from '../home/drive-parts.js';
+import { chartStyles } from '../home/drive-parts.js';
+import { fetchStyle } from '../core/style-sheet.js';
 
 /** @typedef {import('./compare-layout.js').Name} Name */
 
@@ -33,7 +34,7 @@ let current = null;
  * @param {(sentence: string, title?: string) => void} say
  */
 export async function openBeside(id, store, say) {
-  await Promise.all([styled(), chartStyled()]);
+  await Promise.all([fetchStyle('/static/css/compare.css'), chartStyles()]);
   say('Opening…');
   const at_s = Math.max(0, store.frame?.replay?.at_s ?? 0);
   const answer = await store.ask('replay', { do: 'beside', recording: id, at_s }, OPENS_MS);

@@ -1,27 +1,39 @@
 // The list of what to jump to in a recording: pure functions, no DOM.
 
-import { duration, fixed } from '../core/format.js';
+import { categoryWords } from '../drive/mark-model.js';
+import { CATEGORIES, KINDS } from '../drive/mode-words.js';
+import { counted, duration, fixed } from '../core/format.js';
 
-/** A jump leads to so long before its alarm [s]: what led to it is seen. */
+/** A jump leads to so long before what happened [s]: what led to it is seen. */
 export const LEAD_S = 5;
 
 /**
  * @typedef {import('../core/protocol-types.js').Timeline} Timeline
- * @typedef {{at_s: number, kind: import('../core/protocol-types.js').Priority | 'gap', icon: string, title: string, text: string, length_s: number | null}} Jump
- *   length_s: how long it was active; null: not known, or to the end
+ * @typedef {{at_s: number, kind: import('../core/protocol-types.js').Priority | 'gap' | 'flag' | 'wheel', icon: string, title: string, text: string, length_s: number | null}} Jump
+ *   length_s: how long it was active; null: not known, or to the end; of a mark or an intervention: 0
  */
 
 const ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
 
 /**
- * Alarms of every priority, and where nothing was recorded, in the order of time.
- * @param {Pick<Timeline, 'marks' | 'gaps'>} line
+ * Alarms of every priority, what people marked, interventions, and where nothing was recorded, in the order of time.
+ * @param {Pick<Timeline, 'marks' | 'gaps' | 'flags' | 'interventions'>} line
  * @returns {Jump[]}
  */
-export function jumpsOf({ marks, gaps }) {
+export function jumpsOf({ marks, gaps, flags, interventions }) {
   const alarms = marks.map((mark) => ({ at_s: mark.at_s, kind: mark.priority, icon: ICONS[mark.priority], title: mark.title, text: mark.text, length_s: mark.duration_s }));
   const holes = gaps.map(([from_s, to_s]) => ({ at_s: from_s, kind: /** @type {const} */ ('gap'), icon: 'unknown', title: 'Nothing recorded', text: '', length_s: to_s - from_s }));
-  return [...alarms, ...holes].sort((a, b) => a.at_s - b.at_s);
+  const marked = flags.map((flag) => ({ at_s: flag.at_s ?? 0, kind: /** @type {const} */ ('flag'), icon: 'flag', title: flag.words || 'Mark', text: [categoryWords(flag.category), flag.by ?? ''].filter(Boolean).join(' · '), length_s: 0 }));
+  const taken = interventions.map(({ at_s, kind_of, category, what }) => ({ at_s, kind: /** @type {const} */ ('wheel'), icon: 'wheel', title: KINDS[kind_of]?.title ?? 'Intervention', text: [reasonWords(category), what].filter(Boolean).join(': ') || 'not described', length_s: 0 }));
+  return [...alarms, ...holes, ...marked, ...taken].sort((a, b) => a.at_s - b.at_s);
+}
+
+/** What made somebody intervene, as it is read. @param {string | null} category */
+const reasonWords = (category) => CATEGORIES.find(([word]) => word === category)?.[1] ?? category ?? '';
+
+/** "3 alarms, 2 marks, 1 intervention". @param {Pick<Timeline, 'marks' | 'flags' | 'interventions'>} line */
+export function jumpWords({ marks, flags, interventions }) {
+  return [counted(marks.length, 'alarm'), ...(flags.length ? [counted(flags.length, 'mark')] : []), ...(interventions.length ? [counted(interventions.length, 'intervention')] : [])].join(', ');
 }
 
 /** Where a jump leads [s]. @param {Pick<Jump, 'at_s'>} jump */
@@ -35,6 +47,7 @@ export function jumpAt({ at_s }) {
  * @param {boolean} isDone whether all of the recording was read
  */
 export function lengthOfJump({ length_s }, isDone) {
+  if (length_s === 0) return '';
   if (length_s === null) return isDone ? 'to the end' : 'end not read yet';
   if (length_s < 59.5) return `${fixed(length_s, length_s < 9.95 ? 1 : 0)} s`;
   return `${duration(length_s)} ${length_s < 3600 ? 'min' : 'h'}`;

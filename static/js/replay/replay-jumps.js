@@ -1,10 +1,11 @@
-// The alarms and gaps of a recording as a list to jump to: a press leads to some seconds before it.
+// Alarms, marks, interventions and gaps of a recording as a list to jump to: a press leads to some seconds before it.
 
 import { html, icon, listen, setText, setWords, words } from '../core/dom.js';
-import { counted, timeOfDay } from '../core/format.js';
+import { timeOfDay } from '../core/format.js';
+import { shape } from '../drive/drive-parts.js';
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
 import { clockOf } from './replay-layout.js';
-import { LEAD_S, jumpAt, jumpsOf, lengthOfJump, nearestJump } from './replay-jumps-layout.js';
+import { LEAD_S, jumpAt, jumpWords, jumpsOf, lengthOfJump, nearestJump } from './replay-jumps-layout.js';
 
 /** @typedef {import('../core/protocol-types.js').Timeline} Timeline */
 
@@ -73,17 +74,16 @@ export class JumpList {
   #draw() {
     const line = this.#line;
     const jumps = line ? jumpsOf(line) : [];
-    const alarms = jumps.filter(({ kind }) => kind !== 'gap').length;
-    setText(this.#title, line ? counted(alarms, 'alarm') : 'Alarms');
+    setText(this.#title, line ? jumpWords(line) : 'Alarms');
     const isPartial = line !== null && !line.is_done;
-    const hint = jumps.length ? `${this.#source}Each opens ${LEAD_S} s before it begins.` : isPartial || !line ? '' : 'Nothing was announced in this recording, and nothing is missing.';
-    setWords(this.#hint, `${hint}${isPartial || !line ? ` Read up to ${clockOf(line?.done_s ?? 0)}; later alarms may follow.` : ''}`.trim());
+    const hint = jumps.length ? `${this.#source}Each opens ${LEAD_S} s before it begins.` : isPartial || !line ? '' : 'Nothing was announced or marked in this recording, and nothing is missing.';
+    setWords(this.#hint, `${hint}${isPartial || !line ? ` Read up to ${clockOf(line?.done_s ?? 0)}; later alarms may follow.` : ''}${line?.modes.some(({ mode }) => mode === 'manual') ? ' Shaded on the time line: a person drives.' : ''}`.trim());
     const key = JSON.stringify([jumps, line?.is_done]);
     if (key === this.#drawn) return;
     this.#drawn = key;
     const focused = this.#focused;
     this.#list.replaceChildren(...jumps.map((jump) => html('li', {}, html('button', { type: 'button', 'data-at': jumpAt(jump), 'data-begins': jump.at_s, 'data-kind': jump.kind },
-      icon(jump.icon, 's'), html('span', { class: 'n at' }, clockOf(jump.at_s)),
+      jump.kind === 'flag' || jump.kind === 'wheel' ? shape(jump.kind) : icon(jump.icon, 's'), html('span', { class: 'n at' }, clockOf(jump.at_s)),
       html('span', { class: 'tx' }, html('b', {}, jump.title), html('span', { class: 'sub' }, ...words(jump.text))),
       html('span', { class: 'lasts' }, html('span', {}, ...words(lengthOfJump(jump, line?.is_done ?? false))), html('span', { class: 'n sub' }, timeOfDay(this.#start_ms + jump.at_s * 1000)))))));
     if (focused >= 0) this.#keys()[focused]?.focus();

@@ -99,12 +99,36 @@ export function markPath({ x, priority }) {
   return priority === 'critical' ? `M${at} 4l8 8.5-8 8.5-8-8.5z` : `M${at} 4.5l9 16h-18z`;
 }
 
+/** A flag beneath the base at (x): what a person marked. @param {number} x */
+export function flagPath(x) {
+  return `M${x.toFixed(1)} ${HEIGHT}V${BASE + 1}h10l-2.6 3.2 2.6 3.2h-8.4`;
+}
+
 /**
- * The alarm before or after a moment.
- * @param {Mark[]} marks
+ * Where a person drives: x and width of each.
+ * @param {Pick<Timeline, 'modes' | 'length_s'>} line
+ * @param {number} width
+ * @returns {[number, number][]}
+ */
+export function manualBands({ modes, length_s }, width) {
+  return modes.filter(({ mode }) => mode === 'manual').map(({ from_s, to_s }) => {
+    const x = xOf(from_s, length_s, width);
+    return [x, Math.max(1, xOf(to_s, length_s, width) - x)];
+  });
+}
+
+/** Alarms and marks in the order of time. @param {{at_s: number}[]} alarms @param {{at_s: number}[]} flags */
+export function eventsOf(alarms, flags) {
+  return flags.length ? [...alarms, ...flags].sort((a, b) => a.at_s - b.at_s) : alarms;
+}
+
+/**
+ * The alarm or mark before or after a moment.
+ * @template {{at_s: number}} One
+ * @param {One[]} marks
  * @param {number} at_s
  * @param {1 | -1} direction
- * @returns {Mark | null}
+ * @returns {One | null}
  */
 export function markBeside(marks, at_s, direction) {
   const ahead = marks.filter((mark) => (direction > 0 ? mark.at_s > at_s + 0.05 : mark.at_s < at_s - BEHIND_S));
@@ -202,7 +226,7 @@ export function momentOf(frame) {
 export function sketchOf({ length_s, speed_mps = [], raised = [], started_ms }) {
   if (length_s === null || !(length_s > 0)) return null;
   const marks = raised.map(({ at_ms, alarm, title, priority, text }) => ({ at_s: Math.max(0, (at_ms - started_ms) / 1000), alarm, title, priority, text, duration_s: null }));
-  return { kind: 'timeline', length_s, done_s: 0, is_done: false, bucket_s: length_s / Math.max(1, speed_mps.length), speed_mps, gaps: [], marks, marks_left_out: 0, notes: [] };
+  return { kind: 'timeline', length_s, done_s: 0, is_done: false, bucket_s: length_s / Math.max(1, speed_mps.length), speed_mps, gaps: [], marks, marks_left_out: 0, flags: [], interventions: [], modes: [], notes: [] };
 }
 
 /** How many alarms the recording has, as far as it was read. @param {Pick<Timeline, 'marks' | 'marks_left_out' | 'is_done'> | null} line */

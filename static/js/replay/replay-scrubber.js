@@ -1,7 +1,7 @@
-// In the place of the rail: the time line under the thumb, keys to the alarms before and after, play, rate, leave.
+// In the place of the rail: the time line under the thumb, keys to the events before and after, play, rate, leave.
 
 import { html, icon, listen, setAttribute, setIcon, setText, setWords, svg } from '../core/dom.js';
-import { BASE, HEIGHT, RATES, atByKey, atOf, clockOf, gapBands, markBeside, markPath, placed, rateWords, speedPath, spoken, xOf } from './replay-layout.js';
+import { BASE, HEIGHT, RATES, atByKey, atOf, clockOf, eventsOf, flagPath, gapBands, manualBands, markBeside, markPath, placed, rateWords, speedPath, spoken, xOf } from './replay-layout.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
@@ -27,6 +27,7 @@ export class Scrubber {
   #isPlaying = false;
   #pressed_ms = -Infinity;
   #notes = '';
+  #flags = /** @type {{at_s: number}[]} */ ([]); // what people marked
 
   /**
    * @param {Store} store
@@ -46,11 +47,11 @@ export class Scrubber {
       svg('defs', {}, svg('clipPath', { id: 'replay-past' }, this.clip)),
       this.gaps, this.base, this.all, this.past, this.marks, this.head);
     this.slider = html('div', { class: 'time-line', role: 'slider', tabindex: 0, 'aria-label': 'Position in the recording', 'aria-valuemin': 0, 'aria-valuemax': 0, 'aria-valuenow': 0 }, this.picture);
-    this.before = html('button', { type: 'button', class: 'key', 'aria-label': 'Previous alarm' }, icon('back'), 'Alarm');
+    this.before = html('button', { type: 'button', class: 'key', 'aria-label': 'Previous event' }, icon('back'), 'Event');
     this.play = html('button', { type: 'button', class: 'key' }, icon('play', 'fill'), html('span', {}, 'Play'));
     this.rate = /** @type {HTMLSelectElement} */ (html('select', { 'aria-label': 'Playback speed', class: 'n' }, ...RATES.map((rate) => html('option', { value: rate }, rateWords(rate)))));
     this.rateKey = html('label', { class: 'key' }, this.rate, html('span', { 'aria-hidden': 'true' }, 'Rate'));
-    this.after = html('button', { type: 'button', class: 'key', 'aria-label': 'Next alarm' }, icon('next'), 'Alarm');
+    this.after = html('button', { type: 'button', class: 'key', 'aria-label': 'Next event' }, icon('next'), 'Event');
     this.leave = html('button', { type: 'button', class: 'key leave' }, icon('close'), 'Leave');
     this.clock = html('b', { class: 'n' });
     this.of = html('span', { class: 'sub' }, 'Opening…');
@@ -65,8 +66,7 @@ export class Scrubber {
       () => resize.disconnect(),
       listen(this.slider, 'pointerdown', (event) => this.#down(event)),
       listen(this.slider, 'pointermove', (event) => this.#move(event)),
-      listen(this.slider, 'pointerup', (event) => this.#up(event)),
-      listen(this.slider, 'pointercancel', (event) => this.#up(event)),
+      ...['pointerup', 'pointercancel'].map((type) => listen(this.slider, type, (event) => this.#up(event))),
       listen(this.slider, 'keydown', (event) => this.#key(event)),
       listen(this.before, 'click', () => this.#step(-1)),
       listen(this.after, 'click', () => this.#step(1)),
@@ -116,9 +116,18 @@ export class Scrubber {
     setIcon(/** @type {Element} */ (this.play.firstElementChild), this.#isPlaying ? 'pause' : 'play');
     setText(/** @type {Element} */ (this.play.lastElementChild), this.#isPlaying ? 'Pause' : 'Play');
     if (document.activeElement !== this.rate) this.rate.value = String(replay.rate);
-    const marks = this.#line?.marks ?? [];
-    setAttribute(this.before, 'aria-disabled', markBeside(marks, this.#at_s, -1) === null ? 'true' : null);
-    setAttribute(this.after, 'aria-disabled', markBeside(marks, this.#at_s, 1) === null ? 'true' : null);
+    for (const [key, way] of /** @type {const} */ ([[this.before, -1], [this.after, 1]])) setAttribute(key, 'aria-disabled', markBeside(this.#events, this.#at_s, way) === null ? 'true' : null);
+  }
+
+  /** Flags beneath the trace, and moments to step to. @param {{at_s: number}[]} marks of people */
+  flag(marks) {
+    this.#flags = marks;
+    this.#picture();
+  }
+
+  /** What the keys step to. */
+  get #events() {
+    return eventsOf(this.#line?.marks ?? [], [...this.#flags, ...(this.#line?.interventions ?? [])]);
   }
 
   /** What acts on a replay that is open. */
@@ -169,10 +178,11 @@ export class Scrubber {
     setAttribute(this.past, 'd', path);
     const unread = line.is_done ? [] : [[xOf(line.done_s, line.length_s, this.#width), this.#width]];
     this.gaps.replaceChildren(
+      ...manualBands(line, this.#width).map(([x, width]) => svg('rect', { class: 'manual', x, width, y: 26, height: BASE - 26 })),
       ...gapBands(line, this.#width).map(([x, width]) => svg('rect', { x, width, y: 26, height: BASE - 26, fill: 'url(#hatch)' })),
       ...unread.map(([x = 0, end = 0]) => svg('rect', { class: 'unread', x, width: Math.max(0, end - x), y: BASE - 3, height: 6 })),
     );
-    this.marks.replaceChildren(...placed(line.marks, line.length_s, this.#width).map((mark) => svg('path', { class: mark.priority, d: markPath(mark) })));
+    this.marks.replaceChildren(...signsOf(line, this.#flags, this.#width));
   }
 
   /** @param {PointerEvent} event */
@@ -218,9 +228,9 @@ export class Scrubber {
 
   /** @param {1 | -1} direction */
   #step(direction) {
-    const mark = markBeside(this.#line?.marks ?? [], this.#at_s, direction);
+    const mark = markBeside(this.#events, this.#at_s, direction);
     if (mark) this.#seek(mark.at_s);
-    else this.say(direction > 0 ? 'There is no alarm after this moment.' : 'There is no alarm before this moment.');
+    else this.say(direction > 0 ? 'There is no alarm, mark or intervention after this moment.' : 'There is no alarm, mark or intervention before this moment.');
   }
 
   /** One seek at a time is under way; of those that come meanwhile, the last counts. @param {number} at_s */
@@ -252,4 +262,11 @@ export class Scrubber {
     const answer = await this.store.ask('replay', order);
     if (!answer.ok) this.say(answer.reason ?? 'Refused.', 'Replay not changed');
   }
+}
+
+/** Alarms above the trace, flags and interventions at its base. @param {Timeline} line @param {{at_s: number}[]} flags @param {number} width */
+function signsOf(line, flags, width) {
+  return [...placed(line.marks, line.length_s, width).map((mark) => svg('path', { class: mark.priority, d: markPath(mark) })),
+    ...flags.map(({ at_s }) => svg('path', { class: 'flag', d: flagPath(xOf(at_s, line.length_s, width)) })),
+    ...line.interventions.map(({ at_s }) => svg('circle', { class: 'wheel', cx: xOf(at_s, line.length_s, width), cy: BASE, r: 5 }))];
 }

@@ -6,7 +6,9 @@ import { ReplayBand, liveSheet } from './replay-band.js';
 import { JumpList } from './replay-jumps.js';
 import { clockOf, sketchOf, summaryOf } from './replay-layout.js';
 import { Scrubber } from './replay-scrubber.js';
-import { addressOf, request } from '../files/files-model.js';
+import { request } from '../control/request.js';
+import { fetchStyle, styled } from '../core/style-sheet.js';
+import { addressOf } from '../files/files-model.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
@@ -23,6 +25,8 @@ const ID = /^[\w-]+$/;
 const HOME = '#home';
 /** The address follows the moment so often; browsers allow no more [ms]. */
 const NOTE_MS = 2000;
+/** An agent of an older version tells less. */
+const NO_EVENTS = { flags: [], interventions: [], modes: [] };
 
 /** @type {Replay | null} */
 let current = null;
@@ -36,7 +40,7 @@ let current = null;
  * @returns {Promise<boolean>} whether it is shown
  */
 export async function openReplay(id, store, say, { at_s = 0, staysOnTab = false } = {}) {
-  await styled();
+  await fetchStyle('/static/css/replay.css');
   const opening = store.replaying || current ? null : new Replay(id, store, say);
   if (!opening) say('Opening…');
   current ??= opening;
@@ -72,21 +76,6 @@ function opened(store) {
       stop();
       resolve();
     });
-  });
-}
-
-/** The style sheet of a replay is fetched with the first one. @returns {Promise<void>} */
-function styled() {
-  const sheet = document.querySelector('link[data-replay]');
-  if (sheet) return Promise.resolve();
-  const link = /** @type {HTMLLinkElement} */ (html('link', { rel: 'stylesheet', href: '/static/css/replay.css', 'data-replay': true }));
-  return new Promise((resolve, reject) => {
-    link.onload = () => resolve();
-    link.onerror = () => {
-      link.remove();
-      reject(new Error('The style sheet of the replay could not be loaded'));
-    };
-    document.head.append(link);
   });
 }
 
@@ -138,7 +127,24 @@ class Replay {
       listen(document, 'keydown', (event) => this.scrubber.key(event)),
     ];
     void this.#sketch();
+    void this.#fetchMarks();
     this.#aside();
+  }
+
+  /** What people marked: flags on the time line, and a card at each moment. Without them it is replayed all the same. */
+  async #fetchMarks() {
+    if (!ID.test(this.id)) return;
+    try {
+      const { MarkCard, marksOf } = await import('../drive/recorded-marks.js');
+      const [marks] = await Promise.all([marksOf(this.id), styled('drive')]);
+      if (current !== this || !marks.length) return;
+      const card = new MarkCard(this.id, this.say);
+      need(this.board, ':scope > .view').append(card.element);
+      this.scrubber.flag(marks);
+      this.stops.push(this.store.on('draw', () => card.draw(marks, this.store.frame?.replay?.at_s ?? -1)), () => card.stop(), () => card.element.remove());
+    } catch (error) {
+      console.info('Marks of the recording:', error);
+    }
   }
 
   /** The server has opened it. */
@@ -233,9 +239,10 @@ class Replay {
       return;
     }
     if (message.kind !== 'timeline') return;
-    this.#line = message;
-    this.scrubber.take(message);
-    this.jumps.take(message);
+    const line = { ...NO_EVENTS, ...message };
+    this.#line = line;
+    this.scrubber.take(line);
+    this.jumps.take(line);
   }
 
   /** A second recording is chosen among the files. */

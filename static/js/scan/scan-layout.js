@@ -179,8 +179,8 @@ export function beamWords(scan) {
 export function plotScale(width, height, reach_m) {
   const cx = width / 2;
   const cy = height - 34;
-  const k = (cy - 14) / reach_m;
-  return { width, cx, cy, k, far_m: (cy + 8) / k, at: (/** @type {number} */ x_m, /** @type {number} */ y_m) => /** @type {[number, number]} */ ([cx - y_m * k, cy - x_m * k]) };
+  const k = Math.max(cy - 14, 1) / reach_m; // a plot too low for any still has a scale
+  return { width, cx, cy, k, far_m: Math.max(cy + 8, 1) / k, at: (/** @type {number} */ x_m, /** @type {number} */ y_m) => /** @type {[number, number]} */ ([cx - y_m * k, cy - x_m * k]) };
 }
 
 /**

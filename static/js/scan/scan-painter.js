@@ -6,10 +6,10 @@ import { ScanPlot } from './scan-plot.js';
 /**
  * @typedef {import('./scan-plot.js').Picture} Picture
  * @typedef {{family: string, weight: string, bytes: ArrayBuffer}} Font
- * @typedef {{canvas?: OffscreenCanvas, fonts?: Font[], picture?: Picture}} Told one of them
+ * @typedef {{canvas?: OffscreenCanvas, fonts?: Font[], picture?: Picture}} Order one of them
  */
 
-const page = /** @type {{onmessage: (event: MessageEvent<Told>) => void, postMessage(told: 'drawn'): void, fonts?: FontFaceSet}} */ (
+const page = /** @type {{onmessage: (event: MessageEvent<Order>) => void, postMessage(done: 'drawn'): void, fonts?: FontFaceSet}} */ (
   /** @type {unknown} */ (self)
 );
 /** @type {ScanPlot | null} */

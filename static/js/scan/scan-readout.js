@@ -68,7 +68,7 @@ export class ScanReadout {
   /** Describes the plot to screen readers. @param {Scan | null} scan null: there is none of now @param {string} missing */
   #describe(scan, missing) {
     const { at, store } = this;
-    const [canvas, text] = [at('canvas'), at('told')];
+    const [canvas, text] = [at('canvas'), at('described')];
     const key = scan ? 'live' : missing.replace(/[\d.:]+ s/, '');
     if (store.now() - this.#described_ms < DESCRIBE_EVERY_MS && text.dataset['key'] === key) return;
     this.#described_ms = store.now();

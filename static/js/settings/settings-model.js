@@ -1,5 +1,6 @@
 // The settings of one vehicle as this page knows them: what is in force, what was asked for and is not confirmed yet, how to take it back.
 
+import { maybe } from '../core/outcome.js';
 import { DEFAULTS, changeLines, changeTo } from './settings-layout.js';
 
 /**
@@ -165,12 +166,14 @@ export class SettingsModel {
     if (!base) return { ok: false, reason: GONE };
     try {
       const name = this.store.name.replace(/[^\u0020-\u00ff]/g, '');
-      const body = await fetched(this.#path('/api/settings.toml'), { method: 'PUT', body: toml, headers: { 'X-Catgraph-Name': name } });
+      const { fence, frame, seal, vehicle } = this.store;
+      const signed = await seal.headers({ kind: 'import', ...(fence === null ? {} : { fence }) }, { toml }, vehicle, frame?.server.challenge);
+      const body = await fetched(this.#path('/api/settings.toml'), { method: 'PUT', body: toml, headers: { 'X-Catgraph-Name': name, ...signed } });
       if (body.version > base.version) this.#confirmed(body.version, base, '');
       this.body = body;
       return { ok: true };
     } catch (error) {
-      return { ok: false, reason: sentenceOf(error) };
+      return { ok: false, reason: error instanceof Refusal ? error.message : maybe(sentenceOf(error)) };
     }
   }
 

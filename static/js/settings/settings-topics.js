@@ -31,7 +31,7 @@ export function topicWords(signal, picked, isLive) {
     const says = `${label} · ${picked ? `chosen by you, ${signal.note}` : signal.note}`;
     return { topic: signal.topic, says, icon: picked ? 'warn' : 'unknown', rate: NOTHING };
   }
-  const told = [
+  const facts = [
     `${label} · ${kind ?? 'type unknown'}${picked ? ' · chosen by you' : ''}`,
     signal.note ?? '',
     signal.rejected ? `${signal.rejected} rejected: ${signal.rejected_why ?? 'no reason given'}` : '',
@@ -39,7 +39,7 @@ export function topicWords(signal, picked, isLive) {
   ];
   const isWell = !signal.note && !signal.rejected && (signal.freshness === 'fresh' || signal.freshness === 'ageing');
   return {
-    topic: signal.topic, says: told.filter(Boolean).join('\n'), icon: !isLive ? 'unknown' : isWell ? 'ok' : 'warn',
+    topic: signal.topic, says: facts.filter(Boolean).join('\n'), icon: !isLive ? 'unknown' : isWell ? 'ok' : 'warn',
     rate: isLive ? fixed(signal.rate_hz) : NOTHING,
   };
 }

@@ -1,15 +1,15 @@
 // The Settings tab: every threshold under its heading, the topics of the signals, the kind of car, the file of all of it.
 
-import { SettingsDevices } from './settings-devices.js';
+import { departureGroup, devicesGroup, isOfAgent, mailGroup, peopleGroup } from './fetched-groups.js';
 import { SettingsFileKeys } from './settings-file.js';
 import { SettingsGroup } from './settings-group.js';
-import { SettingsMail } from './settings-mail.js';
 import { groupsOf } from './settings-layout.js';
 import { settingsOf } from './settings-model.js';
 import { SettingsTopics } from './settings-topics.js';
 import { openPreferences } from '../shell/preferences.js';
 import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { counted, timeOfDay } from '../core/format.js';
+import { styled } from '../core/style-sheet.js';
 
 /** How many headings are open at first: those that are set in the field. */
 const OPEN_AT_FIRST = 2;
@@ -19,6 +19,8 @@ const OPEN_AT_FIRST = 2;
  * @param {import('../shell/tab-contents.js').TabPage} page
  */
 export function mount(panel, { store, say, isFront }) {
+  panel.style.visibility = 'hidden';
+  void styled('limits').then(() => panel.style.removeProperty('visibility'));
   const tab = new SettingsTab(panel, store, say, isFront);
   tab.draw();
   return { stop: () => tab.stop() };
@@ -45,12 +47,18 @@ class SettingsTab {
     this.model = model;
     this.topics = new SettingsTopics(store, model);
     this.file = new SettingsFileKeys(store, model, say);
-    this.mail = new SettingsMail(say);
-    this.devices = new SettingsDevices(store, say);
+    this.mail = mailGroup(say);
+    this.people = peopleGroup(store, say);
+    this.departure = departureGroup(store);
+    this.devices = devicesGroup(store, say);
     this.parts = this.#build();
     const draw = () => this.draw();
     this.stops = [
       store.on('draw', draw),
+      store.on('switch', () => {
+        this.departure.forget(); // the list of another car is another one
+        if (isOfAgent()) this.mail.forget();
+      }),
       listen(this.parts.search, 'input', () => this.#filter()),
       listen(this.parts.undo, 'click', () => void this.#undo()),
       listen(this.parts.phone, 'click', openPreferences),
@@ -72,14 +80,14 @@ class SettingsTab {
     const keys = html('div', { class: 'keys' }, phone);
     this.panel.replaceChildren(
       html('div', { class: 'find' }, html('div', { class: 'field' }, icon('search'), search), undo), state,
-      all, this.mail.element, this.devices.element, keys,
+      all, this.mail.element, this.people.element, this.departure.element, this.devices.element, keys,
     );
     return { search, undo, state, groups, none, all, phone, keys };
   }
 
   stop() {
     for (const stop of this.stops) stop();
-    for (const part of [...this.#groups, this.topics, this.file, this.mail, this.devices]) part.stop();
+    for (const part of [...this.#groups, this.topics, this.file, this.mail, this.people, this.departure, this.devices]) part.stop();
     this.panel.replaceChildren();
   }
 
@@ -118,7 +126,7 @@ class SettingsTab {
     const query = search.value.trim();
     if (query === this.#query && !isForced) return;
     this.#query = query;
-    const hits = [...this.#groups, this.topics, this.file, this.mail, this.devices].reduce((sum, part) => sum + part.filter(query), 0);
+    const hits = [...this.#groups, this.topics, this.file, this.mail, this.people, this.departure, this.devices].reduce((sum, part) => sum + part.filter(query), 0);
     show(keys, query === '');
     if (!isForced) this.panel.scrollTop = 0;
     show(none, hits === 0 && query !== '');
@@ -134,7 +142,7 @@ class SettingsTab {
 
   /** Shows changes by others while the tab is in front. @param {import('../core/protocol-types.js').LogEvent[]} events */
   #announce(events) {
-    const others = events.filter(({ change, by }) => change === 'settings' && by !== null && by !== this.store.name);
+    const others = events.filter(({ change, by }) => change === 'settings' && by !== null && by !== (this.store.signs || this.store.name));
     if (others.length && this.isShown()) this.say(others.map(({ text }) => text).join('; '), `Changed by ${others.at(-1)?.by}`);
   }
 }

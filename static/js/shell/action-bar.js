@@ -1,5 +1,6 @@
 // The thumb's edge: Stop (confirmed), Pause or Resume. What acts on the car, beside them: slowing.js.
 
+import { mount as mountLedge } from './ledge-place.js';
 import { closeSheet, openSheet } from './sheet.js';
 import { field, listen, need, setAttribute, setIcon, setText } from '../core/dom.js';
 
@@ -26,6 +27,7 @@ export function mount(root, store, router) {
       if (!answer.ok) router.say(answer.reason ?? 'Refused.', isPaused ? 'Not resumed' : 'Not paused');
     }),
     store.on('draw', draw),
+    mountLedge(root, store),
   ];
 
   function draw() {

@@ -29,14 +29,14 @@ export function mount(store) {
   const link = /** @type {HTMLLinkElement} */ (need(document, 'link[rel="icon"]'));
   const icons = { plain: link.getAttribute('href'), critical: link.dataset['critical'], warning: link.dataset['warning'], lost: link.dataset['lost'], replay: '/static/icons/catgraph-replay.svg' };
   /** @type {number | null | undefined} */
-  let told;
+  let shown;
 
   function draw() {
     const badge = badgeOf(store.frame, { isSilent: store.isSilent, isMonitoring: store.isMonitoring, word: store.chain.word });
     if (document.title !== badge.title && !store.painter.drawing.isFailed) document.title = badge.title; // else undrawn.js writes it
     setAttribute(link, 'href', icons[badge.icon]);
-    if (badge.count === told) return;
-    told = badge.count;
+    if (badge.count === shown) return;
+    shown = badge.count;
     const done = badge.count === 0 ? navigator.clearAppBadge?.() : navigator.setAppBadge?.(badge.count ?? undefined);
     done?.catch(() => {}); // not installed, or not allowed: there is no badge to set
   }

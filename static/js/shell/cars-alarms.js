@@ -3,9 +3,7 @@
 import { announcedOf, askingOf, keyOf, louder } from './cars-layout.js';
 import { field, html, icon, listen, need, setAttribute, setIcon, setText, setWords } from '../core/dom.js';
 import { age, counted } from '../core/format.js';
-
-/** The card may appear under a finger: a press this soon after is not meant for it [ms]. */
-const MEANT_MS = 400;
+import { Meant } from '../core/meant.js';
 
 /**
  * @typedef {import('./cars-layout.js').CarRow} CarRow
@@ -18,7 +16,7 @@ export class CarsAlarms {
   #spoken = new Set();
   /** @type {CarRow | null} */
   #shown = null;
-  #shown_ms = -Infinity;
+  #meant = new Meant();
 
   /**
    * @param {HTMLElement} monitor
@@ -36,8 +34,8 @@ export class CarsAlarms {
     this.text = html('span');
     this.card = html('div', { class: 'snack asks other', role: 'alertdialog', 'aria-labelledby': 'other-title', 'data-f': 'other-car' },
       html('div', { class: 'side' }, icon('crit')), html('div', { class: 'tx' }, this.title, this.text), html('div', { class: 'ac' }, this.leave, this.open));
-    const meant = (/** @type {(row: CarRow) => void} */ act) => () => {
-      if (this.#shown && performance.now() - this.#shown_ms > MEANT_MS) act(this.#shown);
+    const meant = (/** @type {(row: CarRow) => void} */ act) => (/** @type {Event} */ event) => {
+      if (this.#shown && this.#meant.by(event)) act(this.#shown);
     };
     this.stops = [
       listen(this.open, 'click', meant((row) => cars.open(row.name))),
@@ -108,7 +106,7 @@ export class CarsAlarms {
       card.remove();
       return;
     }
-    if (!this.#shown || keyOf(this.#shown) !== keyOf(row)) this.#shown_ms = performance.now();
+    if (!this.#shown || keyOf(this.#shown) !== keyOf(row)) this.#meant.moved();
     this.#shown = row;
     setText(this.title, `${row.name}: ${row.worst.title}`);
     const for_s = ((this.store.cars?.time_ms ?? 0) - row.worst.raised_ms) / 1000 + this.store.carsLag_s;

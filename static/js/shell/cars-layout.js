@@ -87,6 +87,12 @@ export function rowsOf(cars, lag_s, page) {
 function rowOf(car, time_ms, lag_s, page) {
   const { name, summary } = car;
   const since_s = car.age_s === null ? null : car.age_s + lag_s;
+  if (car.off && !summary) {
+    return {
+      name, rank: 0, needs: false, icon: 'info', kind: '', isFilled: false, worst: null, chain: null, text: `Off on purpose: said by ${car.off.by}`,
+      speed: { ink: 'never', value_mps: null }, age: since_s === null ? '–' : `${age(since_s)} s`, operator: '?', recording: '?',
+    };
+  }
   if (!summary || (since_s ?? Infinity) > KNOWN_S) {
     return {
       name, rank: 79, needs: true, icon: 'link-off', kind: 'crit', isFilled: true, worst: null, chain: null,

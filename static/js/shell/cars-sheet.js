@@ -3,7 +3,8 @@
 import { drawChain } from './chain.js';
 import { addSheet, closeSheet, openSheet } from './sheet.js';
 import { chipOf } from '../control/control-layout.js';
-import { html, icon, setAttribute, setIcon, setText, setWords, svg } from '../core/dom.js';
+import { dutyWords } from '../control/duty-layout.js';
+import { html, icon, setAttribute, setIcon, setText, setWords, show, svg } from '../core/dom.js';
 import { write } from '../core/ink.js';
 import { speedWords } from '../core/units.js';
 
@@ -18,17 +19,20 @@ import { speedWords } from '../core/units.js';
  * @param {() => CarRow[]} page.rows
  * @param {(name: string) => void} page.open
  * @param {() => void} page.openControl
+ * @param {() => void} page.openDuty
  */
-export function openCars(store, { rows, open, openControl }) {
+export function openCars(store, { rows, open, openControl, openDuty }) {
   const speed = html('span', { class: 'n' });
   const unit = html('span', { class: 'u' });
   const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close', 'data-f': 'no' }, icon('close'));
   const list = html('ul', { class: 'cars' });
   const words = html('p', { class: 'sub small' });
   const control = html('button', { type: 'button', class: 'key wide', 'data-f': 'cars-control' }, icon('operator'), html('span'));
+  const duty = html('button', { type: 'button', class: 'key wide', 'data-f': 'cars-duty' }, icon('operator'), html('span'));
+  const fleet = html('a', { class: 'pick-link', href: '/fleet', 'data-f': 'cars-fleet' }, 'Fleet: what needs a person');
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-cars', 'aria-labelledby': 'cars-title' },
     html('div', { class: 'cars-head' }, html('h2', { id: 'cars-title' }, 'Cars'), html('span', { class: 'speed' }, speed, unit), close),
-    list, html('div', { class: 'keys' }, control, words)));
+    list, fleet, html('div', { class: 'keys' }, duty, control, words)));
   /** @type {Map<string, CarItem>} */
   const items = new Map();
 
@@ -49,16 +53,23 @@ export function openCars(store, { rows, open, openControl }) {
       list.replaceChildren(...wanted);
       if (focused instanceof HTMLElement && list.contains(focused)) focused.focus();
     }
-    const { label } = chipOf(store.control, store.page, store.isSilent);
+    const { label } = chipOf(store.control, store.page, store.isSilent, store.duty);
     setText(/** @type {Element} */ (control.lastElementChild), store.vehicle ? `${label} of ${store.vehicle}` : label);
-    setWords(words, now.length > 1 ? `Opening another car moves the slide to it, not armed. Control of ${store.vehicle} is given up.` : 'The server watches one car.');
+    setText(/** @type {Element} */ (duty.lastElementChild), dutyWords(store.duty));
+    show(duty, store.duty !== null && !store.isViewer);
+    show(fleet, now.length > 1);
+    setWords(words, now.length > 1 ? `Opening another car moves the slide to it and arms nothing. Control of ${store.vehicle} is given up.` : 'The server watches one car.');
   }
 
   control.addEventListener('click', () => {
     closeSheet(sheet);
     openControl();
   });
-  const stops = [store.on('draw', draw), store.on('cars', draw), addSheet(sheet)];
+  duty.addEventListener('click', () => {
+    closeSheet(sheet);
+    openDuty();
+  });
+  const stops = [store.on('draw', draw), store.on('duty', draw), store.on('cars', draw), addSheet(sheet)];
   sheet.addEventListener('close', () => stops.forEach((stop) => stop()), { once: true });
   draw();
   openSheet(sheet);

@@ -2,6 +2,7 @@
 
 import { alone, badgeOf, rowsOf, shortNames } from './cars-layout.js';
 import { chipOf } from '../control/control-layout.js';
+import { openDuty } from '../control/duty.js';
 import { counted } from '../core/format.js';
 import { field, listen, setAttribute, setIcon, setText, show } from '../core/dom.js';
 
@@ -66,7 +67,7 @@ export class Cars {
 
   openList() {
     this.onListed();
-    import('./cars-sheet.js').then(({ openCars }) => openCars(this.store, { rows: () => this.rows(), open: (name) => this.open(name), openControl: () => this.openControl() }))
+    import('./cars-sheet.js').then(({ openCars }) => openCars(this.store, { rows: () => this.rows(), open: (name) => this.open(name), openControl: () => this.openControl(), openDuty: () => void openDuty(this.store, this.say) }))
       .catch(() => this.say('The list of cars could not be loaded.', 'Not opened'));
   }
 }
@@ -91,14 +92,15 @@ export function mountChip(root, cars) {
       setIcon(mark, others.icon);
       setText(count, String(others.count));
     }
-    const { text, label, is } = chipOf(store.control, store.page, store.isSilent);
+    const { text, label, is } = chipOf(store.control, store.page, store.isSilent, store.duty);
     const needing = others ? `. ${counted(others.count, 'other car needs', 'other cars need')} a person` : '';
     setText(operator, text);
     setAttribute(chip, 'data-is', is);
+    setAttribute(chip, 'data-duty', Boolean(store.duty?.me));
     setAttribute(chip, 'aria-label', `${short} ${text}${others ? ` ${others.count}` : ''}: the car ${vehicle}. ${label}${needing}`); // begins with what is seen
   }
 
   draw();
-  const stops = [store.on('draw', draw), store.on('cars', draw), listen(chip, 'click', () => cars.openList())];
+  const stops = [store.on('draw', draw), store.on('cars', draw), store.on('duty', draw), listen(chip, 'click', () => cars.openList())];
   return () => stops.forEach((stop) => stop());
 }

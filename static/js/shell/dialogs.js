@@ -4,6 +4,7 @@ import { isAboutLink, layOut } from '../alarms/alarm-layout.js';
 import { drawBigChain } from './chain.js';
 import { field, html, listen, need, setAttribute, setIcon, setText, setWords, show, words } from '../core/dom.js';
 import { areAlarmsInSight } from './layout.js';
+import { Meant } from '../core/meant.js';
 import { isAsked } from './sheet.js';
 import { shownIn } from '../core/units.js';
 import { dialogWords } from '../alarms/standing.js';
@@ -85,11 +86,11 @@ export function mount(store, router) {
       // Escape and the phone's back key mean: I have seen it.
       listen(sheet, 'cancel', (event) => {
         event.preventDefault();
-        void dialogs.answer();
+        if (dialogs.meant(sheet).by(event)) void dialogs.answer();
       }),
-      listen(sheet, 'close', () => dialogs.closed(sheet)),
+      listen(sheet, 'close', (event) => dialogs.closed(sheet, event)),
     ]),
-    ...keys.map(([sheet, name, act]) => listen(field(sheet, name), 'click', act)),
+    ...keys.map(([sheet, name, act]) => listen(field(sheet, name), 'click', (event) => dialogs.meant(sheet).by(event) && act())),
   ];
   if (store.frame) dialogs.draw();
   return () => stops.forEach((stop) => stop());
@@ -100,11 +101,24 @@ class Dialogs {
     ['alarm', 'lost', 'mute', 'failed'].map((kind) => [kind, need(document, `#sheet-${kind}`)])));
   /** @type {Dialog | null} */
   #standing = null;
+  /** @type {Map<HTMLElement, Meant>} */
+  #meant = new Map();
+  /** The alarm that the dialog shows, by its key. */
+  #shown = '';
 
   /** @param {import('../core/store.js').Store} store @param {import('./router.js').Router} router */
   constructor(store, router) {
     this.store = store;
     this.router = router;
+  }
+
+  /** Whether a press was meant for what this dialog says now. @param {HTMLElement} sheet @returns {Meant} */
+  meant(sheet) {
+    const had = this.#meant.get(sheet);
+    if (had) return had;
+    const meant = new Meant(sheet);
+    this.#meant.set(sheet, meant);
+    return meant;
   }
 
   /** Acknowledges what the open dialog shows. */
@@ -130,10 +144,10 @@ class Dialogs {
     if (!reply.ok) this.router.say(reply.reason ?? 'Refused.', 'Not silenced');
   }
 
-  /** Some browsers close a dialog without `cancel`; what is not acknowledged opens again with the next frame. @param {HTMLDialogElement} sheet */
-  closed(sheet) {
+  /** Some browsers close a dialog without `cancel`; what is not acknowledged opens again with the next frame. @param {HTMLDialogElement} sheet @param {Event} event */
+  closed(sheet, event) {
     if (!sheet.isConnected || sheet.open) return; // removed by a page that gave up, or moved to another place: nobody acknowledged it
-    if (this.#standing && this.sheets[this.#standing.kind] === sheet && !this.store.painter.drawing.isFailed) void this.answer();
+    if (this.#standing && this.sheets[this.#standing.kind] === sheet && this.meant(sheet).by(event) && !this.store.painter.drawing.isFailed) void this.answer();
   }
 
   judge() {
@@ -153,7 +167,7 @@ class Dialogs {
     setAttribute(document.body, 'data-asking', standing?.kind === 'alarm' && standing.alarm.priority === 'critical');
     const place = standing ? placeOf(standing.kind) : document.body;
     if (wanted?.open && wanted.parentElement !== place) wanted.close(); // the window has another size now
-    if (wanted && !wanted.open) {
+    if (wanted && (!wanted.open || wanted.matches(':modal'))) { // a sheet that was being loaded may lie over it
       for (const sheet of /** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog[open]'))) {
         if (isAsked(sheet)) sheet.close();
       }
@@ -164,6 +178,9 @@ class Dialogs {
     else fillLink(wanted, standing.kind, this.store);
     if (standing.kind === 'lost') setText(field(wanted, 'title'), standing.alarm?.title ?? 'Connection lost');
     if (standing.kind === 'failed') setWords(field(wanted, 'change'), this.router.suggestion ? `Use ${this.router.suggestion}` : 'Change the address');
+    const key = standing.kind === 'alarm' ? headKey(standing.alarm) : standing.kind;
+    if (!wanted.open || key !== this.#shown) this.meant(wanted).moved();
+    this.#shown = key;
     if (!wanted.open) raise(wanted, place);
   }
 }
@@ -236,9 +253,9 @@ function fillLink(sheet, kind, store) {
   const [bold, plain, more] = linkWords(kind, view, store.frame);
   const text = field(sheet, 'words');
   const key = `${bold}|${plain}`;
-  if (text.dataset['told'] !== key) {
+  if (text.dataset['shown'] !== key) {
     text.replaceChildren(html('b', {}, ...words(bold)), ' ', ...words(plain));
-    text.dataset['told'] = key;
+    text.dataset['shown'] = key;
   }
   setWords(field(sheet, 'more'), more);
 }
@@ -258,9 +275,9 @@ export function linkWords(kind, view, frame) {
     const heard = link ? `${link.topics_heard} of ${link.topics_subscribed} topics sent data.` : '';
     return [view.sentence, heard, view.detail];
   }
-  const isServer = view.cut === 0;
-  const again = view.cut !== 1 ? view.detail : `The server is running and dials again${link?.attempts ? `; ${counted(link.attempts, 'try', 'tries')} so far` : ''}.`;
-  return [view.sentence, again, `The car may still be moving: watch the car.${isServer || !frame ? '' : savedWords(frame.recording)}`];
+  const isOld = view.cut === 0 || view.isUnserved; // what the frame says was then
+  const again = view.cut !== 1 || view.isUnserved ? view.detail : `The server is running and dials again${link?.attempts ? `; ${counted(link.attempts, 'try', 'tries')} so far` : ''}.`;
+  return [view.sentence, again, `The car may still be moving: watch the car.${isOld || !frame ? '' : savedWords(frame.recording)}`];
 }
 
 /**

@@ -1,6 +1,6 @@
 // "Install" in the menu: the browser's own offer where it has one, on an iPhone the words how, else nothing.
 
-import { field, html, listen, need, show, words } from '../core/dom.js';
+import { field, listen, need, show } from '../core/dom.js';
 import { addSheet, closeSheet, openSheet } from './sheet.js';
 
 /** @typedef {Event & {prompt(): Promise<{outcome: string}>}} Offer https://wicg.github.io/manifest-incubations/#beforeinstallpromptevent-interface */
@@ -33,9 +33,12 @@ export function mount(say) {
   async function install() {
     closeSheet(menu);
     if (way() === 'apple') {
-      if (!sheet) addSheet((sheet = appleSheet()));
-      openSheet(sheet);
-      return;
+      if (!sheet) {
+        const how = await import('./install-sheet.js').catch(() => null);
+        if (!how) return say('The server does not answer. Open “Install” again.', 'Not shown');
+        if (!sheet) addSheet((sheet = how.appleSheet()));
+      }
+      return openSheet(sheet);
     }
     const asked = offer;
     offer = null; // it can be asked once
@@ -59,13 +62,4 @@ export function mount(say) {
     listen(key, 'click', install),
   ];
   return () => stops.forEach((stop) => stop());
-}
-
-function appleSheet() {
-  const step = (/** @type {string} */ sentence) => html('li', {}, ...words(sentence));
-  return /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed', id: 'sheet-install', 'aria-labelledby': 'install-title' },
-    html('div', { class: 'bd' }, html('h2', { id: 'install-title' }, 'Install on this phone'),
-      html('ol', { class: 'steps' }, step('Press Share: the square with the arrow.'), step('Choose “Add to Home Screen”.'), step('Press Add.')),
-      html('p', { class: 'sub' }, 'In Safari, and in other browsers that offer it. The installed page is separate: it may ask again for the position and for pairing.')),
-    html('div', { class: 'keys' }, html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
 }

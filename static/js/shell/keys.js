@@ -5,7 +5,7 @@ import { field, html, listen, need, setText, words } from '../core/dom.js';
 import { isFloor } from './layout.js';
 
 /**
- * @typedef {'acknowledge' | 'silence' | 'tab' | 'help' | 'watch' | 'play' | 'step'} Act
+ * @typedef {'acknowledge' | 'silence' | 'mark' | 'tab' | 'help' | 'watch' | 'play' | 'step'} Act
  * @typedef {{keys: string[], shown: string, act: Act, does: string, isElsewhere?: boolean}} Key isElsewhere: the replay obeys it itself
  */
 
@@ -13,6 +13,7 @@ import { isFloor } from './layout.js';
 export const KEYS = [
   { keys: ['a'], shown: 'A', act: 'acknowledge', does: 'Acknowledge the first alarm of the list' },
   { keys: ['s'], shown: 'S', act: 'silence', does: 'Silence the first alarm of the list for 30 s' },
+  { keys: ['m', 'AudioVolumeUp', 'MediaTrackNext'], shown: 'M', act: 'mark', does: 'Mark this moment; the key of a Bluetooth shutter does so too, where the browser passes it' },
   { keys: ['1', '2', '3', '4', '5', '6'], shown: '1 2 3 …', act: 'tab', does: 'The tabs, from the left' },
   { keys: ['Escape'], shown: 'Esc', act: 'watch', does: 'Back to the first tab; closes a comparison' },
   { keys: [' '], shown: 'Space', act: 'play', does: 'Play or pause the replay', isElsewhere: true },
@@ -30,10 +31,11 @@ const OWN_KEYS = 'input, select, textarea, [contenteditable], [role="slider"], [
 /**
  * What a key asks for; null where it is not one of ours, or belongs to what has the focus.
  * @param {{key: string, ctrlKey: boolean, metaKey: boolean, altKey: boolean, defaultPrevented: boolean, repeat: boolean}} event
- * @param {{isTaken: boolean, isOn: boolean}} page isTaken: a field, a slider or a dialog has the keys
+ * @param {{isTaken: boolean, isOn: boolean, isTouch?: boolean}} page isTaken: a field, a slider or a dialog has the keys
  * @returns {Key | null}
  */
-export function keyOf(event, { isTaken, isOn }) {
+export function keyOf(event, { isTaken, isOn, isTouch }) {
+  if (event.key === 'AudioVolumeUp' && !isTouch) return null; // the keyboard's own
   if (isTaken || !isOn || event.defaultPrevented || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return null;
   const found = KEYS.find(({ keys }) => keys.includes(event.key) || keys.includes(event.key.toLowerCase()));
   return found && !found.isElsewhere ? found : null;
@@ -76,10 +78,11 @@ class PageKeys {
   press(event) {
     const at = event.target;
     const isTaken = Boolean(this.monitor.hidden) || document.querySelector('dialog:modal') !== null || (at instanceof Element && at.closest(OWN_KEYS) !== null);
-    const found = keyOf(event, { isTaken, isOn: this.#isOn });
+    const found = keyOf(event, { isTaken, isOn: this.#isOn, isTouch: matchMedia('(pointer: coarse)').matches });
     if (!found) return;
     const { act } = found;
     if (act === 'help') this.help();
+    else if (act === 'mark') this.#mark();
     else if (act === 'tab') this.#tab(Number(event.key) - 1);
     else if (act === 'watch') {
       if (!this.monitor.dataset['over'] && this.monitor.dataset['wide'] !== 'pane') this.tabs.go(0); // a screen closes itself
@@ -108,6 +111,12 @@ class PageKeys {
     this.look();
     if (this.store.now() - this.#seen[act].since_ms < READ_MS) this.say('The list changed a moment ago. Read it, then press the key again.', act === 'acknowledge' ? 'Not acknowledged' : 'Not silenced');
     else key.click();
+  }
+
+  /** As a tap on the Mark key, where it stands. */
+  #mark() {
+    const key = /** @type {HTMLElement | null} */ (this.monitor.querySelector('[data-f="mark"]'));
+    if (key?.checkVisibility()) key.click();
   }
 
   /** @param {number} place */

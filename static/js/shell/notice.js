@@ -1,6 +1,7 @@
 // A word of the page itself: something was refused, a blind time is over. It goes by itself, and takes no place of an alarm.
 
 import { html, icon, mirror, need, words } from '../core/dom.js';
+import { isMaybe } from '../core/outcome.js';
 
 const STAYS_MS = 8000;
 const OFFERS_MS = 15_000; // what can be pressed must be found and reached first
@@ -23,7 +24,7 @@ function makeRoom(root) {
   seen.observe(view);
 }
 
-/** @typedef {{label: string, act: () => void}} Way what a notice offers, as one key */
+/** @typedef {{label: string, act: () => void, onClosed?: () => void}} Way what a notice offers, as one key; `onClosed`: it was closed by hand */
 
 /**
  * @param {HTMLElement} root where snackbars stand
@@ -31,9 +32,12 @@ function makeRoom(root) {
  */
 export function notices(root) {
   const isCovering = () => root.querySelector('.snack:not([hidden])') !== null;
+  const sheets = [...document.querySelectorAll('.sheet.crit')];
+  mirror(root, 'data-beside', () => sheets.some((sheet) => sheet.matches(':modal')), sheets, { attributeFilter: ['open'] });
   mirror(document.body, 'data-snack', isCovering, [root], { childList: true, subtree: true, attributeFilter: ['hidden'] });
   makeRoom(root);
-  return (sentence, title = '', way = undefined) => {
+  return (sentence, given = '', way = undefined) => {
+    const title = isMaybe(sentence) && !given.includes('Not known') ? 'Not known' : given; // whoever tells it takes it for refused
     const close = html('button', { type: 'button', class: 'btn', 'aria-label': 'Close' }, icon('close'));
     const text = html('div', { class: 'tx' }, ...(title ? [html('b', {}, ...words(title))] : []), html('span', {}, ...words(sentence)));
     const note = html('div', { class: 'snack note', role: 'status' }, html('div', { class: 'side' }, icon('info')), text, close);
@@ -46,7 +50,10 @@ export function notices(root) {
       });
       note.append(html('div', { class: 'ac' }, key));
     }
-    close.addEventListener('click', take);
+    close.addEventListener('click', () => {
+      take();
+      way?.onClosed?.();
+    });
     setTimeout(take, way ? OFFERS_MS : STAYS_MS);
     for (const old of root.querySelectorAll('.note')) old.remove();
     root.append(note);

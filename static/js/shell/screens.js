@@ -1,19 +1,22 @@
 // The screens behind the menu: each slides over the tabs and keeps bar, strip and rail in their places.
 
 import { areAlarmsInSight, floorQuery, isFloor } from './layout.js';
+import { mountHeadSpeed } from './head-speed.js';
 import { openPreferences } from './preferences.js';
 import { closeSheet, openSheet } from './sheet.js';
 import { field, html, listen, need, setAttribute, setText, show, words } from '../core/dom.js';
+import { styled } from '../core/style-sheet.js';
 
 /**
  * @typedef {import('../core/store.js').Store} Store
- * @typedef {(root: HTMLElement, store: Store, where: {close: () => void, of?: string}) => (() => void)} Mount
+ * @typedef {(root: HTMLElement, store: Store, where: {close: () => void, say: (sentence: string, title?: string) => void, of?: string}) => (() => void)} Mount
  */
 
 // Each is fetched when it is first opened: a page that begins has enough to load.
 const SCREENS = /** @type {Record<string, {title: string, hasHead?: boolean, load: () => Promise<Mount>}>} */ ({
   alarms: { title: 'Alarms', hasHead: true, load: async () => (await import('../alarms/alarms.js')).mount },
-  check: { title: 'Check', hasHead: true, load: async () => (await import('../alarms/check.js')).mount },
+  check: { title: 'Check', hasHead: true, load: async () => (await Promise.all([import('../alarms/check.js'), styled('check')]))[0].mount },
+  departure: { title: 'Departure check', load: async () => (await import('../drive/departure-check.js')).mount },
   log: { title: 'Alarm log', load: async () => (await import('../alarms/log.js')).mount },
   trends: { title: 'Trends', load: async () => (await import('../home/drive-screen.js')).mount },
   signals: { title: 'Signals', load: async () => (await import('../home/signals.js')).mount },
@@ -23,7 +26,7 @@ const SCREENS = /** @type {Record<string, {title: string, hasHead?: boolean, loa
 const NOT_HERE = still(['This screen could not be loaded from the server. Go back and open it again.']);
 
 /** Which screens one leads to, and back from. */
-const LEADS = /** @type {Record<string, string[]>} */ ({ alarms: ['check'], check: ['trends'] });
+const LEADS = /** @type {Record<string, string[]>} */ ({ alarms: ['check'], check: ['trends'], departure: ['check', 'signals'] });
 
 export class Screens {
   /** @type {(() => void) | null} */
@@ -37,13 +40,16 @@ export class Screens {
    * @param {HTMLElement} root the monitor's board
    * @param {Store} store
    * @param {(screen: string | null) => void} onChange
+   * @param {(sentence: string, title?: string) => void} say
    */
-  constructor(root, store, onChange) {
+  constructor(root, store, onChange, say) {
     this.root = root;
+    this.say = say;
     this.store = store;
     this.onChange = onChange;
     this.menu = /** @type {HTMLDialogElement} */ (need(document, '#sheet-menu'));
     this.stops = [
+      mountHeadSpeed(need(root, '.titlebar'), store),
       listen(field(root, 'menu'), 'click', () => openSheet(this.menu)),
       listen(field(root, 'back'), 'click', () => this.show(null)),
       listen(field(root, 'link'), 'click', () => this.show('signals')),
@@ -160,7 +166,7 @@ export class Screens {
     place.replaceChildren();
     const mount = await load().catch(() => NOT_HERE);
     if (this.open !== open || this.#of !== of || this.#unmount) return;
-    this.#unmount = mount(place, this.store, { close: () => this.show(null), ...(of === undefined ? {} : { of }) });
+    this.#unmount = mount(place, this.store, { close: () => this.show(null), say: this.say, ...(of === undefined ? {} : { of }) });
     if (SCREENS[open ?? '']?.hasHead) place.querySelector('h2')?.focus();
   }
 }

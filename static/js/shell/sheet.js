@@ -10,6 +10,11 @@ export function openSheet(sheet) {
   if (!sheet.open) sheet.showModal();
 }
 
+/** Whether a dialog stands over the page that no sheet may cover: an alarm, a broken link. */
+export function mustWait() {
+  return [.../** @type {NodeListOf<HTMLDialogElement>} */ (document.querySelectorAll('dialog:modal'))].some((one) => !isAsked(one));
+}
+
 /** @param {HTMLDialogElement} sheet */
 export function closeSheet(sheet) {
   if (sheet.open) sheet.close();

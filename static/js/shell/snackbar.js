@@ -3,6 +3,7 @@
 import { layOut } from '../alarms/alarm-layout.js';
 import { html, icon, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
 import { areAlarmsInSight } from './layout.js';
+import { Meant } from '../core/meant.js';
 import { openShelve } from '../alarms/shelve.js';
 import { snackWords } from '../alarms/standing.js';
 
@@ -22,19 +23,24 @@ export function mount(root, store, say) {
   root.append(bar);
   /** @type {import('../core/protocol-types.js').StandingAlarm | null} */
   let shown = null;
+  const meant = new Meant(bar);
+  let shownKey = '';
 
-  acknowledge.addEventListener('click', async () => {
-    if (!shown) return;
+  acknowledge.addEventListener('click', async (event) => {
+    if (!shown || !meant.by(event)) return;
     const answer = await store.ask('acknowledge', { alarm: shown.id, occurrence: shown.occurrence });
     if (!answer.ok) say(answer.reason ?? 'Refused.', 'Not acknowledged');
   });
-  shelve.addEventListener('click', () => shown && openShelve(store, shown, say));
+  shelve.addEventListener('click', (event) => shown && meant.by(event) && openShelve(store, shown, say));
 
   function draw() {
     const isListed = areAlarmsInSight() || document.querySelector('.screen:not([hidden]) [data-f="alarms"]') !== null; // with keys of its own, which this would cover
     const waiting = store.isSilent || !store.frame || store.replaying || isListed ? [] : layOut(store.frame.alarms).snackbars;
     shown = waiting[0] ?? null;
     show(bar, shown !== null);
+    const key = shown ? `${shown.id} ${shown.occurrence}` : '';
+    if (shown && key !== shownKey) meant.moved();
+    shownKey = key;
     if (!shown) return;
     setAttribute(bar, 'data-priority', shown.priority);
     setIcon(mark, shown.priority === 'advisory' ? 'info' : 'warn');

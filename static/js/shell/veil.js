@@ -2,7 +2,7 @@
 // frame.css) that every completed drawing of a fresh frame rewinds, so that it comes even when this script hangs.
 
 import { drawBigChain } from './chain.js';
-import { DrawProof } from '../core/draw-proof.js';
+import { rewinder } from '../core/draw-proof.js';
 import { field, html, mirror, need, setAttribute, setText, setWords, show, words } from '../core/dom.js';
 import { speedWords } from '../core/units.js';
 import { age, fixed, timeOfDay } from '../core/format.js';
@@ -46,34 +46,16 @@ export function mount(root, store) {
   const chain = field(veil, 'chain');
   if (!title || !sentence || !then || !recName || !rec) throw new Error('The template lacks the veil');
   const sheets = ['#sheet-lost', '#sheet-mute'].map((id) => need(document, id)); // they show the same
-  mirror(veil, 'data-told', () => sheets.some((sheet) => sheet.hasAttribute('open')), sheets, { attributeFilter: ['open'] });
-  const proof = new DrawProof();
-  let beat = 0;
-  /** @type {import('../core/protocol-types.js').State | null} */
-  let seen = null;
+  mirror(veil, 'data-explained', () => sheets.some((sheet) => sheet.hasAttribute('open')), sheets, { attributeFilter: ['open'] });
   let written = '';
   let isDrawn = false;
   const plate = need(veil, '.plate');
-
-  /** Restarts the cover's delay of 2 s after a completed drawing, if it drew a fresh frame. */
-  function rewind() {
-    if (!proof.isDrawn()) {
-      store.painter.drawing.distrust();
-      throw new Error('What was written is not there');
-    }
-    beat = 1 - beat;
-    const { dataset } = document.documentElement;
-    dataset['drawn'] = String(beat);
-    if (dataset['drawn'] !== String(beat)) throw new Error('The covers are not rewound');
-    if (store.deadMan.covered || store.frame === seen) return;
-    seen = store.frame;
-    dataset['beat'] = String(beat);
-  }
 
   function draw() {
     const kind = veilOf(store);
     setAttribute(veil, 'data-on', kind);
     setAttribute(need(root, '.view'), 'data-veil', kind);
+    setAttribute(root, 'data-covered', kind);
     if (kind === null && plate.hidden && !isDrawn) {
       isDrawn = true; // the first values come before the texts of the veil: those are drawn with the next frame
       return;
@@ -97,7 +79,7 @@ export function mount(root, store) {
   }
 
   if (store.frame) draw(); // before the first frame it is not shown
-  const stops = [store.on('drawn', rewind), store.on('draw', draw)];
+  const stops = [store.on('drawn', rewinder(store, () => store.frame)), store.on('draw', draw)];
   return () => stops.forEach((stop) => stop());
 }
 

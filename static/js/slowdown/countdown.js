@@ -1,15 +1,13 @@
 // The banner of a slow-down that starts automatically: over everything, with a key that vetoes it.
 
 import { field, listen, need, setText, setWords, show } from '../core/dom.js';
+import { Meant } from '../core/meant.js';
 import { countdownOf, nameOf } from './slow-layout.js';
 import { ANSWER_MS } from './slow-slides.js';
 
-/** The banner may appear under a finger: a press this soon after is not meant for it [ms]. */
-const MEANT_MS = 300;
-
 export class Countdown {
   #from_s = 0;
-  #shown_ms = -Infinity;
+  #meant = new Meant();
   /** The trigger that was vetoed here; the frames confirm it a moment later. */
   #vetoed = '';
 
@@ -21,7 +19,7 @@ export class Countdown {
     if (store.frame) this.draw();
     this.stops = [
       store.on('draw', () => this.draw()),
-      listen(this.veto, 'click', () => void this.#veto()),
+      listen(this.veto, 'click', (event) => this.#meant.by(event) && void this.#veto()),
       listen(this.banner, 'cancel', (event) => event.preventDefault()), // to leave it is no veto
     ];
   }
@@ -39,7 +37,7 @@ export class Countdown {
     if (this.#vetoed === coming.trigger) return;
     if (!banner.open) {
       this.#from_s = coming.left_s;
-      this.#shown_ms = performance.now();
+      this.#meant.moved();
       setText(at('says'), '');
     }
     setWords(at('title'), coming.title);
@@ -66,12 +64,11 @@ export class Countdown {
   }
 
   async #veto() {
-    if (performance.now() - this.#shown_ms < MEANT_MS) return;
     const trigger = this.veto.dataset['trigger'] ?? '';
     const answer = await this.store.ask('veto', { trigger, vehicle: this.veto.dataset['vehicle'] || null }, ANSWER_MS);
     if (answer.ok) {
       this.#vetoed = trigger;
       this.banner.close();
-    } else setWords(field(this.banner, 'says'), `Not vetoed: ${answer.reason ?? 'refused.'}`);
+    } else setWords(field(this.banner, 'says'), `${answer.outcome === 'unknown' ? 'Not known whether vetoed' : 'Not vetoed'}: ${answer.reason ?? 'refused.'}`);
   }
 }

@@ -77,7 +77,7 @@ export function slideOf(seen) {
   const { now, isSilent, isViewer } = seen;
   /** @param {string} title @param {string} why */
   const off = (title, why) => ({ kind: /** @type {const} */ ('off'), title, why, label: `${title}: ${why}` });
-  if (isSilent || !now) return off('Slow-down off', 'the server does not answer');
+  if (isSilent || !now) return off('State unknown', 'no answer');
   const order = orderOf(now);
   if (order) {
     const [title, why] = goWords(now.state, order);
@@ -87,7 +87,7 @@ export function slideOf(seen) {
     if (isViewer) return off('Slow-down armed', 'not for viewers');
     return { kind: 'armed', title: 'Slide to slow', why: seen.car || 'the car', label: `Slide to slow ${seen.vehicle || 'the car'}. With a keyboard hold Enter for 1 second` };
   }
-  if (now.state === 'safe') return off('Slow-down off', isViewer ? 'not for viewers' : 'press to arm');
+  if (now.state === 'safe') return off('Slow-down not armed', isViewer ? 'not for viewers' : 'press to arm');
   const why = bare(now.why ?? 'not available');
   return off('Slow-down off', why.length > BRIEF ? 'press for the reason' : why);
 }
@@ -226,7 +226,7 @@ export function sheetOf(seen, lag_s) {
     ['Slows at', `${fixed(now.deceleration_mps2 ?? null)} m/s²`, false],
     rivalsOf(now.rivals),
   ] : [];
-  if (isSilent || !now) return { ...plain, title: 'Slow-down off', text: 'The server does not answer: its state is unknown.', facts: [], act: null, says: '' };
+  if (isSilent || !now) return { ...plain, title: 'Slow-down unknown', text: 'The server does not answer.', facts: [], act: null, says: '' };
   if (isReplay) return { ...plain, title: 'As it was recorded', text: 'A recording is shown: nothing is sent to the car.', facts, act: null, says: '' };
   if (now.state === 'not_available') return { ...plain, title: 'Slow-down not available', text: now.why ?? 'The server sent no reason.', facts, act: null, says: '' };
   const isArmed = now.state === 'armed' || order !== null;

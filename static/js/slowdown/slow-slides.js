@@ -8,7 +8,7 @@ import { orderOf, seenOf, slideOf } from './slow-layout.js';
 export const ANSWER_MS = 2000;
 const SENDING = { kind: /** @type {const} */ ('go'), title: 'Sending', why: 'the order', label: 'The order to slow down is being sent' };
 
-/** @typedef {(sentence: string, title: string) => void} Tell */
+/** @typedef {(sentence: string, title: string) => void} Explain */
 
 export class SlowSlides {
   /** Until when an order of this page may be unanswered [ms]. */
@@ -24,16 +24,16 @@ export class SlowSlides {
     this.slides = [.../** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('.slide[data-f="slow"]'))].map((slide) => {
       const sheet = slide.closest('dialog');
       const says = sheet && field(sheet, 'slow-says');
-      /** Shows a sentence where it is readable: an alarm's sheet covers the notices. @type {Tell} */
-      const tell = (sentence, title) => {
+      /** Shows a sentence where it is readable: an alarm's sheet covers the notices. @type {Explain} */
+      const explain = (sentence, title) => {
         if (!says || !sheet?.open) return say(sentence, title);
         show(says, true);
         setWords(says, `${title}: ${sentence}`);
       };
       if (says) sheet.addEventListener('close', () => show(says, false));
       return new SlideKey(slide, {
-        press: () => (sheet ? tell(this.#whyOff(), 'Not slowed') : openSheet()),
-        order: (at_ms, vehicle) => void this.#order(at_ms, vehicle, tell),
+        press: () => (sheet ? explain(this.#whyOff(), 'Not slowed') : openSheet()),
+        order: (at_ms, vehicle) => void this.#order(at_ms, vehicle, explain),
       });
     });
     this.stops = [...this.slides.map((slide) => () => slide.stop()), store.on('switch', () => { this.#sending_ms = -Infinity; })];
@@ -56,8 +56,8 @@ export class SlowSlides {
     return `${because} Use the physical stop.`;
   }
 
-  /** @param {number} at_ms when the slide was released @param {string} vehicle the car whose name stood on it @param {Tell} tell */
-  async #order(at_ms, vehicle, tell) {
+  /** @param {number} at_ms when the slide was released @param {string} vehicle the car whose name stood on it @param {Explain} explain */
+  async #order(at_ms, vehicle, explain) {
     const { store } = this;
     const { frame } = store;
     if (!frame) return;
@@ -72,7 +72,8 @@ export class SlowSlides {
     const answer = await asked;
     if (!answer.ok) {
       this.#sending_ms = -Infinity;
-      tell(`${answer.reason ?? 'Refused.'} Use the physical stop.`, vehicle && vehicle !== store.vehicle ? `${vehicle} NOT slowed` : 'NOT slowed');
+      const [what, ofOther] = answer.outcome === 'unknown' ? ['Not known whether slowed', `${vehicle}: Not known whether slowed`] : ['NOT slowed', `${vehicle} NOT slowed`];
+      explain(`${answer.reason ?? 'Refused.'} Use the physical stop.`, vehicle && vehicle !== store.vehicle ? ofOther : what);
     }
     this.redraw();
   }

@@ -130,15 +130,15 @@ def test_what_the_operator_reads_of_an_offset() -> None:
 
 def announced(offset_s: Any, seconds: int = 60) -> list[tuple[float, str]]:
     """A receiver at 10 Hz whose clock differs by a function of time, before the whole judge."""
-    monitor, state, told = Monitor(), State(), []
+    monitor, state, announced = Monitor(), State(), []
     link = LinkFacts(phase="monitoring", connected_s=0.0, wall_zero_s=WALL_ZERO_S, published=frozenset({"position"}))
     for n in range(10 * seconds):
         now_s = n / 10
         state.link(link)
         fix = GpsFix(lat_deg=32.0 + 1e-7 * (n % 3), lon_deg=-110.0)
         state.receive("position", fix, now_s, WALL_ZERO_S + now_s + offset_s(now_s))
-        told += [(t.at_s, t.alarm_id) for t in monitor.step(state.snapshot(now_s)) if t.announces]
-    return told
+        announced += [(t.at_s, t.alarm_id) for t in monitor.step(state.snapshot(now_s)) if t.announces]
+    return announced
 
 
 def test_stories() -> None:

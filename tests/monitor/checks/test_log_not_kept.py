@@ -27,7 +27,7 @@ def test_it_is_judged_with_and_without_a_link(phase: Phase, trouble: str | None,
 def test_a_growing_number_of_waiting_events_is_no_new_alarm_and_a_pause_does_not_hide_it() -> None:
     monitor = Monitor()
     at = Snapshot(now_s=0.0, link=LinkFacts(phase="monitoring", log_trouble=WHY), paused=True, paused_since_s=0.0)
-    told = [
+    transitions = [
         transition
         for second in range(60)
         for transition in monitor.step(
@@ -35,4 +35,4 @@ def test_a_growing_number_of_waiting_events_is_no_new_alarm_and_a_pause_does_not
         )
         if transition.alarm_id == "log_not_kept"
     ]
-    assert [(transition.change, transition.announces) for transition in told] == [("raised", True)]
+    assert [(transition.change, transition.announces) for transition in transitions] == [("raised", True)]

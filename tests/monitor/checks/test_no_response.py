@@ -76,7 +76,7 @@ def test_what_the_operator_reads_in_the_dialog() -> None:
     assert (spec.place, spec.priority, spec.on_delay_s) == ("dialog", "critical", 1.0)
 
 
-def told(events: list[tuple[float, str, Twist | MotionCommand]]) -> list[float]:
+def raised_at(events: list[tuple[float, str, Twist | MotionCommand]]) -> list[float]:
     """When the whole judge announces it, over speeds and commands; ticks ten times a second."""
     monitor, state, tick_s, raised = Monitor(CHECKS), State(), 0.0, []
     state.link(LinkFacts(phase="monitoring", connected_s=0.0, published=frozenset({"speed", "command"})))
@@ -109,7 +109,7 @@ def test_the_car_has_a_second_to_answer(braking_mps2: float, after_s: float, rai
         braked = max(0.0, at_s - 10.0 - after_s) * braking_mps2
         events.append((at_s, "speed", Twist(speed_mps=max(0.0, 5.0 - braked) + 0.002 * (n % 5))))
         events.append((at_s + 0.01, "command", order(5.0 if at_s < 10.0 else 0.0)))
-    times = told(events)
+    times = raised_at(events)
     assert len(times) == raised
     if raised:
         assert 11.0 <= times[0] <= 11.3
@@ -128,7 +128,7 @@ def real_drive(recordings: Path) -> list[tuple[float, str, Twist | MotionCommand
 
 def test_the_real_drive_answers_its_orders(recordings: Path) -> None:
     """Its brake comes 0.6 s after the command has fallen far below the speed: half of what is allowed."""
-    assert told(real_drive(recordings)) == []
+    assert raised_at(real_drive(recordings)) == []
 
 
 def test_the_real_drive_would_have_alarmed_had_it_not(recordings: Path) -> None:
@@ -136,5 +136,5 @@ def test_the_real_drive_would_have_alarmed_had_it_not(recordings: Path) -> None:
         (at_s, signal, order(0.0) if signal == "command" and 36.0 <= at_s < 40.0 else value)
         for at_s, signal, value in real_drive(recordings)
     ]
-    (at_s,) = told(ignoring)
+    (at_s,) = raised_at(ignoring)
     assert 37.0 <= at_s <= 38.5

@@ -43,8 +43,8 @@ def test_verdict(for_s: float | None, verdict: Verdict, level: int) -> None:
 @pytest.mark.parametrize("phase", ["monitoring", "lost", "failed"])
 def test_it_is_told_with_and_without_a_link_and_although_it_is_paused(phase: Phase) -> None:
     monitor = Monitor()
-    told = [t for t in monitor.step(paused(400.0, phase)) if t.announces and t.alarm_id == "paused_long"]
-    assert [t.text for t in told] == ["Monitoring paused for 7 min: no alarm is raised"]
+    announced = [t for t in monitor.step(paused(400.0, phase)) if t.announces and t.alarm_id == "paused_long"]
+    assert [t.text for t in announced] == ["Monitoring paused for 7 min: no alarm is raised"]
 
 
 def test_how_long_is_a_setting() -> None:
@@ -54,16 +54,16 @@ def test_how_long_is_a_setting() -> None:
 
 def test_a_forgotten_pause_is_told_ever_more_seldom() -> None:
     """paused_long: after 5, 10, 20, 40 minutes, acknowledged or not, and to go on ends it without a word."""
-    monitor, state, told = Monitor(), State(), []
+    monitor, state, announced = Monitor(), State(), []
     state.link(LinkFacts(phase="monitoring", connected_s=0.0))
     state.snapshot(0.0)
     state.set_paused(True)
     for second in range(3000):
         for t in monitor.step(state.snapshot(float(second))):
             if t.alarm_id == "paused_long":
-                told.append((t.at_s / 60, t.change))
+                announced.append((t.at_s / 60, t.change))
                 monitor.acknowledge("paused_long", t.occurrence, "Ann", t.at_s)
-    assert told == [(5.0, "raised"), (10.0, "recaused"), (20.0, "recaused"), (40.0, "recaused")]
+    assert announced == [(5.0, "raised"), (10.0, "recaused"), (20.0, "recaused"), (40.0, "recaused")]
     state.set_paused(False)
     monitor.step(state.snapshot(3001.0))
     assert not monitor.alarms["paused_long"].is_standing

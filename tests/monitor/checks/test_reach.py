@@ -62,12 +62,12 @@ def test_an_old_speed_says_nothing_of_now() -> None:
 
 
 def raised(monitor: Monitor, facts: ReachFacts, seconds: float, begin_s: float) -> list[str]:
-    told: list[str] = []
+    changes: list[str] = []
     for tenth in range(round(seconds * 10)):
         now_s = begin_s + tenth / 10
         snapshot = replace(known(now_s=now_s, speed=Twist(speed_mps=4.2)), reach=facts)
-        told += [t.change for t in monitor.step(snapshot) if t.alarm_id == "reach"]
-    return told
+        changes += [t.change for t in monitor.step(snapshot) if t.alarm_id == "reach"]
+    return changes
 
 
 def test_a_reload_and_a_tap_raise_nothing_and_15_s_of_silence_do() -> None:

@@ -79,7 +79,7 @@ def test_it_records(facts: dict[str, Any], verdict: Verdict, text: str) -> None:
 
 def test_a_stopped_recorder_is_told_at_once_and_alone_and_while_paused() -> None:
     monitor = Monitor()
-    told = []
+    announced = []
     for tenth in range(100):
         stopped = tenth >= 20
         facts = RecorderFacts(
@@ -88,9 +88,9 @@ def test_a_stopped_recorder_is_told_at_once_and_alone_and_while_paused() -> None
             left_gb=0.1 if stopped else 5.0,
         )
         snapshot = replace(known(now_s=tenth / 10), recorder=facts, paused=True, paused_since_s=0.0)
-        told += [
+        announced += [
             (t.at_s, t.alarm_id, t.change)
             for t in monitor.step(snapshot)
             if t.announces and t.alarm_id in ("recording_stopped", "recorder_behind", "disk_nearly_full")
         ]
-    assert told == [(2.0, "recording_stopped", "raised")]
+    assert announced == [(2.0, "recording_stopped", "raised")]

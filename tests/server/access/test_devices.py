@@ -67,7 +67,7 @@ async def test_who_is_removed_is_not_written_back_by_a_list_of_before(tmp_path: 
     disk_answers = threading.Event()
     storage.submit(lambda: disk_answers.wait() and None)
     devices.save_seen(now_ms=100_000)  # it is in this list
-    devices.remove(device.id)
+    devices.remove(device.id, now_ms=100_000)
     saving = asyncio.create_task(devices.save(now_ms=100_001))
     await asyncio.sleep(0)
     disk_answers.set()

@@ -28,13 +28,14 @@ FOR_ANYBODY = {
     "GET /api/health",
     "GET /apple-touch-icon.png",
     "GET /favicon.ico",
+    "GET /fleet",
     "GET /manifest.webmanifest",
     "GET /offline",
     "GET /worker.js",
     "POST /api/pair",
 }
 VIEWERS_ORDERS = {"POST /api/ticket"}
-NOT_FOR_VIEWERS_TO_READ = {"GET /api/devices", "GET /api/mail", "GET /api/mail/settings", "GET /api/mail/{n}"}
+NOT_FOR_VIEWERS_TO_READ = {f"GET /api/{name}" for name in ("devices", "people", "mail", "mail/settings", "mail/{n}")}
 
 
 def walk(routes: list[BaseRoute]) -> Iterator[BaseRoute]:

@@ -53,12 +53,12 @@ def test_few_pins_stand_at_once() -> None:
 async def test_the_terminal_shows_the_same_until_it_is_used_or_old() -> None:
     now_s = 0.0
     access = access_of(config(), now=lambda: now_s, wall_ms=lambda: 0)
-    told: list[tuple[str, Role]] = []
-    access.on_paired = lambda name, role: told.append((name, role))
+    paired: list[tuple[str, Role]] = []
+    access.on_paired = lambda name, role: paired.append((name, role))
     first = access.invitation()
     assert (access.invite(), access.pin()) == (first.token, first.pin)
     await access.pair(token=first.token, pin=None, name="Pixel", peer="10.0.0.9")
-    assert told == [("Pixel", Role.OPERATOR)]
+    assert paired == [("Pixel", Role.OPERATOR)]
     second = access.invitation()
     assert second.token != first.token
     now_s = LASTS_S

@@ -17,6 +17,7 @@ from server.analysis.check_pool import check_each
 from server.analysis.check_recording import CANNOT, CRITICAL, NO_CRITICAL, CheckOptions
 from server.analysis.rehearse import Extract
 from server.recording.read.by_recording import by_recording
+from server.recording.verify import verify
 from server.simulator.scenarios import planned
 from tests.interrupted import INTERRUPTED
 from tests.server.analysis.conftest import Checking, recorded
@@ -111,3 +112,18 @@ def test_parts_of_a_recording_of_ours_are_one(tmp_path: Path) -> None:
     clip = record(tmp_path / "car" / "a_clip.mcap", clip_of="a_1")
     missing = tmp_path / "missing.mcap"
     assert by_recording([first, other, clip, missing, second]) == [[first, second], [other], [clip], [missing]]
+
+
+def test_the_report_says_whether_the_recording_is_as_it_was_recorded(check: Checking, tmp_path: Path) -> None:
+    path = record(tmp_path / "car" / "a_1.mcap", seconds=5.0)
+    ending = check(path)
+    head = verify(path).head
+    assert head is not None
+    assert f"Event log: Intact · {head[:8]}\n" in ending.out
+    assert f"records, head {head}." in ending.out
+    raw = path.read_bytes()
+    path.write_bytes(raw[:60] + bytes((raw[60] ^ 1,)) + raw[61:])
+    ending = check(path, "--json", "-", "--html", tmp_path / "page.html")
+    (found,) = ending.json["recording"]["verified"]
+    assert (found["short"], found["is_broken"], found["head"]) == ("Broken at record 1", True, None)
+    assert "Event log: Broken at record 1" in (tmp_path / "page.html").read_text()

@@ -20,7 +20,7 @@ TWIST = "geometry_msgs/msg/Twist"
 ROWS: list[Row] = [(0.05 * n, "/catvehicle/vel", TWIST, {"linear": {"x": 2.0}}) for n in range(401)]  # 20 s
 
 
-def told(at_s: float, change: str, alarm: str | None = "speed_limit", n: int = 1, **more: Any) -> Own:
+def logged(at_s: float, change: str, alarm: str | None = "speed_limit", n: int = 1, **more: Any) -> Own:
     at_ms = BEGIN_S * 1000 + round(at_s * 1000)
     return (BEGIN_S * NS + round(at_s * NS), "/catgraph/alarms", event(n, at_ms, change, alarm, **more))
 
@@ -31,9 +31,9 @@ def made(folder: Path, own: list[Own], **metadata: str) -> Path:
 
 def found(path: Path) -> RecordedLog:
     with open_recording([path]) as recording:
-        told = read_recorded_log(recording)
-    assert told is not None
-    return told
+        logged = read_recorded_log(recording)
+    assert logged is not None
+    return logged
 
 
 def page(path: Path, folder: Path) -> tuple[str, dict[str, Any]]:
@@ -46,26 +46,26 @@ def page(path: Path, folder: Path) -> tuple[str, dict[str, Any]]:
 
 
 STORY = [
-    told(1.0, "connected", None, text="Connected."),
-    told(2.0, "raised", n=2, text="3.4 m/s, limit 3.0 m/s", state="UNACKED", announces=True),
-    told(4.0, "acknowledged", n=3, by="Ann <b>", state="ACKED"),
-    told(5.0, "suppressed", n=4, state="ACKED"),
-    told(6.0, "unsuppressed", n=5, state="ACKED"),
-    told(7.0, "recaused", n=6, text="and worse", state="UNACKED", announces=True),
-    told(9.0, "cleared", n=7, text="2.0 m/s", state="NORMAL"),
-    told(12.0, "raised", "obstacle", n=8, text="4.2 m", priority="odd", state="UNACKED", announces=True),
+    logged(1.0, "connected", None, text="Connected."),
+    logged(2.0, "raised", n=2, text="3.4 m/s, limit 3.0 m/s", state="UNACKED", announces=True),
+    logged(4.0, "acknowledged", n=3, by="Ann <b>", state="ACKED"),
+    logged(5.0, "suppressed", n=4, state="ACKED"),
+    logged(6.0, "unsuppressed", n=5, state="ACKED"),
+    logged(7.0, "recaused", n=6, text="and worse", state="UNACKED", announces=True),
+    logged(9.0, "cleared", n=7, text="2.0 m/s", state="NORMAL"),
+    logged(12.0, "raised", "obstacle", n=8, text="4.2 m", priority="odd", state="UNACKED", announces=True),
 ]
 
 
 def test_alarms_are_those_that_were_told(tmp_path: Path) -> None:
-    told = found(made(tmp_path, STORY))
-    speed, obstacle = told.episodes
+    logged = found(made(tmp_path, STORY))
+    speed, obstacle = logged.episodes
     assert (speed.raised_s, speed.cleared_s, speed.trip_text) == (2.0, 9.0, "3.4 m/s, limit 3.0 m/s")
     assert [(said.at_s, said.change) for said in speed.announcements] == [(2.0, "raised"), (7.0, "recaused")]
     assert speed.suppressed == ((5.0, 6.0),)
     assert (obstacle.cleared_s, obstacle.until_s, str(obstacle.priority)) == (None, 20.0, "advisory")
-    assert (told.load.announced, told.load.most_in_10_min) == (3, 3)
-    assert [(e.at_s, e.change, e.by) for e in told.entries][:3] == [
+    assert (logged.load.announced, logged.load.most_in_10_min) == (3, 3)
+    assert [(e.at_s, e.change, e.by) for e in logged.entries][:3] == [
         (1.0, "connected", ""),
         (2.0, "raised", ""),
         (4.0, "acknowledged", "Ann <b>"),
@@ -92,15 +92,15 @@ def test_a_clip_s_page_says_what_stood_already(tmp_path: Path) -> None:
     stood = [event(1, BEGIN_S * 1000 - 90_000, "raised", text="3.1 m/s", state="UNACKED")]
     path = made(
         tmp_path,
-        [told(4.0, "acknowledged", n=2, state="ACKED")],
+        [logged(4.0, "acknowledged", n=2, state="ACKED")],
         clip_of="car_1",
         clip_at_ms=str(BEGIN_S * 1000 + 10_000),
         standing=json.dumps(stood),
     )
-    told_ = found(path)
-    (episode,) = told_.episodes
+    recorded = found(path)
+    (episode,) = recorded.episodes
     assert (episode.raised_s, episode.cleared_s, episode.trip_text) == (0.0, None, "3.1 m/s")
-    assert told_.clip_at_s == 10.0
+    assert recorded.clip_at_s == 10.0
     text, _ = page(path, tmp_path)
     assert "My drive · catgraph incident" in text
     assert "20.0 s of car_1" in text
@@ -125,11 +125,11 @@ def test_what_is_no_event_and_too_many_of_them_spoil_nothing(tmp_path: Path) -> 
         {"at_ms": 1, "change": 3},
         {"at_ms": 1, "change": "a", "alarm": 4},
     ]
-    for n, told in enumerate(odd + [event(n, BEGIN_S * 1000, "connected", None) for n in range(MOST_ENTRIES + 5)]):
-        ours.own(BEGIN_S * NS + n, "/catgraph/alarms", told)
-    told_ = found(ours.close())
-    assert (len(told_.entries), told_.left_out, told_.episodes) == (MOST_ENTRIES, 5, ())
-    assert told_.clip_at_s is None
+    for n, logged in enumerate(odd + [event(n, BEGIN_S * 1000, "connected", None) for n in range(MOST_ENTRIES + 5)]):
+        ours.own(BEGIN_S * NS + n, "/catgraph/alarms", logged)
+    recorded = found(ours.close())
+    assert (len(recorded.entries), recorded.left_out, recorded.episodes) == (MOST_ENTRIES, 5, ())
+    assert recorded.clip_at_s is None
 
 
 @pytest.mark.parametrize("toml", ["not TOML at all [", "[limits.gone]\nx = 1.0\n", 'profile = "nobody"\n'])

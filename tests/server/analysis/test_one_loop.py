@@ -317,10 +317,10 @@ def test_the_tables_hold_every_transition(driven: Driven, tmp_path: Path) -> Non
 
 def test_the_page_of_the_drive_has_the_announced_alarms(driven: Driven) -> None:
     with open_recording([driven.path]) as recording:
-        told = read_recorded_log(recording)
-    assert told is not None
+        recorded = read_recorded_log(recording)
+    assert recorded is not None
     raised = [one for one in driven.transitions if one.change == "raised"]
-    assert sorted(one.alarm_id for one in told.episodes) == sorted(one.alarm_id for one in raised)
+    assert sorted(one.alarm_id for one in recorded.episodes) == sorted(one.alarm_id for one in raised)
 
 
 def test_a_clip_that_begins_in_a_pause_is_judged_as_the_whole(

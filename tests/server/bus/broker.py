@@ -13,6 +13,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import nats
+import psutil
 import pytest
 from nats.aio.client import Client
 
@@ -29,30 +30,56 @@ def nats_server() -> str:
 class Broker:
     """One nats-server on a port of its own, which it keeps when it starts again."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, include: Path | None = None, store: Path | None = None, host: str = "127.0.0.1") -> None:
+        """`include`: a configuration that it includes, and reads again when it is told to.
+
+        `store`: the folder of JetStream; None: without it.
+        """
+        self._include = include
+        self._store = store
+        self._host = host
         with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
+            probe.bind((host, 0))
             self.port: int = probe.getsockname()[1]
         self._process: asyncio.subprocess.Process | None = None
 
     @property
     def address(self) -> str:
-        return f"nats://127.0.0.1:{self.port}"
+        return f"nats://{self._host}:{self.port}"
 
     async def start(self) -> None:
-        self._process = await asyncio.create_subprocess_exec(
-            nats_server(), "-a", "127.0.0.1", "-p", str(self.port), stderr=asyncio.subprocess.DEVNULL
-        )
+        options = ["-a", self._host, "-p", str(self.port)]
+        if self._include is not None:
+            conf = self._include.with_name("broker.conf")
+            conf.write_text(f"host: {self._host}\nport: {self.port}\ninclude ./{self._include.name}\n")
+            options = ["-c", str(conf)]
+        if self._store is not None:
+            options += ["-js", "-sd", str(self._store)]
+        self._process = await asyncio.create_subprocess_exec(nats_server(), *options, stderr=asyncio.subprocess.DEVNULL)
         until_s = time.monotonic() + 10
         while True:
             try:
-                _, writer = await asyncio.open_connection("127.0.0.1", self.port)
+                _, writer = await asyncio.open_connection(self._host, self.port)
             except OSError:
                 assert time.monotonic() < until_s, "nats-server does not listen"
                 await asyncio.sleep(0.02)
             else:
                 writer.close()
                 return
+
+    @property
+    def pid(self) -> int:
+        assert self._process is not None
+        return self._process.pid
+
+    def cpu_s(self) -> float:
+        """Processor time that it has used [s]."""
+        spent = psutil.Process(self.pid).cpu_times()
+        return float(spent.user + spent.system)
+
+    def reload(self) -> None:
+        assert self._process is not None
+        self._process.send_signal(signal.SIGHUP)
 
     async def kill(self) -> None:
         if self._process is not None:
@@ -63,8 +90,10 @@ class Broker:
 
 
 @contextlib.asynccontextmanager
-async def running_broker() -> AsyncIterator[Broker]:
-    broker = Broker()
+async def running_broker(
+    *, include: Path | None = None, store: Path | None = None, host: str = "127.0.0.1"
+) -> AsyncIterator[Broker]:
+    broker = Broker(include=include, store=store, host=host)
     try:
         await broker.start()
         yield broker

@@ -11,7 +11,7 @@ from server.bus.bus import PageBus
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
 from server.bus.nats_agent import NatsAgent
-from server.bus.nats_bus import NatsBus
+from server.bus.nats_bus import NatsBus, Read, as_it_is
 from tests.server.bus.broker import connected
 
 SOON_S = 15.0  # on two busy cores
@@ -76,8 +76,8 @@ async def local_buses() -> AsyncIterator[Buses]:
 async def offering(bus: LocalBus, address: str, run: str, clock: Clock) -> AsyncIterator[NatsAgent]:
     """An agent that offers the vehicles of this bus."""
     async with connected(address) as client:
-        agent = NatsAgent(bus, client, run=run, now=clock)
-        await agent.start()
+        agent = NatsAgent(bus, run=run, now=clock)
+        await agent.start(client)
         try:
             yield agent
         finally:
@@ -85,11 +85,11 @@ async def offering(bus: LocalBus, address: str, run: str, clock: Clock) -> Async
 
 
 @contextlib.asynccontextmanager
-async def node(address: str, clock: Clock) -> AsyncIterator[NatsBus]:
+async def node(address: str, clock: Clock, *, read: Read = as_it_is) -> AsyncIterator[NatsBus]:
     """The bus of a web node."""
     async with connected(address) as client:
-        bus = NatsBus(client, now=clock)
-        await bus.start()
+        bus = NatsBus(now=clock, read=read)
+        await bus.start(client)
         try:
             yield bus
         finally:

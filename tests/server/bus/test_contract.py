@@ -84,6 +84,20 @@ async def test_a_frame_that_was_not_replaced_is_outdated(opened: Opened) -> None
         assert both.page.newest("ocelot", "state") is None
 
 
+async def test_a_frame_is_as_old_as_what_it_holds(opened: Opened) -> None:
+    """A process may be stopped between the moment that a frame is of and the moment at which it is put."""
+    async with opened() as both:
+        both.page.watch("ocelot", lambda _: None)
+        await until(lambda: both.session.watched("ocelot"))
+        both.session.put("ocelot", "state", "late", made_s=both.clock() - FRAME_LIVES_S - 0.1)
+        await asyncio.sleep(0.05)
+        assert both.page.newest("ocelot", "state") is None
+        both.session.put("ocelot", "state", "new", made_s=both.clock() - 1.0)
+        frame = await until(lambda: both.page.newest("ocelot", "state"))
+        assert frame.payload == "new"
+        assert 1.0 <= both.clock() - frame.put_s < FRAME_LIVES_S
+
+
 async def test_a_session_knows_whether_anybody_looks(opened: Opened) -> None:
     async with opened() as both:
         assert not both.session.watched("ocelot")

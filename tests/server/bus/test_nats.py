@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
+from typing import Any
 
+import orjson
 import pytest
 
 from server.bus import nats_wire as wire
-from server.bus.bus import FRAME_LIVES_S, NotServed
+from server.bus.bus import ALL, FRAME_LIVES_S, NotServed, PageBus
+from server.bus.journal import Journal
+from server.bus.local import LocalBus
+from server.bus.nats_agent import NatsAgent
 from server.bus.nats_sync import processed
+from server.web.cars_board import CarsBoard
 from tests.page.radio import Radio
 from tests.server.bus.broker import Broker, connected, running_broker
-from tests.server.bus.buses import Buses, event, local_buses, nats_buses, node, numbers, offering, until
+from tests.server.bus.buses import Buses, Clock, event, local_buses, nats_buses, node, numbers, offering, until
 
 LATE_S = 1.2
 
@@ -80,11 +86,25 @@ async def test_a_command_that_comes_late_is_not_carried_out() -> None:
     async with over_radio() as (_, radio, both):
         assert await both.page.request("ocelot", {"what": 1}) == {"ok": True, "got": 1}
         radio.cut()
-        with pytest.raises(NotServed, match="did not answer within"):
+        with pytest.raises(NotServed, match="the agent of ocelot did not answer within") as why:
             await both.page.request("ocelot", {"what": 2}, deadline_s=0.4)
+        assert (why.value.outcome, why.value.cut) == ("unknown", "broker-agent"), "nobody here knows where it was lost"
         radio.mend()
         assert (await both.page.request("ocelot", {"what": 3}, deadline_s=10.0))["got"] == 3
         assert [one["what"] for one in both.commands] == [1, 3]
+
+
+async def test_a_command_whose_time_ran_out_while_its_signature_was_judged_is_not_carried_out() -> None:
+    async def slow(vehicle: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        both.clock.ahead_s += 5.0
+        return message
+
+    async with local_buses() as both:
+        agent = NatsAgent(both.session, run="run-1", now=both.clock, admit=slow)
+        asked = wire.Ask(do="command", command={"what": 1}, not_after_s=both.clock() + 3, run="run-1")
+        with pytest.raises(NotServed, match="the command reached ocelot too late and was not carried out") as why:
+            await agent._command("ocelot", asked)
+        assert (why.value.outcome, both.commands) == ("not_delivered", [])
 
 
 async def test_a_command_for_an_earlier_run_is_refused() -> None:
@@ -115,11 +135,13 @@ async def test_without_its_agent_a_vehicle_is_not_served_and_stays_known() -> No
     async with running_broker() as broker, local_buses() as both, node(broker.address, both.clock) as page:
         async with offering(both.session, broker.address, "run-1", both.clock):
             await until(lambda: page.vehicles)
-        with pytest.raises(NotServed, match="ocelot is not connected to the broker"):
+        with pytest.raises(NotServed, match="ocelot is not connected to the broker") as why:
             await page.request("ocelot", {}, deadline_s=0.3)
+        assert (why.value.outcome, why.value.cut) == ("not_delivered", "broker-agent")
         both.clock.ahead_s += 4.0
-        with pytest.raises(NotServed, match="nothing from ocelot for 4 s"):
+        with pytest.raises(NotServed, match="nothing came from the agent of ocelot for 4 s") as why:
             await page.request("ocelot", {})
+        assert (why.value.outcome, why.value.cut) == ("not_delivered", "broker-agent")
         assert "ocelot" in page.vehicles
 
 
@@ -170,3 +192,50 @@ async def test_a_flood_of_pulls_is_bounded() -> None:
                 await stranger.publish(wire.subject("ocelot", "pull.state"), pull, reply="nowhere")
             await processed(stranger)
             assert (await both.page.request("ocelot", {"what": 1}, deadline_s=10.0))["got"] == 1
+
+
+async def test_a_page_that_knew_one_car_hears_of_the_next() -> None:
+    clock, kinds = Clock(), list[str]()
+    summary = '{"worst": null, "waiting": 0, "phase": "monitoring"}'
+
+    async def answer(_: Mapping[str, Any]) -> dict[str, Any]:
+        return {"ok": True}
+
+    def named(page: PageBus) -> list[str]:
+        frame = page.newest(ALL, "cars")
+        return [] if frame is None else [car["name"] for car in orjson.loads(frame.payload)["cars"]]
+
+    async with running_broker() as broker, node(broker.address, clock) as page, contextlib.AsyncExitStack() as agents:
+        CarsBoard(page, now=clock, wall_ms=lambda: 0).watch(kinds.append)
+        buses: dict[str, LocalBus] = {}
+        for vehicle in ("ocelot", "margay"):
+            bus = buses[vehicle] = LocalBus(Journal(None), now=clock)
+            bus.serve(vehicle, answer)
+            await agents.enter_async_context(offering(bus, broker.address, f"run of {vehicle}", clock))
+            await until(lambda vehicle=vehicle: vehicle in page.vehicles)
+            if vehicle == "ocelot":
+                assert (await page.request(vehicle, {}))["ok"], "what was pulled would have been asked for before"
+                assert not bus.watched(ALL), "one car is no list, and its summary is of no use"
+        for vehicle, bus in buses.items():
+            await until(lambda bus=bus: bus.watched(ALL))
+            bus.put(ALL, vehicle, summary)
+            await until(lambda vehicle=vehicle: page.newest(ALL, vehicle))
+        await until(lambda: "cars" in kinds)
+        assert named(page) == ["margay", "ocelot"]
+
+
+async def test_which_part_was_lost_is_known_for_each_command() -> None:
+    async def slow(vehicle: str, command: Mapping[str, Any], **_: Any) -> Mapping[str, Any]:
+        raise NotServed("ocelot did not answer within 3 s", outcome="unknown")
+
+    async with running_broker() as broker, nats_buses(broker.address, broker.address) as both:
+        both.session.request = slow  # type: ignore[method-assign,assignment]
+        with pytest.raises(NotServed) as why:
+            await both.page.request("ocelot", {"what": 1})
+        assert why.value.outcome == "unknown", "as the agent says of its own session"
+        await broker.kill()
+        await until(lambda: both.page.trouble("ocelot"))
+        both.clock.ahead_s = -1.0
+        with pytest.raises(NotServed, match="the broker is not connected") as why:
+            await both.page.request("ocelot", {"what": 2})
+        assert (why.value.outcome, why.value.cut) == ("not_delivered", "server-broker")

@@ -98,7 +98,7 @@ def test_a_clip_is_a_recording(drive: Path, tmp_path: Path) -> None:
             ["--format", "bag", "--at", "1000"],
             "Nothing was recorded from 2026-09-21 14:29:30 to 2026-09-21 14:30:30 UTC.",
         ),
-        (["--format", "bag", "--out", "nowhere/x.bag"], "nowhere/x.bag cannot be written: nowhere is not a directory."),
+        (["--format", "bag", "--out", "nowhere/x.bag"], "nowhere/x.bag cannot be written: nowhere does not exist."),
         (["--format", "bag", "--out", f"in/{ID}.mcap"], "is the recording itself"),
     ],
 )
@@ -140,10 +140,10 @@ def test_what_is_damaged_is_left_out_and_said(drive: Path, tmp_path: Path, capsy
 
 async def test_for_a_mail_it_is_made_into_a_folder(drive: Path, tmp_path: Path) -> None:
     (tmp_path / "into").mkdir()
-    told: list[float] = []
-    made = await make_export(drive, "csv", tmp_path / "into", told.append)
+    reported: list[float] = []
+    made = await make_export(drive, "csv", tmp_path / "into", reported.append)
     assert made.path == tmp_path / "into" / f"{ID}.csv.zip"
-    assert told == sorted(told)
+    assert reported == sorted(reported)
     with pytest.raises(ExportRefused, match="does not exist"):
         await make_export(tmp_path / "nope.mcap", "csv", tmp_path / "into")
     with pytest.raises(ValueError, match="no format"):

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
+import re
 import sys
 import threading
 from collections.abc import Mapping
 from contextvars import copy_context
+from datetime import datetime
 from typing import Any
 
 import pytest
 
-from server.cli.logging import FORMAT, LONGEST, OneLine
-from server.system.log_context import about, keeping
+from server.cli.logging import FORMAT, LONGEST, JsonLine, OneLine
+from server.system.log_context import about, keeping, tracing
 
 
 def written(message: str, *arguments: object, fault: BaseException | None = None) -> str:
-    told = (type(fault), fault, fault.__traceback__) if fault is not None else None
-    return OneLine(FORMAT).format(logging.LogRecord("catgraph.x", logging.ERROR, "f", 1, message, arguments, told))
+    ei = (type(fault), fault, fault.__traceback__) if fault is not None else None
+    return OneLine(FORMAT).format(logging.LogRecord("catgraph.x", logging.ERROR, "f", 1, message, arguments, ei))
 
 
 @pytest.mark.parametrize(
@@ -80,3 +83,32 @@ async def test_a_line_names_its_car_also_from_a_handler_and_a_thread() -> None:
         "ERROR catgraph.x: from a task vehicle=ocelot",
         "ERROR catgraph.x: the server itself",
     ]
+
+
+def test_a_line_of_json_names_car_and_command() -> None:
+    record = logging.LogRecord("catgraph.x", logging.INFO, "f", 1, "command kind=%s", ("a\n\u202eb",), None)
+    with about("ocelot"), tracing("8f00ba12-7"):
+        found = json.loads(JsonLine().format(record))
+        text = OneLine(FORMAT).format(record)
+    assert text == "INFO catgraph.x: command kind=a\\n\\u202eb vehicle=ocelot trace=8f00ba12-7"
+    datetime.fromisoformat(found.pop("time"))
+    assert found == {
+        "level": "info",
+        "logger": "catgraph.x",
+        "message": "command kind=a\\n\\u202eb",
+        "vehicle": "ocelot",
+        "trace": "8f00ba12-7",
+    }
+    try:
+        raise ValueError("no\x1b")
+    except ValueError:
+        record.exc_info = sys.exc_info()
+    found = json.loads(JsonLine().format(record))
+    assert "ValueError: no\\x1b" in found["error"]
+    assert "trace" not in found
+
+
+@pytest.mark.parametrize("trace", [None, 7, "a b c d", "x", "\n" * 9, "x" * 81])
+def test_an_id_of_a_command_that_is_none_is_replaced(trace: object) -> None:
+    with tracing(trace) as id:
+        assert re.fullmatch(r"[0-9a-f]{16}", id)

@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import orjson
@@ -142,7 +143,8 @@ async def test_spacing_is_that_of_the_drive(recordings: Path) -> None:
         for _ in range(1_000):
             await probe.hear(5)
             times.append(time.monotonic())
-    off = sorted(abs((t - times[0]) - (r - recorded[0])) for t, r in zip(times, recorded, strict=False))
+    late = [t - r for t, r in zip(times, recorded, strict=False)]
+    off = sorted(abs(one - median(late)) for one in late)  # from the median: the first one may itself be late
     assert off[500] < 0.005
     assert off[900] < 0.05  # the machine is busy with other tests
     assert recorded[999] - recorded[0] > 3.5

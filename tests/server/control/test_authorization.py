@@ -220,7 +220,7 @@ def test_a_page_that_shows_a_replay_keeps_control_and_hears_no_alarm() -> None:
         ({}, Caller(name="operator")),
         (
             {"by": "Ann\x1b", "who": "x", "page": "page-a", "fence": 7},
-            Caller(name="Ann", who="x", page="page-a", fence=7),
+            Caller(name="Ann", device="Ann", who="x", page="page-a", fence=7),
         ),
         ({"fence": True}, Caller(name="operator")),
         ({"fence": -1}, Caller(name="operator")),

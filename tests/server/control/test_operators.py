@@ -171,10 +171,16 @@ async def test_the_recording_says_who_ordered_from_which_page(bridge: RosBridge,
     (path,) = (tmp_path / "recordings").rglob("*.mcap")
     with open_recording([path]) as recording:
         took = next(row for _, row in recording.own("/catgraph/operator"))
-        (told,) = [row for _, row in recording.own("/catgraph/phone")]
+        (position,) = [row for _, row in recording.own("/catgraph/phone")]
         log = [row["text"] for _, row in recording.own("/catgraph/alarms")]
     assert took == took | {"kind": "control", "do": "take", "by": "Ann", "who": "local", "page": "page-ann", "ok": True}
-    assert told == told | {"phone": "page-ann", "why": "timeout", "by": "Ann", "who": "local", "page": "page-ann"}
+    assert position == position | {
+        "phone": "page-ann",
+        "why": "timeout",
+        "by": "Ann",
+        "who": "local",
+        "page": "page-ann",
+    }
     assert "Ann is in control." in log
 
 

@@ -24,6 +24,7 @@ from monitor.values import (
     Component,
     Diagnostics,
     Distance,
+    DriveMode,
     Effort,
     GpsFix,
     Heading,
@@ -144,6 +145,19 @@ SHAPES: dict[str, tuple[str, str, Any]] = {
     ),
     "BatteryState": ("fuel", "sensor_msgs/BatteryState", Level(value=72.0, unit="%")),
     "Float32   ": ("fuel", "std_msgs/Float32", Level(value=14.550000190734863, unit="%")),
+    "Bool": ("mode", "std_msgs/Bool", DriveMode(mode="autonomous", said="true")),
+    "UInt8": ("mode", "std_msgs/UInt8", DriveMode(mode="unknown", said="1", number=1)),
+    "String": ("mode", "std_msgs/String", DriveMode(mode="autonomous", said="autonomous")),
+    "ControlModeReport": (
+        "mode",
+        "autoware_vehicle_msgs/ControlModeReport",
+        DriveMode(mode="manual", said="manual"),
+    ),
+    "ControlModeReport.auto": (
+        "mode",
+        "autoware_auto_vehicle_msgs/ControlModeReport",
+        DriveMode(mode="manual", said="manual"),
+    ),
 }
 DECODERS = {read for row in TOPICS for read in row.types.values()}
 

@@ -12,16 +12,16 @@ from server.mail.outbox import MAX_OPEN
 from tests.server.mail.mailing import Shelf, order, settings
 
 
-async def main(told: argparse.Namespace) -> None:
+async def main(options: argparse.Namespace) -> None:
     mailer = Mailer(
-        told.folder, Shelf(told.shelf), wall_ms=lambda: time.time_ns() // 1_000_000, pause_s=lambda attempts: 0.02
+        options.folder, Shelf(options.shelf), wall_ms=lambda: time.time_ns() // 1_000_000, pause_s=lambda attempts: 0.02
     )
     await mailer.start()
     assert mailer.trouble is None, mailer.trouble
     if not mailer.settings.is_complete:
-        await mailer.change(settings(told.port, limit_mb=0.1))
+        await mailer.change(settings(options.port, limit_mb=0.1))
     print("started", flush=True)
-    for i in range(told.orders):  # the same keys at each start: an order that was taken is not taken twice
+    for i in range(options.orders):  # the same keys at each start: an order that was taken is not taken twice
         await mailer.order(f"order-{i:04}", order("large" if i % 10 == 9 else "small", subject=f"Drive {i}"))
         if i % 10 == 9:
             print(f"ordered {i + 1}", flush=True)

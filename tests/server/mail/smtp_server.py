@@ -23,18 +23,18 @@ from aiosmtpd.smtp import SMTP, AuthResult, Envelope, LoginPassword, Session
 class Mailbox:
     """Takes mail as it was told to."""
 
-    def __init__(self, told: argparse.Namespace) -> None:
-        self.told = told
-        self.folder: Path = told.folder
-        self.chance = random.Random(told.seed)
+    def __init__(self, options: argparse.Namespace) -> None:
+        self.options = options
+        self.folder: Path = options.folder
+        self.chance = random.Random(options.seed)
         self.count = len(list(self.folder.glob("*.eml")))
 
     async def handle_RCPT(
         self, server: SMTP, session: Session, envelope: Envelope, address: str, options: list[str]
     ) -> str:
-        if address in self.told.refuse:
+        if address in self.options.refuse:
             return f"550 5.1.1 <{address}>: no such mailbox"
-        if address in self.told.delay:
+        if address in self.options.delay:
             return f"450 4.2.0 <{address}>: greylisted, come back later"
         envelope.rcpt_tos.append(address)
         envelope.rcpt_options.extend(options)
@@ -42,9 +42,9 @@ class Mailbox:
 
     async def handle_DATA(self, server: SMTP, session: Session, envelope: Envelope) -> str:
         mood = self.chance.random()
-        if mood < self.told.temporary:
+        if mood < self.options.temporary:
             return "451 4.3.0 try again later"
-        if self.told.reject:
+        if self.options.reject:
             return "554 5.6.0 content rejected"
         content = envelope.original_content or b""
         message = email.message_from_bytes(content)
@@ -68,17 +68,17 @@ class Mailbox:
                 )
                 + "\n"
             )
-        if mood < self.told.temporary + self.told.lost:
+        if mood < self.options.temporary + self.options.lost:
             assert server.transport is not None
             server.transport.abort()  # it has it, and nobody is told
         return "250 2.0.0 OK queued as " + path.stem
 
 
-def login(told: argparse.Namespace) -> Any:
+def login(options: argparse.Namespace) -> Any:
     def check(server: SMTP, session: Session, envelope: Envelope, mechanism: str, data: Any) -> AuthResult:
         is_known = isinstance(data, LoginPassword) and (data.login, data.password) == (
-            told.user.encode(),
-            told.password.encode(),
+            options.user.encode(),
+            options.password.encode(),
         )
         if is_known:
             return AuthResult(success=True, auth_data=data)
@@ -88,30 +88,30 @@ def login(told: argparse.Namespace) -> Any:
     return check
 
 
-async def main(told: argparse.Namespace) -> None:
-    told.folder.mkdir(parents=True, exist_ok=True)
-    box = Mailbox(told)
+async def main(options: argparse.Namespace) -> None:
+    options.folder.mkdir(parents=True, exist_ok=True)
+    box = Mailbox(options)
     context = None
-    if told.cert:
+    if options.cert:
         context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
-        context.load_cert_chain(told.cert)
+        context.load_cert_chain(options.cert)
 
     def serve() -> SMTP:
         return SMTP(
             box,
             hostname="mail.test",
-            enable_SMTPUTF8=not told.ascii,
-            data_size_limit=told.size,
-            tls_context=context if told.starttls else None,
-            require_starttls=told.starttls,
-            auth_required=bool(told.user),
-            auth_require_tls=told.starttls,
-            authenticator=login(told) if told.user else None,
+            enable_SMTPUTF8=not options.ascii,
+            data_size_limit=options.size,
+            tls_context=context if options.starttls else None,
+            require_starttls=options.starttls,
+            auth_required=bool(options.user),
+            auth_require_tls=options.starttls,
+            authenticator=login(options) if options.user else None,
         )
 
     loop = asyncio.get_running_loop()
     server = await loop.create_server(
-        serve, "127.0.0.1", told.port, ssl=context if context and not told.starttls else None, reuse_address=True
+        serve, "127.0.0.1", options.port, ssl=context if context and not options.starttls else None, reuse_address=True
     )
     print(server.sockets[0].getsockname()[1], flush=True)
     await server.serve_forever()

@@ -28,7 +28,7 @@ async def sending(tmp_path: Path, port: int, orders: int) -> asyncio.subprocess.
     )
 
 
-async def told(process: asyncio.subprocess.Process, word: str) -> None:
+async def printed(process: asyncio.subprocess.Process, word: str) -> None:
     assert process.stdout is not None
     while line := (await process.stdout.readline()).decode():
         if line.startswith(word):
@@ -45,7 +45,7 @@ async def killed_again_and_again(tmp_path: Path, post: Post, orders: int, kills:
     async with asyncio.timeout(within_s):
         for count in at:
             process = await sending(tmp_path, post.port, orders)
-            await told(process, "started")
+            await printed(process, "started")
             while len({one["message_id"] for one in post.taken}) < count:
                 assert process.returncode is None, "the sender ended by itself"
                 await asyncio.sleep(0.01)
@@ -53,7 +53,7 @@ async def killed_again_and_again(tmp_path: Path, post: Post, orders: int, kills:
             process.kill()
             await process.wait()
         process = await sending(tmp_path, post.port, orders)
-        await told(process, "over")
+        await printed(process, "over")
         assert await process.wait() == 0
 
 

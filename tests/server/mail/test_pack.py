@@ -88,11 +88,11 @@ def test_several_recordings_go_in_one_zip_and_a_zip_is_not_zipped_again(tmp_path
 def test_it_is_compressed_and_told_how_far_it_is(tmp_path: Path) -> None:
     drive = tmp_path / "drive.mcap"
     drive.write_bytes(b"speed 4.2 m/s\n" * 300_000)
-    told: list[float] = []
-    whole = pack([drive], tmp_path / "p.zip", "drive", START_MS, told.append, threading.Event())
+    reported: list[float] = []
+    whole = pack([drive], tmp_path / "p.zip", "drive", START_MS, reported.append, threading.Event())
     assert whole.size_bytes < 0.05 * drive.stat().st_size
-    assert told == sorted(told)
-    assert told[-1] == pytest.approx(1.0)
+    assert reported == sorted(reported)
+    assert reported[-1] == pytest.approx(1.0)
 
 
 def test_packing_can_be_broken_off(tmp_path: Path) -> None:

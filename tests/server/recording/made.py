@@ -37,14 +37,18 @@ def record(
     at: tuple[float, float] | None = (32.2319, -110.9501),
     bend_deg: float = 3.0,
     is_closed: bool = True,
+    own: Sequence[dict[str, Any]] = (),
     **metadata: str,
 ) -> Path:
-    """A drive at a steady speed, north at first and then ever more to the right; `at` None: without a position."""
-    told = {"vehicle": path.parent.name, "session": "5e55", "part": "1", "started_ms": str(began_ms)} | metadata
-    file = PartFile(path, profile="ros1", metadata=told)
+    """A drive at a steady speed, north at first and then ever more to the right; `at` None: without a position. `own`:
+    more events of its log, at its beginning."""
+    fields = {"vehicle": path.parent.name, "session": "5e55", "part": "1", "started_ms": str(began_ms)} | metadata
+    file = PartFile(path, profile="ros1", metadata=fields)
     fix, vel = _known("sensor_msgs/NavSatFix"), _known("geometry_msgs/Twist")
     east_m = north_m = heading = 0.0
     events = list(alarms)
+    for event in own:
+        _event(file, began_ms * 1_000_000, event)
     for n in range(round(seconds * 10) + 1):
         at_ns = began_ms * 1_000_000 + n * 100_000_000
         heading += math.radians(bend_deg) / 10

@@ -184,9 +184,9 @@ async def test_a_second_part_tells_which_alarms_stand_when_it_begins(bridge: Ros
         assert stood["speed_limit"]["occurrence"] == raised["occurrence"]
         numbers = {said["n"] for _, said in recording.own("/catgraph/alarms")}
         assert not numbers & {event["n"] for event in stood.values()}, "none is told twice"
-        told = read_recorded_log(recording)
-        assert told is not None
-        assert [e.raised_s for e in told.episodes if e.alarm_id == "speed_limit"] == [0.0]
+        recorded = read_recorded_log(recording)
+        assert recorded is not None
+        assert [e.raised_s for e in recorded.episodes if e.alarm_id == "speed_limit"] == [0.0]
 
 
 async def test_alarms_of_before_a_restart_stand_when_a_recording_begins(bridge: RosBridge, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import re
 import time
 from collections.abc import Callable
@@ -13,12 +14,14 @@ from typing import Any
 import pytest
 
 from server.judge.message import RosVersion
-from server.recording import recorder_queue, space_watch
+from server.recording import chain_neighbours, recorder_queue, space_watch
+from server.recording.chain_neighbours import read_first_metadata
 from server.recording.folder import RecordingsFolder
 from server.recording.read.read import open_recording
 from server.recording.recorder import Recorder
 from server.recording.recorder_queue import Part
 from server.recording.space import Allowance, amount
+from tests.server.recording.chained import closed
 
 AT_NS = 1_700_000_000_000_000_000
 PLENTY = Allowance(quota=0, min_free=0)
@@ -228,6 +231,36 @@ async def test_a_folder_that_is_none_is_said(tmp_path: Path) -> None:
     await user.until(lambda: user.recorder.status.state == "stopped")
     assert user.recorder.status.trouble == "Recording cannot begin: the folder for recordings is not a folder."
     await user.stop()
+
+
+async def test_a_file_whose_name_is_no_text_stops_no_recording(tmp_path: Path) -> None:
+    """Metadata cannot name it: the recording before that one is named."""
+    user = RecorderUser(tmp_path / "recordings")
+    part = user.part()
+    closed(part.path.with_name("car_20210101T000000Z.mcap"), [[1]])
+    closed(part.path.with_name(os.fsdecode(b"car_20220101T000000Z\xe9.mcap")), [[1]])
+    user.recorder.begin(part)
+    user.say(1)
+    await user.end(ended="closed")
+    await user.stop()
+    (path,) = user.finished
+    assert read_first_metadata(path)["previous"] == "car_20210101T000000Z"
+
+
+async def test_a_fault_of_the_search_for_the_recording_before_stops_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path) -> None:
+        raise ValueError("a file of an unforeseen kind")
+
+    monkeypatch.setattr(chain_neighbours, "newest_head", fail)
+    user = RecorderUser(tmp_path / "recordings")
+    user.recorder.begin(user.part())
+    user.say(1)
+    await user.end(ended="closed")
+    await user.stop()
+    (path,) = user.finished
+    assert "previous" not in read_first_metadata(path)
 
 
 async def test_a_file_that_is_taken_away_while_it_is_written_is_said(

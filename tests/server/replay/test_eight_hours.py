@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ ASKED: dict[str, Any] = {"kind": "drive_trends", "signals": ["speed", "distance"
     ],
 )
 def test_a_long_drive_opens_in_the_chart_within_0_3_s_and_60_kB(
-    hours: float, tmp_path: Path, record_property: pytest.RecordProperty
+    hours: float, tmp_path: Path, record_property: Callable[[str, object], None]
 ) -> None:
     lost_s = (LOST_S[0] * hours / 8, LOST_S[0] * hours / 8 + 60)
 

@@ -16,9 +16,11 @@ from server.recording.catalog.survey import survey
 from server.recording.read.read import open_recording
 from server.replay import alarm_history
 from server.replay.alarm_history import AlarmHistory
+from server.replay.manager import summary
 from server.replay.playback import RATES, WARM_UP_S, Playback
 from tests.frames import check_shape
 from tests.page import drives
+from tests.page.canned import live
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
 BAG = DATA / "catvehicle_2016-06-01.bag"
@@ -256,9 +258,9 @@ def test_a_pace_that_is_not_reached_is_said(playback: Playback) -> None:
     for now_s in (101.0, 102.0, 103.0):
         looks = iter([False] * 8 + [True] * 10_000)
         playback._work(now_s, lambda looks=looks: next(looks))  # time for some two hundred steps only
-    told = playback.position()["reached_rate"]
-    assert told is not None
-    assert 0 < told < 14
+    reached = playback.position()["reached_rate"]
+    assert reached is not None
+    assert 0 < reached < 14
     assert playback.at_s < 48.0
 
 
@@ -356,3 +358,10 @@ def test_a_history_that_is_too_long_is_not_shown_as_whole(monkeypatch: pytest.Mo
         history.add(Transition(alarm_id="a", occurrence=1, change="raised", at_s=at_s, text=""), at_s)
     assert [one.at_s for one in history.until("a", 2.9) or ()] == [1.0, 2.0]
     assert (history.until("a", 3.0), history.until("b", 2.0)) == (None, [])
+
+
+def test_a_page_that_replays_can_sign_orders_to_the_live_car() -> None:
+    state: Any = live()
+    assert "challenge" not in summary(state)
+    state["server"]["challenge"] = "of the agent"
+    assert summary(state)["challenge"] == "of the agent"

@@ -1,4 +1,4 @@
-"""What our own recordings tell beside the car's messages: alarms as they were told, pauses, settings, phones."""
+"""Recorded events of our own recordings: original alarms, pauses, settings and phones."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def toml(limit: float) -> str:
 
 def record(path: Path, own: list[tuple[float, Any, dict[str, Any]]], **metadata: str) -> Path:
     """Twenty seconds at 9 m/s, and what catgraph itself wrote."""
-    told = {"vehicle": "car", "session": "5e55", "settings": toml(11.0)} | metadata
-    file = PartFile(path, profile="ros1", metadata=told)
+    metadata = {"vehicle": "car", "session": "5e55", "settings": toml(11.0)} | metadata
+    file = PartFile(path, profile="ros1", metadata=metadata)
     vel = TypeBook(1).schema("geometry_msgs/Twist")
     assert vel is not None
     assert vel.encode is not None

@@ -83,7 +83,7 @@ HANDSHAKE = {
 }
 
 
-def is_well_told(problem: Problem) -> None:
+def is_well_worded(problem: Problem) -> None:
     assert problem.title.endswith(".")
     assert problem.title.count(". ") == 0, "one sentence"
     assert problem.hint.endswith((".", "?"))
@@ -99,7 +99,7 @@ def test_dialling_failed(error: BaseException, code: str, words: str) -> None:
     problem = of_dial_error(error, CAR)
     assert problem.code == code
     assert words in problem.title
-    is_well_told(problem)
+    is_well_worded(problem)
 
 
 @pytest.mark.parametrize(("error", "code", "words"), DIAL_SECURE.values(), ids=DIAL_SECURE)
@@ -107,7 +107,7 @@ def test_dialling_a_secure_address_failed(error: BaseException, code: str, words
     problem = of_dial_error(error, SECURE)
     assert problem.code == code
     assert words in problem.title
-    is_well_told(problem)
+    is_well_worded(problem)
 
 
 def test_a_reset_without_tls_is_no_matter_of_tls() -> None:
@@ -119,7 +119,7 @@ def test_no_websocket(reason: str, answer: bytes, code: str, words: str) -> None
     problem = of_handshake(CAR, reason, answer)
     assert problem.code == code
     assert words in problem.hint
-    is_well_told(problem)
+    is_well_worded(problem)
 
 
 def test_a_secure_connection_is_not_told_to_be_secure() -> None:
@@ -140,4 +140,4 @@ OTHERS = {
 
 @pytest.mark.parametrize("problem", OTHERS.values(), ids=OTHERS)
 def test_the_other_problems_are_well_told(problem: Problem) -> None:
-    is_well_told(problem)
+    is_well_worded(problem)

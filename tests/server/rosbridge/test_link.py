@@ -114,7 +114,7 @@ async def test_twenty_reconnects_multiply_no_subscription() -> None:
         await until(lambda: OVER in bridge.operations)
         assert bridge.operations == [*ROWS, OVER]
         assert len(bridge.connections) == link.attempts == 21
-        assert [name for name, _ in ear.told] == ["opened", "closed"] * 20 + ["opened"]
+        assert [name for name, _ in ear.received] == ["opened", "closed"] * 20 + ["opened"]
 
 
 @on_both_loops
@@ -222,19 +222,19 @@ async def test_after_the_bridges_goodbye_nothing_is_sent_and_the_link_closes_at_
 async def test_a_goodbye_that_cannot_be_answered_ends_the_link_all_the_same() -> None:
     """The bridge reads nothing, so that our answer stays in the pipe for ever."""
     ear = Ear()
-    told = asyncio.Event()
+    sent = asyncio.Event()
 
     async def leave(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await accept(reader, writer)
         reader._transport.pause_reading()  # type: ignore[attr-defined]
-        await told.wait()
+        await sent.wait()
         writer.write(b"\x88\x00")
         await asyncio.sleep(5)
 
     async with answering(leave) as port, linked(f"127.0.0.1:{port}", ear) as link:
         await ear.hears("opened")
         link._socket.sendMessage(b"x" * 12_000_000)  # type: ignore[union-attr]
-        told.set()
+        sent.set()
         assert (await ear.hears("closed", within_s=1.2)).code == "closed"
 
 
@@ -359,7 +359,7 @@ async def test_ended_while_open() -> None:
             await until(lambda: bridge.socket.state == 3)
             await bridge.socket.wait_closed()
             bridge.sockets.clear()
-        assert [name for name, _ in ear.told] == ["opened"]
+        assert [name for name, _ in ear.received] == ["opened"]
 
 
 @on_both_loops
@@ -378,7 +378,7 @@ async def test_ended_while_shaking_hands() -> None:
         async with linked(f"127.0.0.1:{port}", ear):
             await asyncio.wait_for(arrived.wait(), 2)
         await asyncio.wait_for(left.wait(), 0.5)
-    assert ear.told == []
+    assert ear.received == []
 
 
 @on_both_loops
@@ -400,7 +400,7 @@ async def test_ended_just_before_the_handshake_is_done() -> None:
             may_answer.set()
             link.stop()
             await asyncio.wait_for(left.wait(), 1)
-    assert ear.told == []
+    assert ear.received == []
 
 
 @on_both_loops

@@ -92,18 +92,18 @@ class SpyFactory(AsyncioRosBridgeClientFactory):  # type: ignore[misc]
         self._proto = None
         self._proto_lock = contextlib.nullcontext()
         self._stop = False
-        self.told: list[str] = []
+        self.calls: list[str] = []
 
     def ready(self, proto: Any) -> None:
-        self.told.append("ready")
+        self.calls.append("ready")
         super().ready(proto)
 
     def connection_lost(self, proto: Any) -> None:
-        self.told.append("lost")
+        self.calls.append("lost")
         super().connection_lost(proto)
 
     def _schedule_reconnect(self) -> None:
-        self.told.append("reconnect")
+        self.calls.append("reconnect")
 
 
 async def dial(port: int) -> tuple[Spy, SpyFactory]:
@@ -147,9 +147,9 @@ async def test_it_dials_in_one_place_and_tries_again_by_one_way() -> None:
     assert sorted(who("_schedule_reconnect")) == ["_connect_async", "connection_lost"]
     async with bridging() as bridge:
         protocol, factory = await dial(bridge.port)
-        await until(lambda: factory.told == ["ready"])
+        await until(lambda: factory.calls == ["ready"])
         bridge.socket.transport.abort()
-        await until(lambda: factory.told == ["ready", "lost", "reconnect"])
+        await until(lambda: factory.calls == ["ready", "lost", "reconnect"])
         assert protocol.calls == ["onOpen", "onClose"]
 
 
@@ -157,10 +157,10 @@ async def test_it_dials_in_one_place_and_tries_again_by_one_way() -> None:
 async def test_it_is_told_of_the_opening_and_once_of_the_end_opened_or_not() -> None:
     async with bridging() as bridge:
         protocol, factory = await dial(bridge.port)
-        await until(lambda: factory.told == ["ready"])
+        await until(lambda: factory.calls == ["ready"])
         protocol.dropConnection(abort=True)
         protocol.dropConnection(abort=True)
-        await until(lambda: "lost" in factory.told)
+        await until(lambda: "lost" in factory.calls)
         await asyncio.sleep(0.05)
         assert protocol.calls == ["onOpen", "onClose"]
 
@@ -169,7 +169,7 @@ async def test_it_is_told_of_the_opening_and_once_of_the_end_opened_or_not() -> 
 
     async with answering(hang_up) as port:
         protocol, factory = await dial(port)
-        await until(lambda: "lost" in factory.told)
+        await until(lambda: "lost" in factory.calls)
         assert protocol.calls == ["onClose"]
         assert protocol.wasNotCleanReason
 
@@ -178,7 +178,7 @@ async def test_it_is_told_of_the_opening_and_once_of_the_end_opened_or_not() -> 
 
     async with answering(refuse) as port:
         protocol, factory = await dial(port)
-        await until(lambda: "lost" in factory.told)
+        await until(lambda: "lost" in factory.calls)
         assert protocol.calls == ["onClose"]
         assert protocol.wasNotCleanReason == "WebSocket connection upgrade failed [404]: Not Found"
 

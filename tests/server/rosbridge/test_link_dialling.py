@@ -109,7 +109,7 @@ async def test_something_else_answers(handler: Handler, code: str, words: str) -
         assert link.heard_s is None
         await ear.hears("failed", 2)  # and goes on trying
         assert link.attempts - len(ear.all("failed")) in (0, 1)  # one word for each try
-        assert {name for name, _ in ear.told} == {"failed"}
+        assert {name for name, _ in ear.received} == {"failed"}
 
 
 @on_both_loops
@@ -136,7 +136,7 @@ async def test_a_handshake_that_comes_letter_by_letter_is_one() -> None:
 
     async with answering(dribble) as port, linked(f"127.0.0.1:{port}", ear):
         await ear.hears("status")
-        assert [name for name, _ in ear.told] == ["opened", "status"]
+        assert [name for name, _ in ear.received] == ["opened", "status"]
 
 
 @on_both_loops
@@ -152,7 +152,7 @@ async def test_what_comes_with_the_handshake_is_read_after_it() -> None:
 
     async with answering(hasten) as port, linked(f"127.0.0.1:{port}", ear):
         await ear.hears("closed")
-        assert [name for name, _ in ear.told][:3] == ["opened", "status", "closed"]
+        assert [name for name, _ in ear.received][:3] == ["opened", "status", "closed"]
 
 
 # -- nothing answers -------------------------------------------------------------------------------------------------
@@ -221,7 +221,7 @@ async def test_ended_while_dialling() -> None:
             await asyncio.sleep(0.1)
         await until(lambda: asyncio.all_tasks() == before, within_s=0.3)
         await until(lambda: psutil.Process().num_fds() <= fds + 1, within_s=0.3)  # uvloop keeps one of its own
-    assert ear.told == []
+    assert ear.received == []
 
 
 @on_both_loops
@@ -311,7 +311,7 @@ async def test_ended_while_a_name_is_looked_up(monkeypatch: pytest.MonkeyPatch) 
     await until(lambda: asyncio.all_tasks() == before, within_s=0.3)
     answers.set()
     await asyncio.sleep(0.05)
-    assert ear.told == []
+    assert ear.received == []
 
 
 # -- TLS -------------------------------------------------------------------------------------------------------------

@@ -59,7 +59,7 @@ async def test_junk_is_counted_and_harms_nothing(frame: bytes | str, why: str) -
         await bridge.say(frame)
         await bridge.say(GOOD)
         await ear.hears("message")
-        assert ear.told == [("opened", None), ("junk", why), ("message", ("/a", {"data": 1}, None))]
+        assert ear.received == [("opened", None), ("junk", why), ("message", ("/a", {"data": 1}, None))]
 
 
 QUIET: dict[str, bytes | str] = {
@@ -79,7 +79,7 @@ async def test_answers_that_nobody_waits_for_are_passed_over(frame: bytes | str)
         await bridge.say(frame)
         await bridge.say(GOOD)
         await ear.hears("message")
-        assert [name for name, _ in ear.told] == ["opened", "message"]
+        assert [name for name, _ in ear.received] == ["opened", "message"]
 
 
 STATUS: dict[str, tuple[dict[str, Any], tuple[str, str]]] = {
@@ -91,13 +91,13 @@ STATUS: dict[str, tuple[dict[str, Any], tuple[str, str]]] = {
 }
 
 
-@pytest.mark.parametrize(("fields", "told"), STATUS.values(), ids=STATUS)
-async def test_what_the_bridge_says_is_told_in_short(fields: dict[str, Any], told: tuple[str, str]) -> None:
+@pytest.mark.parametrize(("fields", "received"), STATUS.values(), ids=STATUS)
+async def test_what_the_bridge_says_is_told_in_short(fields: dict[str, Any], received: tuple[str, str]) -> None:
     ear = Ear()
     async with bridging() as bridge, linked(bridge.address, ear):
         await ear.hears("opened")
         await bridge.say({"op": "status"} | fields)
-        assert await ear.hears("status") == told
+        assert await ear.hears("status") == received
 
 
 @on_both_loops
@@ -127,7 +127,7 @@ async def test_a_message_of_20_mb_is_skipped_and_the_link_stays() -> None:
         await bridge.say(GOOD)
         await ear.hears("message", within_s=8)
         why = "a message of more than 16 MB"
-        assert ear.told == [
+        assert ear.received == [
             ("opened", None),
             ("junk", why),
             ("large", (None, 20_000_000)),
@@ -181,7 +181,7 @@ async def test_what_is_no_websocket_any_more_ends_the_connection_and_it_is_made_
         assert problem.code == "closed"
         assert words in problem.hint
         await ear.hears("message")
-        assert [name for name, _ in ear.told] == ["opened", "closed", "opened", "message"]
+        assert [name for name, _ in ear.received] == ["opened", "closed", "opened", "message"]
 
 
 @on_both_loops
@@ -224,9 +224,9 @@ async def test_ten_thousand_messages_at_once_come_in_order() -> None:
 @on_both_loops
 async def test_a_listener_that_stumbles_costs_one_message_and_is_told_once() -> None:
     ear = Ear()
-    told: list[logging.LogRecord] = []
+    logged: list[logging.LogRecord] = []
     handler = logging.Handler()
-    handler.emit = told.append  # type: ignore[method-assign]
+    handler.emit = logged.append  # type: ignore[method-assign]
     link_module.log.addHandler(handler)
     take = ear.message_received
 
@@ -245,7 +245,7 @@ async def test_a_listener_that_stumbles_costs_one_message_and_is_told_once() -> 
             await ear.hears("message")
             assert ear.all("junk") == ["a message that caused an internal error"] * 5
             assert ear.all("closed") == []
-            assert len(told) == 1
+            assert len(logged) == 1
     finally:
         link_module.log.removeHandler(handler)
 
@@ -311,7 +311,7 @@ async def main():
             await asyncio.sleep(1.8)
             e.sockets[-1].transport.abort()
             await asyncio.sleep(0.1)
-            kinds = [set(kind for kind, _ in ear.told) for ear in ears]
+            kinds = [set(kind for kind, _ in ear.received) for ear in ears]
             assert kinds == [{"failed"}, {"opened", "closed"}, {"opened", "closed"}, {"opened", "junk", "closed"},
                              {"failed"}, {"failed"}, {"opened", "closed"}], kinds
             assert isinstance(task.exception(), Exception)

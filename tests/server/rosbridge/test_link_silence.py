@@ -117,7 +117,7 @@ async def test_a_slow_way_is_not_a_silent_one() -> None:
         await ear.hears("opened")
         count_pings(bridge, pings, pong_after_s=1.1)
         await asyncio.sleep(2.6)
-        assert [name for name, _ in ear.told] == ["opened"]
+        assert [name for name, _ in ear.received] == ["opened"]
         assert pings
 
 

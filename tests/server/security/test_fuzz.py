@@ -111,11 +111,11 @@ def _try(client: httpx.Client, operation: Any, mode: Any, each: int, number: int
             case.path_parameters["id"] = ID  # else nothing of the sort is ever there
         if operation.path == "/api/mail/test":  # no mail server is dialled
             client.put("/api/mail/settings", json={"host": "", "sender": ""})
-        told = case.as_transport_kwargs(base_url=str(client.base_url).rstrip("/"))
-        told.pop("cookies", None)
-        files = told.pop("files", None)
+        arguments = case.as_transport_kwargs(base_url=str(client.base_url).rstrip("/"))
+        arguments.pop("cookies", None)
+        files = arguments.pop("files", None)
         try:
-            request = client.build_request(**{k: v for k, v in told.items() if k in _TAKEN}, files=files)
+            request = client.build_request(**{k: v for k, v in arguments.items() if k in _TAKEN}, files=files)
         except (ValueError, TypeError, UnicodeError, httpx.InvalidURL):
             return  # what no client can write
         try:
@@ -123,7 +123,7 @@ def _try(client: httpx.Client, operation: Any, mode: Any, each: int, number: int
         except httpx.LocalProtocolError:
             return
         answers[answer.status_code] += 1
-        assert answer.status_code < 500, (operation.label, told, answer.text[:500])
+        assert answer.status_code < 500, (operation.label, sent, answer.text[:500])
         if answer.status_code >= 400:
             assert answer.headers["content-type"] == "application/problem+json", (operation.label, answer.text[:200])
         assert "content-security-policy" in answer.headers

@@ -16,7 +16,15 @@ from server.app.app import create_app
 from server.app.config import Config
 from server.system.page_files import static_dir
 from server.web.assets.bundle import find
-from server.web.middleware.headers import FOR_ALL, PERMISSIONS, POLICY, POLICY_OF_DATA, POLICY_OF_PARTS, policy_of
+from server.web.middleware.headers import (
+    FOR_ALL,
+    PERMISSIONS,
+    POLICY,
+    POLICY_OF_DATA,
+    POLICY_OF_PARTS,
+    POLICY_OF_REPORT,
+    policy_of,
+)
 from server.web.routes.pages import early_of
 from tests.server.conftest import serving, serving_app
 from tests.server.recording.made import record
@@ -34,6 +42,7 @@ ANSWERS = {  # method, path, headers, status, its policy
     "no part": ("GET", "/static/js/nothing.js", {}, 404, POLICY_OF_PARTS),
     "data": ("GET", "/api/state", {}, 200, POLICY_OF_DATA),
     "what is drawn": ("GET", f"/api/recordings/{ID}/track.svg", {}, None, POLICY_OF_DATA),
+    "a report": ("GET", "/api/recordings/none/report", {}, 404, POLICY_OF_REPORT),
     "a file": ("GET", f"/api/recordings/{ID}/file.mcap", {}, 200, POLICY_OF_DATA),
     "a part of a file": ("GET", f"/api/recordings/{ID}/file.mcap", {"Range": "bytes=0-9"}, 206, POLICY_OF_DATA),
     "no part of a file": ("GET", f"/api/recordings/{ID}/file.mcap", {"Range": "bytes=99999999-"}, 416, POLICY_OF_DATA),
@@ -130,4 +139,5 @@ def test_the_page_may_run_only_its_own_scripts_and_use_only_what_it_needs() -> N
     assert "geolocation=(self)" in PERMISSIONS
     assert "screen-wake-lock=(self)" in PERMISSIONS
     assert "camera=()" in PERMISSIONS
-    assert "microphone=()" in PERMISSIONS
+    assert "microphone=(self)" in PERMISSIONS  # the voice of a mark
+    assert rules["media-src"] == "'self' blob:"

@@ -17,6 +17,7 @@ from server.app.app import create_app
 from server.app.config import Config
 from server.protocol.rate_limit import MAX_DEPTH, Allowance, Limits, Rate, nests_deeper
 from server.web.middleware import http_protocol
+from server.web.middleware.throttle import is_upload
 from tests.server.conftest import serving
 from tests.server.viewer import viewer
 
@@ -79,9 +80,10 @@ async def test_no_route_takes_a_body_without_end() -> None:
 
     async with serving(Config()) as base, httpx.AsyncClient(base_url=base, timeout=20) as client:
         for method, path in routes_with_bodies():
-            told = await client.request(method, path, content=b" " * (Limits().body_bytes + 1), headers=JSON)
-            assert told.status_code == 413, (method, path)
-            assert told.json()["detail"] == "At most 256 kB are taken."
+            most, words = (Limits().upload_bytes, "8 MB") if is_upload(path) else (Limits().body_bytes, "256 kB")
+            answer = await client.request(method, path, content=b" " * (most + 1), headers=JSON)
+            assert answer.status_code == 413, (method, path)
+            assert answer.json()["detail"] == f"At most {words} are taken."
         for method, path in (("POST", "/api/connect"), ("PATCH", "/api/settings"), ("PUT", "/api/settings.toml")):
             found_out = await client.request(method, path, content=endless(), headers=JSON)
             assert found_out.status_code == 413, (method, path)

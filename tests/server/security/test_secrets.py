@@ -77,10 +77,10 @@ async def test_no_secret_leaves_its_place(tmp_path: Path) -> None:
 
 async def _live(life: Life, base: str, car: str) -> tuple[dict[str, str], dict[str, str]]:
     """Pairs, drives, records, mails, is refused; the secrets and all that was answered."""
-    told = (await asyncio.to_thread(_invited, life.data)).stdout
-    token = re.search(r"#pair=([\w-]+)", told)
-    pin = re.search(r"\b(\d{3}\s?\d{3})\b", told)
-    assert token is not None, told
+    printed = (await asyncio.to_thread(_invited, life.data)).stdout
+    token = re.search(r"#pair=([\w-]+)", printed)
+    pin = re.search(r"\b(\d{3}\s?\d{3})\b", printed)
+    assert token is not None, printed
     answers: dict[str, str] = {}
     async with httpx.AsyncClient(base_url=base, headers={"Origin": base}, timeout=30) as phone:
         async with asyncio.timeout(10):

@@ -90,9 +90,9 @@ async def _tried(base: str, asked: list[tuple[str, str]]) -> AsyncIterator[tuple
         body = "{}" if method in ("POST", "PUT", "PATCH") else ""
         head = f"{method} {path} HTTP/1.1\r\nHost: {host}:{port}\r\nContent-Type: application/json\r\n"
         writer.write(f"{head}Content-Length: {len(body)}\r\n\r\n{body}".encode())
-        told = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1")
-        heads = email.message_from_string(told.partition("\r\n")[2])
-        status, length = int(told.split(" ")[1]), int(heads["Content-Length"] or 0)
+        head_text = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1")
+        heads = email.message_from_string(head_text.partition("\r\n")[2])
+        status, length = int(head_text.split(" ")[1]), int(heads["Content-Length"] or 0)
         has_body = method != "HEAD" and status not in (204, 304)
         yield method, path, status, await reader.readexactly(length) if has_body else b"", heads["Location"] or ""
     writer.close()
@@ -229,9 +229,9 @@ async def _listening(handler: Any) -> AsyncIterator[int]:
 
 @pytest.mark.parametrize("text", HEADER + TRAVERSAL, ids=lambda text: ascii(text)[:40])
 def test_no_name_of_a_file_adds_a_line_or_a_folder(text: str) -> None:
-    told = disposition(f"{text}.mcap")
-    assert told.isascii()
-    assert told.isprintable()
+    header = disposition(f"{text}.mcap")
+    assert header.isascii()
+    assert header.isprintable()
     name = file_name(f"{text}.mcap")
     assert not set(name) & set('/\\:*?"<>|%')
     assert name.isprintable()
@@ -239,7 +239,7 @@ def test_no_name_of_a_file_adds_a_line_or_a_folder(text: str) -> None:
     assert not name.startswith(".")
     assert len(name) <= 120
     line = Message()
-    line["Content-Disposition"] = told
+    line["Content-Disposition"] = header
     parts = [name for name, _ in line.get_params(header="content-disposition") or []]
     assert parts[0] == "attachment"  # the library calls `filename*` by either name
     assert [part.rstrip("*") for part in parts[1:]] in (["filename"], ["filename", "filename"])

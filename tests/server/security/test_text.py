@@ -108,11 +108,31 @@ def test_the_kinds_of_a_page_are_a_table() -> None:
         "acknowledge", "arm", "connect", "control", "disarm", "disconnect", "import", "pause", "position",
         "present", "record", "release", "resume", "retry", "ride", "set", "shelve", "silence", "slow_down", "unshelve",
         "veto",
+    } | {"answer_item", "offer_item", "release_item", "take_item", "withdraw_item"} | {
+        "accept_control", "end_offer", "offer_control", "outcome", "read_back", "mark", "remove_mark",
+        "describe_intervention",
+    } | {
+        "begin_departure", "reopen_departure", "set_departure_item", "set_departure_list", "sign_departure",
     }  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    "kind", ["state", "refresh", "signals", "settings", "trends", "track", "track_points", "", "x", 3, None, ["state"]]
+    "kind",
+    [
+        "state",
+        "refresh",
+        "signals",
+        "settings",
+        "trends",
+        "track",
+        "track_points",
+        "driving",
+        "",
+        "x",
+        3,
+        None,
+        ["state"],
+    ],
 )
 async def test_what_the_server_asks_of_a_session_is_refused_to_a_page(kind: object) -> None:
     async with serving(Config()) as base, viewer(base) as one:

@@ -230,9 +230,9 @@ class ManySettings:
 
 
 def test_a_recordings_settings_are_read_so_many_times_and_the_rest_is_named() -> None:
-    told = read_recorded_events(ManySettings())  # type: ignore[arg-type]
-    assert len(told.events) == MOST_SETTINGS
-    assert told.notes == (f"{5000 - 1 - MOST_SETTINGS} invalid entries of catgraph's own channels are left out.",)
+    recorded = read_recorded_events(ManySettings())  # type: ignore[arg-type]
+    assert len(recorded.events) == MOST_SETTINGS
+    assert recorded.notes == (f"{5000 - 1 - MOST_SETTINGS} invalid entries of catgraph's own channels are left out.",)
 
 
 def test_the_bounds_leave_room_for_all_settings() -> None:

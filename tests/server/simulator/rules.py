@@ -17,7 +17,7 @@ HALF_CORRIDOR_M = 1.2
 LASER_AHEAD_M, WHEELBASE_M = 2.5, 2.62
 RATES_HZ = {
     "speed": 20, "brake": 20, "accelerator": 20, "steering": 20, "command": 20,
-    "distance": 75, "bearing": 75, "scan": 75, "position": 10, "odometry": 10, "diagnostics": 1,
+    "distance": 75, "bearing": 75, "scan": 75, "position": 10, "odometry": 10, "diagnostics": 1, "mode": 20,
 }  # fmt: skip
 
 

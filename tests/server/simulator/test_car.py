@@ -30,11 +30,13 @@ TYPES = {
     "/gps_odom": "nav_msgs/Odometry",
     "/catvehicle/front_laser_points": "sensor_msgs/LaserScan",
     "/diagnostics": "diagnostic_msgs/DiagnosticArray",
+    "/catvehicle/control_mode": "std_msgs/String",
 }
 RATES_HZ = {
     "/catvehicle/vel": 20, "/catvehicle/brake": 20, "/catvehicle/accelerator": 20, "/catvehicle/steering": 20,
     "/catvehicle/cmd_vel": 20, "/DistanceEstimator/dist": 75, "/DistanceEstimator/angle": 75, "/gps_fix": 10,
     "/gps_odom": 10, "/catvehicle/front_laser_points": 75, "/diagnostics": 1,
+    "/catvehicle/control_mode": 20,
 }  # fmt: skip
 
 
@@ -203,15 +205,15 @@ def test_a_left_bend_is_negative_steering_and_a_positive_commanded_tyre_angle() 
 
 def test_wheels_at_rest_are_as_noisy_as_the_real_ones() -> None:
     car = SimulatedCar()
-    told = []
+    measured = []
     for step in car.steps():
         if car.elapsed_s > 80:
             break
         if car.motion.speed_mps == 0.0:
-            told += [m.message["linear"]["x"] for m in step.messages if m.topic == "/catvehicle/vel"]
-    assert len(told) > 90  # about five seconds at the stop line
-    assert min(told) == 0.0
-    assert 0 < max(told) <= 0.084
+            measured += [m.message["linear"]["x"] for m in step.messages if m.topic == "/catvehicle/vel"]
+    assert len(measured) > 90  # about five seconds at the stop line
+    assert min(measured) == 0.0
+    assert 0 < max(measured) <= 0.084
 
 
 def test_messages_are_never_changed_afterwards() -> None:

@@ -105,7 +105,7 @@ def test_odd_messages_harm_no_effect(make: Callable[[], Effect], fields: dict[st
 
 @pytest.mark.parametrize("shape", SPEED_SHAPES)
 def test_speeding_climbs_smoothly_above_the_limit_and_back(shape: Callable[[float], dict[str, Any]]) -> None:
-    def told(at_s: float) -> float:
+    def speed_at(at_s: float) -> float:
         fields: Any = apply(effect, "speed", shape(3.0), at_s)
         for name in ("twist", "twist", "linear", "x", "data"):
             if isinstance(fields, dict) and name in fields:
@@ -113,13 +113,13 @@ def test_speeding_climbs_smoothly_above_the_limit_and_back(shape: Callable[[floa
         return float(fields)
 
     effect = Speeding()
-    climb = [told(tick / 20) for tick in range(200)]
+    climb = [speed_at(tick / 20) for tick in range(200)]
     assert climb[0] == 3.0
     assert np.diff(climb).max() == pytest.approx(0.1)
     assert climb[-1] == pytest.approx(Speeding.REACHED_MPS)
     effect.end()
     assert not effect.is_over
-    descent = [told(10 + tick / 20) for tick in range(200)]
+    descent = [speed_at(10 + tick / 20) for tick in range(200)]
     assert np.diff(descent).min() == pytest.approx(-0.1)
     assert descent[-1] == 3.0
     assert effect.is_over
@@ -162,7 +162,7 @@ def test_both_pedals_are_down_by_whole_steps(shape: Callable[[float], dict[str, 
     assert apply(effect, "steering", shape(0.0)) == shape(0.0)
 
 
-def told_offsets(effect: GpsOffset, speeds: Iterable[float], began_s: float = 0.0) -> list[float]:
+def offsets(effect: GpsOffset, speeds: Iterable[float], began_s: float = 0.0) -> list[float]:
     """The offset at 10 Hz for a car with these speeds."""
     found = []
     for tick, speed in enumerate(speeds):
@@ -174,15 +174,15 @@ def told_offsets(effect: GpsOffset, speeds: Iterable[float], began_s: float = 0.
 
 def test_drift_waits_for_standstill_grows_and_goes_back_in_motion() -> None:
     effect = GpsOffset(pace_mps=2.0, most_m=10.0, during="standing", after_s=3.0, back_mps=1.0)
-    assert max(told_offsets(effect, [5.0] * 20)) == 0.0
-    standing = told_offsets(effect, [0.0] * 120, began_s=2.0)
+    assert max(offsets(effect, [5.0] * 20)) == 0.0
+    standing = offsets(effect, [0.0] * 120, began_s=2.0)
     assert max(standing[:30]) == 0.0
     assert standing[60] == pytest.approx(6.2, abs=0.3)
     assert standing[-1] == pytest.approx(10.0, rel=0.01)
     effect.end()
-    assert told_offsets(effect, [0.0] * 20, began_s=14.0)[-1] == pytest.approx(10.0, rel=0.01)
+    assert offsets(effect, [0.0] * 20, began_s=14.0)[-1] == pytest.approx(10.0, rel=0.01)
     assert not effect.is_over
-    moving = told_offsets(effect, [3.0] * 120, began_s=16.0)
+    moving = offsets(effect, [3.0] * 120, began_s=16.0)
     assert moving[49] == pytest.approx(5.0, abs=0.3)
     assert moving[-1] == 0.0
     assert effect.is_over
@@ -190,13 +190,13 @@ def test_drift_waits_for_standstill_grows_and_goes_back_in_motion() -> None:
 
 def test_a_mismatch_grows_only_in_motion() -> None:
     effect = GpsOffset(pace_mps=2.0, most_m=60.0, during="moving", back_mps=2.0)
-    assert max(told_offsets(effect, [0.0] * 50)) == 0.0
-    assert told_offsets(effect, [4.0] * 101, began_s=5.0)[-1] == pytest.approx(20.0, abs=0.5)
+    assert max(offsets(effect, [0.0] * 50)) == 0.0
+    assert offsets(effect, [4.0] * 101, began_s=5.0)[-1] == pytest.approx(20.0, abs=0.5)
 
 
 def test_a_jump_runs_away_at_once_and_is_over_at_once() -> None:
     effect = GpsOffset(pace_mps=23.0, most_m=1000.0, during="always", back_mps=None)
-    away = told_offsets(effect, [0.0] * 20)
+    away = offsets(effect, [0.0] * 20)
     assert np.diff(away) == pytest.approx(2.3, rel=0.02)
     effect.end()
     assert effect.is_over
@@ -204,7 +204,7 @@ def test_a_jump_runs_away_at_once_and_is_over_at_once() -> None:
 
 def test_the_odometry_moves_with_the_position() -> None:
     effect = GpsOffset(pace_mps=1.0, most_m=100.0, during="always", back_mps=None)
-    told_offsets(effect, [1.0] * 51)
+    offsets(effect, [1.0] * 51)
     given = {"pose": {"pose": {"position": {"x": 500.0, "y": 900.0, "z": 7.0}}}, "twist": {"linear": 1}}
     moved = apply(effect, "odometry", given, 5.0)
     position = moved["pose"]["pose"]["position"]
@@ -216,8 +216,8 @@ def test_the_odometry_moves_with_the_position() -> None:
 
 def test_a_gap_in_the_recording_is_no_leap_of_the_offset() -> None:
     effect = GpsOffset(pace_mps=2.0, most_m=100.0, during="always", back_mps=None)
-    told_offsets(effect, [1.0] * 11)
-    assert told_offsets(effect, [1.0], began_s=3600.0)[-1] <= 4.1
+    offsets(effect, [1.0] * 11)
+    assert offsets(effect, [1.0], began_s=3600.0)[-1] <= 4.1
 
 
 def test_a_blind_laser_sees_nothing_and_the_estimator_says_so() -> None:

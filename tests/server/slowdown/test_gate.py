@@ -16,7 +16,7 @@ import websockets
 
 from server.app.app import create_app
 from server.app.config import Config
-from server.protocol import commands
+from server.protocol import commands, slowing_commands
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
 from tests.server.access.test_rules import all_routes
@@ -49,13 +49,13 @@ def test_one_file_makes_operations_that_publish() -> None:
     assert found.pop(GATE) == {"publish", "advertise", "unadvertise"}
     calls, rows = "server/rosbridge/service_calls.py", "server/rosbridge/subscription.py"
     assert found == {calls: {"call_service"}, rows: {"?"}}  # subscribe, unsubscribe: see below
-    link = (PROJECT / "server/rosbridge/link.py").read_text(encoding="utf-8")
-    assert {node.args[0].value for node in sent_rows(link)} == {"subscribe", "unsubscribe"}
+    sent = (PROJECT / "server/rosbridge/sent_rows.py").read_text(encoding="utf-8")
+    assert {node.args[0].value for node in sent_rows(sent)} == {"subscribe", "unsubscribe"}
 
 
 def sent_rows(source: str) -> Iterator[Any]:
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "_send_row":
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "_operate":
             yield node
 
 
@@ -84,6 +84,18 @@ VALUES: dict[str, Any] = {
     "awake": "ready",
     "number": 1,
     "trigger": "speed",
+    "to": "0123abcd",
+    "accept": True,
+    "of": "p1",
+    "ago_s": 1.0,
+    "item": "doors",
+    "result": "open",
+    "check": "c1",
+    "items": None,
+    "line": "alarms:none",
+    "version": "0123abcd",
+    "intervention": "i-1",
+    "mark": "m-1",
 }
 ORDERS = ("arm", "slow_down")  # walked last, and one after the other
 UNANSWERED = ("present",)  # once a second from every page
@@ -92,10 +104,10 @@ ENDS = ("disconnect", "connect")  # after these nothing is monitored: not walked
 
 def every_command() -> list[dict[str, Any]]:
     """Each kind of command once, with what it needs; those that order a slow-down last."""
-    models = [*get_args(commands.Command), *get_args(commands.SlowingCommand)]
+    models = [*get_args(commands.Command), *get_args(slowing_commands.SlowingCommand)]
     found = {}
     for model in models:
-        if model is not commands.SlowingCommand:
+        if model is not slowing_commands.SlowingCommand:
             (kind,) = get_args(model.model_fields["kind"].annotation)
             needed = {name for name, field in model.model_fields.items() if field.is_required() and name != "kind"}
             needed |= {"why"} if kind == "position" else set()

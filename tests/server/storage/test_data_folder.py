@@ -14,7 +14,7 @@ from server.app.app import create_app
 from server.app.config import Config
 from server.judge.settings import Settings, SettingsFile
 from server.mail.settings import MailSettings, MailSettingsFile
-from server.storage.data_folder import DataFolder, DataFolderRefused
+from server.storage.data_folder import DATABASES, DataFolder, DataFolderRefused
 from server.storage.set_aside import set_aside
 from tests.tree import PROJECT
 
@@ -75,7 +75,7 @@ def test_a_database_of_a_newer_version_is_refused(tmp_path: Path, name: str) -> 
     database.commit()
     database.close()
     kept = (tmp_path / name).read_bytes()
-    with pytest.raises(DataFolderRefused, match=f"{name} has format 99; this version reads format 1"):
+    with pytest.raises(DataFolderRefused, match=f"{name} has format 99; this version reads format {DATABASES[name]}"):
         create_app(Config(data=tmp_path))
     assert (tmp_path / name).read_bytes() == kept
 

@@ -23,7 +23,7 @@ def accesses(watched: Path) -> list[dict[str, Any]]:
     return [one for one in found if not any(caller.endswith(tuple(ALLOWED)) for caller in one["by"])]
 
 
-def told(one: dict[str, Any]) -> str:
+def described(one: dict[str, Any]) -> str:
     own = [caller for caller in one["by"] if caller.startswith(("server/", "monitor/"))]
     return f"{one['call']}({one['what']}) in {' < '.join(reversed(own or one['by']))}"
 
@@ -45,5 +45,5 @@ async def test_usual_work_opens_no_file_on_the_event_loop(tmp_path: Path) -> Non
     finally:
         server.kill()
     found = accesses(watched)
-    assert not found, "\n".join(dict.fromkeys(map(told, found)))
+    assert not found, "\n".join(dict.fromkeys(map(described, found)))
     assert any("_extract_endpoint_context" in line for line in watched.read_text().splitlines()), "it watched"

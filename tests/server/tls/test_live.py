@@ -190,7 +190,7 @@ async def test_looking_after_it_survives_a_bug_in_one_look(
 
     machine.addresses = [FIELD]
     with caplog.at_level(logging.WARNING):
-        task = asyncio.create_task(keep(certificate, now=clock, told=renewed.set, every_s=0.01))
+        task = asyncio.create_task(keep(certificate, now=clock, on_renewed=renewed.set, every_s=0.01))
         async with asyncio.timeout(5):
             await renewed.wait()
         task.cancel()

@@ -102,7 +102,7 @@ def test_a_bad_one_leaves_the_one_of_before_and_is_told_once(tmp_path: Path) -> 
     new_key = files.key.read_bytes()
     files.key.write_bytes(before)  # half-way: the certificate is new, the key is not
     assert "of before stays" in str(served.refresh(NOW + days(1)))
-    assert "belongs to another" in str(served._told)
+    assert "belongs to another" in str(served._reported)
     assert served.refresh(NOW + days(1)) is None
     assert served.given.cert.serial_number == files.serial
     files.key.write_bytes(new_key)

@@ -100,8 +100,8 @@ def test_it_ends_with_its_authority() -> None:
 )
 def test_it_is_renewed_when_it_must_be(names: object, after: dt.timedelta, why: str | None) -> None:
     made = server_certificate.make(OURS, NAMES, now=NOW)
-    told = server_certificate.why_renew(made, OURS, names, now=NOW + after)  # type: ignore[arg-type]
-    assert (told is None) if why is None else (told is not None and why in told)
+    reason = server_certificate.why_renew(made, OURS, names, now=NOW + after)  # type: ignore[arg-type]
+    assert (reason is None) if why is None else (reason is not None and why in reason)
 
 
 def test_a_clock_that_was_put_back_gives_a_new_one() -> None:

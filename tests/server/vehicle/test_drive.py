@@ -37,6 +37,8 @@ MESSAGES = {
 
 FILES = {1: "catvehicle_2016-06-01.bag", 2: "catvehicle_2016-06-01_mcap"}  # by the version of ROS
 JITTER_S = 0.05  # of a bridge and a server on a machine that is busy with tests
+LOOKS_BACK_MS = 11_000.0  # the check that the car moves looks back ten seconds
+AFTER_MS = 500.0  # what was played late is heard after the moment
 
 
 @contextlib.asynccontextmanager
@@ -65,6 +67,7 @@ async def replaying(path: Path, *options: str) -> AsyncIterator[str]:
 
 @pytest.mark.slow
 @pytest.mark.timeout(180)
+@pytest.mark.flaky(reruns=1, reason="where the machine stands still for long, the server rightly throttles what comes")
 async def test_the_real_drive_of_2016_06_01_both_ways(recordings: Path) -> None:
     """The ROS 1 bag and the ROS 2 MCAP at once, two vehicles of one server: every message, the drive's figures."""
     async with (
@@ -119,7 +122,7 @@ def _assert_as_rehearsed(file: Path, events: list[dict[str, Any]], one: Viewer) 
     """`catgraph check` over the file says what the log of the live drive says, at the same times to a tick.
 
     A moment of the live drive is told by the message of the speed that was the newest then: a busy machine plays a
-    drive more slowly here and there.
+    drive more slowly here and there, and by how much it did so in the seconds before is measured, and allowed for.
     """
     with open_recording([file]) as recording:
         run = rehearse(recording)
@@ -136,18 +139,28 @@ def _assert_as_rehearsed(file: Path, events: list[dict[str, Any]], one: Viewer) 
         heard_ms, count = max((row for row in heard if row[0] <= at_ms), default=heard[0])
         return speed_s[count - 1] + (at_ms - heard_ms) / 1000
 
-    live = {
-        (event["alarm"], event["change"], event["occurrence"]): in_file_s(event["at_ms"])
+    def slip_s(at_ms: float) -> float:
+        """How unevenly the drive was played in the seconds that an alarm may look back."""
+        late = [
+            heard_ms / 1000 - speed_s[count - 1]
+            for heard_ms, count in heard
+            if at_ms - LOOKS_BACK_MS <= heard_ms <= at_ms + AFTER_MS
+        ]
+        return max(late) - min(late)
+
+    at_ms = {
+        (event["alarm"], event["change"], event["occurrence"]): event["at_ms"]
         for event in events
         if event["alarm"] is not None
     }
+    live = {name: in_file_s(one_ms) for name, one_ms in at_ms.items()}
     rehearsed = {(row.alarm_id, row.change, row.occurrence): row.at_s for row in run.transitions}
     during = {name for name, at_s in live.items() if at_s <= run.to_s}  # then the replay falls silent, and that is told
     assert rehearsed
     during = {one for one in during if one[0] != "reach"}  # nobody listens here, which no recording can tell
     assert during == set(rehearsed)
     for name, at_s in rehearsed.items():
-        assert live[name] == pytest.approx(at_s, abs=TICK_S + JITTER_S), name
+        assert live[name] == pytest.approx(at_s, abs=TICK_S + JITTER_S + slip_s(at_ms[name])), name
 
 
 async def test_the_real_laser(recordings: Path) -> None:

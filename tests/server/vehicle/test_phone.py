@@ -211,7 +211,7 @@ async def test_what_does_not_fit_or_is_not_wanted_is_refused(bridge: RosBridge) 
 
 
 def raised(found: Ride) -> list[tuple[str, float]]:
-    return [(one.alarm, one.at_s) for one in found.told if one.change == "raised"]
+    return [(one.alarm, one.at_s) for one in found.events if one.change == "raised"]
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def test_a_healthy_phone_in_the_car_raises_nothing_and_is_really_checked(
 ) -> None:
     """Driving, braking and standing at the stop line; the phone's clock is seven hours off."""
     found = ride(Rider(seed=seed, accuracy_m=accuracy_m), seconds, seed=seed)
-    assert found.told == []
+    assert found.events == []
     assert all("OK" in found.briefs[check] for check in ("phone_car", "phone_tracks", "phone_missing"))
 
 
@@ -247,23 +247,23 @@ def test_a_phone_500_m_away_is_beyond_the_gate_although_its_track_correlates_per
 @pytest.mark.slow
 def test_a_phone_that_is_away_for_a_while_is_told_once_and_its_return_is_not() -> None:
     found = ride(Rider(offset=lambda t: (500.0, 0.0) if 40.0 < t < 60.0 else (0.0, 0.0)), 120.0)
-    assert [(one.alarm, one.change) for one in found.told] == [("phone_car", "raised"), ("phone_car", "cleared")]
+    assert [(one.alarm, one.change) for one in found.events] == [("phone_car", "raised"), ("phone_car", "cleared")]
 
 
 def test_case_07_a_permission_that_is_taken_away_is_told_with_its_name() -> None:
     found = ride(Rider(why=lambda t: "denied" if 20.0 < t < 45.0 else None), 60.0)
-    assert [(one.alarm, one.change) for one in found.told] == [
+    assert [(one.alarm, one.change) for one in found.events] == [
         ("phone_missing", "raised"),
         ("phone_missing", "cleared"),
     ]
-    assert found.told[0].text == "Location permission denied on the phone"
-    assert 28.0 < found.told[0].at_s < 31.0
+    assert found.events[0].text == "Location permission denied on the phone"
+    assert 28.0 < found.events[0].at_s < 31.0
     assert "FAULT permission" in found.briefs["phone_missing"]
 
 
 def test_without_a_phone_nothing_is_said_of_one() -> None:
     found = ride(None, 30.0)
-    assert found.told == []
+    assert found.events == []
     assert {frozenset(found.briefs[check]) for check in ("phone_car", "phone_tracks", "phone_missing")} == {
         frozenset({"no phone"})
     }

@@ -65,8 +65,8 @@ class Crew:
 
 
 def assert_quiet(raised: list[Raised], minutes: float) -> None:
-    told = [(round(one.at_s, 1), one.alarm, one.text) for one in raised]
-    assert len(raised) <= max(2.0, minutes / 10.0), told
+    listed = [(round(one.at_s, 1), one.alarm, one.text) for one in raised]
+    assert len(raised) <= max(2.0, minutes / 10.0), listed
 
 
 @pytest.mark.slow

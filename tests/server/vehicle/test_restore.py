@@ -30,9 +30,9 @@ def bus() -> LocalBus:
     return LocalBus(Journal(None), now=lambda: 0.0)
 
 
-def keep(one: LocalBus, told: list[Transition], spec: AlarmSpec, *, clock_s: float = 0.0) -> None:
+def keep(one: LocalBus, transitions: list[Transition], spec: AlarmSpec, *, clock_s: float = 0.0) -> None:
     """As a session writes them, whose clock read `clock_s` at WALL_MS."""
-    for transition in told:
+    for transition in transitions:
         at_ms = WALL_MS + round((transition.at_s - clock_s) * 1000)
         event = serialize.event(transition, spec, at_ms, now_s=transition.at_s, settings_version=3)
         one.append("car", [orjson.loads(orjson.dumps(event))])
@@ -51,16 +51,16 @@ def test_a_life_written_and_read_again_is_the_same(
     spec: AlarmSpec, day: list[tuple[float, Judge | Tap]], boot_s: float
 ) -> None:
     """Through JSON and a new monotonic clock that starts at `boot_s`, at the same time of day."""
-    alarm, now_s, told = Alarm(id="hot", spec=spec), 0.0, []
+    alarm, now_s, transitions = Alarm(id="hot", spec=spec), 0.0, []
     for wait_s, event in day:
         now_s += wait_s
         try:
             alarm, happened = happen(alarm, event, now_s)
         except Refused:
             continue
-        told += list(happened)
+        transitions += list(happened)
     one = bus()
-    keep(one, told, spec)
+    keep(one, transitions, spec)
     past = read(one, now_s=boot_s, after_s=now_s)
     again = restore({"hot": Alarm(id="hot", spec=spec)}, past.transitions)["hot"]
     shift_s = boot_s - now_s
@@ -84,9 +84,9 @@ def test_the_values_at_the_trip_come_through_the_log() -> None:
         measured=Quantity(label="Speed", value=12.6, unit="m/s"),
         limit=Quantity(label="Limit", value=11.0, unit="m/s"),
     )
-    _, told = lived(trip, spec=LATCH)
+    _, transitions = lived(trip, spec=LATCH)
     one = bus()
-    keep(one, told, LATCH)
+    keep(one, transitions, LATCH)
     found = read(one).transitions[0].finding
     assert found is not None
     assert (found.measured, found.limit, found.causes, found.level) == (trip.measured, trip.limit, ("x",), 2)
@@ -136,21 +136,21 @@ def test_a_pause_that_outlasted_a_restart_is_counted_from_its_beginning() -> Non
     ],
 )
 def test_a_shelf_goes_on_by_the_time_of_day(outage_s: float, left_s: float) -> None:
-    told = [
+    transitions = [
         Transition(
             alarm_id="hot", occurrence=1, change="shelved", at_s=0.0, text="", by="Ann", shelved_until_s=300.0,
             state=lived(fault("bad"), spec=LATCH)[0].state,
         )
     ]  # fmt: skip
     one = bus()
-    keep(one, told, LATCH)
+    keep(one, transitions, LATCH)
     assert read(one, now_s=7.0, after_s=outage_s).transitions[0].shelved_until_s == pytest.approx(7.0 + left_s)
 
 
 def test_nothing_of_the_past_lies_in_the_future() -> None:
-    _, told = lived(fault("bad"), spec=LATCH)
+    _, transitions = lived(fault("bad"), spec=LATCH)
     one = bus()
-    keep(one, told, LATCH)
+    keep(one, transitions, LATCH)
     assert read(one, now_s=7.0, after_s=-3600.0).transitions[0].at_s == 7.0
 
 

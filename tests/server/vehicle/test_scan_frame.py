@@ -139,9 +139,9 @@ def test_an_open_end_invents_no_return() -> None:
     assert np.allclose(frame.codes[[0, 4]] * frame.scale_m, 5.0, atol=4e-3)
 
 
-@pytest.mark.parametrize(("age_s", "told_s"), [(0.0, 0.0), (0.0126, 0.013), (1e9, 65.535), (-1.0, 0.0)])
-def test_the_age(age_s: float, told_s: float) -> None:
-    assert sent(seen(sweep([WALL])), age_s=age_s).age_s == pytest.approx(told_s)
+@pytest.mark.parametrize(("age_s", "sent_s"), [(0.0, 0.0), (0.0126, 0.013), (1e9, 65.535), (-1.0, 0.0)])
+def test_the_age(age_s: float, sent_s: float) -> None:
+    assert sent(seen(sweep([WALL])), age_s=age_s).age_s == pytest.approx(sent_s)
 
 
 def test_1081_beams_stay_within_2200_bytes() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import httpx
 import numpy as np
+import orjson
 import psutil
 import pytest
 
@@ -43,35 +44,39 @@ async def test_events_reach_a_page_before_a_state_is_made(bridge: RosBridge) -> 
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
     app, speeds = create_app(config), {"now": 4.2}
     turns, due = FairWakeup(), asyncio.Event()  # a page as the hub wakes it
-    happened: list[str] = []
-
-    def watch(kind: str) -> None:
-        happened.append(kind)
-        if kind == "events":
-            turns.queue(due, is_urgent=True)
-
-    async def page() -> None:
-        while True:
-            await due.wait()
-            due.clear()
-            happened.append("told")
+    heard, shown = [False], [False]  # whether the alarm is raised: as a page heard, and as the states have it
+    was_heard_first: list[bool] = []
 
     async with serving_app(app, config), driving(bridge, speed=lambda _: speeds["now"]):
         bus = app.state.services.bus
+
+        def watch(kind: str) -> None:
+            if kind == "events":
+                turns.queue(due, is_urgent=True)
+            elif kind == "state":
+                alarms = orjson.loads(bus.newest("car", "state").payload)["alarms"]
+                if (
+                    is_raised := any(one["id"] == "speed_limit" and one["state"] == "UNACKED" for one in alarms)
+                ) != shown[-1]:
+                    shown.append(is_raised)
+                    was_heard_first.append(heard[-1] == is_raised)
+
+        async def page() -> None:
+            while True:
+                await due.wait()
+                due.clear()
+                changes = [event["change"] for event in bus.recent_events("car", 0) if event["alarm"] == "speed_limit"]
+                heard.append(changes[-1:] == ["raised"])
+
         writer = asyncio.create_task(page())
         bus.watch("car", watch)
-        async with asyncio.timeout(20):
-            while "state" not in happened:
-                await asyncio.sleep(0.02)
-            speeds["now"] = 12.6
-            while not bus.past_events("car", change="raised", alarm="speed_limit"):
-                await asyncio.sleep(0.02)
-        await asyncio.sleep(0.3)
+        async with asyncio.timeout(30):
+            for count, speed in enumerate((12.6, 4.2, 12.6, 4.2), 1):
+                speeds["now"] = speed
+                while len(was_heard_first) < count:
+                    await asyncio.sleep(0.02)
         writer.cancel()
-    after = [
-        next(one for one in happened[i:] if one != "events") for i, kind in enumerate(happened) if kind == "events"
-    ]
-    assert set(after) == {"told"}, happened
+    assert any(was_heard_first)  # the machine may stand still between; with a state made at once none is
 
 
 async def test_a_killed_bridge_is_said_at_once_and_data_flow_again(bridge: RosBridge, server: str) -> None:

@@ -17,7 +17,7 @@ import websockets
 from server.app.app import create_app
 from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
-from server.system.log_context import with_vehicle
+from server.system.log_context import with_context
 from server.vehicle.command_handler import CommandHandler
 from server.vehicle.vehicle import Vehicle
 from tests.server.cars import driving, twist
@@ -236,12 +236,12 @@ async def test_the_servers_log_names_the_car_that_a_line_is_about(
     lines: list[str] = []
 
     def fail(self: CommandHandler, message: Mapping[str, Any]) -> None:
-        lines.append(with_vehicle(f"{self._vehicle} failed"))
+        lines.append(with_context(f"{self._vehicle} failed"))
 
     monkeypatch.setattr(CommandHandler, "_query", fail)
     async with serving(two(bridge, other)) as base, httpx.AsyncClient(base_url=base) as client:
         for car in ("ocelot", "serval"):
             await client.post("/api/slow-down/order", params={"vehicle": car})
-    assert [line for line in lines if line.startswith(("ocelot", "serval"))] == [
+    assert [line.split(" trace=")[0] for line in lines if line.startswith(("ocelot", "serval"))] == [
         "ocelot failed vehicle=ocelot", "serval failed vehicle=serval",
     ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any, cast
@@ -12,6 +13,31 @@ from server.bus.local import LocalBus
 from server.protocol.rate_limit import Limits
 from server.replay.view_source import ViewSource
 from server.web.page_commands import PageCommands
+
+
+async def test_another_car_that_is_lost_does_not_hold_up_the_page() -> None:
+    requested = asyncio.Event()
+
+    async def lost(_: Mapping[str, Any]) -> Mapping[str, Any]:
+        requested.set()
+        await asyncio.sleep(60)
+        return {"ok": True}
+
+    async def own(_: Mapping[str, Any]) -> Mapping[str, Any]:
+        return {"ok": True}
+
+    bus = LocalBus(Journal(None), now=lambda: 0.0)
+    bus.serve("ocelot", own)
+    bus.serve("serval", lost)
+    view = cast(ViewSource, SimpleNamespace(is_replaying=False))
+    page = PageCommands(bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, send=lambda _: None, complain=print)
+    async with asyncio.timeout(0.5):
+        for _ in range(3):
+            await page.present(
+                {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", "announces": ["serval"]}
+            )
+        await requested.wait()
+        await page.close()
 
 
 async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> None:
@@ -28,7 +54,9 @@ async def test_other_cars_are_announced_while_the_own_one_is_not_served() -> Non
     page = PageCommands(
         bus, "ocelot", view, LOCAL, Limits(), now=lambda: 0.0, send=lambda _: None, complain=complaints.append
     )
-    await page.present({"kind": "present", "visible": True, "sound": "ready", "announces": ["serval"]})
+    await page.present(
+        {"kind": "present", "visible": True, "sound": "ready", "awake": "ready", "announces": ["serval"]}
+    )
     await page.leave()
     assert [(one["kind"], one["leaves"]) for one in heard] == [("announces", False), ("announces", True)]
     assert complaints == []

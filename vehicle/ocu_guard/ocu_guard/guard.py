@@ -121,11 +121,11 @@ class Guard:
         return True
 
     def tick(self, now_s: float) -> Command | None:
-        """Time has passed, 20 times a second: what a held car is told."""
+        """Time has passed, 20 times a second: the command for a held car."""
         self._look(now_s)
         return self._held(now_s) if self._is_held else None
 
-    # -- what is told ------------------------------------------------------------------------------------------------
+    # -- what is published ---------------------------------------------------------------------------------------------
 
     def state(self, now_s: float) -> str:
         """One of the five states above."""
@@ -159,7 +159,7 @@ class Guard:
             self._begin(now_s, "the operator's heartbeat stopped")
 
     def _begin(self, now_s: float, why: str) -> None:
-        """Holds the car from now on, beginning at the speed it has; where that is not known, at what it was told."""
+        """Holds the car from now on, beginning at the speed it has; where that is not known, at what was commanded."""
         self.hold += 1
         self.why = why
         self._is_held = True

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 from server.recording.export.bag_file import BagFile, BagTimeOutOfRange, Compression
 from server.recording.export.export_format import ExportFormat
+from server.recording.export.later import explain, in_time, later_messages
 from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
 from server.recording.export.raw import OWN, Raw, raw_messages
 from server.recording.export.ros1_definition import md5sum
@@ -45,20 +47,21 @@ def write_bag(
     forms = _forms(recording, outcome, with_own=with_own)
     if not forms:
         raise ExportRefused("Nothing in this recording fits a ROS 1 bag.")
+    later = later_messages(recording) if with_own else []
+    forms.update({(raw.file, raw.channel.number): _as_text() for raw in later})
     bag = BagFile(path, compression)
     try:
-        _copy(recording, bag, forms, outcome, progress)
+        _copy(in_time(raw_messages(recording, progress=progress), later), bag, forms, outcome)
         bag.close()
     except BaseException:
         bag.abandon()
         raise
+    explain(recording, later, outcome)
     outcome.notes += [f"{sentence}." for sentence in recording.damage]
     return outcome
 
 
-def _copy(
-    recording: Recording, bag: BagFile, forms: dict[tuple[int, int], Ros1Form], outcome: Outcome, progress: Progress
-) -> None:
+def _copy(messages: Iterable[Raw], bag: BagFile, forms: dict[tuple[int, int], Ros1Form], outcome: Outcome) -> None:
     numbers: dict[tuple[str, str, str, bool], int] = {}
     ways: dict[tuple[int, int], int] = {}
     unfit: Counter[str] = Counter()
@@ -74,7 +77,7 @@ def _copy(
             )
         return numbers[key]
 
-    for raw in raw_messages(recording, progress=progress):
+    for raw in messages:
         place = (raw.file, raw.channel.number)
         form = forms.get(place)
         if form is None:

@@ -22,8 +22,10 @@ from server.bus.event_table import event_row, safe_cell
 from server.recording.export.columns import OWN_TABLES, TABLES, TIMES, OwnTable
 from server.recording.export.decoded_drive import DecodedDrive
 from server.recording.export.export_format import ExportFormat
+from server.recording.export.later import described_event
 from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
 from server.recording.export.readme import Written, readme
+from server.recording.marks.of_drive import described_late, marks_of, media_of
 from server.recording.read.read import Recording
 
 FORMAT = ExportFormat(
@@ -36,6 +38,7 @@ FORMAT = ExportFormat(
     order=30,
 )
 
+MARK_COLUMNS = ("mark", "category", "words", "voice", "photo", "source", "by", "late")
 _READING = 0.85  # of the work; the rest is packing
 _BLOCK = 1 << 20
 
@@ -55,6 +58,7 @@ def write_csv_zip(recording: Recording, path: Path, *, progress: Progress = noth
 
             drive.read(add, progress=lambda part: progress(part * _READING))
             unfit = _own_tables(recording, tables)
+            _marks(recording, tables)
         texts = _settings(recording)
         if not tables.rows and not texts:
             raise ExportRefused("Nothing in this recording fits a table.")
@@ -63,7 +67,7 @@ def write_csv_zip(recording: Recording, path: Path, *, progress: Progress = noth
         outcome.notices = [f"{note}." for note in recording.notes]
         notes = [*outcome.notices, *outcome.notes]
         about = readme(drive, [Written(name=name, rows=rows) for name, rows in tables.rows.items()], notes)
-        _pack(path, Path(folder), list(tables.rows), {"README.txt": about, **texts}, progress)
+        _pack(path, Path(folder), list(tables.rows), {"README.txt": about, **texts}, recording, progress)
     return outcome
 
 
@@ -124,10 +128,19 @@ def _own_tables(recording: Recording, tables: _Tables) -> list[str]:
             unfit += 1
             continue
         tables.add_whole("alarms.csv", ALARM_COLUMNS, row)
+    for said in described_late(recording):
+        tables.add_whole("alarms.csv", ALARM_COLUMNS, event_row(described_event(said)))
     for topic, table in OWN_TABLES.items():
         for at_s, entry in recording.own(topic):
             tables.add(table.file, (*table.columns, "details"), at_s, None, _own_row(table, entry))
     return [f"{unfit} events of the log are left out: they have no time or no number."] if unfit else []
+
+
+def _marks(recording: Recording, tables: _Tables) -> None:
+    """Those that came after the recording was complete are among them."""
+    for mark in marks_of(recording):
+        row = [mark[name] for name in MARK_COLUMNS]  # type: ignore[literal-required]
+        tables.add("marks.csv", MARK_COLUMNS, mark["marked_ms"] / 1000, None, row)
 
 
 def _own_row(table: OwnTable, entry: Mapping[str, Any]) -> list[Any]:
@@ -164,13 +177,22 @@ def _without_table(drive: DecodedDrive) -> list[str]:
     ]
 
 
-def _pack(path: Path, folder: Path, names: Sequence[str], texts: Mapping[str, str], progress: Progress) -> None:
+def _pack(
+    path: Path,
+    folder: Path,
+    names: Sequence[str],
+    texts: Mapping[str, str],
+    recording: Recording,
+    progress: Progress,
+) -> None:
     now = datetime.now(UTC).timetuple()[:6]
     sizes = {name: (folder / name).stat().st_size for name in names}
     whole, done = max(sum(sizes.values()), 1), 0
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as packed:
         for name, text in texts.items():
             packed.writestr(_entry(name, now), text)
+        for media, data in media_of(recording):
+            packed.writestr(_entry(f"marks/{media.file}", now), data, zipfile.ZIP_STORED)
         for name in names:
             with (folder / name).open("rb") as source, packed.open(_entry(name, now), "w", force_zip64=True) as target:
                 for block in _blocks(source):

@@ -1,4 +1,4 @@
-"""The tracks of a drive as GeoJSON (RFC 7946): lines with the time of each point, a point for each alarm.
+"""The tracks of a drive as GeoJSON (RFC 7946): lines with the time of each point, a point for each alarm and mark.
 
 Lines end at the antimeridian and go on beyond it, as RFC 7946, 3.1.9 wants it. `coordTimes` is the usage of togeojson.
 """
@@ -45,6 +45,9 @@ def write_geojson(recording: Recording, path: Path, *, progress: Progress = noth
                 separator = b",\n"
         for place in tracks.alarms:
             file.write(separator + orjson.dumps(_alarm(place)))
+            separator = b",\n"
+        for place in tracks.marks:
+            file.write(separator + orjson.dumps(_mark(place)))
             separator = b",\n"
         file.write(b"\n]}\n")
     return Outcome(entries=tracks.points, notes=tracks.notes, notices=tracks.notices)
@@ -122,4 +125,13 @@ def _alarm(place: Place) -> dict[str, Any]:
             "change": event.get("change"),
             "time": when(place.at_s),
         },
+    }
+
+
+def _mark(place: Place) -> dict[str, Any]:
+    fields = {name: place.event[name] for name in ("mark", "category", "voice", "photo", "source", "by", "late")}
+    return {
+        "type": "Feature",
+        "geometry": {"type": "Point", "coordinates": _position(place.lat_deg, place.lon_deg, place.alt_m)},
+        "properties": {"kind": "mark", "name": place.title, "text": place.text, **fields, "time": when(place.at_s)},
     }

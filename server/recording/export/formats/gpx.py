@@ -1,4 +1,4 @@
-"""The tracks of a drive as GPX 1.1 (topografix.com/GPX/1/1): the car, each phone, a waypoint for each alarm."""
+"""The tracks of a drive as GPX 1.1 (topografix.com/GPX/1/1): car, phones, a waypoint for each alarm and mark."""
 
 from __future__ import annotations
 
@@ -47,6 +47,12 @@ def write_gpx(recording: Recording, path: Path, *, progress: Progress = nothing)
                 f'<wpt lat="{place.lat_deg:.8f}" lon="{place.lon_deg:.8f}">{_height(place.alt_m)}'
                 f"<time>{when(place.at_s)}</time><name>{_text(place.title)}</name>"
                 f"<desc>{_text(place.text)}</desc><type>{_text(place.priority)}</type></wpt>\n"
+            )
+        for place in tracks.marks:
+            file.write(
+                f'<wpt lat="{place.lat_deg:.8f}" lon="{place.lon_deg:.8f}">{_height(place.alt_m)}'
+                f"<time>{when(place.at_s)}</time><name>{_text(place.title)}</name>"
+                f"<desc>{_text(place.text)}</desc><sym>Flag, Blue</sym><type>mark</type></wpt>\n"
             )
         if tracks.car.at_s:
             _track(file, str(recording.metadata.get("vehicle") or "car"), "car", tracks.car)

@@ -6,8 +6,8 @@ from server.recording.export.export_format import ExportFormat
 
 FORMAT = ExportFormat(
     name="html",
-    label="HTML report",
-    use="plots and alarms in one page, works offline",
+    label="Drive report",
+    use="one page, works offline, prints on A4",
     extension="html",
     media_type="text/html; charset=utf-8",
     writer="server.analysis.drive_page:write_drive_page",

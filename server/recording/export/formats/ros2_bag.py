@@ -11,6 +11,7 @@ import struct
 import tempfile
 import zipfile
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,8 +20,9 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_typestore
 
 from server.recording.export.export_format import ExportFormat
+from server.recording.export.later import explain, in_time, later_messages
 from server.recording.export.outcome import ExportRefused, Outcome, Progress, nothing
-from server.recording.export.raw import OWN, raw_messages
+from server.recording.export.raw import OWN, Raw, raw_messages
 from server.recording.read.definitions import definitions_of, distribution, times
 from server.recording.read.errors import Undecodable
 from server.recording.read.read import Recording
@@ -68,20 +70,23 @@ def write_ros2_bag(
     if recording.ros_version != 2:
         raise ExportRefused("This drive was recorded from ROS 1: export a ROS 1 bag.")
     outcome = Outcome()
+    later = later_messages(recording) if with_own else []
     with tempfile.TemporaryDirectory(prefix=".bag-", dir=path.parent) as folder:
         bag = Path(folder) / (re.sub(r"[^A-Za-z0-9._-]+", "_", name).strip("._")[:100] or "drive")
         writer = Writer(bag, version=VERSION, storage_plugin=StoragePlugin.MCAP)
         writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         with writer:
-            _copy(recording, writer, outcome, with_own=with_own, progress=lambda part: progress(part * _READING))
+            read = raw_messages(recording, progress=lambda part: progress(part * _READING))
+            _copy(recording, in_time(read, later), writer, outcome, with_own=with_own)
         if not outcome.entries:
             raise ExportRefused("Nothing in this recording fits a ROS 2 bag.")
         _pack(path, bag, progress)
+    explain(recording, later, outcome)
     outcome.notes += [f"{sentence}." for sentence in recording.damage]
     return outcome
 
 
-def _copy(recording: Recording, writer: Writer, outcome: Outcome, *, with_own: bool, progress: Progress) -> None:
+def _copy(recording: Recording, messages: Iterable[Raw], writer: Writer, outcome: Outcome, *, with_own: bool) -> None:
     connections: dict[tuple[int, int], Any] = {}  # file and channel → its connection; None: left out
     by_topic: dict[str, tuple[str, Any]] = {}  # a topic has one type in a bag of ROS 2
     left_out: Counter[tuple[str, str]] = Counter()
@@ -102,7 +107,7 @@ def _copy(recording: Recording, writer: Writer, outcome: Outcome, *, with_own: b
         by_topic[channel.topic] = (type, added)
         return added
 
-    for raw in raw_messages(recording, progress=progress):
+    for raw in messages:
         channel, place = raw.channel, (raw.file, raw.channel.number)
         is_own = _is_own(channel)
         if is_own and not with_own:

@@ -74,13 +74,13 @@ def as_ours(source: Path, path: Path, own: Iterable[Own] = (), **metadata: str) 
 
 def event(n: int, at_ms: int, change: str, alarm: str | None = "speed_limit", **more: Any) -> dict[str, Any]:
     """An event of the log as docs/protocol.md has it."""
-    told = {"n": n, "at_ms": at_ms, "alarm": alarm, "change": change, "text": "", "by": None, "settings_version": 1}
+    fields = {"n": n, "at_ms": at_ms, "alarm": alarm, "change": change, "text": "", "by": None, "settings_version": 1}
     if alarm is not None:
-        told |= {
+        fields |= {
             "occurrence": 1,
             "title": "Speed above limit",
             "priority": "critical",
             "place": "dialog",
             "sound": "high",
         }
-    return told | more
+    return fields | more

@@ -27,7 +27,7 @@ def cut(source: Path, out: Path, at_s: float, before_s: float = 2.0, after_s: fl
         return write_clip(recording, out, window, clip_of="car_1")
 
 
-def told(at_s: float, n: int, change: str, alarm: str | None = "speed_limit", **more: Any) -> Own:
+def logged(at_s: float, n: int, change: str, alarm: str | None = "speed_limit", **more: Any) -> Own:
     at_ms = BEGIN_S * 1000 + round(at_s * 1000)
     return (BEGIN + round(at_s * NS), "/catgraph/alarms", event(n, at_ms, change, alarm, **more))
 
@@ -43,16 +43,16 @@ ROWS: list[Row] = [
 ]
 SAID: list[Own] = [
     in_force(0.0, TOML),
-    told(1.0, 1, "raised", state="UNACKED"),
-    told(2.0, 2, "raised", "gps_fix", state="UNACKED"),
-    told(3.0, 3, "cleared", "gps_fix", state="NORMAL"),
-    told(4.0, 4, "raised", "old_style"),  # as without a state: it stands until it is cleared
-    told(4.5, 5, "acknowledged", state="ACKED"),
-    told(5.0, 6, "connected", None),
+    logged(1.0, 1, "raised", state="UNACKED"),
+    logged(2.0, 2, "raised", "gps_fix", state="UNACKED"),
+    logged(3.0, 3, "cleared", "gps_fix", state="NORMAL"),
+    logged(4.0, 4, "raised", "old_style"),  # as without a state: it stands until it is cleared
+    logged(4.5, 5, "acknowledged", state="ACKED"),
+    logged(5.0, 6, "connected", None),
     in_force(6.0, STRICTER),
-    told(11.0, 7, "raised", "obstacle", state="UNACKED"),
+    logged(11.0, 7, "raised", "obstacle", state="UNACKED"),
     in_force(11.5, TOML),
-    told(19.0, 8, "raised", "late", state="UNACKED"),
+    logged(19.0, 8, "raised", "late", state="UNACKED"),
 ]
 
 

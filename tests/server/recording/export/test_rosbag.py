@@ -37,8 +37,8 @@ QUICKER = 10  # times true speed
 
 
 def exported(source: Path, folder: Path, compression: Literal["none", "bz2", "lz4"]) -> Path:
-    told: list[Own] = [(BEGAN_NS + 10**9, "/catgraph/alarms", event(1, BEGAN_NS // 10**6 + 1000, "raised"))]
-    ours = as_ours(source, folder / "ours.mcap", told)
+    events: list[Own] = [(BEGAN_NS + 10**9, "/catgraph/alarms", event(1, BEGAN_NS // 10**6 + 1000, "raised"))]
+    ours = as_ours(source, folder / "ours.mcap", events)
     with open_recording([ours]) as recording:
         write_bag(recording, folder / "out.bag", compression=compression)
     return folder / "out.bag"

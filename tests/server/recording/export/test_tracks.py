@@ -60,7 +60,7 @@ def phone(at_s: float, lat: float, lon: float, **more: Any) -> Own:
 
 
 LAP = [fix(0.1 * n, 32.0 + n * 1e-5, -110.0, alt=700.0 + n) for n in range(30)]
-TOLD: list[Own] = [
+OWN: list[Own] = [
     alarm(1.0, text="3.2 m/s & <more>"),
     phone(1.0, 32.5, -110.5),
     phone(2.0, 32.6, -110.5),
@@ -71,7 +71,7 @@ TOLD: list[Own] = [
 
 
 def test_gpx_has_the_car_the_phone_and_the_alarm(tmp_path: Path) -> None:
-    root, outcome = gpx(made(tmp_path, LAP, TOLD), tmp_path)
+    root, outcome = gpx(made(tmp_path, LAP, OWN), tmp_path)
     assert root.attrib["version"] == "1.1"
     assert [child.tag.rpartition("}")[2] for child in root] == ["metadata", "wpt", "trk", "trk"]  # the schema's order
     points = root.findall("g:trk[1]/g:trkseg/g:trkpt", GPX)
@@ -92,7 +92,7 @@ def test_gpx_has_the_car_the_phone_and_the_alarm(tmp_path: Path) -> None:
 
 
 def test_geojson_has_the_same(tmp_path: Path) -> None:
-    features, outcome = geojson(made(tmp_path, LAP, TOLD), tmp_path)
+    features, outcome = geojson(made(tmp_path, LAP, OWN), tmp_path)
     car, other, point = features
     assert (car["geometry"]["type"], car["properties"]["kind"]) == ("LineString", "car")
     assert car["geometry"]["coordinates"][1] == [-110.0, 32.00001, 701.0]
@@ -161,7 +161,7 @@ def test_no_position_is_said(tmp_path: Path, rows: list[Row]) -> None:
 
 def test_a_phone_alone_is_a_track_and_alarms_without_a_place_are_counted(tmp_path: Path) -> None:
     drive: list[Row] = [(0.0, "/catvehicle/vel", TWIST, {"linear": {"x": 1.0}})]
-    root, outcome = gpx(made(tmp_path, drive, TOLD), tmp_path)
+    root, outcome = gpx(made(tmp_path, drive, OWN), tmp_path)
     assert [t.findtext("g:type", namespaces=GPX) for t in root.findall("g:trk", GPX)] == ["phone"]
     assert outcome.notices == ["The car published no position: only that of the phone is in the file."]
     assert outcome.notes == [

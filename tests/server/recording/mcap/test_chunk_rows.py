@@ -34,14 +34,14 @@ def test_rows_come_in_order_and_parts_are_read_when_their_time_has_come(times: l
         begun.append(part.message_start_time)
         return list(part.rows)
 
-    told = []
+    merged = []
     for row in in_order(parts, read):
-        told.append(row)
+        merged.append(row)
         assert all(begin_ns <= row[0] for begin_ns in begun)
-    assert [row[0] for row in told] == sorted(row[0] for row in told)
-    assert sorted(told) == sorted(row for part in parts for row in part.rows)
+    assert [row[0] for row in merged] == sorted(row[0] for row in merged)
+    assert sorted(merged) == sorted(row for part in parts for row in part.rows)
     for number in range(len(parts)):  # what one chunk says at one moment stays in its order
-        assert [row for row in told if row[1] == number] == list(parts[number].rows)
+        assert [row for row in merged if row[1] == number] == list(parts[number].rows)
 
 
 def test_a_part_that_cannot_be_read_leaves_the_others() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from pathlib import Path
 
@@ -79,7 +80,7 @@ def test_a_chunk_that_cannot_be_unpacked_is_one_sentence(tmp_path: Path) -> None
 def test_an_index_that_is_none_is_one_sentence(tmp_path: Path, damage: str) -> None:
     path = written(tmp_path / "a.bag")
     raw = bytearray(path.read_bytes())
-    at = raw.find(b"count=")  # of the first index record
+    at = raw.find(b"\x0a\0\0\0count=") + 4  # of the first index record
     match damage:
         case "op":
             raw[raw.rfind(b"op=", 0, at + 60) + 3] = 9
@@ -91,4 +92,16 @@ def test_an_index_that_is_none_is_one_sentence(tmp_path: Path, damage: str) -> N
             raw[at - 4 : at] = struct.pack("<I", 2**31)
     path.write_bytes(raw)
     with pytest.raises(RecordingUnreadable, match=r"a\.bag"):
+        open_recording([path])
+
+
+def test_an_index_that_names_a_part_twice_is_refused(tmp_path: Path) -> None:
+    """Else a small bag, which names its one part a million times, would hold any number of messages."""
+    path = written(tmp_path / "a.bag")
+    content = bytearray(path.read_bytes())
+    places = [found.end() for found in re.finditer(rb"chunk_pos=", content)]
+    assert len(places) > 1
+    content[places[1] : places[1] + 8] = content[places[0] : places[0] + 8]
+    path.write_bytes(content)
+    with pytest.raises(RecordingUnreadable, match="The index names a part twice"):
         open_recording([path])

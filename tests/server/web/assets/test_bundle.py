@@ -13,7 +13,7 @@ import pytest
 
 from server.app.config import Config
 from server.system.page_files import static_dir
-from server.web.assets.bundle import STYLES, find, join
+from server.web.assets.bundle import FLEET_STYLES, STYLES, find, join
 from server.web.routes.pages import parts_of
 from tests.server.conftest import serving
 from tests.tree import PROJECT
@@ -25,7 +25,7 @@ NODE = shutil.which("node") or "node"
 @pytest.fixture
 def static(tmp_path: Path) -> Path:
     """A small page that loads a part of itself later."""
-    for folder in ("boot", "core", "scan"):
+    for folder in ("boot", "core", "scan", "shell"):
         (tmp_path / "js" / folder).mkdir(parents=True)
     (tmp_path / "css").mkdir()
     (tmp_path / "js" / "main.js").write_text(
@@ -46,7 +46,10 @@ def static(tmp_path: Path) -> Path:
     (tmp_path / "js" / "boot" / "early.js").write_text(
         "// before all others\n(() => {\n  globalThis.early = 'first';\n})();\n"
     )
-    for name in STYLES:
+    (tmp_path / "js" / "shell" / "fleet.js").write_text(
+        "import { word } from '../core/format.js';\nconsole.log(word, 'to all cars');\n"
+    )
+    for name in {*STYLES, *FLEET_STYLES}:
         (tmp_path / "css" / f"{name}.css").write_text(f".{name} {{ color: red; }}\n")
     (tmp_path / "css" / "tokens.css").write_text("@font-face { font-family: n; src: url('../fonts/n.woff2'); }\n")
     join(TOOLS, tmp_path)
@@ -77,6 +80,18 @@ def test_the_joined_script_says_what_the_many_said_and_the_rest_comes_later(stat
     assert "first" in built.early
     assert "before" not in built.early, "without comments"
     assert "\n" not in built.early
+
+
+def test_the_page_of_all_cars_is_joined_for_itself(static: Path) -> None:
+    built = find(static)
+    assert built is not None
+    program = f"await import({json.dumps(str(static / built.fleet.script))});"
+    done = subprocess.run([NODE, "--input-type=module", "-e", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "hello to all cars\n"
+    style = (static / built.fleet.style).read_text()
+    assert re.findall(r"\.(\w+)\{", style) == list(FLEET_STYLES[1:])
+    assert "all cars" not in "".join((static / name).read_text() for name in (built.script, *built.needed))
+    assert parts_of(built, str, is_fleet=True)["script"] == f"/static/{built.fleet.script}"
 
 
 def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(static: Path) -> None:
@@ -137,9 +152,12 @@ def test_what_cannot_be_joined_is_said_with_the_reason(static: Path) -> None:
     assert find(static) is None
 
 
-async def test_the_page_begins_with_few_files_that_may_be_kept_for_ever() -> None:
+@pytest.mark.parametrize("page", ["/", "/fleet"])
+async def test_the_page_begins_with_few_files_that_may_be_kept_for_ever(page: str) -> None:
     async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
-        text = (await client.get("/")).text
+        served = await client.get(page)
+        assert "script-src 'self' 'sha256-" in served.headers["content-security-policy"]
+        text = served.text
         named = re.findall(r'(?:src|href)="(/static/built/[^"]+)"', text)
         assert 2 <= len(named) <= 20
         for path in named:

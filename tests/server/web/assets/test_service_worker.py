@@ -18,7 +18,7 @@ from server.app.app import create_app
 from server.app.config import Config
 from server.system.page_files import static_dir
 from server.web.assets import icons
-from server.web.assets.bundle import Built
+from server.web.assets.bundle import Built, Entry
 from server.web.assets.manifest import manifest
 from server.web.assets.service_worker import build_of, shell_of, withdrawn
 from tests.tree import PROJECT
@@ -45,7 +45,8 @@ def static(tmp_path: Path) -> Path:
     return folder
 
 
-BUILT = Built(script="built/app-AAAAAAAA.js", style="built/page-CCCCCCCC.css", needed=(), early="", name="0123456789ab")
+ENTRY = Entry(script="built/app-AAAAAAAA.js", style="built/page-CCCCCCCC.css", needed=())
+BUILT = Built(script=ENTRY.script, style=ENTRY.style, needed=ENTRY.needed, early="", name="0123456789ab", fleet=ENTRY)
 
 
 def asset(name: str) -> str:
@@ -95,11 +96,11 @@ async def test_without_drawn_icons_the_svg_is_served_alone(
 ) -> None:
     monkeypatch.setattr("server.web.routes.pages.are_drawn", lambda static: False)
     async with asking() as client:
-        told = (await client.get("/manifest.webmanifest")).json()
-        assert {(one["type"], one["purpose"]) for one in told["icons"]} == {
+        found = (await client.get("/manifest.webmanifest")).json()
+        assert {(one["type"], one["purpose"]) for one in found["icons"]} == {
             ("image/svg+xml", "any"), ("image/svg+xml", "maskable"), ("image/svg+xml", "monochrome"),
         }  # fmt: skip
-        for one in told["icons"]:
+        for one in found["icons"]:
             assert (await client.get(one["src"])).headers["content-type"] == "image/svg+xml"
         text = (await client.get("/")).text
         assert "apple-touch-icon" not in text
@@ -109,12 +110,12 @@ async def test_without_drawn_icons_the_svg_is_served_alone(
 
 
 def test_the_manifest_names_what_a_phone_needs() -> None:
-    told = manifest(asset, are_drawn=True)
-    sizes = {(one["purpose"], one["sizes"]) for one in told["icons"]}
+    found = manifest(asset, are_drawn=True)
+    sizes = {(one["purpose"], one["sizes"]) for one in found["icons"]}
     assert sizes >= {("any", "192x192"), ("any", "512x512"), ("maskable", "512x512"), ("monochrome", "512x512")}
-    assert all(one["purpose"] in ("any", "maskable", "monochrome") for one in told["icons"]), "one purpose each"
-    assert told["display"] == "standalone"
-    assert len(told["short_name"]) <= 12
+    assert all(one["purpose"] in ("any", "maskable", "monochrome") for one in found["icons"]), "one purpose each"
+    assert found["display"] == "standalone"
+    assert len(found["short_name"]) <= 12
 
 
 # -- the shell ---------------------------------------------------------------------------------------------------------
@@ -128,7 +129,8 @@ def test_another_content_is_another_version_and_the_same_is_the_same(static: Pat
     first = version()
     assert version() == first
     seen = {first, version(offline=b"<html>2"), version(asset=lambda name: f"/static/{name}?v=2")}
-    seen.add(version(built=Built(script="", style="", needed=(), early="", name="ba9876543210")))
+    other = Built(script="", style="", needed=(), early="", name="ba9876543210", fleet=ENTRY)
+    seen.add(version(built=other))
     font = static / "fonts" / "catgraph-numerals-500.woff2"
     font.write_bytes(font.read_bytes() + b"0")
     seen.add(version())
@@ -142,13 +144,13 @@ def test_another_content_is_another_version_and_the_same_is_the_same(static: Pat
 
 def test_the_worker_is_told_of_every_joined_file_and_of_nothing_that_is_live(static: Path) -> None:
     script = shell_of(static, BUILT, asset, b"").worker(static)
-    told = json.loads(script.partition("\n")[0].removeprefix("self.SHELL = ").removesuffix(";"))
+    found = json.loads(script.partition("\n")[0].removeprefix("self.SHELL = ").removesuffix(";"))
     assert {f"/static/built/{name}" for name in ("app-AAAAAAAA.js", "log-BBBBBBBB.js", "page-CCCCCCCC.css")} <= set(
-        told["named"]
+        found["named"]
     )
-    addresses = [*told["named"], *told["plain"], told["offline"]]
+    addresses = [*found["named"], *found["plain"], found["offline"]]
     assert all(address.startswith(("/static/", "/offline?v=")) for address in addresses)
-    assert told["build"] == build_of(BUILT)
+    assert found["build"] == build_of(BUILT)
     assert build_of(None) == ""
 
 

@@ -163,11 +163,15 @@ async def test_what_is_kept_is_a_map_file_like_any_other(source: Source, tmp_pat
         assert kept.layer.zoom == (2, 3)
         assert kept.layer.bounds == pytest.approx((45.0, 40.979898, 135.0, 66.513260))
     with closing(sqlite3.connect(path)) as rows:
-        told = dict(rows.execute("SELECT name, value FROM metadata"))
-        assert (told["format"], told["type"], told["name"]) == ("png", "baselayer", f"127.0.0.1:{source.port}")
+        metadata = dict(rows.execute("SELECT name, value FROM metadata"))
+        assert (metadata["format"], metadata["type"], metadata["name"]) == (
+            "png",
+            "baselayer",
+            f"127.0.0.1:{source.port}",
+        )
         assert rows.execute("PRAGMA application_id").fetchone()[0] == 0x4D504258
         assert rows.execute("PRAGMA journal_mode").fetchone()[0] == "delete", "one file, whole by itself"
-        assert "SECRET" not in str(told)
+        assert "SECRET" not in str(metadata)
     async with serving(source.upstream(), tmp_path / "other", maps=(path,)) as both:
         layers = (await both.client.get("/api/map")).json()["layers"]
         assert [("upstream" in layer) for layer in layers] == [True, False], "what may be fetched lies below the files"
@@ -298,22 +302,24 @@ async def test_no_redirect_is_followed_and_no_other_host_dialled(source: Source,
 async def test_a_source_that_hangs_keeps_nobody_waiting_but_its_own(
     source: Source, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.web.maps.tile_proxy.WAITS_S", 0.3)
+    monkeypatch.setattr("server.web.maps.tile_proxy.WAITS_S", 1.5)
     async with serving(source.upstream(), tmp_path / "data") as one:
         await one.at(3, 5, 2)
         source.be(after_s=30)
         began_s = time.monotonic()
         hanging = [asyncio.create_task(one.at(4, x, 0)) for x in range(8)]
-        longest_s = 0.0
+        waits_s = []
         while not all(task.done() for task in hanging):
             at_s = time.monotonic()
             assert (await one.at(3, 5, 2)).status_code == 200
-            longest_s = max(longest_s, time.monotonic() - at_s)
+            waits_s.append(time.monotonic() - at_s)
             await asyncio.sleep(0.01)
         assert {(await task).status_code for task in hanging} == {204}
-        assert time.monotonic() - began_s < 5
-        assert longest_s < 0.25
-    assert time.monotonic() - began_s < 6, "nor does the end of the server wait for it"
+        assert time.monotonic() - began_s < 8
+        waits_s.sort()
+        assert waits_s[-2] < 1.0, "nobody waits as long as the hanging ones do; once the machine itself may stand still"
+        assert len(waits_s) > 20
+    assert time.monotonic() - began_s < 9, "nor does the end of the server wait for it"
 
 
 async def test_older_wishes_give_way_when_there_are_too_many(

@@ -41,8 +41,8 @@ class Tiles(BaseHTTPRequestHandler):
         with LOCK:
             Tiles.at_once += 1
             with (self.folder / "asked.jsonl").open("a") as asked:
-                told = {"path": self.path, "headers": dict(self.headers), "at_once": Tiles.at_once}
-                asked.write(json.dumps(told) + "\n")
+                row = {"path": self.path, "headers": dict(self.headers), "at_once": Tiles.at_once}
+                asked.write(json.dumps(row) + "\n")
         try:
             time.sleep(mood.get("after_s", 0))
             self.answer(mood)

@@ -143,9 +143,10 @@ async def test_the_password_goes_one_way(
     caplog.set_level("DEBUG")
     given = {
         "host": "smtp.example.org", "port": 587, "security": "starttls", "user": "car", "password": "hunter2",
-        "sender": "car@example.org", "sender_name": "Prüfstand", "allowed": ["example.org"], "limit_mb": 10.0,
+        "sender": "car@example.org", "sender_name": "Prüfstand", "allowed": ["example.org"], "report_to": [],
+        "limit_mb": 10.0,
     }  # fmt: skip
-    told = (await api.put("/api/mail/settings", json=given)).raise_for_status()
+    first = (await api.put("/api/mail/settings", json=given)).raise_for_status()
     body = (await api.get("/api/mail/settings")).json()
     assert body == {
         **{name: value for name, value in given.items() if name != "password"},
@@ -159,7 +160,7 @@ async def test_the_password_goes_one_way(
     assert refused.status_code == 422
     gone = await api.put("/api/mail/settings", json=kept | {"password": ""})
     assert gone.json()["has_password"] is False
-    for answer in (told, stolen, refused, gone):
+    for answer in (first, stolen, refused, gone):
         assert "hunter2" not in answer.text
     assert "hunter2" not in caplog.text
     assert (tmp_path / "data" / "mail" / "settings.toml").stat().st_mode & 0o777 == 0o600

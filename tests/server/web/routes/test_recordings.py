@@ -193,3 +193,24 @@ async def test_no_id_finds_what_is_not_a_recording(client: httpx.AsyncClient, id
         answer = await client.get(f"/api/recordings/{safe}{way}")
         assert answer.status_code in (307, 404, 405, 422), (id, answer.text)
     assert (await client.delete(f"/api/recordings/{safe}")).status_code in (307, 404, 405, 422)
+
+
+async def test_verified_on_request_and_only_then(client: httpx.AsyncClient, data: Path) -> None:
+    row = (await client.get(f"/api/recordings/{FIRST}")).json()
+    assert len(row["head"]) == 64
+    assert row["verified"] is None, "the list never claims what was not verified"
+    found = (await client.get(f"/api/recordings/{FIRST}/verify")).json()
+    assert (found["state"], found["is_broken"], found["head"]) == ("intact", False, row["head"])
+    assert found["short"] == f"Intact · {row['head'][:8]}"
+    assert (await client.get(f"/api/recordings/{FIRST}")).json()["verified"] == found
+    path = data / "recordings" / "car" / f"{FIRST}.mcap"
+    raw = path.read_bytes()
+    path.write_bytes(raw[:-300] + bytes((raw[-300] ^ 1,)) + raw[-299:])
+    try:
+        found = (await client.get(f"/api/recordings/{FIRST}/verify")).json()
+    finally:
+        path.write_bytes(raw)
+    assert found["is_broken"]
+    assert found["short"].startswith("Broken at record ")
+    assert (await client.get(f"/api/recordings/{FIRST}")).json()["verified"] is None, "the file is another again"
+    assert problem(await client.get("/api/recordings/none/verify"), 404)

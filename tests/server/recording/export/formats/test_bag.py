@@ -226,8 +226,8 @@ def test_our_own_channels_are_text_or_left_out(tmp_path: Path, with_own: bool) -
     source = write_ros1(
         tmp_path / "in.bag", Drive(messages=[(0.0, "/n", INT, {"data": 1}), (2.0, "/n", INT, {"data": 2})])
     )
-    told = event(1, BEGIN_S * 1000 + 1000, "raised", text="3.2 m/s, limit 3.0 m/s – zu schnell")
-    ours = as_ours(source, tmp_path / "ours.mcap", [(BEGIN_S * 10**9 + 10**9, "/catgraph/alarms", told)])
+    alarm = event(1, BEGIN_S * 1000 + 1000, "raised", text="3.2 m/s, limit 3.0 m/s – zu schnell")
+    ours = as_ours(source, tmp_path / "ours.mcap", [(BEGIN_S * 10**9 + 10**9, "/catgraph/alarms", alarm)])
     outcome = export(ours, tmp_path / "out.bag", with_own=with_own)
     with open_recording([tmp_path / "out.bag"]) as after:
         found = [(m.topic, m.type, m.message["data"]) for m in after.messages() if m.topic != "/n"]
@@ -239,7 +239,7 @@ def test_our_own_channels_are_text_or_left_out(tmp_path: Path, with_own: bool) -
     else:
         ((topic, type, data),) = found
         assert (topic, type) == ("/catgraph/alarms", "std_msgs/String")
-        assert json.loads(data) == {"time_ms": BEGIN_S * 1000 + 1000} | told
+        assert json.loads(data) == {"time_ms": BEGIN_S * 1000 + 1000} | alarm
 
 
 def test_latched_topics_stay_latched(tmp_path: Path) -> None:

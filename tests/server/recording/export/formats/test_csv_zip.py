@@ -51,11 +51,21 @@ def made(folder: Path, rows: list[Row], own: list[Own] | None = None) -> Path:
 
 def test_every_signal_has_a_table_with_its_units() -> None:
     assert TABLES.keys() == SIGNALS.keys()
-    without = ("none in range", "status", "covariance type", "frame", "beams", "usable beams", "component", "level")
+    without = (
+        "none in range",
+        "status",
+        "covariance type",
+        "frame",
+        "beams",
+        "usable beams",
+        "component",
+        "level",
+        "mode",
+    )
     for name, table in TABLES.items():
         for column in table.columns:
             assert column.isascii(), (name, column)
-            assert "[" in column or column in (*without, "message", "unit"), (name, column)
+            assert "[" in column or column in (*without, "message", "unit", "mode", "as sent"), (name, column)
         assert SIGNALS[name].about.endswith(".")
 
 
@@ -223,8 +233,8 @@ def test_a_recording_with_nothing_in_it_is_refused(tmp_path: Path) -> None:
 def test_what_is_no_event_spoils_nothing(tmp_path: Path) -> None:
     odd: list[Any] = [{}, {"at_ms": "x", "change": 3}, {"at_ms": 1e300, "change": "raised", "alarm": None}]
     ours = OurFile(tmp_path / "ours.mcap")
-    for told in odd:
-        ours.own(BEGIN_S * NS, "/catgraph/alarms", told)
+    for row in odd:
+        ours.own(BEGIN_S * NS, "/catgraph/alarms", row)
     ours.own(BEGIN_S * NS, "/catgraph/alarms", event(1, BEGIN_S * 1000, "connected", None))
     ours.own(BEGIN_S * NS, "/catgraph/phone", {"phone": 3, "fix": [1]})
     export(ours.close(), tmp_path / "out.zip")

@@ -40,8 +40,8 @@ def rows(bag: Path) -> list[tuple[str, str, int, bytes]]:
 
 def test_a_real_drive_recorded_and_exported_equals_the_original(recordings: Path, tmp_path: Path) -> None:
     original = recordings / "catvehicle_2016-06-01_mcap"
-    told = event(1, NS // 10**6, "raised")
-    ours = as_ours(original, tmp_path / "ours.mcap", [(NS, "/catgraph/alarms", told)])
+    raised = event(1, NS // 10**6, "raised")
+    ours = as_ours(original, tmp_path / "ours.mcap", [(NS, "/catgraph/alarms", raised)])
     outcome, bag = export(ours, tmp_path, with_own=False)
     assert outcome.notes == []
     assert rows(bag) == rows(original)
@@ -54,8 +54,8 @@ def test_our_own_channels_are_text_in_it_and_every_message_is_understood(tmp_pat
     drive: list[Row] = [(0.1 * n, "/n", INT, {"data": n}) for n in range(5)]
     drive.append((0.2, "/scan", SCAN, {"ranges": [1.0, float("inf"), float("nan")]}))
     source = write_ros2(tmp_path / "in", Drive(messages=drive, latched={"/n"}))
-    told = event(1, NS // 10**6, "raised", text="5.2 m/s, über 5.0")
-    ours = as_ours(source, tmp_path / "ours.mcap", [(NS + 10**8, "/catgraph/alarms", told)])
+    raised = event(1, NS // 10**6, "raised", text="5.2 m/s, über 5.0")
+    ours = as_ours(source, tmp_path / "ours.mcap", [(NS + 10**8, "/catgraph/alarms", raised)])
     outcome, bag = export(ours, tmp_path, name="catgraph/../drive of Monday")
     assert bag.name == "catgraph_.._drive_of_Monday"
     with AnyReader([bag]) as reader:
@@ -65,7 +65,7 @@ def test_our_own_channels_are_text_in_it_and_every_message_is_understood(tmp_pat
     assert len(said) == outcome.entries == 7
     assert [m.data for c, m in said if c.topic == "/n"] == [0, 1, 2, 3, 4]
     (alarm,) = (json.loads(m.data) for c, m in said if c.topic == "/catgraph/alarms")
-    assert alarm["text"] == told["text"]
+    assert alarm["text"] == raised["text"]
     assert qos["/n"][0].durability.name == "TRANSIENT_LOCAL"
     assert qos["/scan"] == []
 

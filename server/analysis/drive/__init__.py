@@ -1,0 +1,1 @@
+"""The drive's report: what its page, its tables and its mail show."""

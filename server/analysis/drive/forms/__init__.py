@@ -1,0 +1,1 @@
+"""Tables of authorities as templates: their columns are data, for their rules change."""

@@ -1,0 +1,134 @@
+"""What the drive's report shows, as plain values: the same for its page, its JSON and its tables.
+
+What nobody knows is None, and is shown as "not known".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from typing import Any
+
+from server.analysis.alarm_load import Load
+from server.recording.catalog.annotations import Annotations
+from server.recording.drive.facts import DriveFacts, DriveLog, figures_of
+from server.recording.drive.people import Span
+from server.recording.read.read import Recording
+from server.recording.verification import Verification
+from server.version import catgraph_version
+
+MOST_ROWS = 500  # of one table on the page
+
+
+def report_json(
+    facts: DriveFacts,
+    recording: Recording,
+    *,
+    name: str,
+    load: Load | None,
+    verified: Sequence[Verification],
+    annotations: Annotations,
+) -> dict[str, Any]:
+    """The whole report. Times are ms since 1970 and ISO 8601, lengths m and s, speeds m/s."""
+    metadata, log = recording.metadata, facts.log
+    return {
+        "catgraph": catgraph_version(),
+        "name": name,
+        "vehicle": metadata.get("vehicle") or None,
+        "session": metadata.get("session") or None,
+        "part": metadata.get("part") or None,
+        "start": _iso(facts.start_ms) if recording.count else None,
+        "end": _iso(facts.end_ms) if recording.count else None,
+        "start_ms": facts.start_ms,
+        "end_ms": facts.end_ms,
+        "title": annotations.title,
+        "weather": annotations.weather,
+        "remarks": annotations.note,
+        "tags": list(annotations.tags),
+        "chain": [one.as_json() for one in verified],
+        "figures": figures_of(facts),
+        "load": None if load is None or log is None else _load(load),
+        "blind": [{"from_s": round(a, 2), "to_s": round(b, 2)} for a, b in facts.motion.blind_spans()[:MOST_ROWS]],
+        "damage": list(recording.damage),
+        "left_out": [line for line in metadata.get("left_out", "").split("\n") if line][:MOST_ROWS],
+        "not_received": [line for line in metadata.get("not_received", "").split("\n") if line][:MOST_ROWS],
+        "speed_limits": [{"from_s": round(at_s, 2), "max_mps": value} for at_s, value in facts.limits],
+        "link_delay": _delay(facts),
+        **(_unknown() if log is None else _of_log(log, facts)),
+    }
+
+
+def _unknown() -> dict[str, Any]:
+    """Of a recording without a log."""
+    names = ("people", "departure", "modes", "alarms", "marks", "interventions", "slow_downs")
+    return dict.fromkeys(names)
+
+
+def _of_log(log: DriveLog, facts: DriveFacts) -> dict[str, Any]:
+    return {
+        "people": [
+            {
+                "name": one.name,
+                "role": one.role,
+                "on_duty": [_span(span) for span in one.on_duty],
+                "in_control": [_span(span) for span in one.in_control],
+            }
+            for one in log.people
+        ],
+        "departure": asdict(log.departure),
+        "modes": [asdict(span) for span in log.modes] if log.are_modes_known else None,
+        "alarms": [{**asdict(one), "to_acknowledge_s": one.to_acknowledge_s} for one in log.alarms],
+        "marks": [{**row, "at_s": round(facts.at_s(row["marked_ms"]), 3)} for row in log.marks],
+        "interventions": [{**asdict(one), "at_s": round(facts.at_s(one.at_ms), 3)} for one in log.interventions]
+        if log.are_modes_known
+        else None,
+        "slow_downs": [asdict(one) for one in log.slow_downs],
+    }
+
+
+def _span(span: Span) -> dict[str, int | None]:
+    return {"from_ms": span.from_ms, "to_ms": span.to_ms}
+
+
+def _load(load: Load) -> dict[str, Any]:
+    return {
+        "announced": load.announced,
+        "in_10_min": round(load.in_10_min, 2),
+        "most_in_10_min": load.most_in_10_min,
+        "chattering": list(load.chattering),
+        "standing": load.standing,
+        "verdict": load.verdict,
+    }
+
+
+def _delay(facts: DriveFacts) -> dict[str, float] | None:
+    """Weighted by how long each delay held; None: it was not recorded."""
+    if not facts.late:
+        return None
+    held: list[tuple[float, float]] = []
+    for number, (at_s, late_s) in enumerate(facts.late):
+        until_s = facts.late[number + 1][0] if number + 1 < len(facts.late) else facts.length_s
+        held.append((late_s, max(0.0, until_s - max(0.0, at_s))))
+    whole_s = sum(time_s for _, time_s in held)
+    return {
+        "median_s": _weighted(held, 0.5 * whole_s),
+        "p90_s": _weighted(held, 0.9 * whole_s),
+        "most_s": round(max(late_s for late_s, _ in held), 3),
+    }
+
+
+def _weighted(held: Sequence[tuple[float, float]], until_s: float) -> float:
+    passed_s = 0.0
+    for late_s, time_s in sorted(held):
+        passed_s += time_s
+        if passed_s >= until_s:
+            return round(late_s, 3)
+    return round(max(held)[0], 3)
+
+
+def _iso(at_ms: int) -> str | None:
+    try:
+        return datetime.fromtimestamp(at_ms / 1000, UTC).isoformat(timespec="milliseconds")
+    except (OverflowError, ValueError, OSError):
+        return None

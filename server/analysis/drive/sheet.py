@@ -1,0 +1,287 @@
+"""The drive's report as HTML: the first part of the page of a drive, and all of it on paper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+from jinja2 import Environment
+from markupsafe import Markup
+
+from monitor.load import BEARABLE_IN_10_MIN, FLOOD_IN_10_MIN
+from server.analysis import report_text
+from server.analysis.drive import drawings
+from server.analysis.drive.axis import day_time
+from server.analysis.drive.media import Media
+from server.recording.drive.facts import DriveFacts
+from server.version import catgraph_version
+
+MOST_ROWS = 300  # of one table; the CSV has all of them
+_MODES = {"autonomous": "Autonomous", "manual": "Manual", "unknown": "Not known"}
+_RESULTS = {"failed": "critical", "not_applicable": "na", "open": "unknown", "done": "ok"}
+
+
+def sheet(environment: Environment, template: str, facts: DriveFacts, found: Mapping[str, Any], media: Media) -> Markup:
+    """`found`: what report_json says. Every text of it is escaped by the template."""
+    return Markup(environment.from_string(template).render(view=_view(facts, found, media), version=catgraph_version()))
+
+
+def _view(facts: DriveFacts, found: Mapping[str, Any], media: Media) -> dict[str, Any]:
+    alarms = _alarms(found["alarms"])
+    return {
+        "about": _about(found),
+        **{name: found[name] for name in ("title", "weather", "remarks", "tags")},
+        "chain": [(_state(one), _head(one)) for one in found["chain"]],
+        "chain_is_bad": any(one["is_broken"] for one in found["chain"]),
+        "figures": _figures(found),
+        "people": None if found["people"] is None else _people(found["people"]),
+        "departure": _departure(found["departure"]),
+        "departure_head": _departure_head(found["departure"]),
+        "map": _both(drawings.drive_map, facts, (476, 340), (340, 360)),
+        "load": _load(found),
+        "modes": _modes(found),
+        "speed": _both(drawings.speed_plot, facts, (700, 210), (340, 230), (510, 220)),
+        "has_limit": bool(facts.limits),
+        "alarms": None if alarms is None else alarms[:MOST_ROWS],
+        "alarms_left": 0 if alarms is None else max(0, len(alarms) - MOST_ROWS),
+        "interventions": _interventions(found["interventions"]),
+        "marks": _marks(found["marks"], media),
+        "media_left": media.left_out,
+        "slow_downs": _slow_downs(found["slow_downs"]),
+        "link": drawings.link_plot(facts, 340, 150),
+        "link_head": _link_head(found["link_delay"]),
+        "blind": [(day_time(facts.start_ms + a * 1000), report_text.length(b - a)) for a, b in _blind(found)],
+        "lost": _lost(found),
+        "nothing_lost": "none: nothing is missing that was to be recorded"
+        if found["alarms"] is not None
+        else "no gap in the messages; whether topics were left out is not known",
+        "distance_by": {"position": "from positions", "speed": "from the wheels' speed", None: "not known"}[
+            found["figures"]["distance_by"]
+        ],
+    }
+
+
+def _both(draw: Any, facts: DriveFacts, *sizes: tuple[int, int]) -> list[Markup] | None:
+    drawn = [draw(facts, *size) for size in sizes]
+    return None if drawn[0] is None else drawn
+
+
+def _about(found: Mapping[str, Any]) -> str:
+    car = found["vehicle"] or "car not known"
+    if found["start"] is None:
+        return f"{car}, time not known"
+    begin = datetime.fromtimestamp(found["start_ms"] / 1000, UTC)
+    part = f", part {found['part']}" if found["part"] not in (None, "1") else ""
+    return f"{car}, {begin:%-d %b %Y}, {day_time(found['start_ms'])} to {day_time(found['end_ms'])} UTC{part}"
+
+
+def _state(one: Mapping[str, Any]) -> str:
+    is_intact = one["state"] == "intact" and not one["is_broken"]
+    return f"Intact: {report_text.counted(one['records'], 'record')}" if is_intact else str(one["short"])
+
+
+def _head(one: Mapping[str, Any]) -> str:
+    head = one["head"]
+    return "" if not head else f"head {head[:4]} {head[4:8]} {head[8:12]} {head[12:16]}"
+
+
+def _figures(found: Mapping[str, Any]) -> list[tuple[str, str | None, str, str]]:
+    """Title, value (None: not known), unit, what stands below."""
+    f, load = found["figures"], found["load"]
+    metres, modes = f["distance_m"], f["modes"]
+    km = None if metres is None else metres / 1000
+    auto_m = modes["autonomous"]["m"]
+    is_known = found["modes"] is not None and metres is not None
+    share = f"{100 * auto_m / metres:.0f} % of the distance" if is_known and metres else ""
+    per_km = f"{f['interventions'] / km:.2f} per km" if km and f["interventions"] is not None else ""
+    marks = found["marks"] or []
+    voices, photos = sum(one["voice"] for one in marks), sum(one["photo"] for one in marks)
+    p50, p90 = f["acknowledged_p50_s"], f["acknowledged_p90_s"]
+    waited = f"p90 {p90:.1f} s" if p90 is not None else "none was acknowledged" if f["alarms"] else ""
+    return [
+        ("Distance", _km(km), "km", _clock(f["driven_s"])),
+        ("Autonomous", _km(auto_m / 1000) if is_known else None, "km", share),
+        ("Interventions", _whole(f["interventions"]), "", per_km),
+        ("Alarms", _whole(f["alarms"]), "", f"{load['in_10_min']:.1f} in 10 min" if load else ""),
+        ("To acknowledge", None if p50 is None else f"{p50:.1f}", "s", waited),
+        ("Marks", _whole(f["marks"]), "", f"{voices} with voice, {photos} with photo" if marks else ""),
+        ("Data lost", f"{f['blind_s']:.1f}", "s", f"in {report_text.counted(f['blind'], 'gap')}"),
+    ]
+
+
+def _people(people: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    rows = []
+    for one in people:
+        rows += [(one["name"], one["role"] or "no person signed on", _span(span)) for span in one["on_duty"]]
+        rows += [(one["name"], "in control", _span(span)) for span in one["in_control"]]
+        if not one["on_duty"] and not one["in_control"]:
+            rows.append((one["name"], one["role"], ""))
+    return rows[:MOST_ROWS]
+
+
+def _span(span: Mapping[str, int | None]) -> str:
+    begin = "before" if span["from_ms"] is None else day_time(span["from_ms"])
+    end = "end" if span["to_ms"] is None else day_time(span["to_ms"])
+    return f"{begin}–{end}"
+
+
+def _departure(found: Mapping[str, Any] | None) -> str | list[tuple[str, str, str]] | None:
+    """A sentence where there was none; None: not known."""
+    if found is None:
+        return None
+    if found["state"] == "none":
+        return "No departure check was made."
+    failed, is_signed = found["failed"], found["state"] == "signed"
+    open_ = found["of"] - found["done"] - failed - found["not_applicable"]
+    sign = "critical" if failed else "ok" if is_signed else "unknown"
+    rows = [(sign, f"{found['done']} of {found['of']} done", f"{failed} failed" if failed else "")]
+    if open_ > 0:
+        rows.append(("unknown", f"{open_} open", ""))
+    for one in found["items"]:
+        is_fixed = one["result"] == "done" and one["had_failed"]
+        if one["result"] != "done" or one["note"] or is_fixed:
+            parts = (one["value"], "had failed, fixed" if is_fixed else "", one["note"])
+            value = " ".join(filter(None, parts)) or one["result"].replace("_", " ")
+            rows.append((_RESULTS[one["result"]], one["title"], value))
+    return rows
+
+
+def _departure_head(found: Mapping[str, Any] | None) -> str:
+    if found is None or found["state"] == "none":
+        return ""
+    if found["state"] == "open":
+        return "not signed"
+    return f"signed {day_time(found['at_ms'])}, {found['by']}"
+
+
+def _load(found: Mapping[str, Any]) -> list[tuple[bool, str, str, str]] | None:
+    load, f = found["load"], found["figures"]
+    if load is None:
+        return None
+    chattering = len(load["chattering"])
+    rows = [
+        (load["in_10_min"] <= BEARABLE_IN_10_MIN, "Alarms in 10 min, mean", f"{load['in_10_min']:.1f}", "≤ 1"),
+        (load["most_in_10_min"] <= FLOOD_IN_10_MIN, "Highest 10 min", f"{load['most_in_10_min']}", "≤ 10"),
+        (chattering == 0, "Chattering", f"{chattering}", "0"),
+        (not f["unacknowledged"], "Never acknowledged", f"{f['unacknowledged']}", "0"),
+    ]
+    return rows
+
+
+def _modes(found: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    if found["modes"] is None:
+        return [("The mode of the car was not recorded", "not known", _clock(found["figures"]["driven_s"]))]
+    rows = []
+    for mode, title in _MODES.items():
+        row = found["figures"]["modes"][mode]
+        way = "not known" if row["m"] is None else f"{row['m'] / 1000:.2f} km"
+        rows.append((title, way, _clock(row["s"])))
+    return rows
+
+
+def _alarms(alarms: Sequence[Mapping[str, Any]] | None) -> list[tuple[str, str, str, str, str]] | None:
+    if alarms is None:
+        return None
+    return [
+        (
+            day_time(one["raised_ms"]),
+            one["priority"],
+            one["title"],
+            one["text"],
+            "not acknowledged" if one["to_acknowledge_s"] is None else f"{one['to_acknowledge_s']:.1f} s",
+        )
+        for one in alarms
+    ]
+
+
+def _interventions(found: Sequence[Mapping[str, Any]] | None) -> list[tuple[str, str, str, str]] | None:
+    if found is None:
+        return None
+    rows = []
+    for one in found[:MOST_ROWS]:
+        initiator = "by whom not known" if one["initiated_by"] == "unknown" else f"by the {one['initiated_by']}"
+        speed = "speed not known" if one["speed_mps"] is None else f"{one['speed_mps']:.1f} m/s"
+        kind = f"{one['kind'].capitalize()}, {initiator}, {speed}"
+        what = ": ".join(filter(None, (one["category"], one["what"]))) or "not described"
+        place = (
+            "place not known"
+            if one["lat_deg"] is None or one["lon_deg"] is None
+            else f"{one['lat_deg']:.6f}, {one['lon_deg']:.6f}"
+        )
+        active = f"alarms then: {', '.join(one['active'][:6])}" if one["active"] else "no alarm was active"
+        described = f"described by {one['described_by']}" if one["described_by"] else ""
+        rows.append((day_time(one["at_ms"]), kind, what, "; ".join(filter(None, (place, active, described)))))
+    return rows
+
+
+def _marks(marks: Sequence[Mapping[str, Any]] | None, media: Media) -> list[dict[str, Any]] | None:
+    if marks is None:
+        return None
+    rows = []
+    for one in marks[:MOST_ROWS]:
+        voice, photo = media.get(one["mark"], "voice"), media.get(one["mark"], "photo")
+        has = [kind for kind in ("voice", "photo") if one[kind]]
+        rows.append(
+            {
+                "at": day_time(one["marked_ms"]),
+                **{name: one[name] or "" for name in ("category", "words", "by")},
+                "has": ", ".join(has),
+                "voice": voice if one["voice"] else None,
+                "photo": photo if one["photo"] else None,
+            }
+        )
+    return rows
+
+
+def _slow_downs(found: Sequence[Mapping[str, Any]] | None) -> list[tuple[str, str, str, str]] | None:
+    if found is None:
+        return None
+    rows = []
+    for one in found[:MOST_ROWS]:
+        title = f"Ordered by {one['by'] or 'nobody known'}" + (f": {one['why']}" if one["why"] else "")
+        slows = one["slows_ms"]
+        proof = one["proof"] or ("the car slowed" if slows else "no proof was recorded that the car slowed")
+        rows.append(
+            (
+                day_time(one["ordered_ms"]),
+                title,
+                proof,
+                f"{(slows - one['ordered_ms']) / 1000:.1f} s" if slows else "not proven",
+            )
+        )
+    return rows
+
+
+def _link_head(delay: Mapping[str, float] | None) -> str:
+    return "" if delay is None else f"delay in ms; p90 {delay['p90_s'] * 1000:.0f}, most {delay['most_s'] * 1000:.0f}"
+
+
+def _blind(found: Mapping[str, Any]) -> list[tuple[float, float]]:
+    return [(one["from_s"], one["to_s"]) for one in found["blind"][:50]]
+
+
+def _lost(found: Mapping[str, Any]) -> list[str]:
+    """What else is missing, in lines."""
+    lines = list(found["damage"][:20])
+    for name, what in (("left_out", "not recorded"), ("not_received", "not received")):
+        if found[name]:
+            shown = ", ".join(found[name][:5])
+            more = f" and {len(found[name]) - 5} more" if len(found[name]) > 5 else ""
+            lines.append(f"Topics {what}: {shown}{more}.")
+    return lines
+
+
+def _km(km: float | None) -> str | None:
+    return None if km is None else f"{km:.2f}" if km < 100 else f"{km:.0f}"
+
+
+def _whole(number: int | None) -> str | None:
+    return None if number is None else str(number)
+
+
+def _clock(seconds: float) -> str:
+    """A time: 12:48 min, 2:03:10 h."""
+    whole = round(seconds)
+    minutes, rest = divmod(whole, 60)
+    return f"{minutes}:{rest:02d} min" if minutes < 60 else f"{minutes // 60}:{minutes % 60:02d}:{rest:02d} h"

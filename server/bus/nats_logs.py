@@ -1,0 +1,90 @@
+"""The newest events of every vehicle at a web node; what was lost on the way is asked of the agents."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from server.bus import nats_wire as wire
+from server.bus.bus import NotServed
+from server.bus.nats_events import EventCache
+from server.bus.nats_questions import Questions
+
+
+class RemoteLogs:
+    """`on_new` is called with the name of a vehicle that has new events."""
+
+    def __init__(self, questions: Questions, on_new: Callable[[str], None]) -> None:
+        self._questions = questions
+        self._on_new = on_new
+        self._caches: dict[str, EventCache] = {}
+        self._fetches: dict[str, asyncio.Task[None]] = {}
+        self._changed = asyncio.Event()
+
+    def __contains__(self, vehicle: str) -> bool:
+        return vehicle in self._caches
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(tuple(self._caches))
+
+    async def stop(self) -> None:
+        """End what is being asked for."""
+        for task in self._fetches.values():
+            task.cancel()
+        await asyncio.gather(*self._fetches.values(), return_exceptions=True)
+        self._fetches.clear()
+
+    def run(self, vehicle: str) -> str:
+        """In which the agent numbers; "": it was not heard."""
+        cache = self._caches.get(vehicle)
+        return "" if cache is None else cache.run
+
+    def last(self, vehicle: str) -> int:
+        cache = self._caches.get(vehicle)
+        return 0 if cache is None else cache.last
+
+    def after(self, vehicle: str, n: int, limit: int) -> list[dict[str, Any]] | None:
+        """The events after number `n`; None where some of them are not here."""
+        cache = self._caches.get(vehicle)
+        return [] if cache is None else cache.after(n, limit)
+
+    def begin(self, vehicle: str, run: str, last: int) -> None:
+        """The agent is there, in this run of it, and its newest event has this number."""
+        self._caches.setdefault(vehicle, EventCache()).begin(run, last)
+        self._fetch_missing(vehicle)
+
+    def take(self, vehicle: str, events: list[dict[str, Any]]) -> None:
+        """Events that were published or asked for."""
+        if self._caches[vehicle].take(events):
+            self._changed.set()
+            self._changed = asyncio.Event()
+            self._on_new(vehicle)
+        self._fetch_missing(vehicle)
+
+    def _fetch_missing(self, vehicle: str) -> None:
+        running = self._fetches.get(vehicle)
+        if self._caches[vehicle].is_behind and (running is None or running.done()):
+            self._fetches[vehicle] = asyncio.create_task(self._fetch(vehicle))
+
+    async def _fetch(self, vehicle: str) -> None:
+        """What was lost on the way; where the agent does not answer, its next word begins it again."""
+        cache = self._caches[vehicle]
+        with contextlib.suppress(NotServed):
+            while cache.is_behind:
+                before = cache.last
+                answer = await self._questions.ask(vehicle, wire.Ask(do="after", n=before))
+                self.take(vehicle, answer.events)
+                if cache.last == before:
+                    return
+
+    async def caught_up(self, vehicle: str, last: int, wait_s: float) -> None:
+        """Wait until event `last` is here, and no longer than `wait_s`."""
+        cache = self._caches[vehicle]
+        cache.newest = max(cache.newest, last)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(max(0.0, wait_s)):
+                while cache.last < last:
+                    self._fetch_missing(vehicle)
+                    await self._changed.wait()

@@ -1,0 +1,44 @@
+"""`catgraph web`: serve the page of all cars whose agents are at a broker."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+
+from server.app.process import add_common_arguments
+from server.cli import broker_options, logging
+from server.cli import serve as serve_command
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    broker_options.add_arguments(parser)
+    parser.add_argument(
+        "--expect",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a car that is listed as lost until its agent is heard; can be repeated",
+    )
+    parser.add_argument(
+        "--forget",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a car that was heard once and does not exist any more; can be repeated",
+    )
+    add_common_arguments(parser, has_cars=False)
+    logging.add_arguments(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serves until it is ended; 2 when it cannot start."""
+    return serve_command.run_with(
+        lambda: replace(
+            serve_command.common_config(args),
+            vehicles=(),
+            broker=broker_options.read(args),
+            is_node=True,
+            expected=tuple(args.expect),
+            forgotten=tuple(args.forget),
+        )
+    )

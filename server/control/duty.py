@@ -1,0 +1,220 @@
+"""Who is on duty: a person signs on at a device that is paired. Pure: time is an argument, in ms since 1970.
+
+A person is on duty at one device at a time: a name in the log then says in whose hand the device was, and an escalated
+alarm or a hand-over goes to one place. Signing on elsewhere moves the duty, and only by a request that says so.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from dataclasses import dataclass, field, replace
+
+from monitor.runner import Refused
+from server.control import display_name
+from server.protocol.people import ROLES, DutyRole
+
+MOST_PEOPLE = 50
+LONGEST_NAME = 30
+ENDS_AFTER_H = 12.0
+ENDS_WITHIN_H = (1.0, 24.0)
+NOTE_LASTS_MS = 86_400_000  # that a duty ended is shown for a day
+MOST_DUTIES = 100
+HOUR_MS = 3_600_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OnDuty:
+    """A person as an order carries them."""
+
+    name: str
+    role: DutyRole
+    device: str = field(default="", compare=False)  # the key under which they are on duty
+
+    @property
+    def title(self) -> str:
+        return ROLES[self.role]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Person:
+    """One of the list. `role` and `last_ms` are of the last time."""
+
+    id: str
+    name: str
+    role: DutyRole = "operator"
+    last_ms: int | None = None
+    changed_ms: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DutyEntry:
+    """What is known of one device: who is on duty, or how the last duty ended."""
+
+    device: str  # its key: of a paired device its id, else of a page
+    device_name: str
+    changed_ms: int
+    person: str | None = None  # id; None: nobody
+    role: DutyRole = "operator"
+    since_ms: int = 0
+    ended: str | None = None  # a sentence, until it is dismissed
+
+
+class DutyBoard:
+    """The list of people and all duties of one server. Raises Refused with a sentence."""
+
+    def __init__(self) -> None:
+        self.people: dict[str, Person] = {}
+        self.removed: dict[str, int] = {}  # ids of people who were removed, and when: nobody brings them back
+        self.entries: dict[str, DutyEntry] = {}  # by device
+        self.ends_after_h = ENDS_AFTER_H
+        self.hours_changed_ms = 0
+
+    # -- the list ----------------------------------------------------------------------------------------------------
+
+    def add(self, id: str, name: object, role: object, now_ms: int) -> Person:
+        if len(self.people) >= MOST_PEOPLE:
+            raise Refused(f"The list has at most {MOST_PEOPLE} people: remove one first.")
+        person = Person(id=id, name=self._free_name(name), role=role_of(role), changed_ms=now_ms)
+        self.people[id] = person
+        return person
+
+    def change(self, id: str, *, name: object, role: object, now_ms: int) -> Person:
+        person = self.person(id)
+        new_name = person.name if name is None else self._free_name(name, but=id)
+        new_role = person.role if role is None else role_of(role)
+        changed = self.people[id] = replace(person, name=new_name, role=new_role, changed_ms=now_ms)
+        return changed
+
+    def remove(self, id: str, now_ms: int) -> Person:
+        person = self.person(id)
+        entry = self.duty_of(id)
+        if entry is not None:
+            raise Refused(f"{person.name} is on duty at {entry.device_name}: they must sign off first.")
+        del self.people[id]
+        self.forget(id, now_ms)
+        return person
+
+    def forget(self, id: str, at_ms: int) -> None:
+        """Nobody brings this person back; of the removed so many are kept."""
+        self.removed = dict([*self.removed.items(), (id, at_ms)][-2 * MOST_PEOPLE :])
+
+    def person(self, id: str) -> Person:
+        person = self.people.get(id)
+        if person is None:
+            raise Refused("This person is not in the list of people any more.")
+        return person
+
+    def set_hours(self, hours: float, now_ms: int = 0) -> None:
+        low, high = ENDS_WITHIN_H
+        if not low <= hours <= high:
+            raise Refused(f"A duty ends after {low:.0f} to {high:.0f} h.")
+        self.ends_after_h, self.hours_changed_ms = hours, now_ms
+
+    def _free_name(self, name: object, but: str | None = None) -> str:
+        cleaned = person_name(name)
+        same = unicodedata.normalize("NFKC", cleaned).casefold()
+        for one in self.people.values():
+            if one.id != but and unicodedata.normalize("NFKC", one.name).casefold() == same:
+                raise Refused(f"{one.name} is in the list already.")
+        return cleaned
+
+    # -- duty --------------------------------------------------------------------------------------------------------
+
+    def on_duty(self, device: str) -> OnDuty | None:
+        """Who is on duty at a device."""
+        entry = self.entries.get(device)
+        person = self.people.get(entry.person) if entry is not None and entry.person is not None else None
+        return None if entry is None or person is None else OnDuty(name=person.name, role=entry.role)
+
+    def duty_of(self, person: str) -> DutyEntry | None:
+        """Where a person is on duty."""
+        return next((one for one in self.entries.values() if one.person == person), None)
+
+    def duties(self) -> list[DutyEntry]:
+        """All duties, the longest first."""
+        found = [one for one in self.entries.values() if one.person in self.people]
+        return sorted(found, key=lambda one: (one.since_ms, one.device))
+
+    def sign_on(
+        self, device: str, device_name: str, person: str, role: object, now_ms: int, *, moves: bool = False
+    ) -> DutyEntry:
+        """Put a person on duty at a device, instead of who was. `moves`: also where they are on duty at another one."""
+        found = self.person(person)
+        chosen = found.role if role is None else role_of(role)
+        elsewhere = self.duty_of(person)
+        if elsewhere is not None and elsewhere.device != device:
+            if not moves:
+                raise Refused(f"{found.name} is on duty at {elsewhere.device_name}: move the duty to this device.")
+            self._end(elsewhere, f"{found.name} signed on at {device_name}: nobody is on duty here now.", now_ms)
+        elif elsewhere is None and len(self.duties()) >= MOST_DUTIES:
+            raise Refused(f"At most {MOST_DUTIES} people are on duty at a time.")
+        same = elsewhere is not None and elsewhere.device == device and elsewhere.role == chosen
+        entry = DutyEntry(
+            device=device,
+            device_name=device_name,
+            person=person,
+            role=chosen,
+            since_ms=elsewhere.since_ms if same and elsewhere is not None else now_ms,
+            changed_ms=now_ms,
+        )
+        self.entries[device] = entry
+        self.people[person] = replace(found, role=chosen, last_ms=now_ms, changed_ms=now_ms)
+        return entry
+
+    def sign_off(self, device: str, now_ms: int, why: str | None = None) -> bool:
+        """End the duty at a device; `why`: a note that stands there. Whether there was one."""
+        entry = self.entries.get(device)
+        if entry is None or entry.person is None:
+            return False
+        self._end(entry, why, now_ms)
+        return True
+
+    def dismiss(self, device: str, now_ms: int) -> bool:
+        """The note of how a duty ended was read."""
+        entry = self.entries.get(device)
+        if entry is None or entry.ended is None:
+            return False
+        self.entries[device] = replace(entry, ended=None, changed_ms=now_ms)
+        return True
+
+    def advance(self, now_ms: int) -> list[DutyEntry]:
+        """End the duties that lasted too long; those that ended, as they were. A note of long ago is forgotten."""
+        due = [one for one in self.duties() if now_ms - one.since_ms >= self.ends_after_h * HOUR_MS]
+        for one in due:
+            name = self.people[one.person or ""].name
+            self._end(one, f"The duty of {name} ended by itself after {self.ends_after_h:g} h. Sign on again.", now_ms)
+        over = sorted((one for one in self.entries.values() if one.person is None), key=lambda one: one.changed_ms)
+        kept = {one.device for one in over[-MOST_DUTIES:] if now_ms - one.changed_ms < NOTE_LASTS_MS}
+        self.entries = {key: one for key, one in self.entries.items() if one.person is not None or key in kept}
+        return due
+
+    def next_ms(self) -> int | None:
+        """When the next duty ends by itself; None: nobody is on duty."""
+        since = [one.since_ms for one in self.duties()]
+        return round(min(since) + self.ends_after_h * HOUR_MS) if since else None
+
+    def _end(self, entry: DutyEntry, why: str | None, now_ms: int) -> None:
+        self.entries[entry.device] = DutyEntry(
+            device=entry.device, device_name=entry.device_name, changed_ms=now_ms, ended=why
+        )
+
+
+def person_name(name: object) -> str:
+    """A name of a person as one line. Raises Refused where none remains, or it is too long."""
+    cleaned = display_name.clean(name)
+    if cleaned is None:
+        raise Refused(f"A name has 1 to {LONGEST_NAME} characters that can be seen.")
+    if len(cleaned) > LONGEST_NAME:
+        raise Refused(f"A name has at most {LONGEST_NAME} characters: initials are enough.")
+    if not any(unicodedata.category(letter)[0] in "LN" for letter in cleaned):
+        raise Refused("A name needs at least one letter or digit.")
+    if set(cleaned) & set("()"):
+        raise Refused("A name has no brackets: the device stands in them beside the name.")
+    return cleaned
+
+
+def role_of(role: object) -> DutyRole:
+    for known in ROLES:
+        if role == known:
+            return known
+    raise Refused(f"A role is one of {', '.join(ROLES.values())}.")

@@ -1,0 +1,85 @@
+"""The alarms of a drive: when they were raised, acknowledged and over. Times are ms since 1970."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from statistics import median
+
+from server.recording.drive.components import component_of
+from server.recording.drive.drive_events import Event, text_of
+
+MOST_ALARMS = 5000
+PRIORITIES = ("critical", "warning", "advisory")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlarmInDrive:
+    """From raising to clearing; None: not, or not in this drive."""
+
+    alarm: str
+    title: str
+    priority: str
+    text: str
+    component: str
+    raised_ms: int
+    acknowledged_ms: int | None = None
+    acknowledged_by: str = ""
+    cleared_ms: int | None = None
+
+    @property
+    def to_acknowledge_s(self) -> float | None:
+        """How long nobody acknowledged it."""
+        return None if self.acknowledged_ms is None else (self.acknowledged_ms - self.raised_ms) / 1000
+
+
+def alarms_of(events: Sequence[Event]) -> list[AlarmInDrive]:
+    """Those that were raised in the drive, in order; what stood before it began was raised in another."""
+    found: list[AlarmInDrive] = []
+    standing: dict[str, int] = {}
+    for event in events:
+        alarm, change = event.get("alarm"), event["change"]
+        if not isinstance(alarm, str):
+            continue
+        if change == "raised" and len(found) < MOST_ALARMS:
+            standing[alarm] = len(found)
+            found.append(_raised(alarm, event))
+        elif (place := standing.get(alarm)) is None:
+            continue
+        elif change == "acknowledged" and found[place].acknowledged_ms is None:
+            by = text_of(event, "person", 60) or text_of(event, "by", 120)
+            found[place] = replace(found[place], acknowledged_ms=event["at_ms"], acknowledged_by=by)
+        elif change == "cleared" and found[place].cleared_ms is None:
+            found[place] = replace(found[place], cleared_ms=event["at_ms"])
+            if event.get("state") != "RTN_UNACKED":
+                standing.pop(alarm)
+    return found
+
+
+def percentile(values: Sequence[float], share: float) -> float | None:
+    """By nearest rank; the middle of two for the half. None: of nothing."""
+    if not values:
+        return None
+    if share == 0.5:
+        return median(values)
+    return sorted(values)[max(0, math.ceil(share * len(values)) - 1)]
+
+
+def by_component(alarms: Sequence[AlarmInDrive]) -> dict[str, int]:
+    """How many alarms of each component, most first."""
+    return dict(Counter(alarm.component for alarm in alarms).most_common(40))
+
+
+def _raised(alarm: str, event: Event) -> AlarmInDrive:
+    priority, causes = event.get("priority"), event.get("causes")
+    named = [text for text in causes[:10] if isinstance(text, str)] if isinstance(causes, list) else []
+    return AlarmInDrive(
+        alarm=alarm[:120],
+        title=text_of(event, "title", 120) or alarm[:120],
+        priority=str(priority) if priority in PRIORITIES else "advisory",
+        text=text_of(event, "text", 300),
+        component=component_of(alarm, named),
+        raised_ms=event["at_ms"],
+    )

@@ -1,0 +1,115 @@
+"""The course of a drive in some hundred numbers, by distance and by time: what two drives are compared by."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from typing import Any
+
+from server.protocol.drive_course import Course, CourseEvent, CoursePoints
+from server.protocol.marks import DriveMark
+from server.recording.drive.facts import DriveFacts
+
+POINTS = 600
+LEAST_M = 2.0  # between two points by distance
+LEAST_S = 0.2  # by time
+PLACE_S = 1.5  # between two positions: what lies in a longer gap is not known
+Place = tuple[float, float, float]  # s, latitude, longitude
+MOST_EVENTS = 300
+
+
+def course_of(facts: DriveFacts) -> Course:
+    """Without a distance only by time; None in a list: not known there."""
+    length_m = facts.motion.distance_m
+    step_s = max(LEAST_S, facts.length_s / POINTS)
+    by_time = [number * step_s for number in range(int(facts.length_s / step_s) + 1)]
+    by_way: list[float] = []
+    step_m = LEAST_M
+    if length_m:
+        step_m = max(LEAST_M, length_m / POINTS)
+        times, metres = facts.motion.odometer()
+        for number in range(int(length_m / step_m) + 1):
+            place = min(bisect_left(metres, number * step_m), len(times) - 1)
+            by_way.append(_moment(times, metres, place, number * step_m))
+    return {
+        "start_ms": facts.start_ms,
+        "length_s": round(facts.length_s, 2),
+        "length_m": None if length_m is None else round(length_m, 1),
+        "step_m": round(step_m, 4),
+        "step_s": round(step_s, 4),
+        "way": _points(facts, by_way),
+        "time": _points(facts, by_time),
+        "events": _events(facts),
+        "limit_mps": facts.limits[0][1] if facts.limits else None,
+    }
+
+
+def with_marks(course: Course, marks: Sequence[DriveMark]) -> Course:
+    """With these marks in place of those that were there when it was computed."""
+    moments, metres = course["time"]["t"], course["time"]["m"]
+    events = [event for event in course["events"] if event["kind"] != "mark"]
+    for row in marks[:MOST_EVENTS]:
+        at_s = (row["marked_ms"] - course["start_ms"]) / 1000
+        if 0 <= at_s <= course["length_s"]:
+            place = min(bisect_left(moments, at_s), len(moments) - 1)
+            text = (row["words"] or row["category"] or "")[:120]
+            events.append({"t": round(at_s, 2), "m": metres[place], "kind": "mark", "text": text})
+    return {**course, "events": sorted(events, key=lambda event: event["t"])[:MOST_EVENTS]}
+
+
+def _moment(times: Sequence[float], metres: Sequence[float], place: int, at_m: float) -> float:
+    """When the car was there; between two numbers its distance grew evenly."""
+    if place == 0 or metres[place] <= metres[place - 1]:
+        return times[place]
+    share = (at_m - metres[place - 1]) / (metres[place] - metres[place - 1])
+    return times[place - 1] + min(1.0, max(0.0, share)) * (times[place] - times[place - 1])
+
+
+def _points(facts: DriveFacts, moments: list[float]) -> CoursePoints:
+    motion, places = facts.motion, facts.motion.places
+    found: CoursePoints = {"t": [], "m": [], "speed": [], "steering": [], "lat": [], "lon": []}
+    place_times = [place[0] for place in places]
+    for at_s in moments:
+        found["t"].append(round(at_s, 2))
+        found["m"].append(_rounded(motion.until(at_s), 1))
+        found["speed"].append(_rounded(motion.speed.at(at_s), 2))
+        found["steering"].append(_rounded(motion.steering.at(at_s), 1))
+        place = _place(places, place_times, at_s)
+        found["lat"].append(None if place is None else round(place[0], 7))
+        found["lon"].append(None if place is None else round(place[1], 7))
+    return found
+
+
+def _place(places: Sequence[Place], times: Sequence[float], at_s: float) -> tuple[float, float] | None:
+    """Between two positions that are near each other in time; None: in a gap."""
+    after = bisect_left(times, at_s)
+    if after == len(times) or (after == 0 and times[0] > at_s):
+        near = after - 1 if after else 0
+        return places[near][1:] if times and abs(times[near] - at_s) <= PLACE_S else None
+    if after == 0 or times[after] == at_s:
+        return places[after][1:]
+    (from_s, lat0, lon0), (to_s, lat1, lon1) = places[after - 1], places[after]
+    if to_s - from_s > PLACE_S:
+        return None
+    share = (at_s - from_s) / (to_s - from_s)
+    lon_turn = (lon1 - lon0 + 180) % 360 - 180
+    return lat0 + share * (lat1 - lat0), lon0 + share * lon_turn
+
+
+def _events(facts: DriveFacts) -> list[CourseEvent]:
+    if facts.log is None:
+        return []
+    logged: list[tuple[int, str, str]] = [(one.raised_ms, one.priority, one.title) for one in facts.log.alarms]
+    logged += [(row["marked_ms"], "mark", row["words"] or row["category"] or "") for row in facts.log.marks]
+    logged += [(one.at_ms, "intervention", one.kind) for one in facts.log.interventions]
+    events: list[CourseEvent] = []
+    for at_ms, kind, text in sorted(logged)[:MOST_EVENTS]:
+        at_s = facts.at_s(at_ms)
+        if 0 <= at_s <= facts.length_s:
+            metres = _rounded(facts.motion.until(at_s), 1)
+            events.append({"t": round(at_s, 2), "m": metres, "kind": kind, "text": text[:120]})
+    return events
+
+
+def _rounded(value: Any, digits: int) -> float | None:
+    return None if value is None else round(float(value), digits)

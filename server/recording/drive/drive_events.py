@@ -1,0 +1,83 @@
+"""The events of a drive's log, valid and in order, as all readers of this package take them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from typing import Any
+
+import orjson
+
+from server.recording.read.read import Recording
+from server.recording.standing import read_standing
+from server.system.clean_text import clean
+
+ALARMS = "/catgraph/alarms"
+MOST = 50_000  # events of one recording: a day with one every two seconds
+LONGEST = 4000  # characters of a text
+MOST_LATE_MS = 3_600_000  # between what happened and its event
+
+Event = Mapping[str, Any]
+
+
+def read_drive_events(recording: Recording) -> list[Event] | None:
+    """What stood when the recording began, then what was logged in it; None: it has no log. Invalid ones are left out.
+
+    Reads the whole channel. Raises RecordingUnreadable.
+    """
+    rows = [event for _, event in islice(recording.own(ALARMS), MOST)]
+    if not rows and not recording.metadata:
+        return None
+    stood = [*read_standing(recording.metadata), *_signature(recording.metadata)]
+    return [event for event in (*stood, *rows) if _is_event(event)]
+
+
+def _signature(metadata: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Of a departure check that was signed before the recording began, as the event that it was."""
+    try:
+        found = orjson.loads(metadata.get("departure") or "null")
+    except orjson.JSONDecodeError:
+        return []
+    return [{**found, "change": "departure", "step": "signed", "alarm": None}] if isinstance(found, dict) else []
+
+
+def of_change(events: Sequence[Event], *changes: str) -> Iterator[Event]:
+    """The events of these kinds."""
+    return (event for event in events if event["change"] in changes)
+
+
+def text_of(event: Event, name: str, most: int = LONGEST) -> str:
+    """A text of an event, as one that can be shown; "" where it has none."""
+    value = event.get(name)
+    return clean(value, most) if isinstance(value, str) else ""
+
+
+def number_of(event: Event, name: str) -> float | None:
+    """A finite number of an event; None where it has none."""
+    value = event.get(name)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    return float(value) if abs(value) < 1e15 else None
+
+
+def moment_of(event: Event) -> int:
+    """When it happened [ms since 1970], which is a moment before some are logged."""
+    moment_ms, at_ms = event.get("moment_ms"), int(event["at_ms"])
+    is_moment = isinstance(moment_ms, int) and not isinstance(moment_ms, bool) and abs(moment_ms - at_ms) < MOST_LATE_MS
+    return int(moment_ms) if is_moment and moment_ms is not None else at_ms
+
+
+def whole_of(event: Event, name: str) -> int:
+    """A count of an event; 0 where it has none."""
+    value = number_of(event, name)
+    return 0 if value is None else max(0, int(value))
+
+
+def _is_event(event: Any) -> bool:
+    return (
+        isinstance(event, dict)
+        and isinstance(event.get("at_ms"), int)
+        and abs(event["at_ms"]) < 2**53
+        and isinstance(event.get("change"), str)
+        and isinstance(event.get("alarm", None), str | None)
+    )

@@ -1,0 +1,173 @@
+"""Everything a recording says of its drive, read once: for the report, its tables and the logbook."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from server.judge.drive import Drive
+from server.judge.offline import OfflineRun
+from server.judge.recorded_events import NewSettings
+from server.protocol.marks import DriveMark
+from server.recording.delay import RecordedDelay
+from server.recording.drive.alarms import AlarmInDrive, alarms_of, by_component, percentile
+from server.recording.drive.departure import Departure, check_of, departure_of
+from server.recording.drive.drive_events import Event, of_change, read_drive_events
+from server.recording.drive.modes import MODES, Intervention, ModeSpan, are_modes_known, interventions_of, mode_spans
+from server.recording.drive.motion import Motion
+from server.recording.drive.people import PersonInDrive, names_of, people_of
+from server.recording.drive.slow_downs import SlowDownInDrive, slow_downs_of
+from server.recording.event_channels import read_recorded_events
+from server.recording.marks.described import as_event
+from server.recording.marks.of_drive import described_late, marks_of
+from server.recording.read.read import Recording
+
+SIGNALS = ("speed", "odometry", "position", "steering")
+MOST_NAMES = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveLog:
+    """What the log of a drive says."""
+
+    people: Sequence[PersonInDrive]
+    departure: Departure
+    modes: Sequence[ModeSpan]
+    are_modes_known: bool
+    interventions: Sequence[Intervention]
+    marks: Sequence[DriveMark]
+    alarms: Sequence[AlarmInDrive]
+    slow_downs: Sequence[SlowDownInDrive]
+    resumes: bool  # the server was started again: the drive is that of the recording before
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveFacts:
+    """Of one recording. `log` None: it has none, so nobody knows."""
+
+    start_ms: int
+    end_ms: int
+    log: DriveLog | None
+    motion: Motion
+    late: Sequence[tuple[float, float]]  # s since the beginning, delay of the link [s]
+    limits: Sequence[tuple[float, float]] = ()  # s since the beginning, speed limit in force from then on [m/s]
+
+    @property
+    def length_s(self) -> float:
+        return (self.end_ms - self.start_ms) / 1000
+
+    def at_s(self, at_ms: float) -> float:
+        """A time of day as seconds since the beginning."""
+        return (at_ms - self.start_ms) / 1000
+
+
+def read_facts(recording: Recording) -> DriveFacts:
+    """Reads the whole recording, with what is beside it; a judge is not asked. Raises RecordingUnreadable."""
+    drive = Drive(recording, read_recorded_events(recording), signals=SIGNALS)
+    has_speed = any("speed" in epoch.published for epoch in drive.epochs)
+    motion = Motion(drive.length_s, speed="speed" if has_speed else "odometry")
+    OfflineRun(recording, drive, observer=motion, with_checks=False).advance(math.inf, to_last_message=True)
+    return replace(facts_of(recording, motion), limits=limits_of(drive))
+
+
+def limits_of(drive: Drive) -> list[tuple[float, float]]:
+    """Without settings in the recording nobody knows which limit was in force."""
+    if not drive.settings_from_recording:
+        return []
+    moments = [0.0, *(at_s for at_s, event in drive.recorded.events if isinstance(event, NewSettings))]
+    limits = [epoch.tuning.limits.speed_limit.max_mps for epoch in drive.epochs]
+    return list(zip(moments, limits, strict=False))
+
+
+def facts_of(recording: Recording, motion: Motion) -> DriveFacts:
+    """With a motion that was followed already; the limits are left out."""
+    start_ms = round(recording.start_s * 1000)
+    end_ms = start_ms + round(recording.duration_s * 1000)
+    events = read_drive_events(recording)
+    delay = RecordedDelay(recording)
+    return DriveFacts(
+        start_ms=start_ms,
+        end_ms=end_ms,
+        log=None if events is None else _log_of(recording, events, start_ms, end_ms),
+        motion=motion,
+        late=delay.course(),
+    )
+
+
+def _log_of(recording: Recording, events: Sequence[Event], start_ms: int, end_ms: int) -> DriveLog:
+    return DriveLog(
+        people=people_of(events, start_ms),
+        departure=departure_of(events),
+        modes=mode_spans(events, start_ms, end_ms),
+        are_modes_known=are_modes_known(events),
+        interventions=interventions_of([*events, *map(as_event, described_late(recording))]),
+        marks=marks_of(recording),
+        alarms=alarms_of(events),
+        slow_downs=slow_downs_of(events),
+        resumes=any(event.get("resumes") is True for event in of_change(events, "started")),
+    )
+
+
+def figures_of(facts: DriveFacts) -> dict[str, Any]:
+    """The numbers of a drive for the logbook, as JSON has them: metres, seconds; None: not known."""
+    log, motion = facts.log, facts.motion
+    blind = motion.blind_spans()
+    found: dict[str, Any] = {
+        "distance_m": _rounded(motion.distance_m, 1),
+        "distance_by": motion.source,
+        "driven_s": round(facts.length_s, 1),
+        "blind_s": round(sum(to_s - from_s for from_s, to_s in blind), 1),
+        "blind": len(blind),
+        "modes": by_mode(facts),
+        **dict.fromkeys(("alarms", "interventions", "undescribed", "marks", "slow_downs", "departure")),
+        **dict.fromkeys(("unacknowledged", "acknowledged_p50_s", "acknowledged_p90_s")),
+        "check": None,
+        "resumes": False,
+        "components": {},
+        "people": [],
+    }
+    if log is not None:
+        waited = [alarm.to_acknowledge_s for alarm in log.alarms if alarm.to_acknowledge_s is not None]
+        found |= {
+            "alarms": len(log.alarms),
+            "interventions": len(log.interventions) if log.are_modes_known else None,
+            "undescribed": len(undescribed_of(log)) if log.are_modes_known else None,
+            "marks": len(log.marks),
+            "slow_downs": len(log.slow_downs),
+            "departure": log.departure.state,
+            "check": check_of(log.departure),
+            "resumes": log.resumes,
+            "unacknowledged": len(log.alarms) - len(waited),
+            "acknowledged_p50_s": _rounded(percentile(waited, 0.5), 1),
+            "acknowledged_p90_s": _rounded(percentile(waited, 0.9), 1),
+            "components": by_component(log.alarms),
+            "people": names_of(log.people)[:MOST_NAMES],
+        }
+    return found
+
+
+def undescribed_of(log: DriveLog) -> list[str]:
+    """The interventions that nobody has described."""
+    return [one.intervention for one in log.interventions if not one.what and not one.category]
+
+
+def by_mode(facts: DriveFacts) -> Mapping[str, dict[str, float | None]]:
+    """Metres and seconds of each mode; without a log all of it is unknown."""
+    spans = [ModeSpan(mode="unknown", from_ms=facts.start_ms, to_ms=facts.end_ms)]
+    if facts.log is not None and facts.log.modes:
+        spans = list(facts.log.modes)
+    is_known = facts.motion.source is not None
+    found: dict[str, dict[str, float | None]] = {mode: {"m": 0.0 if is_known else None, "s": 0.0} for mode in MODES}
+    for span in spans:
+        row = found[span.mode]
+        row["s"] = (row["s"] or 0.0) + (span.to_ms - span.from_ms) / 1000
+        if is_known:
+            until_m, from_m = facts.motion.until(facts.at_s(span.to_ms)), facts.motion.until(facts.at_s(span.from_ms))
+            row["m"] = (row["m"] or 0.0) + (until_m or 0.0) - (from_m or 0.0)
+    return {mode: {"m": _rounded(row["m"], 1), "s": _rounded(row["s"], 1)} for mode, row in found.items()}
+
+
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)

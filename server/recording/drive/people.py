@@ -1,0 +1,98 @@
+"""Who was on duty during a drive, and who was in control when. Times are ms since 1970."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from server.protocol.people import ROLES
+from server.recording.drive.drive_events import Event, of_change, text_of
+
+MOST_PEOPLE = 100
+
+
+@dataclass(slots=True, kw_only=True)
+class Span:
+    """A time; None: since before the drive began, or to its end."""
+
+    from_ms: int | None
+    to_ms: int | None = None
+
+
+@dataclass(slots=True, kw_only=True)
+class PersonInDrive:
+    """One person in one role, or a device at which nobody had signed on."""
+
+    name: str
+    role: str  # its title; "": nobody signed on at this device
+    on_duty: list[Span] = field(default_factory=list)
+    in_control: list[Span] = field(default_factory=list)
+
+
+def people_of(events: Sequence[Event], start_ms: int) -> list[PersonInDrive]:
+    """Everybody who was on duty, gave an order or was in control, in the order in which they appear."""
+    found: dict[str, PersonInDrive] = {}
+    holder: PersonInDrive | None = None
+    for event in events:
+        at_ms: int | None = event["at_ms"] if event["at_ms"] > start_ms else None
+        person = _person(event, found)
+        if person is not None and event["change"] == "duty":
+            _change_duty(person, event.get("act"), at_ms)
+        if event["change"] == "control":
+            if holder is not None:
+                _end(holder.in_control, event["at_ms"])
+            holder = _holder(text_of(event, "holder", 120), found)
+            if holder is not None:
+                holder.in_control.append(Span(from_ms=at_ms))
+    return list(found.values())
+
+
+def names_of(people: Sequence[PersonInDrive]) -> list[str]:
+    """The people by name, without devices at which nobody had signed on."""
+    return list(dict.fromkeys(one.name for one in people if one.role))
+
+
+def controllers(events: Sequence[Event]) -> bool:
+    """Whether the log says anything of control."""
+    return any(True for _ in of_change(events, "control"))
+
+
+def _person(event: Event, found: dict[str, PersonInDrive]) -> PersonInDrive | None:
+    """The person that an event names as its subject or its author."""
+    name = text_of(event, "person", 60)
+    if not name:
+        return None
+    role = event.get("role")
+    title = next((title for key, title in ROLES.items() if key == role), "role not known")
+    known = found.get(name)
+    if known is None and len(found) < MOST_PEOPLE:
+        known = found[name] = PersonInDrive(name=name, role=title)
+    elif known is not None and known.role != title and title != "role not known":
+        known.role = title if not known.role else f"{known.role}, {title}" if title not in known.role else known.role
+    return known
+
+
+def _holder(name: str, found: dict[str, PersonInDrive]) -> PersonInDrive | None:
+    """Whose name stands before the brackets of the device, else the device itself."""
+    if not name:
+        return None
+    person = name.rpartition(" (")[0] if name.endswith(")") else ""
+    if person in found:
+        return found[person]
+    if name not in found and len(found) < MOST_PEOPLE:
+        found[name] = PersonInDrive(name=name, role="")
+    return found.get(name)
+
+
+def _change_duty(person: PersonInDrive, act: object, at_ms: int | None) -> None:
+    if act == "on" and not (person.on_duty and person.on_duty[-1].to_ms is None):
+        person.on_duty.append(Span(from_ms=at_ms))
+    elif act == "off":
+        if not person.on_duty:
+            person.on_duty.append(Span(from_ms=None))
+        _end(person.on_duty, at_ms)
+
+
+def _end(spans: list[Span], at_ms: int | None) -> None:
+    if spans and spans[-1].to_ms is None:
+        spans[-1].to_ms = at_ms

@@ -1,0 +1,16 @@
+"""Report as JSON; `server.analysis` writes it."""
+
+from __future__ import annotations
+
+from server.recording.export.export_format import ExportFormat
+
+FORMAT = ExportFormat(
+    name="report_json",
+    label="Report as JSON",
+    use="for programs: everything that the drive's report says",
+    extension="report.json",
+    media_type="application/json",
+    writer="server.analysis.drive.tables:write_report_json",
+    options=("name",),
+    order=62,
+)

@@ -1,0 +1,172 @@
+"""Reads the marks of a finished recording, its voice notes and photos, with what came after it was complete."""
+
+from __future__ import annotations
+
+import contextlib
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import IO, Any
+
+import orjson
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.records import Attachment, AttachmentIndex
+
+from server.protocol.marks import DriveMark
+from server.recording.catalog import annotations as annotation_store
+from server.recording.marks import media
+from server.recording.marks.media import Kind, MediaName
+from server.recording.marks.rows import folded, merged
+from server.recording.own import PREFIX
+
+TOPIC = f"{PREFIX}marks"
+MOST = 20_000  # entries; a file that holds more is not of our making
+_HEAD_BYTES = 1 + 8  # of a record
+_CRC_BYTES = 4
+_MOST_AROUND = 4096  # bytes of an attachment's record besides its data: head, times, name, type and checksum
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InFile:
+    """What the file itself holds, of marks."""
+
+    start_ms: float
+    end_ms: float
+    marks: Mapping[str, DriveMark]
+    removed: frozenset[str]
+    media: Mapping[MediaName, int]  # name → its size
+
+
+NOTHING = InFile(start_ms=0.0, end_ms=0.0, marks={}, removed=frozenset(), media={})
+
+
+def in_file(path: Path) -> InFile:
+    """Of one file; nothing where it has no index, or is none of ours. Raises OSError."""
+    with path.open("rb") as file:
+        try:
+            return _in_file(file)
+        except OSError:
+            raise
+        except Exception:  # damage makes the readers fail in every way there is
+            return NOTHING
+
+
+def _in_file(file: IO[bytes]) -> InFile:
+    reader = make_reader(file)
+    summary = reader.get_summary()
+    if summary is None or summary.statistics is None:
+        return NOTHING
+    has_marks = any(channel.topic == TOPIC for channel in summary.channels.values())
+    marks, removed = folded(_entries(reader) if has_marks else ())
+    named = ((media.name_of(index.name), index.data_size) for index in summary.attachment_indexes)
+    return InFile(
+        start_ms=summary.statistics.message_start_time / 1e6,
+        end_ms=summary.statistics.message_end_time / 1e6,
+        marks=marks,
+        removed=frozenset(removed),
+        media={name: size for name, size in named if name is not None},
+    )
+
+
+def _entries(reader: Any) -> Iterator[Mapping[str, Any]]:
+    for number, (_, _, message) in enumerate(reader.iter_messages(topics=[TOPIC])):
+        if number >= MOST:
+            return
+        with contextlib.suppress(orjson.JSONDecodeError):
+            entry = orjson.loads(message.data)
+            if isinstance(entry, dict):
+                yield entry
+
+
+def read_marks(path: Path, within: InFile | None = None) -> list[DriveMark]:
+    """The marks of a recording, oldest first, each with its moment since the beginning. Raises OSError.
+
+    `within`: what the file holds, where that was read already.
+    """
+    found = in_file(path) if within is None else within
+    return with_late(found.marks.values(), [path], found.start_ms)
+
+
+def with_late(rows: Iterable[DriveMark], paths: Iterable[Path], start_ms: float) -> list[DriveMark]:
+    """Marks that files hold, with those that came after they were complete; oldest first, each with its moment since
+    the beginning of the recording."""
+    said = [annotation_store.read(path) for path in paths]
+    late, removed = [row for one in said for row in one.marks], [id for one in said for id in one.removed]
+    return [
+        {**row, "at_s": max(0.0, round((row["marked_ms"] - start_ms) / 1000, 3)), "late": row.get("late", False)}
+        for row in merged(rows, late, removed)
+    ]
+
+
+def read_media(path: Path, mark: str, kind: Kind) -> tuple[MediaName, bytes] | None:
+    """The voice note or the photo of a mark: that beside the recording, else the newest in it. Raises OSError."""
+    late = media.find(annotation_store.media_beside(path), mark, kind)
+    if late is not None and (name := media.name_of(late.name)) is not None:
+        return name, late.read_bytes()
+    return next(((name, data) for name, data in attached(path) if (name.mark, name.kind) == (mark, kind)), None)
+
+
+def attached(path: Path) -> Iterator[tuple[MediaName, bytes]]:
+    """The voice notes and photos in a file, the newest first, without damaged ones. Raises OSError."""
+    with path.open("rb") as file:
+        try:
+            summary = make_reader(file).get_summary()
+            indexes = [] if summary is None else summary.attachment_indexes
+        except OSError:
+            raise
+        except Exception:  # damage makes the readers fail in every way there is
+            return
+        for index in reversed(indexes):
+            name = media.name_of(index.name)
+            if name is None or index.data_size > media.MAX_BYTES[name.kind]:
+                continue
+            data = _attachment(file, index)
+            if data is not None:
+                yield name, data
+
+
+def _attachment(file: IO[bytes], index: AttachmentIndex) -> bytes | None:
+    """The data of one attachment; None: it is not what its index says. Raises OSError."""
+    if not 0 <= index.length - index.data_size <= _MOST_AROUND:
+        return None
+    try:
+        file.seek(index.offset)
+        record = file.read(index.length)
+        content = record[_HEAD_BYTES:]
+        length = int.from_bytes(record[1:_HEAD_BYTES], "little")
+        if record[:1] != bytes([Opcode.ATTACHMENT]) or length != len(content):
+            return None
+        crc = int.from_bytes(content[-_CRC_BYTES:], "little")
+        if crc and zlib.crc32(content[:-_CRC_BYTES]) != crc:  # 0: its writer gave none
+            return None
+        found = Attachment.read(ReadDataStream(BytesIO(content)))
+    except OSError:
+        raise
+    except Exception:
+        return None
+    return found.data if found.name == index.name and len(found.data) == index.data_size else None
+
+
+def all_media(path: Path) -> Iterator[tuple[MediaName, bytes]]:
+    """Each voice note and photo of a recording once: those beside it, and those in it. Raises OSError."""
+    seen: set[tuple[str, Kind]] = set()
+    for file in late_media(path):
+        if (name := media.name_of(file.name)) is not None:
+            seen.add((name.mark, name.kind))
+            if file.stat().st_size <= media.MAX_BYTES[name.kind]:
+                yield name, file.read_bytes()
+    for name, data in attached(path):
+        if (name.mark, name.kind) not in seen:
+            seen.add((name.mark, name.kind))
+            yield name, data
+
+
+def late_media(path: Path) -> list[Path]:
+    """The voice notes and photos beside a recording. Raises OSError."""
+    folder = annotation_store.media_beside(path)
+    found = sorted(folder.iterdir()) if folder.is_dir() else []
+    return [file for file in found if media.name_of(file.name) is not None]

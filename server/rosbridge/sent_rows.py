@@ -1,0 +1,84 @@
+"""The subscriptions of a link as its bridge gets them: at once, or a few at a time where it may refuse them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from server.rosbridge.link_listener import Marks
+from server.rosbridge.paced import Paced
+from server.rosbridge.subscription import Subscription, operation_of
+
+
+class SentRows:
+    """The table of one link. A bridge refuses a topic without a type that has no publisher: those are paced."""
+
+    def __init__(
+        self, send: Callable[[dict[str, Any]], None], is_open: Callable[[], bool], marks: Marks | None
+    ) -> None:
+        self._send = send
+        self._is_open = is_open
+        self._marks = marks
+        self._paced = Paced(self._send_paced)
+        self._known: set[str] = set()  # topics that this connection's bridge was asked for
+        self.table: dict[str, Subscription] = {}
+
+    def opened(self) -> None:
+        self.closed()
+        for row in self.table.values():
+            self._begin(row)
+
+    def closed(self) -> None:
+        self._paced.clear()
+        self._known.clear()
+
+    def subscribe(self, wanted: Subscription) -> None:
+        previous = self.table.get(wanted.topic)
+        self.table[wanted.topic] = wanted
+        if self._is_open():
+            if previous is not None and not previous.is_like(wanted):
+                self._end(previous)
+            self._begin(wanted)  # under the same id: its throttle and queue replace the old ones
+
+    def unsubscribe(self, topic: str) -> None:
+        row = self.table.pop(topic, None)
+        if row is not None and self._is_open():
+            self._end(row)
+
+    def renew(self, topic: str) -> None:
+        row = self.table.get(topic)
+        if row is None or not self._is_open():
+            return
+        if row.type is None:
+            self._paced.put(topic, is_renewed=True)
+        else:
+            self._operate("unsubscribe", row)
+            self._operate("subscribe", row)
+
+    def _begin(self, row: Subscription) -> None:
+        if row.type is None:
+            self._paced.put(row.topic)
+        else:
+            self._operate("subscribe", row)
+
+    def _end(self, row: Subscription) -> None:
+        self._paced.take_back(row.topic)
+        if row.topic in self._known:
+            self._operate("unsubscribe", row)
+
+    def _send_paced(self, topic: str, is_renewed: bool) -> None:
+        row = self.table.get(topic)
+        if row is None or not self._is_open():
+            return
+        if is_renewed and topic in self._known:
+            self._operate("unsubscribe", row)
+        self._operate("subscribe", row)
+
+    def _operate(self, operation: str, row: Subscription) -> None:
+        if operation == "unsubscribe":
+            self._known.discard(row.topic)
+        else:
+            self._known.add(row.topic)
+            if self._marks is not None:
+                self._marks.subscribe(row.topic, row.queue_length, row.throttle_ms / 1000)
+        self._send(operation_of(operation, row))

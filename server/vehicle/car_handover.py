@@ -1,0 +1,160 @@
+"""The hand-over of control of one car: offered and read back by commands, logged, and shown in its state."""
+
+from __future__ import annotations
+
+from typing import assert_never
+
+from monitor.runner import Refused
+from server.control.authorization import Authorization, Caller
+from server.control.handover import Handover, Line, NotReadBack, version_of
+from server.control.lease import Operator
+from server.judge.active_settings import ActiveSettings
+from server.protocol import handover_commands, serialize
+from server.protocol.alarm_state import Note
+from server.protocol.messages import Answer
+from server.protocol.operator_state import HandoverState
+from server.slowdown.controller import SlowDownController
+from server.vehicle import phone
+from server.vehicle.car_departure import CarDeparture
+from server.vehicle.car_driving import CarDriving
+from server.vehicle.handover_lines import (
+    alarm_lines,
+    departure_line,
+    driving_line,
+    limit_lines,
+    mode_lines,
+    rides_line,
+)
+from server.vehicle.judgement import Judgement
+from server.vehicle.pause import Pause
+
+
+class CarHandover:
+    """Of one vehicle; its session is the only writer. Times are on the session's monotonic clock, in seconds."""
+
+    def __init__(
+        self,
+        judgement: Judgement,
+        settings: ActiveSettings,
+        authorization: Authorization,
+        pause: Pause,
+        slow_down: SlowDownController,
+        driving: CarDriving,
+        departure: CarDeparture,
+        note: Note,
+    ) -> None:
+        self._judgement = judgement
+        self._settings = settings
+        self._authorization = authorization
+        self._pause = pause
+        self._slow_down = slow_down
+        self._driving = driving
+        self._departure = departure
+        self._note = note
+        self._handover = Handover()
+        self._since_ms = 0  # when it was offered; the same in every state, by which pages distinguish offers
+
+    def tick(self, now_s: float) -> bool:
+        """Time passes, or control changed; whether the offer ended by it."""
+        gate = self._authorization
+        ended = self._handover.advance(gate.lease, lambda one: gate.is_here(one, now_s), now_s)
+        if ended is not None:
+            self._log_step("ended", ended, None)
+        return ended is not None
+
+    def obey(
+        self, command: handover_commands.HandoverCommand, caller: Caller, now_s: float, wall_ms: int
+    ) -> Operator | None:
+        """Who was in control until now, where control changed by it; None: it did not. Raises Refused."""
+        self._authorization.tick(now_s)
+        self.tick(now_s)
+        by, handover = caller.operator, self._handover
+        if by is None:
+            raise Refused("Only a page hands control over: a program cannot show that somebody is watching.")
+        match command:
+            case handover_commands.OfferControl():
+                to = self._authorization.find(command.to, now_s)
+                if to is None:
+                    raise Refused("That page is closed or not visible.")
+                if handover.begin(by, self._authorization.lease, to, now_s):
+                    self._since_ms = wall_ms
+                    self._authorization.answer(to)
+                    self._log_step("offered", f"{by.name} offers control to {to.name}, who reads back what stands.", by)
+            case handover_commands.ReadBack():
+                handover.read(by, command.line, command.is_read, self.lines(now_s, wall_ms))
+            case handover_commands.AcceptControl():
+                return self._accept(by, command.version, now_s, wall_ms)
+            case handover_commands.EndOffer():
+                offer = handover.end(by)
+                text = (
+                    f"{by.name} declined control: {offer.by.name} keeps it."
+                    if by.is_same(offer.to)
+                    else f"{by.name} does not offer control to {offer.to.name} any more."
+                )
+                self._log_step("declined" if by.is_same(offer.to) else "withdrawn", text, by)
+            case _:
+                assert_never(command)
+        return None
+
+    def _accept(self, by: Operator, version: str, now_s: float, wall_ms: int) -> Operator:
+        lines = self.lines(now_s, wall_ms)
+        offer = self._handover.accept(by, version, lines)
+        self._authorization.hand_over(offer.by, offer.fence, offer.to, now_s)
+        titles = "; ".join(line.title for line in lines)
+        self._log_step("accepted", f"{by.name} read back what stands: {titles}.", by)
+        return offer.by
+
+    def refusal(self, why: NotReadBack, now_s: float, wall_ms: int) -> Answer:
+        """The answer to a read-back that does not fit, with what stands now."""
+        return {"ok": False, "reason": why.reason, "handover": self.as_json(now_s, wall_ms)}
+
+    def lines(self, now_s: float, wall_ms: int) -> list[Line]:
+        """What stands now."""
+        judgement, slow_down = self._judgement, self._slow_down.frame()
+        standing = [serialize.alarm(alarm, now_s, wall_ms) for alarm in judgement.monitor.standing()]
+        compared = phone.as_json(judgement.snapshot().phone, now_s)
+        is_riding = compared is not None and not compared["handheld"]
+        return [
+            *alarm_lines(standing),
+            *limit_lines(self._settings.as_json()),
+            rides_line(
+                self._authorization.people(now_s), compared["label"] if compared is not None and is_riding else None
+            ),
+            driving_line(self._driving.frame(now_s, wall_ms)),
+            departure_line(self._departure.state(), self._departure.failed_items),
+            *mode_lines(
+                slow_down["state"], slow_down["why"], self._pause.by, is_paused=self._pause.since_s is not None
+            ),
+        ]
+
+    def as_json(self, now_s: float, wall_ms: int) -> HandoverState | None:
+        """The `handover` of a state; None: control is not being handed over."""
+        offer = self._handover.offer
+        if offer is None:
+            return None
+        lines = self.lines(now_s, wall_ms)
+        return {
+            "by": offer.by.name,
+            "by_page": offer.by.page,
+            "name": offer.to.name,
+            "page": offer.to.page,
+            "since_ms": self._since_ms,
+            "lines": [
+                {
+                    "key": line.key,
+                    "kind": line.kind,
+                    "title": line.title,
+                    "text": line.text,
+                    "priority": line.priority,
+                    "since_ms": line.since_ms,
+                    "until_ms": line.until_ms,
+                    "read": line.key in offer.read,
+                }
+                for line in lines
+            ],
+            "left": len(self._handover.unread(lines)),
+            "version": version_of(lines),
+        }
+
+    def _log_step(self, step: str, text: str, by: Operator | None) -> None:
+        self._note("hand_over", text, by=by.name if by else None, step=step)

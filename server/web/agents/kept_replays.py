@@ -1,0 +1,156 @@
+"""At an agent: replays that pages of web nodes show. A node asks for the newest frames, one answer after the other."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from typing import Annotated, Any
+
+import orjson
+from fastapi import APIRouter, Body, HTTPException, Query, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from server.replay.manager import NoReplay, ReplayClient, ReplayManager
+from server.web.agents.kept import REPLAYS
+
+router = APIRouter(prefix=REPLAYS)
+WAITS_S = 1.0  # for a newer frame
+UNASKED_S = 15.0  # a replay that no node asks for is closed
+Number = Annotated[int, Query(ge=0, lt=1 << 53)]
+
+
+class Opening(BaseModel):
+    """As `ViewSource` opens one."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    vehicle: str = Field(max_length=40)
+    at_s: float | int | None = None
+    settings: str = Field("", max_length=100_000)
+    settings_version: int = 0
+
+
+class OpenKept(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+    recording: str = Field(max_length=100)
+    opening: Opening
+
+
+class Shown:
+    """One replay, closed where no node asks for it any more."""
+
+    def __init__(self, manager: ReplayManager) -> None:
+        self._manager = manager
+        self._changed = asyncio.Event()
+        self._due: asyncio.TimerHandle | None = None
+        self._closing: asyncio.Task[None] | None = None
+        self.client: ReplayClient | None = None
+
+    def on_new(self, _kind: str) -> None:
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+    def asked(self) -> ReplayClient:
+        """A node asks for it now."""
+        self.stop()
+        self._due = asyncio.get_running_loop().call_later(UNASKED_S, self._give_up)
+        assert self.client is not None
+        return self.client
+
+    async def newer(self, have: dict[str, int]) -> ReplayClient:
+        """It, once a frame is newer than those, or has failed, or after a second."""
+        client = self.asked()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(WAITS_S):
+                while client.failed is None and all(have[kind] >= n for kind, n in client.numbers.items()):
+                    await self._changed.wait()
+        return client
+
+    def stop(self) -> None:
+        if self._due is not None:
+            self._due.cancel()
+
+    def _give_up(self) -> None:
+        if self.client is not None:
+            self._closing = asyncio.create_task(self._manager.close(self.client))
+
+
+class KeptReplays:
+    """Those of all nodes, by their tokens."""
+
+    def __init__(self, manager: ReplayManager) -> None:
+        self.manager = manager
+        self._shown: dict[str, Shown] = {}
+
+    async def open(self, recording: str, opening: dict[str, Any]) -> ReplayClient:
+        """Raises NoReplay."""
+        for token in [token for token, shown in self._shown.items() if not self.manager.holds(token)]:
+            del self._shown[token]
+        shown = Shown(self.manager)
+        client = shown.client = await self.manager.open(recording, opening, on_new=shown.on_new)
+        self._shown[client.token] = shown
+        shown.asked()
+        return client
+
+    def of(self, token: str) -> Shown:
+        """Raises NoReplay."""
+        self.manager.by_token(token)
+        shown = self._shown.get(token)
+        if shown is None:
+            raise NoReplay("This replay is over.")
+        return shown
+
+    async def close(self, token: str) -> None:
+        shown = self._shown.pop(token, None)
+        if shown is not None and shown.client is not None:
+            shown.stop()
+            await self.manager.close(shown.client)
+
+
+def _kept(request: Request) -> KeptReplays:
+    found: KeptReplays = request.app.state.replays
+    return found
+
+
+def _shown(request: Request, token: str) -> Shown:
+    try:
+        return _kept(request).of(token)
+    except NoReplay as why:
+        raise HTTPException(404, str(why)) from None
+
+
+@router.post("")
+async def opened(request: Request, body: Annotated[OpenKept, Body()]) -> dict[str, Any]:
+    try:
+        client = await _kept(request).open(body.recording, body.opening.model_dump())
+    except NoReplay as why:
+        raise HTTPException(409, str(why)) from None
+    return {"token": client.token, **client.source_facts()}
+
+
+@router.get("/{token}")
+async def frames(request: Request, token: str, state: Number = 0, scan: Number = 0, timeline: Number = 0) -> Response:
+    """A line of JSON, then the frames that are newer than the numbers in the request, one after the other."""
+    have = {"state": state, "scan": scan, "timeline": timeline}
+    client = await _shown(request, token).newer(have)
+    found = client.newest_parts(have)
+    head = {
+        "numbers": client.numbers,
+        "silent_s": client.silent_s,
+        "failed": client.failed,
+        "parts": [(kind, len(payload)) for kind, payload in found],
+    }
+    return Response(orjson.dumps(head) + b"\n" + b"".join(payload for _, payload in found))
+
+
+@router.post("/{token}/ask")
+async def asked(request: Request, token: str, order: Annotated[dict[str, Any], Body()]) -> dict[str, Any]:
+    try:
+        return await _shown(request, token).asked().ask(order)
+    except NoReplay as why:
+        raise HTTPException(409, str(why)) from None
+
+
+@router.delete("/{token}")
+async def closed(request: Request, token: str) -> dict[str, Any]:
+    await _kept(request).close(token)
+    return {"ok": True}

@@ -1,0 +1,64 @@
+"""What a page sends, read with care: a limited number of JSON objects; a page that sends anything else is closed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import orjson
+
+from server.protocol import commands, messages
+from server.protocol.rate_limit import MAX_DEPTH, Allowance, Limits, nests_deeper
+
+MAX_COMPLAINTS = 200  # a page that sends nothing sensible is closed
+LONGEST_SLOW_DOWN = 400  # letters of an order to slow the car
+
+
+class PageInbox:
+    """Of one page. `send` queues a message to it."""
+
+    def __init__(self, limits: Limits, *, now: Callable[[], float], send: Callable[[messages.ToPage], None]) -> None:
+        self._allowance = Allowance(limits.messages, now())
+        self._now = now
+        self._send = send
+        self._complaints = 0
+
+    @property
+    def is_hopeless(self) -> bool:
+        """Whether the page sent too many invalid messages."""
+        return self._complaints >= MAX_COMPLAINTS
+
+    def complain(self, reason: str) -> None:
+        self._complaints += 1
+        self._send(messages.problem(reason))
+
+    def read(self, text: str | None) -> dict[str, Any] | None:
+        """A message of the page; None: it is none, and the page was sent why."""
+        if not self._allowance.takes(self._now()) and not _may_slow_down(text):
+            self.complain("Too many messages at once.")
+            return None
+        try:
+            return _parsed(text)
+        except ValueError as why:
+            self.complain(str(why))
+            return None
+
+
+def _parsed(text: str | None) -> dict[str, Any]:
+    """The message in a frame of the page. Raises ValueError with a sentence for the page."""
+    if text is None or len(text) > commands.MAX_COMMAND_BYTES:
+        raise ValueError("A message must be text of at most 16 kB.")
+    try:
+        message = orjson.loads(text)
+    except orjson.JSONDecodeError:
+        raise ValueError("The message is not JSON.") from None
+    if not isinstance(message, dict):
+        raise ValueError("A message must be an object with a kind.")
+    if nests_deeper(message, MAX_DEPTH):
+        raise ValueError("The message is nested too deeply.")
+    return message
+
+
+def _may_slow_down(text: str | None) -> bool:
+    """Whether a message beyond the allowance is read all the same: it may be an order to slow the car."""
+    return text is not None and len(text) <= LONGEST_SLOW_DOWN and '"slow_down"' in text

@@ -1,0 +1,94 @@
+"""What a web node makes of frames that came from an agent: no page gets what is not of this vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import orjson
+from pydantic import TypeAdapter, ValidationError
+
+from server.bus import nats_wire as wire
+from server.bus.bus import SUMMARY
+from server.protocol.cars_state import CarSummary
+
+LONGEST_SUMMARY = 6000  # bytes; it goes to every page
+_SUMMARY: TypeAdapter[CarSummary] = TypeAdapter(CarSummary)
+
+
+class RemoteFrames:
+    """Reads them. `wall_ms`: the time of day of this node."""
+
+    def __init__(self, wall_ms: Callable[[], int]) -> None:
+        self._wall_ms = wall_ms
+
+    def __call__(self, vehicle: str, kind: str, payload: str | bytes, age_s: float) -> str | bytes:
+        """What pages get; `age_s`: since it was put, at most. Raises Malformed."""
+        if kind == SUMMARY:
+            return summary(payload, self._wall_ms() - round(1000 * age_s))
+        if kind == "state":
+            return state(vehicle, payload, self._wall_ms() - round(1000 * age_s))
+        return scan(payload)
+
+
+def state(vehicle: str, payload: str | bytes, time_ms: int) -> str:
+    """The state as if it had been made here: `time_ms` is the time of day by this node's clock when it was put.
+
+    The page reads the delay of a frame from it; the clock of the car may show another time. Raises Malformed.
+    """
+    found = _loaded(payload)
+    if found.get("kind") != "state" or found.get("vehicle") != vehicle or not isinstance(found.get("server"), dict):
+        raise wire.Malformed(f"no state of {vehicle}")
+    found["server"]["time_ms"] = time_ms
+    try:
+        return orjson.dumps(found).decode()
+    except (TypeError, ValueError) as error:  # nested too deeply to be written
+        raise wire.Malformed(str(error)) from None
+
+
+def summary(payload: str | bytes, time_ms: int) -> str:
+    """The summary as if it had been made here, at `time_ms` by this node's clock; the clock of the car may show another
+    time. What is not declared is left out: the agent may be newer. Raises Malformed."""
+    if len(payload) > LONGEST_SUMMARY:
+        raise wire.Malformed(f"a summary of {len(payload)} bytes")
+    try:
+        found = _SUMMARY.validate_python(_loaded(payload))
+        if (made_ms := found.get("time_ms")) is not None:
+            _shift(found, time_ms - made_ms)
+        return orjson.dumps(found).decode()
+    except (ValidationError, TypeError, ValueError) as error:  # a number may be too large to be written
+        raise wire.Malformed(str(error)[:200]) from None
+
+
+def _shift(found: CarSummary, by_ms: int) -> None:
+    """Put all times of day forward."""
+    found["time_ms"] += by_ms
+    if (worst := found["worst"]) is not None:
+        worst["raised_ms"] += by_ms
+    if (item := found.get("attention")) is None:
+        return
+    item["since_ms"] += by_ms
+    for one in (item["assigned"], item["offered"]):
+        if one is not None:
+            one["since_ms"] += by_ms
+    if item["escalates_ms"] is not None:
+        item["escalates_ms"] += by_ms
+    if item["escalated_ms"] is not None:
+        item["escalated_ms"] += by_ms
+
+
+def scan(payload: str | bytes) -> bytes:
+    """As it is: the page reads it with care. Raises Malformed."""
+    if isinstance(payload, str):
+        raise wire.Malformed("a scan is no text")
+    return payload
+
+
+def _loaded(payload: str | bytes) -> dict[str, Any]:
+    try:
+        found = orjson.loads(payload)
+    except orjson.JSONDecodeError as error:
+        raise wire.Malformed(str(error)) from None
+    if not isinstance(found, dict):
+        raise wire.Malformed("no object")
+    return found

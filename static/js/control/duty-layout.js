@@ -1,0 +1,28 @@
+// Who is on duty, in words: pure functions of what the server told.
+
+import { timeOfDay } from '../core/format.js';
+
+/**
+ * @typedef {import('../core/protocol-types.js').Duty} Duty
+ * @typedef {import('../core/protocol-types.js').HandoverState} HandoverState
+ */
+
+/** "AK" of "A. K.", "Anna Keller" or "anna"; of other scripts their first letters. @param {string} name */
+export function initialsOf(name) {
+  const parts = name.split(/[\s.\-_,]+/u).map((part) => [...part].find((letter) => /[\p{L}\p{N}]/u.test(letter)) ?? '').filter(Boolean);
+  const [first = '?', last = ''] = [parts[0], parts.length > 1 ? parts.at(-1) : ''];
+  return (first + last).toLocaleUpperCase('en');
+}
+
+/** The key that leads to who is on duty. @param {Duty | null} duty */
+export function dutyWords(duty) {
+  if (!duty) return 'On duty: not known';
+  if (duty.me) return `${duty.me.name}, ${duty.me.title}: on duty since ${timeOfDay(duty.me.since_ms).slice(0, 5)}`;
+  return duty.people ? 'Sign on: nobody is on duty here' : 'Sign on: the list of people is empty';
+}
+
+/** What this page has to do with a hand-over. @param {HandoverState | null | undefined} handover @param {string} page @returns {'taker' | 'giver' | null} */
+export function partOf(handover, page) {
+  if (!handover || !page) return null;
+  return handover.page === page ? 'taker' : handover.by_page === page ? 'giver' : null;
+}

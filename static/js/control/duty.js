@@ -1,0 +1,148 @@
+// Who is on duty at this device: asks once who it is where there is a list, tells how a duty ended, shows a hand-over.
+
+import { dutyWords, partOf } from './duty-layout.js';
+import { field, listen, need, setText } from '../core/dom.js';
+import { request } from './request.js';
+import { closeSheet, mustWait } from '../shell/sheet.js';
+
+/** In this tab it was asked already who is on duty. */
+const ASKED = 'catgraph.asked-duty';
+
+/**
+ * @typedef {import('../core/store.js').Store} Store
+ * @typedef {object} DutyStore what of a page's store is used here
+ * @property {import('../core/protocol-types.js').Duty | null} duty
+ * @property {string} page
+ * @property {boolean} isViewer
+ * @property {boolean} isSilent
+ * @property {(topic: any, listener: (detail?: any) => void) => () => void} on
+ * @typedef {(sentence: string, title?: string, way?: import('../shell/notice.js').Way) => void} Say
+ */
+
+/**
+ * Opens who is on duty here, and the list to sign on from.
+ * @param {DutyStore & {name?: string}} store
+ * @param {Say} say
+ * @param {() => boolean} [mayOpen] asked once it is loaded
+ * @returns {Promise<boolean | null>} whether it opened; null: it could not be loaded
+ */
+export function openDuty(store, say, mayOpen = () => true) {
+  return import('./sign-on.js').then(({ openSignOn }) => openSignOn(store, say, mayOpen)).catch(() => {
+    say('The list of people could not be loaded.', 'Not opened');
+    return null;
+  });
+}
+
+/** Shows once how a duty ended that nobody ended here, where it can be seen; the server keeps the note until it was closed. @param {DutyStore & {name?: string}} store @param {Say} say @returns {() => void} to be called when it changed, and from time to time */
+export function dutyEndedNotice(store, say) {
+  let shown_ms = 0;
+  const onClosed = () => void request('/api/duty/note', { method: 'DELETE' }).catch(() => {}); // it is shown again after a reload
+  return () => {
+    const ended = store.duty?.ended;
+    if (!ended || store.isViewer || ended.at_ms === shown_ms || document.hidden || document.querySelector('dialog:modal')) return;
+    shown_ms = ended.at_ms;
+    const act = () => {
+      onClosed();
+      void openDuty(store, say);
+    };
+    say(ended.text, 'Not on duty any more', { label: 'Sign on', act, onClosed });
+  };
+}
+
+/** Nothing may open by itself over the slow-down, nor under the finger that orders it. @param {Store} store */
+function isSlowing(store) {
+  const state = store.frame?.decelerate?.state;
+  return state === 'ordered' || state === 'holding' || document.querySelector('.slide[data-moves]') !== null;
+}
+
+/** Asks once in this tab, and never over another sheet: whoever does not want to sign on closes it. @param {Store} store @param {Say} say */
+function asker(store, say) {
+  let isAskedHere = false; // or it cannot be, or it is being opened
+
+  function mayAsk() {
+    return store.frame !== null && !isSlowing(store) && !document.querySelector('dialog[open]') && !document.documentElement.hasAttribute('data-replay');
+  }
+
+  return async () => {
+    if (isAskedHere || !mayAsk()) return;
+    isAskedHere = true;
+    try {
+      if (sessionStorage.getItem(ASKED)) return;
+      sessionStorage.setItem(ASKED, '');
+    } catch {
+      return; // it cannot be remembered that it was asked
+    }
+    const isOpen = await openDuty(store, say, mayAsk);
+    if (isOpen) sessionStorage.setItem(ASKED, '1');
+    isAskedHere = isOpen !== false;
+  };
+}
+
+/** The sheet of who takes over stands until the end; one that was closed here is behind the chip. Who hands over, or has a slow-down in view, opens it by a key. @param {Store} store @param {Say} say */
+function handoverNotice(store, say) {
+  let opened = '';
+  let isOpening = false;
+
+  return () => {
+    const handover = store.isSilent ? null : store.control?.handover;
+    const part = partOf(handover, store.page);
+    if (!handover || !part) {
+      opened = '';
+      return;
+    }
+    const which = `${handover.page} ${handover.since_ms}`;
+    if (which === opened || isOpening || document.querySelector('.slide[data-moves]') || document.querySelector('dialog[open]:not(#sheet-cars, #sheet-control, #sheet-duty)')) return;
+    if (part === 'giver' || isSlowing(store)) {
+      if (document.hidden || document.querySelector('dialog:modal')) return; // it could not be seen
+      opened = which;
+      const sentence = part === 'taker' ? `${handover.by} hands over to you, with read-back.` : `${handover.name} reads back what stands. You stay in control until the last line.`;
+      say(sentence, 'Control is offered', { label: 'Show', act: () => openHandover(store, say, (isByHand) => { if (!isByHand) opened = ''; }) }); // an alarm closes it: offered again
+      return;
+    }
+    isOpening = true;
+    openHandover(store, say, (isByHand) => { if (isByHand) opened = which; }, () => !isSlowing(store));
+    setTimeout(() => { isOpening = false; }, 1000);
+  };
+}
+
+/**
+ * @param {import('../core/store.js').Store} store
+ * @param {import('./control.js').Say} say
+ */
+export function mount(store, say) {
+  const menu = /** @type {HTMLDialogElement} */ (need(document, '#sheet-menu'));
+  const key = field(menu, 'duty');
+  const words = field(menu, 'duty-words');
+  const showEnded = dutyEndedNotice(store, say);
+  const askOnce = asker(store, say);
+  const drawHandover = handoverNotice(store, say);
+
+  function draw() {
+    const { duty } = store;
+    setText(words, dutyWords(duty));
+    if (!duty || store.isViewer) return;
+    showEnded();
+    if (!duty.me && duty.people && !duty.ended) void askOnce();
+  }
+
+  draw();
+  const stops = [
+    store.on('duty', draw),
+    store.on('draw', () => {
+      draw();
+      drawHandover();
+    }),
+    listen(key, 'click', () => {
+      closeSheet(menu);
+      void openDuty(store, say);
+    }),
+  ];
+  return () => stops.forEach((stop) => stop());
+}
+
+/** Opens the hand-over that concerns this page. @param {import('../core/store.js').Store} store @param {import('./control.js').Say} say @param {(isByHand: boolean) => void} [onClosed] @param {() => boolean} [mayOpen] asked once it is loaded */
+export function openHandover(store, say, onClosed = () => {}, mayOpen = () => true) {
+  import('./handover-sheet.js').then(({ HandoverSheet }) => {
+    if (!mustWait() && mayOpen() && !document.querySelector('#sheet-handover[open]')) new HandoverSheet(store, say, onClosed);
+  }).catch(() => say('The hand-over could not be loaded.', 'Not opened'));
+}

@@ -1,0 +1,29 @@
+// A hand-over, in words: what the taker reads back. Fetched with its sheet.
+
+import { timeOfDay } from '../core/format.js';
+
+/**
+ * @typedef {import('../core/protocol-types.js').HandoverState} HandoverState
+ * @typedef {import('../core/protocol-types.js').HandoverLine} HandoverLine
+ */
+
+/** The second line of a line. @param {HandoverLine} line */
+export function lineWords({ text, since_ms, until_ms }) {
+  const since = since_ms === null ? '' : `since ${timeOfDay(since_ms)}`;
+  const until = until_ms === null ? '' : `back at ${timeOfDay(until_ms)}`;
+  return [text, since || until].filter(Boolean).join(' · ');
+}
+
+/** The key below the list. @param {HandoverState} handover @param {'taker' | 'giver'} part */
+export function endWords({ left, name, lines }, part) {
+  const many = `${left} ${left === 1 ? 'line' : 'lines'} not read back yet`;
+  if (part === 'giver') return { title: `${lines.length - left} of ${lines.length} read back`, text: left ? `${name}: ${many}` : `${name} can take over now`, isOpen: false };
+  return { title: 'Take over control', text: left ? many : 'all lines are read back', isOpen: left === 0 };
+}
+
+/** The icon of a line. @param {HandoverLine} line */
+export function markOf({ kind, priority, title }) {
+  if (kind === 'alarm') return priority === 'critical' ? 'crit' : priority === 'warning' ? 'warn' : title === 'No alarm is active' ? 'ok' : 'info';
+  if (kind === 'departure') return title === 'Departure check signed' ? 'ok' : 'info';
+  return /** @type {const} */ ({ shelved: 'bell-off', limit: 'settings', rides: 'operator', driving: 'car', slow_down: 'slow', paused: 'pause' })[kind];
+}

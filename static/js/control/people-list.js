@@ -1,0 +1,108 @@
+// The list of people in Settings: add, rename, remove; the role of each; and after how long a duty ends by itself.
+
+import { lastWords } from './people-layout.js';
+import { styled } from '../core/style-sheet.js';
+import { request, sentenceOf } from './request.js';
+import { html, icon, listen, setText, setWords } from '../core/dom.js';
+import { counted } from '../core/format.js';
+
+/**
+ * @typedef {import('../core/protocol-types.js').PeopleList} PeopleShown
+ * @typedef {import('../core/protocol-types.js').PersonRow} PersonRow
+ * @typedef {(sentence: string, title?: string) => void} Say
+ */
+
+/**
+ * @param {HTMLElement} place
+ * @param {HTMLDetailsElement} group in which it lies: what is folded away asks nothing
+ * @param {import('../core/store.js').Store} store
+ * @param {Say} say
+ * @param {(words: string) => void} head says at the group's head what holds
+ */
+export async function mount(place, group, store, say, head) {
+  await styled('people');
+  if (store.isViewer) {
+    place.replaceChildren(html('p', { class: 'state' }, 'This phone is paired as a viewer: an operator sees and changes the list of people.'));
+    return;
+  }
+  new PeopleGroup(place, group, store, say, head);
+}
+
+class PeopleGroup {
+  #drawn = '';
+
+  /** @param {HTMLElement} place @param {HTMLDetailsElement} group @param {import('../core/store.js').Store} store @param {Say} say @param {(words: string) => void} head */
+  constructor(place, group, store, say, head) {
+    this.group = group;
+    this.say = say;
+    this.head = head;
+    this.bad = html('p', { class: 'bad', role: 'alert' });
+    this.list = html('ul', { class: 'people-list', 'aria-label': 'People' });
+    this.name = /** @type {HTMLInputElement} */ (html('input', { type: 'text', maxlength: 30, autocomplete: 'off', autocapitalize: 'words', spellcheck: 'false', 'aria-label': 'Name or initials of one more person', placeholder: 'Name or initials' }));
+    const add = html('button', { type: 'submit', class: 'key wide', 'data-f': 'person-add' }, icon('plus'), 'Add');
+    const form = html('form', { class: 'keys' }, html('div', { class: 'field' }, this.name), add);
+    this.hours = /** @type {HTMLInputElement} */ (html('input', { type: 'number', min: 1, max: 24, step: 1, inputmode: 'numeric', 'aria-label': 'A duty ends by itself after so many hours' }));
+    const hours = html('label', { class: 'hours' }, html('span', {}, 'A duty ends by itself after, hours'), html('span', { class: 'field' }, this.hours));
+    place.replaceChildren(this.bad, this.list, form, hours);
+    listen(form, 'submit', (event) => {
+      event.preventDefault();
+      void this.#send('/api/people', 'POST', { name: this.name.value }, 'Not added').then((isDone) => { if (isDone) this.name.value = ''; });
+    });
+    listen(this.hours, 'change', () => void this.#send('/api/people', 'PATCH', { ends_after_h: Number(this.hours.value) }, 'Not changed'));
+    listen(group, 'toggle', () => group.open && void this.#ask());
+    store.on('duty', () => group.open && void this.#ask());
+    void this.#ask();
+  }
+
+  async #ask() {
+    try {
+      this.#take(await request('/api/people'));
+      setText(this.bad, '');
+    } catch (error) {
+      setWords(this.bad, sentenceOf(error));
+    }
+  }
+
+  /** @param {PeopleShown} shown */
+  #take(shown) {
+    this.head(shown.people.length ? counted(shown.people.length, 'person', 'people') : 'nobody');
+    if (document.activeElement !== this.hours) this.hours.value = String(shown.ends_after_h);
+    const key = JSON.stringify(shown.people);
+    if (key === this.#drawn || this.list.contains(document.activeElement)) return; // what is typed is not taken away
+    this.#drawn = key;
+    this.list.replaceChildren(...shown.people.map((row) => this.#row(row, shown.roles)));
+  }
+
+  /** @param {PersonRow} row @param {PeopleShown['roles']} roles */
+  #row(row, roles) {
+    const path = `/api/people/${encodeURIComponent(row.id)}`;
+    const name = /** @type {HTMLInputElement} */ (html('input', { type: 'text', maxlength: 30, autocomplete: 'off', spellcheck: 'false', 'aria-label': `Name of ${row.name}` }));
+    name.value = row.name;
+    const role = /** @type {HTMLSelectElement} */ (html('select', { 'aria-label': `Role of ${row.name}` }, ...roles.map((one) => html('option', { value: one.role }, one.title))));
+    role.value = row.role;
+    const remove = html('button', { type: 'button', class: 'key', 'aria-label': `Remove ${row.name}`, 'data-f': 'person-remove' }, icon('trash'));
+    const about = html('span', { class: 'm' });
+    setWords(about, lastWords(row, Date.now()));
+    name.addEventListener('change', () => void this.#send(path, 'PATCH', { name: name.value }, 'Not renamed'));
+    role.addEventListener('change', () => void this.#send(path, 'PATCH', { role: role.value }, 'Not changed'));
+    remove.addEventListener('click', () => void this.#send(path, 'DELETE', null, 'Not removed'));
+    return html('li', { 'data-id': row.id }, html('span', { class: 'field' }, name), html('span', { class: 'field' }, role), remove, about);
+  }
+
+  /** @param {string} path @param {string} method @param {object | null} body @param {string} title of a refusal */
+  async #send(path, method, body, title) {
+    let isDone = true;
+    try {
+      const shown = await request(path, { method, ...(body ? { body } : {}) });
+      if (document.activeElement instanceof HTMLElement && this.list.contains(document.activeElement)) document.activeElement.blur();
+      this.#take(shown);
+      setText(this.bad, '');
+    } catch (error) {
+      isDone = false;
+      this.say(sentenceOf(error), title);
+      this.#drawn = '';
+      await this.#ask();
+    }
+    return isDone;
+  }
+}

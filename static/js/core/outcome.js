@@ -1,0 +1,51 @@
+// What became of a command, in words: carried out, refused, not delivered, or not known. The one place that words it.
+
+/**
+ * @typedef {import('./protocol-types.js').Reply} Reply
+ * @typedef {NonNullable<Reply['outcome']>} Outcome
+ * @typedef {NonNullable<Reply['became']>} Became
+ * @typedef {Exclude<import('./protocol-types.js').PageMessage['kind'], 'hello' | 'take' | 'have' | 'watch' | 'replay' | 'present' | 'position' | 'outcome'>} Ordered
+ */
+
+/** It ends each sentence on a command of which it is not known whether it was carried out; the server's too. */
+const MAYBE = 'It may have been carried out.';
+
+/** What the key is called, where it is not called as the command. @type {Partial<Record<Ordered, string>>} */
+const NAMES = {
+  connect: 'Connect', retry: 'Retry', disconnect: 'End monitoring', pause: 'Pause', resume: 'Resume', record: 'Record',
+  acknowledge: 'Acknowledge', silence: 'Silence', shelve: 'Shelve', unshelve: 'Unshelve', set: 'Change settings', import: 'Import settings',
+  ride: 'Choose the phone in the car', control: 'Change control', arm: 'Arm', disarm: 'Disarm', slow_down: 'Slow down', release: 'Release', veto: 'Veto',
+  take_item: 'Take it', release_item: 'Release', offer_item: 'Hand over', answer_item: 'Answer', withdraw_item: 'Withdraw',
+  offer_control: 'Hand over', read_back: 'Confirm', accept_control: 'Take control', end_offer: 'End the hand-over',
+};
+
+/** Whether a sentence is on a command of which it is not known. @param {string} sentence */
+export function isMaybe(sentence) {
+  return sentence.includes(MAYBE);
+}
+
+/** A sentence on a command that may have been carried out. @param {string} why */
+export function maybe(why) {
+  return `${why} ${MAYBE}`;
+}
+
+/**
+ * What was found out later of a command that was not answered.
+ * @param {string} kind
+ * @param {Became} became
+ * @param {string} reason where it was refused
+ * @returns {{title: string, text: string}}
+ */
+export function laterWords(kind, became, reason) {
+  const name = `“${NAMES[/** @type {Ordered} */ (kind)] ?? kind.replaceAll('_', ' ')}”`;
+  switch (became) {
+    case 'done':
+      return { title: 'Carried out', text: `${name} was carried out. Only its answer was lost.` };
+    case 'refused':
+      return { title: 'Refused', text: `${name} was refused: ${reason || 'it is not known why.'}` };
+    case 'never':
+      return { title: 'Not carried out', text: `${name} was lost on its way. It is not carried out any more.` };
+    default:
+      return { title: 'Not known', text: `It is not known whether ${name} was carried out. Look at what the car shows.` };
+  }
+}

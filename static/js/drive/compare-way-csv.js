@@ -1,0 +1,58 @@
+// Two drives beside each other as a table (RFC 4180): a row for each place or moment of A. Pure.
+
+import { difference, placeOfB } from './compare-way-model.js';
+
+/**
+ * @typedef {import('../core/protocol-types.js').Course} Course
+ * @typedef {import('../core/protocol-types.js').CourseEvent} CourseEvent
+ * @typedef {import('./compare-way-model.js').By} By
+ * @typedef {import('./compare-way-model.js').Point} Point
+ * @typedef {import('./compare-way-model.js').Row} Row
+ */
+
+const POINT = ['time [UTC]', 'time [s]', 'distance [m]', 'speed [m/s]', 'steering [%]', 'latitude [deg]', 'longitude [deg]', 'events'];
+const FORMULA = /^\s*[=+\-@|＝＋－＠]/; // a spreadsheet would compute it
+
+/** An empty cell is not known; there B was not, or had no data. @param {Row[]} rows @param {By} by @param {Course} a @param {Course} b */
+export function csvOf(rows, by, a, b) {
+  const ofA = eventsAt(rows, a.events, ({ t, m }) => (by === 'time' ? t : m));
+  const ofB = eventsAt(rows, b.events, ({ t }) => placeOfB(rows, t));
+  const heads = [by === 'time' ? 'time along A [s]' : 'distance along A [m]', ...POINT.map((head) => `A ${head}`), ...POINT.map((head) => `B ${head}`), 'B aside of A [m]', 'speed, B − A [m/s]', 'steering, B − A [%]'];
+  const lines = rows.map((row, i) => [
+    number(row.x, 2), ...pointCells(row.a, a), text(ofA.get(i)), ...pointCells(row.b, b), text(ofB.get(i)),
+    number(row.aside, 2), number(difference(row, 'speed'), 3), number(difference(row, 'steering'), 2),
+  ]);
+  return [heads, ...lines].map((cells) => `${cells.map(quoted).join(',')}\r\n`).join('');
+}
+
+/** @param {Point | null} point @param {Course} course */
+function pointCells(point, course) {
+  if (!point) return POINT.slice(1).map(() => '');
+  return [new Date(course.start_ms + point.t * 1000).toISOString(), number(point.t, 2), number(point.m, 2), number(point.speed, 3), number(point.steering, 2), number(point.lat, 7), number(point.lon, 7)];
+}
+
+/** By the row nearest to each; without those that are not on the axis. @param {Row[]} rows @param {CourseEvent[]} events @param {(event: CourseEvent) => number | null} place */
+function eventsAt(rows, events, place) {
+  /** @type {Map<number, string>} */
+  const found = new Map();
+  for (const event of events) {
+    const at = place(event);
+    if (at === null) continue;
+    let best = 0;
+    rows.forEach(({ x }, i) => {
+      if (Math.abs(x - at) < Math.abs((rows[best]?.x ?? 0) - at)) best = i;
+    });
+    const said = event.text ? `${event.kind}: ${event.text}` : event.kind;
+    found.set(best, found.has(best) ? `${found.get(best)}; ${said}` : said);
+  }
+  return found;
+}
+
+/** @param {number | null} value @param {number} digits */
+const number = (value, digits) => (value === null ? '' : String(Number(value.toFixed(digits))));
+
+/** Words of people: no spreadsheet takes them for a formula. @param {string | undefined} said */
+const text = (said) => (said === undefined ? '' : FORMULA.test(said) ? `'${said}` : said);
+
+/** @param {string} cell */
+const quoted = (cell) => (/[",\r\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell);

@@ -1,0 +1,63 @@
+// Who drives and what is known of an intervention, in words: pure functions of what the server told.
+
+import { distanceWords, duration } from '../core/format.js';
+
+/**
+ * @typedef {import('../core/protocol-types.js').ModeState} ModeState
+ * @typedef {import('../core/protocol-types.js').InterventionAnswer} Intervention
+ * @typedef {{mode: ModeState['mode'], title: string, text: string, open: string | null}} Shown open: id of the intervention that is to be described first
+ */
+
+/** @type {Record<NonNullable<ModeState['why']>, string>} */
+const WHY = { no_source: 'no mode topic', silent: 'mode topic is silent', flickers: 'the mode flickers', unclear: 'the car does not say' };
+/** @type {Record<ModeState['mode'], string>} */
+const TITLES = { autonomous: 'Autonomous', manual: 'Manual', unknown: 'Mode not known' };
+/** Of a newer server there may be others. @type {Partial<Record<string, {title: string, ask: string}>>} */
+export const KINDS = {
+  to_manual: { title: 'Take-over', ask: 'Describe take-over' },
+  brake: { title: 'Braked', ask: 'Describe braking' },
+  steer: { title: 'Steered', ask: 'Describe steering' },
+};
+
+/** What made somebody intervene: the word of the log, and the word on the key. @type {readonly (readonly [string, string])[]} */
+export const CATEGORIES = [
+  ['object_late', 'Object late'], ['path_wrong', 'Path wrong'], ['too_fast', 'Too fast'],
+  ['other_traffic', 'Other traffic'], ['planned', 'Planned'], ['system_fault', 'System fault'],
+];
+/** @type {readonly (readonly [Intervention['initiated_by'], string])[]} */
+export const STARTERS = [['driver', 'Driver'], ['operator', 'Operator'], ['system', 'Car']];
+
+/**
+ * @param {ModeState | null | undefined} mode null: nothing is known of the car
+ * @param {number} now_ms the server's time of day
+ * @param {boolean} isLinked the car is heard
+ * @returns {Shown}
+ */
+export function modeWords(mode, now_ms, isLinked) {
+  if (!mode || !isLinked) return { mode: 'unknown', title: TITLES.unknown, text: 'no link to the car', open: mode?.open[0]?.id ?? null };
+  const [first] = mode.open;
+  const text = first ? (mode.open.length > 1 ? `${mode.open.length} to describe` : KINDS[first.kind_of]?.ask ?? 'Describe') : mode.why ? WHY[mode.why] : lasted(mode, now_ms);
+  return { mode: mode.mode, title: TITLES[mode.mode], text, open: first?.id ?? null };
+}
+
+/** @param {ModeState} mode @param {number} now_ms */
+function lasted({ since_ms, way_m }, now_ms) {
+  const time = since_ms === null ? '' : duration((now_ms - since_ms) / 1000, true);
+  const way = way_m === null ? '' : way_m < 100 ? `${Math.round(way_m)} m` : way_m >= 1000 && way_m < 100_000 ? `${(way_m / 1000).toFixed(2)} km` : distanceWords(way_m).join(' ');
+  return [time, way].filter(Boolean).join(' · ');
+}
+
+/** Who acted first, as the data show it. @param {Intervention} found @returns {{title: string, value: string, unit: string, text: string}} */
+export function startedWords({ kind_of, initiated_by, brake_percent, acted_before_s }) {
+  const by = { driver: 'By the driver', operator: 'By the operator', system: 'By the car', unknown: 'Started by' }[initiated_by] ?? 'Started by';
+  const before = acted_before_s === null || acted_before_s < 0.05 ? '' : `${acted_before_s.toFixed(1)} s before mode`;
+  if (brake_percent !== null) return { title: by, value: String(Math.round(brake_percent)), unit: '% brake', text: before };
+  if (kind_of === 'steer') return { title: by, value: 'wheel', unit: '', text: 'against the command' };
+  return { title: by, value: initiated_by === 'unknown' ? 'not known' : '–', unit: '', text: before };
+}
+
+/** @param {Intervention} found @returns {{value: string, text: string}} */
+export function alarmWords({ active, last_alarm_ago_s }) {
+  if (active.length) return { value: String(active.length), text: active.join(', ') };
+  return { value: '0', text: last_alarm_ago_s === null ? 'none before' : `last ${last_alarm_ago_s < 99.5 ? `${Math.round(last_alarm_ago_s)} s` : `${Math.round(last_alarm_ago_s / 60)} min`} ago` };
+}

@@ -1,0 +1,40 @@
+// The place above the rail where the Mark key comes: kept free from the first picture on, so that nothing moves under a finger.
+
+import { listen, need, setAttribute, show } from '../core/dom.js';
+
+/** Tabs that show the car. */
+const LIVE = ['home', 'map', 'scan'];
+/** A lower phone has not room for everything [px]. */
+const LOW_PX = 700;
+/** On a lower one the list of alarms, or a check, needs the room [px]. */
+const LIST_PX = 800;
+
+/** On a low phone the steps of a slow-down and a warning leave no room: they come first. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
+function isCramped(monitor, store) {
+  if (innerWidth < LOW_PX && innerHeight < LIST_PX && monitor.dataset['over'] === 'headed') return true;
+  const state = store.frame?.decelerate?.state;
+  return innerHeight < LOW_PX && innerWidth < LOW_PX && (state === 'ordered' || state === 'holding') && document.body.hasAttribute('data-snack');
+}
+
+/** What is marked is the live drive: in a replay there is no such place. @param {HTMLElement} monitor @param {import('../core/store.js').Store} store */
+function placeLedge(monitor, store) {
+  const root = document.documentElement;
+  const isThere = LIVE.includes(monitor.dataset['front'] ?? '') && !store.replaying && !root.hasAttribute('data-replay') && !isCramped(monitor, store);
+  show(need(monitor, ':scope > .ledge'), isThere);
+  setAttribute(root, 'data-ledge', isThere);
+}
+
+/**
+ * A warning that comes, or a list that opens, finds its room in the same picture, not with the next state of the car.
+ * @param {HTMLElement} monitor
+ * @param {import('../core/store.js').Store} store
+ */
+export function mount(monitor, store) {
+  const place = () => placeLedge(monitor, store);
+  const seen = new MutationObserver(place);
+  seen.observe(document.body, { attributeFilter: ['data-snack'] });
+  seen.observe(monitor, { attributeFilter: ['data-over', 'data-front'] });
+  const stops = [store.on('draw', place), listen(window, 'resize', place), () => seen.disconnect()];
+  if (store.frame) place(); // before the first frame it is not shown
+  return () => stops.forEach((stop) => stop());
+}

@@ -1,0 +1,82 @@
+"""What the way through a broker costs: an agent beside the car, a web node for the pages, and a real broker between."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator
+
+from tests.bench.child import Child
+from tests.bench.rig import Rig
+from tests.bench.rows import latency
+from tests.bench.table import Group, Row
+
+HOP_MS = 3.0  # what the way may add at the 99th percentile
+
+
+def measure(rig: Rig) -> Group:
+    """Alarms to one viewer with and without the broker, in one run; then the processor of each part."""
+    load_s, most = rig.pace.load_s, rig.pace.most
+    with rig.pages(1) as pages:
+        alone, _ = latency.series(rig, pages)
+    with fleet(rig) as (broker, agent, node):
+        with rig.pages_at(node.hello["url"], 1) as pages:
+            through, _ = latency.series(rig, pages)
+            few = shares(broker, agent, node, load_s)
+        with rig.pages_at(node.hello["url"], most) as pages:
+            pages.ask("begin")
+            many = shares(broker, agent, node, load_s)
+            report = pages.ask("report")
+        unwatched = shares(broker, agent, node, load_s)
+    rows = [
+        Row(what=f"alarm to one viewer, {name}", unit="ms", catgraph=a, floor=b)
+        for name, a, b in zip(("p50", "p99", "max"), latency.spread(through), latency.spread(alone), strict=True)
+    ]
+    hop_ms = latency.spread(through)[1] - latency.spread(alone)[1]
+    rows.append(Row(what="what the broker adds, p99", unit="ms", catgraph=hop_ms, reach=HOP_MS))
+    for pages_, found in (("no page", unwatched), ("1 page", few), (f"{most} pages", many)):
+        rows += [
+            Row(what=f"{part}, {pages_}", unit="% of a core", catgraph=share, digits=1)
+            for part, share in zip(("broker", "agent", "web node"), found, strict=True)
+        ]
+    each = (many[2] - few[2]) / (most - 1)
+    rows.append(Row(what="web node, each further page on Home", unit="% of a core", catgraph=each, reach=0.4))
+    states_per_s = sum(report["states"]) / report["seconds"] / most
+    return Group(
+        name="fleet",
+        title="Through a broker, one car at full load",
+        rows=tuple(rows),
+        notes=(
+            f"floor: the same without a broker, in the same run; each of the {most} pages got {states_per_s:.1f} states"
+            " a second",
+        ),
+    )
+
+
+@contextlib.contextmanager
+def fleet(rig: Rig) -> Iterator[tuple[Child, Child, Child]]:
+    """A broker, an agent that is connected to the car, and a web node that has heard it; each a process."""
+    with contextlib.ExitStack() as up:
+
+        def child(module: str, **options: object) -> Child:
+            started = Child(module, **options)
+            up.callback(started.stop)
+            return started
+
+        broker = child("broker")
+        agent = child("serving", broker=broker.hello["address"])
+        agent.ask("command", kind="connect", address=rig.car.hello["url"])
+        node = child("serving", broker=broker.hello["address"], is_node=True)
+        time.sleep(max(1.0, rig.pace.settle_s))
+        yield broker, agent, node
+
+
+def shares(broker: Child, agent: Child, node: Child, for_s: float) -> tuple[float, float, float]:
+    """Processor time of each over so long, in per cent of one core."""
+    used_s, agent_ns, node_ns = broker.ask("used"), agent.ask("cpu"), node.ask("cpu")
+    began_ns = time.monotonic_ns()
+    time.sleep(for_s)
+    took_ns = time.monotonic_ns() - began_ns
+    spent_ns = (1e9 * (broker.ask("used") - used_s), agent.ask("cpu") - agent_ns, node.ask("cpu") - node_ns)
+    at_broker, at_agent, at_node = (100.0 * one / took_ns for one in spent_ns)
+    return at_broker, at_agent, at_node

@@ -1,0 +1,67 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { Emitter } from '../../static/js/core/emitter.js';
+import { Painter } from '../../static/js/core/painter.js';
+
+/** A painter whose pictures come when the test says so. @param {(error: unknown) => void} [failed] */
+function studio(failed = (error) => { throw error; }) {
+  /** @type {(() => void)[]} */
+  const due = [];
+  globalThis.requestAnimationFrame = (draw) => due.push(/** @type {() => void} */ (draw));
+  const painter = new Painter(new Emitter(failed));
+  return { painter, picture: () => due.splice(0).forEach((draw) => draw()) };
+}
+
+test('what is drawn in turn has a picture each, in the order in which it asked', () => {
+  const { painter, picture } = studio();
+  /** @type {string[]} */
+  const drawn = [];
+  const [map, chart, tile] = ['map', 'chart', 'tile'].map((name) => () => void drawn.push(name));
+  for (const draw of [map, chart, tile]) painter.inTurn(/** @type {() => void} */ (draw));
+  for (const expected of [['map'], ['map', 'chart'], ['map', 'chart', 'tile'], ['map', 'chart', 'tile']]) {
+    picture();
+    assert.deepEqual(drawn, expected);
+  }
+  painter.inTurn(/** @type {() => void} */ (map));
+  picture();
+  assert.deepEqual(drawn, ['map', 'chart', 'tile', 'map'], 'it goes on after a rest');
+});
+
+test('what asks again before its turn waits once', () => {
+  const { painter, picture } = studio();
+  let times = 0;
+  const draw = () => void (times += 1);
+  for (let i = 0; i < 10; i += 1) painter.inTurn(draw);
+  for (let i = 0; i < 3; i += 1) picture();
+  assert.equal(times, 1);
+});
+
+test('what throws in its turn is told, and the next has its turn', () => {
+  /** @type {unknown[]} */
+  const errors = [];
+  const { painter, picture } = studio((error) => errors.push(error));
+  let isDrawn = false;
+  painter.inTurn(() => { throw new Error('no canvas'); });
+  painter.inTurn(() => { isDrawn = true; });
+  picture();
+  picture();
+  assert.equal(`${errors}`, 'Error: no canvas');
+  assert.equal(isDrawn, true);
+});
+
+test('a picture that never came holds up nothing once the failure was noticed', () => {
+  const { painter, picture } = studio();
+  const { requestAnimationFrame } = globalThis;
+  globalThis.requestAnimationFrame = () => 0;
+  let times = 0;
+  const draw = () => void (times += 1);
+  painter.inTurn(draw);
+  const complain = console.error;
+  console.error = () => {};
+  for (let i = 0; i < 7; i += 1) painter.look(true);
+  console.error = complain;
+  globalThis.requestAnimationFrame = requestAnimationFrame;
+  painter.inTurn(draw);
+  picture();
+  assert.equal(times, 1);
+});

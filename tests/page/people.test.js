@@ -1,0 +1,69 @@
+// Who is on duty, in words; a hand-over; who is called next, and who asks for control, in the attention queue.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { chipOf } from '../../static/js/control/control-layout.js';
+import { dutyWords, initialsOf, partOf } from '../../static/js/control/duty-layout.js';
+import { endWords, lineWords, markOf } from '../../static/js/control/handover-layout.js';
+import { lastWords } from '../../static/js/control/people-layout.js';
+import { requestItem, supervisorWords } from '../../static/js/shell/fleet-requests.js';
+
+const AT = new Date(2026, 10, 19, 13, 58).getTime();
+const me = { person: 'a', name: 'A. K.', role: 'operator', title: 'operator', device: 'Pixel', since_ms: AT };
+const duty = (/** @type {any} */ more = {}) => /** @type {any} */ ({ kind: 'duty', me: null, signs: 'Pixel', ended: null, people: 3, on_duty: [], ...more });
+const FREE = { holder: null, page: null, fence: null, former: null, requests: [] };
+const MINE = { ...FREE, holder: 'A. K. (Pixel)', page: 'page-a', fence: 7 };
+
+test('initials of names', () => {
+  assert.deepEqual(['A. K.', 'Anna Maria Keller', 'anna', 'Ö', '山田 太郎', '<b>x</b>', '---', '𝒜 b'].map(initialsOf), ['AK', 'AK', 'A', 'Ö', '山太', 'B', '?', '𝒜B']);
+});
+
+test('the chip says who is on duty and what they do', () => {
+  assert.equal(chipOf(MINE, 'page-a', false, duty({ me })).text, 'AK controls');
+  assert.equal(chipOf(MINE, 'page-a', false, duty()).text, 'You');
+  assert.equal(chipOf(FREE, 'page-a', false, duty({ me })).text, 'AK on duty');
+  assert.equal(chipOf(FREE, 'page-a', false, duty()).text, 'Sign on');
+  assert.equal(chipOf(FREE, 'page-a', false, duty({ people: 0 })).text, 'No one');
+  assert.equal(chipOf(MINE, 'page-b', false, duty({ me })).text, 'A. K. (Pixel)');
+  assert.equal(chipOf(MINE, 'page-a', true, duty({ me })).text, '?');
+});
+
+test('who is on duty, and since when', () => {
+  assert.equal(dutyWords(duty({ me })), 'A. K., operator: on duty since 13:58');
+  assert.equal(dutyWords(null), 'On duty: not known');
+  assert.equal(dutyWords(duty({ people: 0 })), 'Sign on: the list of people is empty');
+  const row = (/** @type {number | null} */ last_ms) => lastWords(/** @type {any} */ ({ last_ms, duty: null }), AT);
+  assert.deepEqual([row(null), row(AT - 60_000), row(AT - 20 * 3_600_000), row(AT - 3 * 86_400_000)], ['no shift yet', 'last shift today 13:57', 'last shift yesterday', 'last shift 16 Nov']);
+});
+
+test('a hand-over concerns two pages, and opens once all is read', () => {
+  const handover = /** @type {any} */ ({ by: 'A', by_page: 'page-a', name: 'M. R.', page: 'page-b', since_ms: 0, lines: [{}, {}, {}], left: 1, version: 'x' });
+  assert.deepEqual(['page-a', 'page-b', 'page-c', ''].map((page) => partOf(handover, page)), ['giver', 'taker', null, null]);
+  assert.deepEqual(endWords(handover, 'taker'), { title: 'Take over control', text: '1 line not read back yet', isOpen: false });
+  assert.equal(endWords({ ...handover, left: 0 }, 'taker').isOpen, true);
+  assert.equal(endWords({ ...handover, left: 0 }, 'giver').isOpen, false, 'who hands over cannot take it for them');
+  const line = (/** @type {any} */ more) => /** @type {any} */ ({ key: 'k', kind: 'alarm', title: 'Speed', text: '12 m/s', priority: null, since_ms: null, until_ms: null, read: false, ...more });
+  assert.equal(lineWords(line({ since_ms: AT })), '12 m/s · since 13:58:00');
+  assert.equal(lineWords(line({ until_ms: AT, text: '' })), 'back at 13:58:00');
+  assert.deepEqual([line({ priority: 'critical' }), line({ priority: 'warning' }), line({ kind: 'shelved', priority: 'critical' })].map(markOf), ['crit', 'warn', 'bell-off']);
+});
+
+test('an item goes on to who is on duty, or says that nobody is', () => {
+  const item = (/** @type {any} */ more) => /** @type {any} */ ({ since_ms: 0, assigned: null, offered: null, escalates_ms: null, escalated_ms: null, ...more });
+  assert.equal(supervisorWords(item({ escalated_ms: 0, supervisors: ['J. D.'] }), 11_000), 'escalated to J. D. for 0:11');
+  assert.equal(supervisorWords(item({ escalated_ms: 0, supervisors: [] }), 11_000), 'escalated: no supervisor is on duty, 0:11');
+  assert.equal(supervisorWords(item({ escalated_ms: 0, supervisors: null }), 11_000), 'at Supervisor for 0:11');
+  assert.equal(supervisorWords(item({ escalates_ms: 4000, supervisors: ['J. D.', 'K. L.'] }), 0), 'J. D., K. L. in 0:04');
+  assert.equal(supervisorWords(item({ escalates_ms: 4000, supervisors: [] }), 0), 'Supervisor in 0:04: none on duty');
+  assert.equal(supervisorWords(item({}), 0), '');
+});
+
+test('a request for control that nobody answers is an item', () => {
+  const summary = (/** @type {any} */ more) => /** @type {any} */ ({ holder: 'Ann', requests: [{ page: 'b', name: 'Ben', left_s: 7.2 }], ...more });
+  const one = requestItem('ocelot', summary({}), 1.0);
+  assert.deepEqual([one?.key, one?.title, one?.detail], ['ocelot control', 'Ben asks for control', 'Granted in 7 s unless Ann keeps it']);
+  assert.equal(requestItem('ocelot', summary({ requests: [] }), 0), null);
+  assert.equal(requestItem('ocelot', summary({ requests: undefined }), 0), null, 'an older agent does not state it');
+  assert.match(requestItem('ocelot', summary({ requests: [{ page: 'b', name: 'Ben', left_s: 1 }, { page: 'c', name: 'Cem', left_s: 5 }] }), 9)?.detail ?? '', /Granted in 0 s .* 1 other asks too/);
+});

@@ -1,0 +1,69 @@
+"""A screen that covers the gauge carries the speed in its head."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from playwright.async_api import expect
+
+from tests.page.canned import Canned, live
+from tests.page.conftest import Phone
+from tests.page.screenshots import silent_car
+
+TITLED = ("departure", "log", "trends", "signals")
+OPEN = "name => dispatchEvent(new CustomEvent('catgraph-open', { detail: { screen: name } }))"
+#: What of a title bar is cut off or lies over its neighbour [px].
+LOST = """bar => {
+  const parts = [...bar.children].filter((part) => part.checkVisibility());
+  const boxes = parts.map((part) => part.getBoundingClientRect());
+  const bottom = bar.getBoundingClientRect().bottom;
+  const words = parts.filter((part) => !part.matches('.head-speed'));  // whose cover is larger on purpose
+  const cut = words.map((part) => part.scrollWidth - part.clientWidth);
+  const over = boxes.map((box, n) => box.right - (boxes[n + 1]?.left ?? innerWidth));
+  const low = boxes.map((box) => box.bottom - bottom - 1);
+  return [...cut, ...over, ...low].filter((px) => px > 1);
+}"""
+
+
+@pytest.mark.parametrize("width", [412, 360, 320])
+async def test_each_screen_behind_the_menu_shows_the_speed(phone: Phone, canned: Canned, width: int) -> None:
+    await phone.page.set_viewport_size({"width": width, "height": 780})
+    await phone.open(canned.address)
+    await phone.live()
+    bar = phone.page.locator("#monitor > .titlebar")
+    for name in TITLED:
+        await phone.page.evaluate(OPEN, name)
+        await expect(bar.locator(".head-speed")).to_have_text("4.2m/s")
+        await expect(bar.locator(".head-speed")).to_be_visible()
+        assert await bar.evaluate(LOST) == [], name
+        if folder := os.environ.get("CATGRAPH_LOOK"):
+            await phone.page.screenshot(path=Path(folder) / f"head-{name}-{width}.png")
+
+
+async def test_the_speed_in_a_head_is_covered_once_it_is_not_renewed(phone: Phone, canned: Canned) -> None:
+    await phone.open(canned.address)
+    await phone.live()
+    await phone.page.evaluate(OPEN, "signals")
+    cover = phone.page.locator("#monitor > .titlebar .head-speed > .cover")
+    await expect(cover).to_have_css("opacity", "0")
+    canned.state = silent_car(live())
+    await expect(cover).to_have_css("opacity", "1")
+
+
+async def test_the_speed_in_a_head_is_covered_with_the_values_when_the_page_hangs(phone: Phone, canned: Canned) -> None:
+    """It goes by the animation of the veil, which every drawing rewinds and which needs no script."""
+    await phone.open(canned.address)
+    await phone.live()
+    await phone.page.evaluate(OPEN, "signals")
+    cover = phone.page.locator("#monitor > .titlebar .head-speed > .cover")
+    await expect(cover).to_be_visible()
+    course = """element => {
+      const veil = document.querySelector('#monitor > .view > .veil');
+      const styles = [element, veil].map((one) => getComputedStyle(one));
+      return styles.map(({ animationName, animationDuration }) => [animationName, animationDuration].join());
+    }"""
+    mine, veils = await cover.evaluate(course)
+    assert mine == veils
+    assert mine in ("cover-even,2s", "cover-odd,2s")

@@ -1,0 +1,189 @@
+"""kill -9 of the browser, at times of the server too, while marks are placed: none of 1 s is lost, none doubled."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import random
+import time
+from bisect import bisect_left
+from collections import Counter
+from collections.abc import AsyncIterator, Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import httpx
+import psutil
+import pytest
+from playwright.async_api import BrowserContext, Playwright, async_playwright, expect
+from playwright.async_api import Error as PlaywrightError
+
+from tests.chromium import FLAGS
+from tests.page.conftest import PHONE
+from tests.page.processes import Process, free_port, running, server, simulate
+
+SETTINGS = "[limits.link_late]\nlate_s = 10.0\ncritical_s = 20.0\n"  # this machine is shared: that is not tested here
+OLD_MS = 1000  # a mark so old outlives everything
+SAME_MS = 100  # a mark's time by the server's clock and by the page's own
+SERVER_TOO = 0.3  # of the kills
+# The page presses its own key, until it is killed, and tells each mark that it says is stored.
+MARKS = """() => setInterval(() => {
+  const key = document.querySelector('[data-f="mark"]');
+  if (!key || key.getAttribute('aria-disabled') === 'true') return;
+  const at_ms = performance.timeOrigin + performance.now();
+  key.click();
+  if (/stored/.test(document.querySelector('.fresh:not([hidden]) .m')?.textContent ?? '')) confirmed(at_ms);
+}, 230 + 60 * Math.random())"""
+
+# Of what the phone keeps, all was acknowledged by the server.
+NONE_WAITS = """() => new Promise((resolve) => {
+  const asked = indexedDB.open('catgraph-marks');
+  asked.onerror = () => resolve(false);
+  asked.onupgradeneeded = () => asked.transaction.abort(); // the page makes it
+  asked.onsuccess = () => {
+    const all = asked.result.transaction('marks').objectStore('marks').getAll();
+    all.onsuccess = () => {
+      asked.result.close();
+      resolve(all.result.length > 0 && all.result.every(({ stored }) => stored > 0));
+    };
+  };
+})"""
+
+
+class Phone:
+    """A browser whose profile outlives it."""
+
+    def __init__(self, playwright: Playwright, chromium: str, profile: Path) -> None:
+        self._playwright = playwright
+        self._chromium = chromium
+        self._profile = profile
+        self.confirmed_ms: list[float] = []
+
+    async def start(self) -> BrowserContext:
+        context = await self._playwright.chromium.launch_persistent_context(
+            self._profile, executable_path=self._chromium, args=list(FLAGS), **PHONE
+        )
+        await context.expose_binding("confirmed", lambda _, at_ms: self.confirmed_ms.append(at_ms))
+        return context
+
+    async def kill(self) -> None:
+        """All of its processes, at once."""
+        named = f"--user-data-dir={self._profile}"
+        mine = psutil.Process().children(recursive=True)
+        (main,) = [one for one in mine if named in _words(one) and not any("--type=" in word for word in _words(one))]
+        killed = [main, *main.children(recursive=True)]
+        for process in killed:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.kill()
+        await asyncio.to_thread(psutil.wait_procs, killed, 10)
+
+
+def _words(process: psutil.Process) -> list[str]:
+    try:
+        return process.cmdline()
+    except psutil.Error:
+        return []
+
+
+@contextlib.asynccontextmanager
+async def marking(phone: Phone, address: str) -> AsyncIterator[None]:
+    """The page is open, and marks until the end of the block, which kills it."""
+    context = await phone.start()
+    page = context.pages[0]
+    await page.goto(address)
+    await expect(page.locator('[data-f="mark"]')).to_be_visible(timeout=20_000)
+    before = len(phone.confirmed_ms)
+    await page.evaluate(MARKS)
+    async with asyncio.timeout(20):
+        while len(phone.confirmed_ms) == before:
+            await asyncio.sleep(0.02)
+    yield
+    await phone.kill()
+    with contextlib.suppress(PlaywrightError):
+        await context.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "kills",
+    [
+        pytest.param(2, id="2", marks=pytest.mark.timeout(180)),
+        pytest.param(100, id="100", marks=[pytest.mark.soak, pytest.mark.timeout(5400)]),
+    ],
+)
+async def test_what_the_page_said_is_stored_survives_its_kill(
+    chromium: str, tmp_path: Path, kills: int, record_property: Callable[[str, object], None]
+) -> None:
+    data, port, chance = tmp_path / "data", free_port(), random.Random(kills)
+    (data / "settings").mkdir(parents=True)
+    (data / "settings" / "car.toml").write_text(SETTINGS)
+    old_ms: list[float] = []
+    async with running(*simulate()) as car, async_playwright() as playwright:
+        watch = await Process(*server(data, car.address, port)).start()
+        try:
+            phone = Phone(playwright, chromium, tmp_path / "profile")
+            for _ in range(kills):
+                async with marking(phone, watch.address):
+                    await asyncio.sleep(chance.uniform(0.0, 4.0))
+                    if chance.random() < SERVER_TOO:
+                        await watch.kill()
+                        await asyncio.sleep(chance.uniform(0.0, 3.0))
+                    killed_ms = time.time() * 1000
+                old_ms += [at_ms for at_ms in phone.confirmed_ms if at_ms <= killed_ms - OLD_MS]
+                phone.confirmed_ms.clear()
+                if not await is_there(watch.address):
+                    watch = await Process(*server(data, car.address, port)).start()
+            context = await phone.start()
+            page = context.pages[0]
+            await page.goto(watch.address)
+            async with asyncio.timeout(60):
+                while not await page.evaluate(NONE_WAITS):
+                    await asyncio.sleep(0.2)
+            await context.close()
+            await watch.terminate()
+            watch = await Process(*server(data, car.address, port)).start()
+            marks = await recorded(watch.address, old_ms)
+        finally:
+            await watch.kill()
+    record_property("marks that had to survive", len(old_ms))
+    record_property("marks in the recordings", len(marks))
+    print(f"{kills} kills, {len(old_ms)} marks had to survive, {len(marks)} are there")
+    assert lost(old_ms, marks) == []
+    assert [b - a for a, b in pairwise(marks) if b - a < SAME_MS] == [], "one press, two marks"
+
+
+async def is_there(address: str) -> bool:
+    async with httpx.AsyncClient(base_url=address) as client:
+        try:
+            return (await client.get("/api/health")).status_code < 500
+        except httpx.HTTPError:
+            return False
+
+
+async def recorded(address: str, old_ms: list[float]) -> list[float]:
+    """The moments of all marks in the recordings, once nothing is missing or a minute passed; each is there once."""
+    until_s = time.monotonic() + 60
+    async with httpx.AsyncClient(base_url=address, timeout=30.0) as client:
+        while True:
+            found: dict[str, float] = {}
+            times: Counter[str] = Counter()
+            for row in (await client.get("/api/recordings", params={"limit": 200})).json()["recordings"]:
+                marks: list[dict[str, Any]] = (await client.get(f"/api/recordings/{row['id']}/marks")).json()["marks"]
+                times.update(mark["mark"] for mark in marks)
+                found |= {mark["mark"]: mark["marked_ms"] for mark in marks}
+            moments = sorted(found.values())
+            if not lost(old_ms, moments) or time.monotonic() > until_s:
+                assert {mark: count for mark, count in times.items() if count > 1} == {}
+                return moments
+            await asyncio.sleep(0.5)
+
+
+def lost(old_ms: list[float], marks: list[float]) -> list[float]:
+    """Those without a mark at their moment. `marks`: sorted."""
+
+    def is_near(at_ms: float) -> bool:
+        around = marks[max(0, bisect_left(marks, at_ms) - 1) :][:2]
+        return any(abs(one - at_ms) <= SAME_MS for one in around)
+
+    return [at_ms for at_ms in old_ms if not is_near(at_ms)]

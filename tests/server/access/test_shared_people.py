@@ -1,0 +1,99 @@
+"""People and duties of several web nodes, without a broker: what one tells, the others have."""
+
+from __future__ import annotations
+
+import pytest
+
+from server.access.people import People
+from server.access.shared_people import BadPeopleEntry, SharedPeople
+from server.control.duty import MOST_PEOPLE
+
+
+class Node:
+    def __init__(self, ms: int = 1000) -> None:
+        self.ms = ms
+        self.people = People(None, wall_ms=lambda: self.ms)
+        self.shared = SharedPeople(self.people)
+
+    def hear(self, *others: Node) -> None:
+        for other in others:
+            for key, value in other.shared.due().items():
+                self.shared.take(key, value)
+
+
+async def test_what_is_changed_at_one_node_holds_at_the_other() -> None:
+    one, two = Node(), Node()
+    ann = await one.people.add("A. K.", "operator")
+    one.ms = 2000
+    await one.people.sign_on("phone", "Pixel", ann, "supervisor", moves=False)
+    two.hear(one)
+    assert two.people.duty_of("phone", "Pixel")["me"] == one.people.duty_of("phone", "Pixel")["me"]
+    person = {"name": "A. K.", "role": "supervisor", "device": "phone"}
+    assert two.people.sent("phone") == {"person": person, "supervisors": ["A. K."]}
+    assert one.shared.due() == {} == two.shared.due()
+    two.ms = 3000
+    await two.people.sign_off("phone", "It was handed over.")
+    await two.people.remove(ann)
+    await two.people.set_hours(8)
+    one.hear(two)
+    assert one.people.board.people == {}
+    assert one.people.duty_of("phone", "Pixel")["ended"] == {"text": "It was handed over.", "at_ms": 3000}
+    assert one.people.board.ends_after_h == 8
+
+
+async def test_who_signs_on_at_two_nodes_at_once_is_on_duty_at_the_later() -> None:
+    one, two = Node(), Node()
+    ann = await one.people.add("A. K.", "operator")
+    two.hear(one)
+    one.ms, two.ms = 2000, 2001
+    await one.people.sign_on("phone", "Pixel", ann, None, moves=False)
+    await two.people.sign_on("desk", "Desk", ann, None, moves=False)
+    due_one, due_two = one.shared.due(), two.shared.due()
+    for node, due in ((one, due_two), (two, due_one)):
+        for key, value in due.items():
+            node.shared.take(key, value)
+    for node in (one, two):
+        assert [entry.device for entry in node.people.board.duties()] == ["desk"]
+
+
+async def test_a_removed_person_is_not_brought_back() -> None:
+    one, two = Node(), Node()
+    ann = await one.people.add("A. K.", "operator")
+    two.hear(one)
+    await one.people.remove(ann)
+    two.ms = 9000
+    await two.people.change(ann, name="Anna", role=None)
+    one.hear(two)
+    two.hear(one)
+    assert one.people.board.people == {} == two.people.board.people
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("person.a", b""),
+        ("person.a", b"7"),
+        ("person.a", b'{"name": "\\u0000", "changed_ms": 1}'),
+        ("person.../x", b'{"name": "A", "changed_ms": 1}'),
+        ("duty.d", b'{"person": "../x", "changed_ms": 1}'),
+        ("duty.d", b'{"changed_ms": -1}'),
+        ("person.a", b'{"removed_ms": -1}'),
+        ("person.a", b'{"removed_ms": "7"}'),
+        ("person.../x", b'{"removed_ms": 1}'),
+        ("people", b'{"ends_after_h": 8, "changed_ms": 99999999999999999999}'),
+        ("people", b'{"ends_after_h": 900, "changed_ms": 1}'),
+    ],
+)
+def test_what_is_no_entry_changes_nothing(key: str, value: bytes) -> None:
+    node = Node()
+    with pytest.raises(BadPeopleEntry):
+        node.shared.take(key, value)
+    assert node.people.board.people == {} == node.people.board.entries
+    assert node.people.board.removed == {}
+
+
+def test_of_the_removed_so_many_are_kept() -> None:
+    node = Node()
+    for number in range(2 * MOST_PEOPLE + 5):
+        node.shared.take(f"person.p{number}", b'{"removed_ms": 1}')
+    assert len(node.people.board.removed) == 2 * MOST_PEOPLE

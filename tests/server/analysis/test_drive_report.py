@@ -1,0 +1,179 @@
+"""The drive's report as a page, as JSON, as a table, and in an authority's columns."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+import json
+import re
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Literal
+
+import pytest
+
+from server.analysis.drive import form, media, sheet
+from server.analysis.drive.axis import nice_step, ticks, time_ticks
+from server.analysis.drive.form import write_forms
+from server.analysis.drive.tables import write_report_csv, write_report_json
+from server.analysis.drive_page import write_drive_page
+from server.recording.catalog import annotations
+from server.recording.drive.departure import Departure
+from server.recording.export.outcome import ExportRefused
+from server.recording.marks.media import MediaName
+from server.recording.read.read import open_recording
+from tests.server.recording.drive.story import EVIL, PHOTO, recorded
+from tests.server.recording.drive.test_facts import BEGIN_MS
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A drive with everything, and all that is written of it."""
+    folder = tmp_path_factory.mktemp("report")
+    path = recorded(folder)
+    annotations.write(path, annotations.Annotations(note=EVIL, weather="dry, 21 °C", tags=(EVIL[:30],)))
+    late = path.with_name(path.name + ".marks")
+    late.mkdir()
+    (late / "m1.photo.png").write_bytes(PHOTO)
+    (late / "m3.voice.webm").write_bytes(b"\x1a\x45\xdf\xa3" + bytes(90))
+    (late / "m3.voice.exe").write_bytes(b"MZ")
+    with open_recording([path]) as recording:
+        write_drive_page(recording, folder / "page.html", name="drive")
+        write_report_json(recording, folder / "report.json", name="drive")
+        write_report_csv(recording, folder / "report.csv", name="drive")
+        write_forms(recording, folder / "forms.zip", name="drive")
+    return folder
+
+
+def test_the_page_shows_all_of_it(folder: Path) -> None:
+    text = re.sub(r"<style>.*?</style>|<script.*?</script>", "", (folder / "page.html").read_text(), flags=re.S)
+    words = html.unescape(re.sub(r"<[^>]+>", " ", text))
+    for said in (
+        *("Drive report", "Intact: 3 records", "1.20", "0.70", "59 % of the distance", "0.84 per km", "p90 4.6 s"),
+        *(
+            "dry, 21 °C",
+            "signed 22:13:26, A. K. (Pixel)",
+            "2 of 3 done",
+            "0.02 s had failed, fixed set again",
+            "in control",
+        ),
+        *("22:13:40", "12.5 m/s, limit 11.0 m/s", "2.1 s", "22:13:53", "22:14:40", "Change to manual, by the driver"),
+        *("22:14:55", "The car slows: 10.0 to 8.2 m/s.", "1.4 s", "in 1 gap", "alarms then: signal_slow.scan"),
+    ):
+        assert said in words, said
+    assert "data:image/png;base64," in text
+    assert "data:audio/webm;base64," in text
+
+
+def test_hostile_words_are_text(folder: Path) -> None:
+    text = (folder / "page.html").read_text()
+    assert EVIL not in text
+    assert "<img src=x" not in text
+    assert text.count(html.escape(EVIL, quote=True)) + text.count("&lt;img src=x") >= 4  # note, item, mark, description
+    assert 'style="' not in text.partition("</style>")[2]  # the policy of the page would refuse it
+
+
+def test_json_and_csv_say_the_same(folder: Path) -> None:
+    found = json.loads((folder / "report.json").read_text())
+    assert (found["marks"][0]["at_s"], found["interventions"][0]["at_s"]) == (33.33, 80.0)
+    assert (found["weather"], found["remarks"]) == ("dry, 21 °C", EVIL)
+    assert found["link_delay"] == {"median_s": 0.079, "p90_s": 0.119, "most_s": 0.119}
+    assert found["speed_limits"] == [{"from_s": 0.0, "max_mps": 3.0}]
+    rows = list(csv.reader(io.StringIO((folder / "report.csv").read_text(encoding="utf-8"), newline="")))
+    assert {len(row) for row in rows} == {8}
+    assert ["mark", "2023-11-14T22:13:53.330000Z", "", "object", EVIL, "", "A. K. (Pixel)", "m1"] in rows
+
+
+def test_the_authority_gets_its_columns(folder: Path) -> None:
+    with zipfile.ZipFile(folder / "forms.zip") as packed:
+        tables = {name: list(csv.reader(io.StringIO(packed.read(name).decode()))) for name in packed.namelist()}
+    heads, row = tables["california-disengagements.csv"]
+    assert (len(heads), row[2], row[6]) == (9, "11/14/2023", "Test Driver")
+    assert row[8] == f"object late. {EVIL}"
+    heads, row = tables["california-mileage.csv"]
+    by_month = dict(zip(heads, row, strict=True))
+    assert (by_month["NOV"], by_month["DEC"], by_month["ANNUAL TOTAL"]) == ("0.43", "", "0.43")
+    assert by_month["Annual Total of Disengagements"] == "1"
+
+
+def test_a_template_beside_it(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "other.toml").write_text(
+        'title = "T"\n[[table]]\nfile = "mine"\nrows = "drive"\ncolumns = [{ title = "=cmd", value = "marks" }]\n'
+    )
+    monkeypatch.setenv(form.FOLDER, str(tmp_path))
+    with open_recording([folder / "ours.mcap"]) as recording:
+        write_forms(recording, tmp_path / "out.zip", name="drive")
+    with zipfile.ZipFile(tmp_path / "out.zip") as packed:
+        assert packed.read("mine.csv").decode() == "'=cmd\r\n2\r\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param(b"title = 3", id="no title"),
+        pytest.param(b"\xff\xfe", id="no text"),
+        pytest.param(
+            b'title = "T"\n[[table]]\nfile = "../x"\nrows = "drive"\ncolumns = [{ title = "a" }]', id="a way out"
+        ),
+        pytest.param(b'title = "T"\n[[table]]\nfile = "x"\nrows = "all"\ncolumns = [{ title = "a" }]', id="other rows"),
+        pytest.param(b"#" * (form.MAX_BYTES + 1), id="too long"),
+    ],
+)
+def test_a_template_that_cannot_be_used_is_named(text: bytes) -> None:
+    with pytest.raises(ExportRefused, match=r"The template bad\.toml cannot be used: "):
+        form.read_form(text, "bad.toml")
+
+
+@pytest.mark.parametrize("name", ["catvehicle_2016-06-01.bag", "catvehicle_2016-06-01_mcap"])
+def test_a_real_drive_says_what_it_does_not_know(name: str, recordings: Path, tmp_path: Path) -> None:
+    with open_recording([recordings / name]) as recording:
+        write_drive_page(recording, tmp_path / "page.html", name="drive")
+        write_report_json(recording, tmp_path / "report.json", name="drive")
+    text = (tmp_path / "page.html").read_text()
+    article = text[text.index('<article class="drive"') : text.index("</article>")]
+    assert article.count("not known") >= 12
+    assert "No departure check was made." not in article  # nobody knows
+    found = json.loads((tmp_path / "report.json").read_text())
+    unknown = ("people", "departure", "modes", "alarms", "marks", "interventions", "slow_downs", "load", "link_delay")
+    assert {name: found[name] for name in unknown} == dict.fromkeys(unknown)
+    assert 70 < found["figures"]["distance_m"] < 80
+    assert found["start_ms"] < BEGIN_MS
+
+
+@pytest.mark.parametrize(
+    ("state", "counts", "rows"),
+    [
+        ("signed", (2, 0, 1), [("ok", "2 of 3 done", "")]),
+        ("open", (3, 0, 0), [("unknown", "3 of 3 done", "")]),
+        ("open", (1, 1, 0), [("critical", "1 of 3 done", "1 failed"), ("unknown", "1 open", "")]),
+    ],
+    ids=["signed", "not-signed", "failed"],
+)
+def test_only_a_signed_check_has_a_tick(
+    state: Literal["open", "signed"], counts: tuple[int, int, int], rows: list[tuple[str, str, str]]
+) -> None:
+    done, failed, not_applicable = counts
+    check = Departure(state=state, done=done, failed=failed, not_applicable=not_applicable, of=3)
+    assert sheet._departure(asdict(check)) == rows
+
+
+def test_media_are_bounded() -> None:
+    found = media.Media()
+    found.add(MediaName(mark="a", kind="photo", ending="png"), bytes(media.MOST_BYTES + 1))
+    found.add(MediaName(mark="b", kind="photo", ending="png"), b"x")
+    found.add(MediaName(mark="b", kind="photo", ending="png"), b"another")
+    assert (found.left_out, found.get("a", "photo")) == (1, None)
+    assert found.get("b", "photo") == "data:image/png;base64,eA=="
+
+
+def test_axes_are_round() -> None:
+    assert ticks(0, 12.5, 3) == [0, 5, 10, 15]
+    assert nice_step(0, 3) == 1
+    assert [name for _, name in time_ticks(BEGIN_MS, BEGIN_MS + 120_000, 4)] == [
+        "22:13:30",
+        "22:14:00",
+        "22:14:30",
+        "22:15:00",
+    ]

@@ -1,0 +1,162 @@
+"""What may never happen, whatever is lost between pages and a car: a real broker, an agent and two nodes as processes.
+
+While parts are killed and frozen, and the network swallows what is sent, two people give orders through either node,
+and two pages look on. A history of all of it is checked in the end.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import math
+import random
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import websockets
+
+from tests.server.bus.fleet_parts import FAULTS, NODES, Part, break_once, journal_of, parts, settled
+from tests.server.viewer import viewer
+
+DEADLINE_MS = 3000  # of a request
+EVERY_S = 0.15  # between the changes of one person
+ROUND_S = 3.0
+AGE_SLACK_MS = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class Order:
+    name: str
+    sent_ms: float
+    status: int | None  # None: no answer
+
+
+@dataclass
+class History:
+    """What the people and pages have seen."""
+
+    orders: list[Order] = field(default_factory=list)
+    events: dict[str, list[dict[str, Any]]] = field(default_factory=dict)  # of each node's page
+    states: list[tuple[str, int, float]] = field(default_factory=list)  # run, when made, for how long connected [ms]
+
+
+async def person(node: Part, name: str, history: History) -> None:
+    """Orders again and again, and notes what came of it: Ann changes a setting, Bo pauses and resumes monitoring."""
+    for n in range(10**9):
+        order, sent_ms = f"{name} {n}", time.time() * 1000
+        status = None
+        with contextlib.suppress(httpx.HTTPError):
+            async with httpx.AsyncClient(base_url=node.process.address, timeout=6.0) as client:
+                asked: dict[str, Any] = {"params": {"vehicle": "ocelot"}, "headers": {"x-catgraph-name": order}}
+                if name == "Ann":
+                    values = {"speed_limit.max_mps": 20 + n % 1000 / 100}
+                    answer = await client.patch("/api/settings", json={"values": values}, **asked)
+                else:
+                    answer = await client.post("/api/pause" if n % 2 == 0 else "/api/resume", **asked)
+                status = answer.status_code
+        history.orders.append(Order(name=order, sent_ms=sent_ms, status=status))
+        await asyncio.sleep(EVERY_S)
+
+
+async def page(node: str, part: Part, history: History) -> None:
+    """A page at this node, which dials again with the number of the newest event that it has."""
+    got = history.events[node] = []
+    while True:
+        with contextlib.suppress(OSError, websockets.WebSocketException, TimeoutError):
+            have = got[-1]["n"] if got else None
+            async with viewer(part.process.address, vehicle="ocelot", have_event=have) as one:
+                while one.socket.state is websockets.State.OPEN:
+                    await asyncio.sleep(0.05)
+                    events, one.events = one.events, []
+                    got += events
+                    states, one.states = one.states, []
+                    for state in states:
+                        since_s = state["session"]["connected_for_s"]
+                        if since_s is not None:
+                            history.states.append((state["server"]["boot"], state["server"]["time_ms"], since_s * 1000))
+        await asyncio.sleep(0.2)
+
+
+@pytest.mark.parametrize(
+    "rounds",
+    [
+        pytest.param(1, marks=[pytest.mark.slow, pytest.mark.timeout(300)]),
+        pytest.param(100, marks=[pytest.mark.soak, pytest.mark.timeout(10_800)]),
+    ],
+)
+async def test_nothing_is_lost_doubled_late_or_old(rounds: int, tmp_path: Path) -> None:
+    history, lengths = History(), random.Random(20)
+    async with parts(tmp_path) as (broker, made):
+        await settled(made)
+        at_work = [
+            asyncio.create_task(person(made[node], name, history))
+            for node, name in zip(NODES, ("Ann", "Bo"), strict=True)
+        ]
+        looking = [asyncio.create_task(page(node, made[node], history)) for node in NODES]
+        try:
+            for _ in range(rounds):
+                for fault in FAULTS:
+                    await asyncio.sleep(ROUND_S)
+                    swallow_s = 4.0 if rounds == 1 else math.exp(lengths.uniform(0.0, math.log(60.0)))
+                    await break_once(fault, broker, made, swallow_s)
+                    await settled(made)
+            await asyncio.sleep(ROUND_S)
+            for task in at_work:
+                task.cancel()
+            await asyncio.gather(*at_work, return_exceptions=True)
+            await asyncio.sleep(2 * ROUND_S)  # what is late would come now
+            journal = await journal_of(made["agent"])
+            async with asyncio.timeout(20):
+                while any(not got or got[-1]["n"] != journal[-1]["n"] for got in history.events.values()):
+                    await asyncio.sleep(0.1)
+        finally:
+            for task in (*at_work, *looking):
+                task.cancel()
+            await asyncio.gather(*at_work, *looking, return_exceptions=True)
+    check(history, journal)
+
+
+def _by(event: dict[str, Any]) -> str:
+    """Who ordered it: these programs sign nothing, and the agent says so."""
+    return str(event["by"]).removesuffix(" (not signed)")
+
+
+def check(history: History, journal: list[dict[str, Any]]) -> None:
+    numbers = [event["n"] for event in journal]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), "the journal has no hole"
+    by_number = {event["n"]: event for event in journal}
+    for node, got in history.events.items():
+        seen = [event["n"] for event in got]
+        assert seen == list(range(seen[0], seen[0] + len(seen))), f"{node}: lost, doubled or out of order"
+        assert all(by_number[event["n"]]["at_ms"] == event["at_ms"] for event in got), node
+
+    # A restarted agent notes once more what paused it, with the time since when.
+    ordered = [e for e in journal if e["change"] in ("settings", "paused", "resumed") and e.get("since_ms") is None]
+    done = Counter(_by(event) for event in ordered)
+    when = {_by(event): event["at_ms"] for event in ordered}
+    answers = Counter(order.status for order in history.orders)
+    print(f"{len(history.orders)} orders, answers {dict(answers)}, {len(journal)} events, {len(history.states)} states")
+    assert answers[200] > len(history.orders) / 4
+    assert set(answers) <= {200, 503, None}
+    for order in history.orders:
+        assert done[order.name] <= 1, f"{order} was carried out twice"
+        if order.status == 200 and order.name.startswith("Ann"):  # to pause what is paused is nothing
+            assert done[order.name] == 1, f"{order} was answered and is not in the log"
+        # A setting is accepted in time and may be stored by a slow disk, or after the process was frozen, later.
+        if done[order.name] and order.name.startswith("Bo"):
+            late_ms = when[order.name] - order.sent_ms
+            assert late_ms <= DEADLINE_MS + 100, f"{order} was carried out {late_ms:.0f} ms after it was given"
+
+    # Each run of the agent connects once; from then on its states say for how long, to a tenth of a second.
+    connected_ms = [event["at_ms"] for event in journal if event["change"] == "connected"]
+    runs = list(dict.fromkeys(run for run, _, _ in history.states))
+    assert len(connected_ms) == len(runs)
+    began_ms = dict(zip(runs, connected_ms, strict=True))
+    younger = [made_ms - since_ms - began_ms[run] for run, made_ms, since_ms in history.states]
+    print(f"{max(younger):.0f} ms younger at most, {-min(younger):.0f} ms older")
+    assert max(younger) <= AGE_SLACK_MS, f"a state was shown {max(younger):.0f} ms younger than it was"

@@ -1,0 +1,53 @@
+"""The events of one vehicle at a node, in whatever order and from whatever run they come."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from server.bus import nats_wire as wire
+from server.bus.nats_events import EventCache
+
+
+def events(*numbers: int) -> list[dict[str, Any]]:
+    return [{"n": n} for n in numbers]
+
+
+def test_an_older_word_of_the_same_run_takes_nothing_back() -> None:
+    cache = EventCache()
+    cache.begin("a", 9)
+    assert cache.take(events(10, 11))
+    cache.begin("a", 10)  # it was overtaken by the events
+    assert (cache.last, cache.after(10, 9)) == (11, events(11))
+
+
+def test_a_log_that_was_begun_anew_is_all_new() -> None:
+    cache = EventCache()
+    cache.begin("a", 50)
+    cache.take(events(51))
+    cache.begin("b", 3)
+    assert (cache.last, cache.newest, cache.is_behind) == (0, 3, True)
+    assert cache.take(events(1, 2, 3))
+    assert cache.after(1, 9) == events(2, 3)
+
+
+def test_another_run_of_the_same_log_goes_on() -> None:
+    cache = EventCache()
+    cache.begin("a", 50)
+    cache.begin("b", 52)
+    assert (cache.last, cache.newest) == (50, 52)
+
+
+@pytest.mark.parametrize(
+    "more", ['"age_s": 1e308', '"age_s": 1e30', '"waited_s": NaN', '"now_s": 1e300', '"number": -1']
+)
+def test_a_frame_of_no_sensible_age_is_refused(more: str) -> None:
+    with pytest.raises(wire.Malformed):
+        wire.decode_frame(b'{"run": "a", "number": 1, "now_s": 1.0, %s}\nx' % more.encode())
+
+
+def test_more_events_than_were_asked_for_are_refused() -> None:
+    body = wire.encode(wire.Events.model_construct(run="a", events=events(*range(wire.PORTION + 1))))
+    with pytest.raises(wire.Malformed):
+        wire.decode(wire.Events, body)

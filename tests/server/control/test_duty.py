@@ -1,0 +1,142 @@
+"""Who is on duty: the list of people, signing on and off, and what ends a duty; with a clock of the tests."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from monitor.runner import Refused
+from server.control.authorization import Caller
+from server.control.duty import HOUR_MS, LONGEST_NAME, MOST_PEOPLE, NOTE_LASTS_MS, DutyBoard, OnDuty, person_name
+
+
+@pytest.fixture
+def board() -> DutyBoard:
+    found = DutyBoard()
+    found.add("ak", "A. K.", "operator", 1)
+    found.add("mr", "M. R.", "supervisor", 2)
+    return found
+
+
+def test_signing_on_takes_the_role_of_last_time(board: DutyBoard) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    assert board.on_duty("phone") == OnDuty(name="A. K.", role="operator")
+    board.sign_on("phone", "Pixel 7", "ak", "safety_driver", 2000)
+    board.sign_off("phone", 3000)
+    board.sign_on("phone", "Pixel 7", "ak", None, 4000)
+    assert board.on_duty("phone") == OnDuty(name="A. K.", role="safety_driver")
+    assert board.people["ak"].last_ms == 4000
+
+
+def test_a_person_is_on_duty_at_one_device(board: DutyBoard) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    with pytest.raises(Refused, match="on duty at Pixel 7"):
+        board.sign_on("desk", "Desk", "ak", None, 2000)
+    assert board.on_duty("desk") is None
+    board.sign_on("desk", "Desk", "ak", None, 2000, moves=True)
+    assert board.on_duty("phone") is None
+    assert board.on_duty("desk") is not None
+    assert board.entries["phone"].ended == "A. K. signed on at Desk: nobody is on duty here now."
+    assert [one.device for one in board.duties()] == ["desk"]
+
+
+def test_signing_on_again_keeps_the_beginning(board: DutyBoard) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    assert board.sign_on("phone", "Pixel 7", "ak", None, 9000).since_ms == 1000
+    assert board.sign_on("phone", "Pixel 7", "ak", "supervisor", 9500).since_ms == 9500
+
+
+def test_a_duty_ends_by_itself_with_a_note(board: DutyBoard) -> None:
+    board.set_hours(2)
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    assert board.next_ms() == 1000 + 2 * HOUR_MS
+    assert board.advance(1000 + 2 * HOUR_MS - 1) == []
+    assert [one.person for one in board.advance(1000 + 2 * HOUR_MS)] == ["ak"]
+    assert board.on_duty("phone") is None
+    note = board.entries["phone"]
+    assert note.ended == "The duty of A. K. ended by itself after 2 h. Sign on again."
+    assert board.advance(note.changed_ms + NOTE_LASTS_MS - 1) == []
+    assert "phone" in board.entries
+    board.advance(note.changed_ms + NOTE_LASTS_MS)
+    assert board.entries == {}
+
+
+def test_a_note_is_dismissed_once(board: DutyBoard) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    assert board.sign_off("phone", 2000, "Handed over.")
+    assert not board.sign_off("phone", 2500)
+    assert board.dismiss("phone", 3000)
+    assert not board.dismiss("phone", 3000)
+    assert not board.dismiss("unknown", 3000)
+
+
+def test_who_is_on_duty_is_not_removed(board: DutyBoard) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    with pytest.raises(Refused, match="sign off first"):
+        board.remove("ak", 2000)
+    board.sign_off("phone", 3000)
+    board.remove("ak", 4000)
+    with pytest.raises(Refused, match="not in the list"):
+        board.sign_on("phone", "Pixel 7", "ak", None, 5000)
+    assert board.removed == {"ak": 4000}
+
+
+def test_a_rename_holds_at_once(board: DutyBoard) -> None:
+    board.sign_on("phone", "Pixel 7", "ak", None, 1000)
+    board.change("ak", name="Anna K.", role=None, now_ms=2000)
+    assert board.on_duty("phone") == OnDuty(name="Anna K.", role="operator")
+    with pytest.raises(Refused, match="in the list already"):
+        board.change("ak", name="\uff4d. R.", role=None, now_ms=3000)  # looks alike, and is the same by NFKC
+
+
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [
+        ("  A.\tK.\n", "A. K."),
+        ("<img src=x>", "<img src=x>"),
+        ("A\u202eB", "A B"),
+        ("Ä\x1b[31m", "Ä [31m"),
+        ("山田 太郎", "山田 太郎"),
+    ],
+)
+def test_a_name_is_one_line(name: str, kept: str) -> None:
+    assert person_name(name) == kept
+
+
+@pytest.mark.parametrize(
+    "name", ["", "   ", "\x00", "...", "\u202e", None, 7, "x" * (LONGEST_NAME + 1), "A. K. (Desk)"]
+)
+def test_what_is_no_name_is_refused(name: object) -> None:
+    with pytest.raises(Refused):
+        person_name(name)
+
+
+def test_the_list_and_the_roles_are_bounded() -> None:
+    board = DutyBoard()
+    for number in range(MOST_PEOPLE):
+        board.add(str(number), f"P {number}", "operator", 0)
+    with pytest.raises(Refused, match="at most"):
+        board.add("more", "One more", "operator", 0)
+    with pytest.raises(Refused, match="A role is one of operator"):
+        board.change("0", name=None, role="king", now_ms=1)
+    for hours in (0.5, 25, float("nan")):
+        with pytest.raises(Refused):
+            board.set_hours(hours)
+
+
+@pytest.mark.parametrize(
+    ("person", "name"),
+    [
+        ({"name": "A. K.", "role": "operator"}, "A. K. (Desk)"),
+        ({"name": "\x1b", "role": "operator"}, "Desk"),
+        ({"name": "A. K.", "role": "king"}, "Desk"),
+        ({"name": "A. K."}, "Desk"),
+        ("A. K.", "Desk"),
+        (None, "Desk"),
+    ],
+)
+def test_an_order_is_signed_by_the_person_at_the_device(person: Any, name: str) -> None:
+    caller = Caller.of({"by": "Desk", "person": person})
+    assert (caller.name, caller.device) == (name, "Desk")
+    assert (caller.person is not None) == (name != "Desk")

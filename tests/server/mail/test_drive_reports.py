@@ -1,0 +1,218 @@
+"""The report of each drive by mail, where that is wished."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from server.app.build import build
+from server.app.config import Config
+from server.app.lifespan import lifespan
+from server.mail.drive_reports import MOST_PARTS, DriveReports
+from server.mail.mailer import Mailer
+from server.mail.settings import BadMailSetting, MailSettings, MailSettingsFile, checked
+from server.recording.folder import WRITING, part_id
+from server.web.services import Services
+from tests.server.mail.mailing import Clock, Shelf
+from tests.server.recording.made import record
+
+TO = ("ann@example.org",)
+QUIET_S = 0.05
+
+
+async def until(is_so: object, within_s: float = 10.0) -> None:
+    async with asyncio.timeout(within_s):
+        while not is_so():  # type: ignore[operator]
+            await asyncio.sleep(0.01)
+
+
+class Watch:
+    """Seconds, moved by hand."""
+
+    s = 0.0
+
+    def __call__(self) -> float:
+        return self.s
+
+
+@pytest.mark.parametrize("report_to", [TO, ()])
+async def test_a_drive_that_ended_is_mailed_once_where_wished(tmp_path: Path, report_to: tuple[str, ...]) -> None:
+    shelf, watch = Shelf(tmp_path / "car"), Watch()
+    mailer = Mailer(tmp_path / "mail", shelf, wall_ms=Clock())
+    await mailer.start()
+    mailer.settings = replace(MailSettings(host="localhost", port=1, sender="car@example.org"), report_to=report_to)
+    reports = DriveReports(mailer, now=watch, quiet_s=QUIET_S)
+    reports.start()
+    try:
+        reports.finished(shelf.put("20261119T140303Z"))
+        going_on = shelf.folder / f"20261119T140303Z_p2{WRITING}"
+        going_on.write_bytes(b"")
+        watch.s = 100.0
+        await asyncio.sleep(4 * QUIET_S)
+        assert await mailer.letters(None, 10) == []  # another part is being written: the drive goes on
+        going_on.unlink()
+        reports.finished(shelf.put("20261119T140303Z_p2"))
+        await asyncio.sleep(0)
+        watch.s = 200.0
+        if report_to:
+            await until(lambda: not reports._waiting)
+        else:
+            await asyncio.sleep(4 * QUIET_S)
+        letters = await mailer.letters(None, 10)
+        assert [(one.order.recordings, one.order.format, one.order.to) for one in letters] == (
+            [(("20261119T140303Z", "20261119T140303Z_p2"), "html", TO)] if report_to else []
+        )
+    finally:
+        await reports.stop()
+        await mailer.stop()
+
+
+async def test_what_waits_at_the_end_of_the_server_is_kept(tmp_path: Path) -> None:
+    shelf = Shelf(tmp_path / "car")
+    mailer = Mailer(tmp_path / "mail", shelf, wall_ms=Clock())
+    await mailer.start()
+    mailer.settings = replace(MailSettings(host="localhost", port=1, sender="car@example.org"), report_to=TO)
+    reports = DriveReports(mailer, now=Watch())
+    reports.start()
+    reports.finished(shelf.put("20261119T140303Z"))
+    await asyncio.sleep(0.01)
+    await reports.stop()
+    assert len(await mailer.letters(None, 10)) == 1
+    await mailer.stop()
+
+
+def test_the_setting_is_checked_and_kept(tmp_path: Path) -> None:
+    body = {"host": "localhost", "port": 25, "sender": "car@example.org", "report_to": [" ann@example.org ", ""]}
+    found = checked(body, MailSettings())
+    assert (found.report_to, MailSettings().report_to) == (TO, ())
+    file = MailSettingsFile(tmp_path / "mail.toml")
+    file.write(found)
+    assert file.read() == found
+    for bad in (["no address"], ["a@b.org"] * 30, "ann@example.org", [5]):
+        with pytest.raises(BadMailSetting) as refused:
+            checked({**body, "report_to": bad}, MailSettings())
+        assert refused.value.field == "report_to"
+
+
+def test_a_drive_is_reported_when_its_file_is_closed_and_not_when_a_mark_comes_late(tmp_path: Path) -> None:
+    called: list[str] = []
+
+    class Part:
+        def __init__(self, name: str) -> None:
+            self._name = name
+
+        def __getattr__(self, what: str) -> Callable[..., None]:
+            return lambda *_: called.append(f"{self._name}.{what}")
+
+    names = ("recordings", "marks", "drive_reports", "uploader")
+    running: Any = SimpleNamespace(**{name: Part(name) for name in names})
+    Services.recording_finished(running, tmp_path)
+    assert called == ["recordings.add", "marks.finished", "drive_reports.finished", "uploader.rouse"]
+    called.clear()
+    Services.marks_changed(running, tmp_path)
+    assert called == ["recordings.reread_annotations", "uploader.rouse"]
+
+
+async def test_a_drive_whose_server_was_killed_is_reported_too(tmp_path: Path) -> None:
+    """What the last run left is recovered, and then its drive has ended as any other."""
+    left = tmp_path / "recordings" / "car" / f"car_20261119T140303Z{WRITING}"
+    record(left, seconds=2.0)
+    (tmp_path / "mail").mkdir()
+    file = MailSettingsFile(tmp_path / "mail" / "settings.toml")
+    file.write(replace(MailSettings(host="localhost", port=1, sender="car@example.org"), report_to=TO))
+    running, journal, storage = build(Config(data=tmp_path), now=Watch(), wall_ms=Clock(), checks=None)
+    async with lifespan(running, journal, storage):
+        reports = running.drive_reports
+        assert reports is not None
+        await until(lambda: reports._waiting)
+        ((_, drive),) = reports._waiting.items()
+        assert drive.ids == ["car_20261119T140303Z"]
+
+
+@contextlib.asynccontextmanager
+async def reporting(
+    tmp_path: Path, shelf: Shelf, watch: Watch, quiet_s: float = QUIET_S
+) -> AsyncIterator[DriveReports]:
+    mailer = Mailer(tmp_path / "mail", shelf, wall_ms=Clock())
+    await mailer.start()
+    mailer.settings = replace(MailSettings(host="localhost", port=1, sender="car@example.org"), report_to=TO)
+    reports = DriveReports(mailer, now=watch, quiet_s=quiet_s)
+    reports.start()
+    try:
+        yield reports
+    finally:
+        await reports._supervisor.stop()  # as a kill: what waits is not ordered
+        await mailer.stop()
+
+
+async def mailed(reports: DriveReports) -> list[tuple[str, ...]]:
+    """The recordings of each mail, the oldest first."""
+    return [one.order.recordings for one in (await reports._mailer.letters(None, 100))[::-1]]
+
+
+async def test_each_session_has_mails_of_its_own_and_all_its_parts(tmp_path: Path) -> None:
+    """Yesterday's recovered drive is mailed at once though today's is being written, and in several mails."""
+    shelf, watch = Shelf(tmp_path / "car"), Watch()
+    yesterday = [part_id("car_20261118T140303Z", part) for part in range(1, 2 * MOST_PARTS + 6)]
+    today = shelf.folder / f"car_20261119T140303Z_p2{WRITING}"
+    today.write_bytes(b"")
+    async with reporting(tmp_path, shelf, watch) as reports:
+        for id in [*yesterday, "car_20261119T140303Z"]:
+            reports.finished(shelf.put(id))
+        await until(lambda: len(reports._waiting) == 1)
+        parts = [tuple(yesterday[first : first + MOST_PARTS]) for first in (0, MOST_PARTS, 2 * MOST_PARTS)]
+        assert await mailed(reports) == parts
+        today.unlink()
+        watch.s = 100.0
+        await until(lambda: not reports._waiting)
+        assert await mailed(reports) == [*parts, ("car_20261119T140303Z",)]
+
+
+async def test_what_waits_is_mailed_after_kills(tmp_path: Path) -> None:
+    shelf, watch = Shelf(tmp_path / "car"), Watch()
+    id, name = "car_20261118T140303Z", tmp_path / "mail" / "reports.json"
+    async with reporting(tmp_path, shelf, watch) as reports:
+        reports.finished(shelf.put(id))
+        await until(name.exists)
+    for _ in range(2):
+        async with reporting(tmp_path, shelf, watch) as reports:
+            await until(lambda: reports._waiting)
+    watch.s = 100.0
+    async with reporting(tmp_path, shelf, watch, quiet_s=0.0) as reports:
+        await until(lambda: id.encode() not in name.read_bytes())
+        assert await mailed(reports) == [(id,)]
+    async with reporting(tmp_path, shelf, watch, quiet_s=0.0) as reports:
+        assert await mailed(reports) == [(id,)]
+
+
+@pytest.mark.parametrize("content", [b"", b"[1]", b'{"/a": 5, "/b": ["../x", 7]}', b"\xff"], ids=repr)
+async def test_a_file_of_somebody_else_does_no_harm(tmp_path: Path, content: bytes) -> None:
+    shelf = Shelf(tmp_path / "car")
+    (tmp_path / "mail").mkdir()
+    (tmp_path / "mail" / "reports.json").write_bytes(content)
+    async with reporting(tmp_path, shelf, Watch()) as reports:
+        reports.finished(shelf.put("car_20261118T140303Z"))
+        await until(lambda: reports._kept)
+        assert not reports.problems()
+
+
+async def test_what_the_outbox_does_not_take_is_tried_again(tmp_path: Path) -> None:
+    shelf, watch = Shelf(tmp_path / "car"), Watch()
+    async with reporting(tmp_path, shelf, watch) as reports:
+        settings, mailer = reports._mailer.settings, reports._mailer
+        mailer.settings = replace(settings, host="")
+        reports.finished(shelf.put("car_20261118T140303Z"))
+        await until(lambda: reports._waiting)
+        watch.s = 100.0
+        await until(lambda: next(iter(reports._waiting.values())).is_refused)
+        mailer.settings = settings
+        watch.s = 200.0
+        await until(lambda: not reports._waiting)
+        assert await mailed(reports) == [("car_20261118T140303Z",)]

@@ -1,0 +1,200 @@
+"""Who is on duty, at a car: in its log, in the item that is escalated, in a hand-over with read-back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from monitor.alarm_spec import Priority
+from tests.server.vehicle.attended import ANN, BEN, PROGRAM, SEEN, Attended
+
+AK = {"person": {"name": "A. K.", "role": "operator", "device": "dev-a"}}
+MR = {"person": {"name": "M. R.", "role": "safety_driver"}}
+BOSS: dict[str, Any] = {"supervisors": ["J. D."]}
+NOBODY: dict[str, Any] = {"supervisors": []}
+
+
+def escalated(car: Attended) -> str:
+    return next(str(event["text"]) for event in car.log if event["act"] == "escalated")
+
+
+@pytest.mark.parametrize(
+    ("stated", "said", "shown"),
+    [
+        (BOSS, "escalated to J. D., supervisor.", ["J. D."]),
+        ({"supervisors": ["J. D.", "K. L."]}, "escalated to J. D. and K. L., supervisors.", ["J. D.", "K. L."]),
+        (NOBODY, "escalated, but no supervisor is on duty.", []),
+        ({}, "escalated to the supervisor.", None),  # of a web node that knows nothing of people
+        ({"supervisors": "J. D."}, "escalated to the supervisor.", None),
+    ],
+)
+async def test_a_critical_alarm_is_escalated_to_who_is_on_duty(
+    stated: dict[str, Any], said: str, shown: list[str] | None
+) -> None:
+    car = Attended()
+    car.faults = {Priority.CRITICAL}
+    car.tick(32.0, heard=(ANN | stated,))
+    assert escalated(car).endswith(said)
+    assert car.item is not None
+    assert car.item["supervisors"] == shown
+
+
+async def test_who_is_supervisor_is_not_known_once_no_page_states_it() -> None:
+    car = Attended()
+    car.faults = {Priority.CRITICAL}
+    car.tick(1.0, heard=(ANN | BOSS,))
+    assert car.item is not None
+    assert car.item["supervisors"] == ["J. D."]
+    car.tick(11.5)
+    assert car.item["supervisors"] is None
+
+
+async def test_what_a_person_does_is_logged_with_their_name_and_role() -> None:
+    car = Attended()
+    car.tick(0.5)
+    car.faults = {Priority.WARNING}
+    car.tick(0.5, heard=(ANN,))
+    await car.obeyed(ANN | AK, "acknowledge", alarm="test_warning", occurrence=1)
+    assert car.session.frame()["alarms"][0]["acknowledged_by"] == "A. K. (Ann)"
+    await car.obeyed(BEN, "shelve", alarm="test_warning", occurrence=1, minutes=5.0)
+    await car.obeyed(PROGRAM | AK, "unshelve", alarm="test_warning")
+    events = {event["change"]: event for event in car.bus.past_events(car.name) if event["by"]}
+    assert events["acknowledged"]["by"] == "A. K. (Ann)"
+    assert (events["acknowledged"]["person"], events["acknowledged"]["role"]) == ("A. K.", "operator")
+    assert events["shelved"]["by"] == "Ben"
+    assert "person" not in events["shelved"]
+
+
+async def test_coming_and_going_at_a_page_of_the_car_is_logged_once() -> None:
+    car = Attended()
+    for who in (ANN, ANN | AK, ANN | AK, ANN | MR, ANN):
+        await car.obeyed(SEEN | who, "present")
+    texts = [event["text"] for event in reversed(car.bus.past_events(car.name, change="duty"))]
+    assert texts == [
+        "A. K. is on duty as operator at Ann.",
+        "A. K., operator, is not on duty at Ann any more.",
+        "M. R. is on duty as safety driver at Ann.",
+        "M. R., safety driver, is not on duty at Ann any more.",
+    ]
+
+
+async def test_a_request_for_control_is_in_the_summary_until_it_is_answered() -> None:
+    car = Attended()
+    for who in (ANN | AK, BEN):
+        await car.obeyed(SEEN | who, "present")
+    await car.obeyed(ANN | AK, "control", do="take")
+    assert car.summary["requests"] == []
+    await car.obeyed(BEN, "control", do="request")
+    assert car.summary["holder"] == "A. K. (Ann)"
+    assert car.summary["requests"] == [{"page": "page-b", "name": "Ben", "left_s": 10.0}]
+    await car.obeyed(ANN | AK, "control", do="keep", to="page-b")
+    assert car.summary["requests"] == []
+
+
+class Shift:
+    """Ann is in control and offers it to Ben."""
+
+    def __init__(self) -> None:
+        self.car = Attended()
+
+    async def begin(self) -> None:
+        await self.seen()
+        await self.car.obeyed(ANN | AK, "control", do="take")
+        await self.car.obeyed(ANN | AK, "offer_control", to="page-b")
+
+    async def seen(self) -> None:
+        for who in (ANN | AK, BEN | MR):
+            await self.car.obeyed(SEEN | who, "present")
+
+    @property
+    def state(self) -> dict[str, Any] | None:
+        found: dict[str, Any] | None = self.car.session.frame()["control"].get("handover")  # type: ignore[assignment]
+        return found
+
+    async def read_all(self) -> None:
+        assert self.state is not None
+        for line in self.state["lines"]:
+            await self.car.obeyed(BEN | MR, "read_back", line=line["key"])
+
+    async def accept(self) -> dict[str, Any]:
+        assert self.state is not None
+        return await self.car.ask(BEN | MR, "accept_control", version=self.state["version"])
+
+
+async def test_a_new_alarm_during_the_read_back_adds_a_line() -> None:
+    shift = Shift()
+    await shift.begin()
+    assert shift.state is not None
+    assert [line["kind"] for line in shift.state["lines"]] == ["alarm", "rides", "driving", "departure", "slow_down"]
+    assert shift.state["lines"][0]["title"] == "No alarm is active"
+    assert [line["title"] for line in shift.state["lines"][1:4]] == [
+        "M. R. rides, safety driver", "Who drives is not known", "No departure check was made",
+    ]  # fmt: skip
+    await shift.read_all()
+    version = shift.state["version"]
+    shift.car.faults = {Priority.CRITICAL}
+    await shift.seen()
+    shift.car.tick(0.5)
+    assert [line["title"] for line in shift.state["lines"] if not line["read"]] == ["Test critical"]
+    refused = await shift.car.ask(BEN | MR, "accept_control", version=version)
+    assert refused["ok"] is False
+    assert refused["reason"] == "One line is not read back yet: Test critical."
+    assert refused["handover"]["left"] == 1
+    assert shift.car.session.frame()["control"]["holder"] == "A. K. (Ann)"
+    await shift.read_all()
+    answer = await shift.accept()
+    assert answer["ok"] is True
+    assert answer["handed_over"] == {"device": "dev-a", "to": "M. R. (Ben)"}
+    assert shift.car.session.frame()["control"]["holder"] == "M. R. (Ben)"
+    assert shift.state is None
+    steps = [event["step"] for event in reversed(shift.car.bus.past_events("ocelot", change="hand_over"))]
+    assert steps == ["offered", "accepted"]
+
+
+async def test_limits_that_differ_from_their_default_are_read_back() -> None:
+    shift = Shift()
+    await shift.begin()
+    await shift.car.obeyed(ANN | AK, "set", values={"speed_limit.max_mps": 9.0})
+    assert shift.state is not None
+    (limit,) = (line for line in shift.state["lines"] if line["kind"] == "limit")
+    assert (limit["title"], limit["text"]) == ("Speed limit: 9 m/s", "Default: 11 m/s")
+    await shift.read_all()
+    await shift.car.obeyed(ANN | AK, "set", values={"speed_limit.max_mps": 8.0})  # another limit is another line
+    assert (await shift.accept())["reason"] == "One line is not read back yet: Speed limit: 8 m/s."
+
+
+async def test_an_offer_answers_a_request_that_silence_would_grant() -> None:
+    shift = Shift()
+    await shift.seen()
+    await shift.car.obeyed(ANN | AK, "control", do="take")
+    await shift.car.obeyed(BEN | MR, "control", do="request")
+    await shift.car.obeyed(ANN | AK, "offer_control", to="page-b")
+    for _ in range(12):
+        await shift.seen()
+        shift.car.tick(1.0)
+    assert shift.car.session.frame()["control"]["holder"] == "A. K. (Ann)"
+    assert shift.state is not None
+
+
+async def test_taking_control_over_ends_the_hand_over() -> None:
+    shift = Shift()
+    await shift.begin()
+    await shift.car.obeyed(BEN | MR, "control", do="take_over")
+    shift.car.tick(0.1)
+    assert shift.state is None
+    assert await shift.car.refused(BEN | MR, "read_back", line="alarms:none") == "Control is not offered to this page."
+
+
+async def test_an_offer_is_declined_or_taken_back() -> None:
+    for who, step in ((BEN | MR, "declined"), (ANN | AK, "withdrawn")):
+        shift = Shift()
+        await shift.begin()
+        await shift.car.obeyed(who, "end_offer")
+        assert shift.state is None
+        assert shift.car.bus.past_events("ocelot", change="hand_over")[0]["step"] == step
+
+
+async def test_a_program_hands_nothing_over() -> None:
+    car = Attended()
+    assert "Only a page" in await car.refused(PROGRAM, "offer_control", to="page-b")

@@ -1,0 +1,101 @@
+"""`python -m tests.through_broker serve …`: the same server in three parts, an agent, a real broker and a web node.
+
+The tests of the page run against it with CATGRAPH_THROUGH_BROKER=1. Its parts end with it, also when it is killed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import ctypes
+import os
+import re
+import signal
+import socket
+import sys
+import tempfile
+from pathlib import Path
+
+from server.bus import nats_wire as wire
+from tests.server.bus.broker import connected, nats_server
+
+NODE = "node"  # the node's data folder, in that of the agent
+OF_AGENT = ("--vehicle", "--only")
+_PR_SET_PDEATHSIG = 1
+
+
+def end_with_parent() -> None:
+    ctypes.CDLL("libc.so.6").prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+async def start(*command: str, listens: bool = True) -> str:
+    """Start a part and answer the address that it prints."""
+    process = await asyncio.create_subprocess_exec(
+        *command,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=None if os.environ.get("CATGRAPH_THROUGH_BROKER") == "2" else asyncio.subprocess.DEVNULL,
+        preexec_fn=end_with_parent,
+    )
+    if not listens:
+        return ""
+    assert process.stdout is not None
+    while line := (await process.stdout.readline()).decode():
+        if found := re.search(r"https?://[^\s/]+:\d+", line):
+            asyncio.get_running_loop().create_task(drain(process.stdout))
+            return found.group()
+    raise SystemExit(f"{command} ended")
+
+
+async def heard(broker: str, names: list[str]) -> None:
+    """Wait until the agent has said of each vehicle that it is there, and the node has had time to read it."""
+    async with connected(broker) as client:
+        for name in names:
+            here = await client.subscribe(wire.subject(name, "here"))
+            await here.next_msg(timeout=60)
+    await asyncio.sleep(0.3)
+
+
+def parted(words: list[str]) -> tuple[list[str], list[str], Path]:
+    """The options of the agent, those of the node, and the data folder; the node's own is in it."""
+    options: list[list[str]] = []
+    for word in words:
+        if word.startswith("--"):
+            options.append([word])
+        else:
+            options[-1].append(word)
+    data = [Path(option[1]) for option in options if option[0] == "--data"] or [Path(tempfile.mkdtemp())]
+    agent = [word for option in options if option[0] in OF_AGENT for word in option]
+    page = [word for option in options if option[0] not in (*OF_AGENT, "--data") for word in option]
+    return agent, page if "--port" in page else ["--port", "0", *page], data[0]
+
+
+async def drain(out: asyncio.StreamReader) -> None:
+    while await out.readline():
+        pass
+
+
+async def main(arguments: list[str]) -> None:
+    assert arguments[0] == "serve"
+    of_agent, of_page, data = parted(arguments[1:])
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        at_port = probe.getsockname()[1]
+    broker = f"nats://127.0.0.1:{at_port}"
+    store = tempfile.mkdtemp()
+    await start(nats_server(), "-a", "127.0.0.1", "-p", str(at_port), "-js", "-sd", store, listens=False)
+    await asyncio.sleep(0.3)
+    python = (sys.executable, "-m", "server")
+    names = [word.split("=")[0] for word in of_agent if "=" in word.split("://")[0]]
+    expected = [word for name in names or ["car"] for word in ("--expect", name)]
+    agent = (*python, "agent", "--no-require-signed", "--broker", broker)  # the tests' own requests sign nothing
+    console, node = await asyncio.gather(
+        start(*agent, "--port", "0", "--data", str(data), *of_agent),
+        start(*python, "web", "--broker", broker, "--data", str(data / NODE), *expected, *of_page),
+    )
+    await heard(broker, names or ["car"])
+    print(f"console at {console.split('//')[1]}\ncatgraph listens on {node}/", flush=True)
+    await asyncio.Event().wait()
+
+
+if __name__ == "__main__":
+    asyncio.run(main(sys.argv[1:]))
