@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo fleet test check world format lint types imports tsc node bench soak mutation sbom screenshots clean vendor-missing
+.PHONY: help demo fleet test test-field check world format lint types imports tsc node bench soak mutation sbom screenshots clean vendor-missing
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -11,12 +11,6 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Compiled modules are kept, whatever this machine's own setting: without them each start of a server takes twice the time.
 export PYTHONDONTWRITEBYTECODE :=
 PYTEST := $(PY) -m pytest
-LOGS := fast slow browser
-# asyncio's debug mode is on here only, and in the tests' own process only.
-FAST := --asyncio-debug --ignore=tests/page -n 2 --dist worksteal -m "not browser and not slow and not soak"
-BROWSER := tests/page tests/recipes -m "browser and not soak"
-SLOW := --ignore=tests/page -n 3 --dist worksteal -m "slow and not browser and not soak"
-
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
 
@@ -26,23 +20,20 @@ demo: $(VENV)/.ready static/built/built.json ## a simulated car, its bridge and 
 fleet: $(VENV)/.ready-test static/built/built.json ## a broker, five simulated cars with faults, their agents and two web nodes
 	$(PY) -m tests.fleet
 
-test: $(VENV)/.ready-test static/built/built.json ## all of the tests: what must pass before a change goes in
+test: $(VENV)/.ready-test static/built/built.json ## the gate: what must pass before a change goes in (docs/testing.md)
 	$(PY) -m tests.chromium
 	$(PY) -m tests.vehicle.ros2_environment
 	$(MAKE) --no-print-directory -j 2 --output-sync format lint types imports tsc node
-	rm -f $(LOGS:%=out/tests/%.jsonl)
-	status=0; \
-	$(PYTEST) --report-log=out/tests/fast.jsonl $(FAST) || status=$$?; \
-	$(PYTEST) --report-log=out/tests/slow.jsonl $(SLOW) || status=$$?; \
-	$(PYTEST) --report-log=out/tests/browser.jsonl $(BROWSER) || status=$$?; \
-	$(PY) -m tests.summary $(LOGS:%=out/tests/%.jsonl) || status=$$?; \
-	exit $$status
+	$(PY) -m tests.stages test
 
-check: $(VENV)/.ready-test ## the fast half of the tests, without a browser
+test-field: $(VENV)/.ready-test static/built/built.json ## all tests of processes, real time, widths and real ROS nodes
+	$(PY) -m tests.chromium
+	$(PY) -m tests.vehicle.ros2_environment
+	$(PY) -m tests.stages test-field
+
+check: $(VENV)/.ready-test ## the quick part of the gate, without a browser
 	$(MAKE) --no-print-directory -j 2 --output-sync format lint types imports tsc node
-	rm -f out/tests/fast.jsonl
-	status=0; $(PYTEST) -q --report-log=out/tests/fast.jsonl $(FAST) || status=$$?; \
-	$(PY) -m tests.summary out/tests/fast.jsonl && exit $$status
+	$(PY) -m tests.stages check
 
 world: $(VENV)/.ready-test static/built/built.json ## what failed on real bridges and for real operators, by its points (docs/world.md)
 	$(PY) -m tests.chromium

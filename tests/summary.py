@@ -1,8 +1,8 @@
-"""Prints what the stages of `make test` gave: counts, the slowest tests, what was retried, failed or never ended.
+"""Prints what the stages of a run gave: counts, the slowest tests, what was unstable, failed or never ended.
 
-    python -m tests.summary out/tests/fast.jsonl out/tests/slow.jsonl …
+    python -m tests.summary out/tests/server.jsonl out/tests/page.jsonl …
     python -m tests.summary --each out/tests/soak.jsonl
-    python -m tests.summary --slow out/tests/fast.jsonl out/tests/slow.jsonl > tests/slow_tests.txt
+    python -m tests.summary --slow out/tests/server.jsonl > tests/slow_tests.txt
 
 With `--each`, every test is a row, with the last line that it printed: what it measured. With `--slow`, only the names
 of the tests that took more than a second are printed, for the file from which they are marked.
@@ -13,6 +13,7 @@ and what never ended goes to the error output, as the last lines there.
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -23,10 +24,12 @@ from typing import Any
 SLOWEST = 10
 LONGEST_REASON = 200  # characters
 SLOW_S = 1.0
+TIMED_OUT = re.compile(r"Timeout \(>[\d.]+ ?s\) from pytest-timeout")
+CRASHED = "???"  # the phase that pytest-xdist reports of a test whose worker ended
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class StageResult:
     """One stage's tests by how they ended, the seconds that each took, and the stage's own length in seconds."""
 
     name: str
@@ -34,17 +37,33 @@ class Stage:
     seconds: dict[str, float] = field(default_factory=dict)
     outcomes: dict[str, str] = field(default_factory=dict)
     failed: dict[str, str] = field(default_factory=dict)
-    retried: dict[str, str] = field(default_factory=dict)
+    crashed: frozenset[str] = frozenset()
     unfinished: tuple[str, ...] = ()
     printed: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def failed_once(self) -> dict[str, str]:
+        """The failed tests that may have failed by chance: no crash of the worker, no timeout, none that never ended."""
+        return {
+            name: why
+            for name, why in self.failed.items()
+            if name not in self.crashed and name not in self.unfinished and not TIMED_OUT.search(why)
+        }
 
-def read_stage(path: Path) -> Stage:
+    def without(self, unstable: Iterable[str]) -> StageResult:
+        """This result, where these failed tests passed by themselves."""
+        names = frozenset(unstable) & self.failed.keys()
+        failed = {name: why for name, why in self.failed.items() if name not in names}
+        return replace(self, failed=failed, outcomes=self.outcomes | dict.fromkeys(names, "unstable"))
+
+
+def read_stage(path: Path) -> StageResult:
     """A stage from its log; an empty stage where there is no such file, for then it never began."""
     reports = list(_reports(path.read_text(encoding="utf-8").splitlines())) if path.is_file() else []
     times_s = [float(one[when]) for one in reports for when in ("start", "stop") if one[when]]  # 0: its worker crashed
-    stage = Stage(path.stem, max(times_s) - min(times_s) if times_s else 0.0)
+    stage = StageResult(path.stem, max(times_s) - min(times_s) if times_s else 0.0)
     open_tests: dict[str, None] = {}
+    crashed = set()
     for one in reports:
         name, when, outcome = one["nodeid"], one["when"], one["outcome"]
         stage.seconds[name] = stage.seconds.get(name, 0.0) + float(one["duration"])
@@ -54,14 +73,14 @@ def read_stage(path: Path) -> Stage:
             open_tests.pop(name, None)
         if when == "call":
             stage.printed[name] = _last_line_printed(one)
-        if outcome == "rerun":
-            stage.retried[name] = _reason(one)
-        elif outcome == "failed":
+        if when == CRASHED:
+            crashed.add(name)
+        if outcome == "failed":
             stage.failed[name] = _reason(one)
             stage.outcomes[name] = outcome
         elif when == "call" or outcome == "skipped":
             stage.outcomes[name] = outcome
-    return replace(stage, unfinished=tuple(open_tests))
+    return replace(stage, unfinished=tuple(open_tests), crashed=frozenset(crashed))
 
 
 def _reports(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
@@ -88,7 +107,7 @@ def _last_line_printed(report: dict[str, Any]) -> str:
     return written.strip().rpartition("\n")[2][:LONGEST_REASON]
 
 
-def each(stage: Stage) -> list[str]:
+def each(stage: StageResult) -> list[str]:
     """A row for each test of a stage, in the order in which they ran."""
     rows = [f"{'result':8}{'minutes':>8}  test: what it printed"]
     for name, outcome in stage.outcomes.items():
@@ -97,28 +116,26 @@ def each(stage: Stage) -> list[str]:
     return ["", *rows]
 
 
-def slow(stages: Iterable[Stage]) -> list[str]:
+def slow(stages: Iterable[StageResult]) -> list[str]:
     """The names of functions of which one test took longer than SLOW_S, in order."""
     return sorted({name.partition("[")[0] for stage in stages for name, s in stage.seconds.items() if s > SLOW_S})
 
 
-def summary(stages: Iterable[Stage]) -> list[str]:
-    """The lines of the table, the slowest tests and the retried ones."""
+def summary(stages: Iterable[StageResult]) -> list[str]:
+    """The lines of the table and the slowest tests."""
     stages = tuple(stages)
-    lines = ["", "stage      passed  skipped  failed  retried  minutes"]
+    lines = ["", "stage       passed  skipped  failed  unstable  minutes"]
     for stage in stages:
         counts = Counter(stage.outcomes.values())
-        row = (counts["passed"], counts["skipped"], counts["failed"], len(stage.retried))
-        lines.append(f"{stage.name:9}{row[0]:8}{row[1]:9}{row[2]:8}{row[3]:9}{stage.length_s / 60:9.1f}")
-    lines.append(f"{'total':9}{sum(stage.length_s for stage in stages) / 60:42.1f}")
+        row = (counts["passed"], counts["skipped"], counts["failed"], counts["unstable"])
+        lines.append(f"{stage.name:10}{row[0]:8}{row[1]:9}{row[2]:8}{row[3]:10}{stage.length_s / 60:9.1f}")
+    lines.append(f"{'total':10}{sum(stage.length_s for stage in stages) / 60:44.1f}")
     seconds = {name: s for stage in stages for name, s in stage.seconds.items()}
     lines += ["", f"the {SLOWEST} slowest"]
-    lines += [f"{s:7.1f} s  {name}" for name, s in sorted(seconds.items(), key=lambda one: -one[1])[:SLOWEST]]
-    retried = [f"{name}: {why}" for stage in stages for name, why in stage.retried.items()]
-    return lines + (["", f"{len(retried)} retried", *retried] if retried else [])
+    return lines + [f"{s:7.1f} s  {name}" for name, s in sorted(seconds.items(), key=lambda one: -one[1])[:SLOWEST]]
 
 
-def faults(stages: Iterable[Stage]) -> list[str]:
+def faults(stages: Iterable[StageResult]) -> list[str]:
     """A line for each test that failed, never ended, and for each stage without any test."""
     lines = []
     for stage in stages:

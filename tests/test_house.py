@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import SLOW_TESTS
+from tests.stages import TARGETS
 from tests.tree import PROJECT, project_files, text_of
 
 EMPTY_NAMES = {"util", "utils", "helper", "helpers", "common", "misc"}
@@ -53,13 +54,13 @@ def test_the_page_loads_nothing_from_elsewhere() -> None:
 
 
 def test_what_drives_a_browser_lies_in_the_folders_of_its_stage() -> None:
-    """Any other would be in no stage of `make test`."""
-    stage = re.search(r"(?m)^BROWSER := ((?:tests/\w+ )+)", text_of(Path("Makefile")))
-    assert stage is not None
+    """Any other would be in no stage."""
+    (stage,) = (one for one in TARGETS["test-field"] if one.name == "field-page")
+    folders = tuple(one for one in stage.selection if one.startswith("tests/"))
     tests = [path for path in project_files() if path.suffix == ".py" and path.parts[0] == "tests"]
     marked = [path for path in tests if re.search(r"\bmark\.browser\b", text_of(path))]
     assert marked != []
-    assert [path for path in marked if not path.as_posix().startswith(tuple(stage[1].split()))] == []
+    assert [path for path in marked if not path.as_posix().startswith(folders)] == []
 
 
 def test_nobody_elses_files_are_tracked() -> None:
@@ -118,9 +119,7 @@ def test_what_is_listed_as_slow_exists() -> None:
     assert {re.sub("::.*::", "::", one) for one in SLOW_TESTS} - found == set()
 
 
-def test_a_retry_stands_on_one_test_with_its_reason() -> None:
-    retried = re.compile(r".*mark\.flaky.*")
-    reasoned = re.compile(r"\s*@pytest\.mark\.flaky\(.*reason=\"\w.*")
+def test_no_test_is_retried_by_a_mark() -> None:
+    """What fails by chance runs again by itself (`tests/stages.py`), and is listed."""
     tests = [path for path in project_files() if path.parts[0] == "tests" and path.name != Path(__file__).name]
-    lines = [line for path in tests if path.suffix == ".py" for line in retried.findall(text_of(path) or "")]
-    assert [line for line in lines if not reasoned.fullmatch(line)] == []
+    assert [path for path in tests if "mark.flaky" in (text_of(path) or "")] == []

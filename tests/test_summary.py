@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.summary import main, read_stage, summary
+from tests.summary import faults, main, read_stage, summary
 
 
 def report(name: str, when: str, outcome: str, start: float, stop: float, why: str = "", printed: str = "") -> str:
@@ -32,13 +32,11 @@ def write(path: Path, lines: list[str]) -> str:
 
 
 def test_each_way_a_test_ends_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    retried = [report("t::c", "call", "rerun", 3, 4, "too late\nand more"), *whole("t::c", 4, 1)]
-    lines = whole("t::a", 0, 2) + whole("t::b", 2, 1, "failed", "assert 1 == 2") + retried
+    skipped = [report("t::c", "setup", "skipped", 3, 4), report("t::c", "teardown", "passed", 4, 4)]
+    lines = whole("t::a", 0, 2) + whole("t::b", 2, 1, "failed", "assert 1 == 2\nand more") + skipped
     assert main([write(tmp_path / "fast.jsonl", lines)]) == 1
     shown = capsys.readouterr()
-    assert "fast            2        0       1        1      0.1" in shown.out
-    assert "1 retried\nt::c: too late" in shown.out
-    assert "and more" not in shown.out
+    assert "fast             1        1       1         0      0.0" in shown.out
     assert shown.err == "FAILED t::b: assert 1 == 2\n"
 
 
@@ -77,3 +75,23 @@ def test_slow_functions_are_named_once(tmp_path: Path, capsys: pytest.CaptureFix
     logs = [write(tmp_path / "fast.jsonl", fast), write(tmp_path / "slow.jsonl", whole("t::T::c", 6, 2))]
     assert main(["--slow", *logs]) == 0
     assert capsys.readouterr().out == "t::T::c\nt::a\n"
+
+
+def test_a_crash_and_a_timeout_are_no_accidents(tmp_path: Path) -> None:
+    """Only a test that failed of itself runs again by itself."""
+    lines = [
+        *whole("t::late", 0, 2, "failed", "Failed: Timeout (>120.0s) from pytest-timeout."),
+        *whole("t::wrong", 2, 1, "failed", "assert 1 == 2"),
+        report("t::ended", "setup", "passed", 3, 3),
+        report("t::ended", "???", "failed", 0, 0, "worker 'gw0' crashed while running 't::ended'"),
+    ]
+    result = read_stage(Path(write(tmp_path / "page.jsonl", lines)))
+    assert set(result.failed) == {"t::late", "t::wrong", "t::ended"}
+    assert result.failed_once == {"t::wrong": "assert 1 == 2"}
+
+
+def test_an_unstable_test_is_no_failure(tmp_path: Path) -> None:
+    lines = whole("t::a", 0, 2) + whole("t::b", 2, 1, "failed", "assert 1 == 2")
+    result = read_stage(Path(write(tmp_path / "page.jsonl", lines))).without(["t::b"])
+    assert faults([result]) == []
+    assert summary([result])[2].split() == ["page", "1", "0", "0", "1", "0.0"]

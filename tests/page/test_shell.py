@@ -268,7 +268,6 @@ def changing(project: Path, tmp_path: Path) -> Path:
     return copied
 
 
-@pytest.mark.flaky(reruns=2, reason="its last load sometimes draws nothing in a headless browser, and never begins")
 async def test_a_new_version_comes_at_the_next_load_and_never_mixed(
     browser: Browser, changing: Path, tmp_path: Path
 ) -> None:

@@ -37,7 +37,6 @@ REORDERED_WITHIN_S = 0.005
 
 @pytest.mark.slow
 @pytest.mark.timeout(180)
-@pytest.mark.flaky(reruns=2, reason="a process that the machine holds up for 5 ms changes the order among topics")
 @pytest.mark.parametrize("name", [BAG, MCAP])
 async def test_a_replayed_drive_is_recorded_and_exported_as_it_was(recordings: Path, tmp_path: Path, name: str) -> None:
     source = recordings / name

@@ -67,7 +67,6 @@ async def replaying(path: Path, *options: str) -> AsyncIterator[str]:
 
 @pytest.mark.slow
 @pytest.mark.timeout(180)
-@pytest.mark.flaky(reruns=1, reason="where the machine stands still for long, the server rightly throttles what comes")
 async def test_the_real_drive_of_2016_06_01_both_ways(recordings: Path) -> None:
     """The ROS 1 bag and the ROS 2 MCAP at once, two vehicles of one server: every message, the drive's figures."""
     async with (
