@@ -1,7 +1,6 @@
 """Bounds the rosbags library for files from elsewhere.
 
-The library unpacks whatever it is given, and reads YAML whose references can multiply without end. It has no options
-for either, so its own functions are replaced here. What a bag of ROS 2 says of quality of service and cannot be read
+The library bounds neither what it unpacks nor what it reads as YAML. It has no options for that, so its own functions are replaced here. What a bag of ROS 2 says of quality of service and cannot be read
 within bounds is not known.
 """
 
