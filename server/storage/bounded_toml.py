@@ -1,7 +1,7 @@
 """TOML from outside, refused before it is parsed where parsing it could take long.
 
-A small text can hold `tomllib` for minutes. Within the bounds below, the slowest text that is known takes 30 ms (tests/server/security/test_toml.py), and the
-bounds themselves are counted in one pass.
+A small text can hold `tomllib` for minutes. Within the bounds below, the slowest text that is known takes 30 ms
+(tests/server/security/test_toml.py), and the bounds themselves are counted in one pass.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ MOST_QOS = 64 << 10  # letters of the quality of service of one topic
 DEEPEST = 30
 MOST_ENTRIES = 100_000
 LEAVE_FREE = 1 << 30  # bytes of the disk with the temporary files
-_LOOK_EVERY = 32 << 20  # bytes unpacked between two checks of the disk
+LOOK_EVERY = 32 << 20  # bytes unpacked between two checks of the disk
 
 
 def install() -> None:
@@ -103,7 +103,7 @@ class _OntoDisk:
         data = bytes(self._stream.read(size))
         self._look_in -= len(data)
         if self._look_in < 0:
-            self._look_in = _LOOK_EVERY
+            self._look_in = LOOK_EVERY
             free = space.free_at(Path(tempfile.gettempdir()))
             if free < self._leave_free:
                 raise RecordingUnreadable(
