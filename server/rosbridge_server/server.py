@@ -34,9 +34,8 @@ _SERVERS = {1: "AutobahnPython/22.7.1", 2: "TornadoServer/6.6.1"}
 class RosBridge:
     """Behaves as the rosbridge of `ros_version`; `now` is the ROS time of rosapi [s since 1970].
 
-    `like` "helpful" reports errors in `status` messages, and sends and survives what the real server loses or crashes
-    on; "real" imitates that server without its error messages, started with the options `real`. What ends or silences
-    that server is not imitated.
+    `like` "helpful" reports errors in `status` messages, and sends what the real server loses; "real" imitates that
+    server without its error messages, started with the options `real`, but not where a client ends or silences it.
 
     Everything but start, stop, kill and revive is synchronous and belongs on the loop on which the bridge was started.
     """

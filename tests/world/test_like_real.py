@@ -94,7 +94,7 @@ async def test_a_fragment_size_takes_answers_apart() -> None:
         await socket.send(TIME)
         pieces = [await answer_of(socket), await answer_of(socket)]
         assert [one["op"] for one in pieces] == ["fragment"] * 2
-        assert [len(one["data"]) for one in pieces][0] == 60
+        assert len(pieces[0]["data"]) == 60
 
 
 @pytest.mark.parametrize("ros", [1, 2])

@@ -105,9 +105,7 @@ def shown(name: str, frames: Iterable[str | bytes]) -> dict[str, list[Any]]:
     for key in list(found):
         if (name, key) in OTHERWISE:
             del found[key]
-    found["answers"] = [
-        answer for answer in found.get("answers", []) if (name, str(answer.get("id"))) not in OTHERWISE
-    ]
+    found["answers"] = [answer for answer in found.get("answers", []) if (name, str(answer.get("id"))) not in OTHERWISE]
     return found
 
 

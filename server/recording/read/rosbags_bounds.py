@@ -1,7 +1,7 @@
 """Bounds the rosbags library for files from elsewhere.
 
-The library bounds neither what it unpacks nor what it reads as YAML. It has no options for that, so its own functions are replaced here. What a bag of ROS 2 says of quality of service and cannot be read
-within bounds is not known.
+The library bounds neither what it unpacks nor what it reads as YAML. It has no options for that, so its own functions
+are replaced here. What a bag of ROS 2 says of quality of service and cannot be read within bounds is not known.
 """
 
 from __future__ import annotations

@@ -44,7 +44,9 @@ class RealClient:
         self._connection = connection
         self._outbox = Outbox(connection, bridge.counters, limit_bytes=BACKLOG_BYTES)
         self._lane = Lane(0)
-        self._fragment_size: int | None = bridge.real.max_message_bytes or (DEFAULT_BYTES if bridge.ros_version == 2 else None)
+        self._fragment_size: int | None = bridge.real.max_message_bytes or (
+            DEFAULT_BYTES if bridge.ros_version == 2 else None
+        )
         self._topics = ClientTopics(bridge, self.send)
         self._providers = Providers(bridge, self.send)
         self._calls: set[asyncio.Task[None]] = set()

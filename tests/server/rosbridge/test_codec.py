@@ -84,7 +84,10 @@ BAD = {
         "a frame that nests too deep",
     ),
     "too many parts": (b"[" + b"[]," * codec.MAX_CONTAINERS + b"1]", "a message with too many parts"),
-    "too many parts with a bare NaN": (b"[NaN," + b"[]," * codec.MAX_CONTAINERS + b"1]", "a message with too many parts"),
+    "too many parts with a bare NaN": (
+        b"[NaN," + b"[]," * codec.MAX_CONTAINERS + b"1]",
+        "a message with too many parts",
+    ),
     "200 deep with a bare NaN": (b'{"a":NaN,"b":' + b"[" * 200 + b"]" * 200 + b"}", "a frame that nests too deep"),
 }
 

@@ -155,7 +155,7 @@ def test_no_such_address_is_dialled(typed: str) -> None:
 
 
 async def test_a_name_that_changes_its_mind_is_looked_at_when_it_is_dialled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A name server whose answer is proper when asked first, and forbidden later. What was looked at is what is dialled, as a number."""
+    """Its address is proper when asked first, forbidden later. What was looked at is what is dialled, as a number."""
     loop = asyncio.get_running_loop()
     dialled: list[Any] = []
     turns = iter(["10.255.255.1"] + ["224.0.0.1"] * 1000)
