@@ -57,8 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--like",
         choices=("helpful", "real"),
         default="helpful",
-        help="real: behave as the real rosbridge_suite, which says nothing of errors, loses what it cannot encode and "
-        "can be made deaf (default: helpful)",
+        help="real: behave as the real rosbridge_suite, which says nothing of errors and loses what it "
+        "cannot encode (default: helpful)",
     )
 
 

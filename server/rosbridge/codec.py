@@ -198,8 +198,7 @@ def _bignum(value: Any, immutable: bool) -> int:
     return int.from_bytes(value)
 
 
-# Negative numbers of any size, dates, patterns, values shared with each other and with themselves: rosbridge sends none
-# of the kinds that cbor2 knows besides, and a hostile one could hang us with some.
+# rosbridge sends none of the kinds of values that cbor2 knows besides, and some could take long.
 _NOT_SENT = dict.fromkeys(
     (0, 1, 3, 4, 5, 25, 28, 29, 30, 35, 36, 37, 52, 54, 100, 256, 258, 260, 261, 1004, 43000), _refuse
 ) | {2: _bignum}

@@ -206,7 +206,7 @@ def blocked_topics(topics: Sequence[str], clients: int) -> Problem:
     return Problem(
         code="topics_blocked",
         title=f"No message arrives through the bridge from {_names(topics)}.",
-        hint=f"They have a publisher, and {others}: one that subscribed with cbor-raw before us blocks them. "
+        hint=f"They have a publisher, and {others}: one that asked for them in raw form can block them. "
         "End that client; the subscription is renewed by itself. Or the publisher is idle.",
         mark="blocked topics",
     )

@@ -1,8 +1,8 @@
 """The gate before the socket: every operation that is sent to a bridge is checked against the tables below.
 
-A real bridge reports almost nothing to its client, and some operations harm others: on ROS 1 one message that cannot
-be packed ends its topic for every client, `publish` without `msg` publishes zeros, a frame that is no object leaves
-the connection deaf; on ROS 2 a wrong argument ends rosapi. What is not in the tables is refused before it is sent.
+A real bridge reports almost nothing to its client, and some of what it can be sent harms others: it can end a topic
+for every client, publish zeros, leave the connection without answers, or end rosapi. What is not in the tables is
+refused before it is sent.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def is_type(value: Any) -> bool:
 
 
 def _is_type_of_ros_1(value: Any) -> bool:
-    # On ROS 2 message_details of a type with a bounded or byte field ends rosapi, whose own list offers such types.
+    # On ROS 2 this question can end rosapi.
     return isinstance(value, str) and len(value) <= MAX_NAME and _TYPE_OF_ROS_1.fullmatch(value) is not None
 
 
@@ -59,7 +59,7 @@ def _is_id(value: Any) -> bool:
 
 
 def _is_compression(value: Any) -> bool:
-    # cbor-raw silences the other clients of a topic; PNG never arrives on ROS 2.
+    # The others can cost another client its messages, or never arrive.
     return value in ("none", "cbor") and isinstance(value, str)
 
 

@@ -29,8 +29,7 @@ def operation_of(operation: str, row: Subscription) -> dict[str, Any]:
             message["type"] = row.type
         message |= {
             "compression": row.compression,
-            # ROS 2's rosbridge sends what is left in a queue without a throttle for ever once its client has gone,
-            # and takes no connection any more.
+            # Never zero with a queue: ROS 2's rosbridge could take no connection any more once we have gone.
             "throttle_rate": max(row.throttle_ms, 1 if row.queue_length else 0),
             "queue_length": row.queue_length,
         }

@@ -63,10 +63,6 @@ class Connection(ServerConnection):
         """Writes one whole frame. Frames are never split here, so they cannot fall into the middle of another."""
         self.transport.write(frame)
 
-    def drop(self) -> None:
-        """Ends the connection without a closing handshake."""
-        self.transport.abort()
-
     def close_without_code(self) -> None:
         """Ends the connection with a closing frame that is empty: the peer sees 1005."""
         self.protocol.send_close()

@@ -49,8 +49,6 @@ class ServiceHost(RosContext, Protocol):
     dead_nodes: set[str]
     down: str | None
 
-    def end_node(self, node: str) -> None: ...
-
 
 class RosapiHost(TypeSource, Protocol):
     """Everything that rosapi reports on."""

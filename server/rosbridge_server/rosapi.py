@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fnmatch
 import json
-import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -16,9 +15,8 @@ from server.rosbridge_server.completion import stamp
 from server.rosbridge_server.graph import SOURCE, Topic
 from server.rosbridge_server.interface import RosapiHost
 from server.rosbridge_server.real.loader import Malformed, Unknown, load
-from server.rosbridge_server.typedefs import TIME_TYPEDEF, TypeNotDescribable, describe
+from server.rosbridge_server.typedefs import TIME_TYPEDEF, describe
 
-_WIDE = re.compile(r"^\s*wstring\b", re.MULTILINE)  # the real rosapi of ROS 2 ends on it
 BRIDGE_NODE = "/rosbridge_websocket"
 ROSAPI_NODE = "/rosapi"
 
@@ -103,9 +101,7 @@ class _Rosapi:
         return {"time": stamp(self._bridge.now(), self._version)}
 
     def ros_version(self, args: Json) -> Json:
-        if self._bridge.real.distro is None:
-            raise KeyError("ROS_DISTRO")
-        return {"version": 2, "distro": self._bridge.real.distro}
+        return {"version": 2, "distro": "humble"}
 
     def message_details(self, args: Json) -> Json:
         type = _text(args, "type")
@@ -121,10 +117,7 @@ class _Rosapi:
             raise
         definitions = self._bridge.types.definitions(loaded)
         assert definitions is not None
-        is_strict = self._bridge.like == "real"
-        if is_strict and self._version == 2 and _WIDE.search(self._bridge.types.text(loaded)):
-            raise TypeNotDescribable(f"{type} has a field that is not a valid type string")
-        return {"typedefs": describe(self._bridge.types.long_name(loaded), definitions, self._version, is_strict)}
+        return {"typedefs": describe(self._bridge.types.long_name(loaded), definitions, self._version)}
 
     def publishers(self, args: Json) -> Json:
         topic = self._topic(args)
@@ -139,8 +132,6 @@ class _Rosapi:
 
     def node_details(self, args: Json) -> Json:
         node = _text(args, "node")
-        if self._version == 2 and self._bridge.like == "real" and node not in self._nodes():
-            raise TypeError("cannot unpack non-iterable NoneType object")
         topics = self._bridge.graph.topics()
         return {
             "subscribing": [topic.name for topic in topics if topic.subscribers] if node == BRIDGE_NODE else [],
@@ -262,7 +253,7 @@ class _Rosapi:
         long = f"{package}/msg/{kind}{side}"
         definitions = dict(get_types_from_msg(text, long)) if text else {long: ([], [])}
         shown = f"{package}/{kind}{side}" if self._version == 1 else f"{package}/{kind}_{side}"
-        found = describe(long, definitions, self._version, self._bridge.like == "real")
+        found = describe(long, definitions, self._version)
         return {"typedefs": [{**found[0], "type": shown}, *found[1:]]}
 
 
@@ -277,7 +268,7 @@ _ATOMICS = {
     },
 }  # fmt: skip
 
-__all__ = ["BRIDGE_NODE", "ROSAPI_NODE", "TypeNotDescribable", "add_rosapi"]
+__all__ = ["BRIDGE_NODE", "ROSAPI_NODE", "add_rosapi"]
 
 
 def _text(args: Json, name: str) -> str:

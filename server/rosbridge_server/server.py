@@ -34,8 +34,8 @@ _SERVERS = {1: "AutobahnPython/22.7.1", 2: "TornadoServer/6.6.1"}
 class RosBridge:
     """Behaves as the rosbridge of `ros_version`; `now` is the ROS time of rosapi [s since 1970].
 
-    `like` "helpful" reports errors in `status` messages, and sends and survives what the real server loses or crashes
-    on; "real" imitates that server without its error messages, started with the options `real`.
+    `like` "helpful" reports errors in `status` messages, and sends what the real server loses; "real" imitates that
+    server without its error messages, started with the options `real`, but not where a client ends or silences it.
 
     Everything but start, stop, kill and revive is synchronous and belongs on the loop on which the bridge was started.
     """
@@ -130,6 +130,15 @@ class RosBridge:
     def thaw(self) -> None:
         """Resume after a freeze: read and send what was waiting."""
         self._listener.thaw()
+
+    def mute(self, topic: str) -> None:
+        """Passes no message of a topic on to the clients of a bridge like the real one, as if another program of the
+        bridge's took them all; see `unmute`."""
+        self.subscribers.mute(topic)
+
+    def unmute(self, topic: str) -> None:
+        """Those who subscribe from now on get its messages again. Subscriptions made before stay without."""
+        self.subscribers.unmute(topic)
 
     def message_type(self, name: str) -> str:
         """A message type's name as this ROS version spells it. Raises BadName."""

@@ -26,25 +26,17 @@ _CODES = {
 _FIRST_ADDRESS = 0x7F0000000000
 
 
-class TypeNotDescribable(Exception):
-    """A type that ends the real rosapi of ROS 2."""
-
-
-def describe(type: str, definitions: dict[str, Any], version: RosVersion, is_strict: bool = False) -> list[Json]:
-    """The type, then every type it contains, each once. `type` is spelled as rosbags does.
-
-    `is_strict`: raises TypeNotDescribable where the real one fails.
-    """
+def describe(type: str, definitions: dict[str, Any], version: RosVersion) -> list[Json]:
+    """The type, then every type it contains, each once. `type` is spelled as rosbags does."""
     found: dict[str, Json] = {}
-    _Description(definitions, version, is_strict=is_strict).add(type, found, 0)
+    _Description(definitions, version).add(type, found, 0)
     return list(found.values())
 
 
 class _Description:
-    def __init__(self, definitions: dict[str, Any], version: RosVersion, *, is_strict: bool) -> None:
+    def __init__(self, definitions: dict[str, Any], version: RosVersion) -> None:
         self._definitions = definitions
         self._version = version
-        self._is_strict = is_strict
         self._address = _FIRST_ADDRESS
 
     def add(self, type: str, found: dict[str, Json], depth: int) -> None:
@@ -57,8 +49,6 @@ class _Description:
         if type not in self._definitions:
             return
         rows = fields(type, self._definitions)
-        if self._is_strict and self._version == 2 and any(_ends_rosapi(row) for row in rows):
-            raise TypeNotDescribable(f"{name} has a field that is not a valid type string")
         constants = {
             constant: str(bytes((value,))) if self._version == 2 and kind == "byte" else _constant(value)
             for constant, kind, value in self._definitions[type][0]
@@ -155,7 +145,3 @@ def _slot(row: Field) -> str:
     else:
         kind = "BasicType"
     return kind
-
-
-def _ends_rosapi(row: Field) -> bool:
-    return bool(row.type == "wstring" or row.text_bound or (row.array == "sequence" and row.length))

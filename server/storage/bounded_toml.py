@@ -1,8 +1,7 @@
 """TOML from outside, refused before it is parsed where parsing it could take long.
 
-`tomllib` needs time that grows with the square of the number of parts in a dotted key: 64 kB can hold it for minutes.
-Within the bounds below, the slowest text that is known takes 30 ms (tests/server/security/test_toml.py), and the
-bounds themselves are counted in one pass.
+A small text can hold `tomllib` for minutes. Within the bounds below, the slowest text that is known takes 30 ms
+(tests/server/security/test_toml.py), and the bounds themselves are counted in one pass.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ async def fetch_topics(link: Asks) -> Offer | None:
 async def fetch_definitions(link: Asks, types: Collection[str], ros: RosVersion | None) -> dict[str, str]:
     """The type definitions known to the bridge, as .msg text. Raises LinkDown, or CallFailed without an answer.
 
-    `message_details` is called on ROS 1 only: on ROS 2 a type with a bounded array or a wstring crashes rosapi.
+    `message_details` is called on ROS 1 only: on ROS 2 it can end rosapi.
     """
     answer = await link.call("/rosapi/topics_and_raw_types", timeout_s=DEFINITIONS_WITHIN_S)
     found = {type: text for type, text in _texts(answer, ros).items() if type in types}

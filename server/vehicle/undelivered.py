@@ -1,7 +1,7 @@
 """Published topics that a bridge does not deliver, and the cause, by rosapi's list of subscribers.
 
-A topics_glob prevents the bridge from subscribing. After another client's cbor-raw subscription the bridge is
-subscribed, and we get no messages. The bridge reports neither. Pure: time is an argument.
+A topics_glob prevents the bridge from subscribing. Another client's subscription can take the messages: then the
+bridge is subscribed, and we get none. The bridge reports neither. Pure: time is an argument.
 """
 
 from __future__ import annotations

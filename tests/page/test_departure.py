@@ -25,7 +25,7 @@ critical_s = 20.0
 [limits.recording]
 automatic = 0.0
 """
-HOSTILE = "<img src=x onerror=alert`1`>"
+HOSTILE = "<img src=x onerror=alert(1)>"
 LIST = f"""item = [
   {{ id = "tyres", title = "Tyres and lamps" }},
   {{ id = "doors", title = "Boot and doors shut" }},

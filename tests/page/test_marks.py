@@ -21,7 +21,7 @@ from tests.page.barriers import fits, no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, free_port, running, server, simulate
 
-HOSTILE = "<img src=x onerror=alert`1`>"
+HOSTILE = "<img src=x onerror=alert(1)>"
 SLOW = "[limits.link_late]\nlate_s = 10.0\ncritical_s = 20.0\n"  # this machine is shared: that is not tested here
 pytestmark = pytest.mark.timeout(120)
 

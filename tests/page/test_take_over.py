@@ -17,7 +17,7 @@ from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.processes import Process, running, server, simulate
 
-HOSTILE = "<img src=x onerror=alert`1`> the car did not see the box"
+HOSTILE = "<img src=x onerror=alert(1)> the car did not see the box"
 SLOW = "[limits.link_late]\nlate_s = 10.0\ncritical_s = 20.0\n"  # this machine is shared: that is not tested here
 
 

@@ -138,9 +138,6 @@ class Wire:
         assert frame[0] in (0x81, 0x82), "a whole text or binary frame"
         self.frames.append(frame[head:].decode() if frame[0] == 0x81 else frame[head:])
 
-    def drop(self) -> None:
-        self.code = 1006
-
     def close_without_code(self) -> None:
         self.code = 1005
 

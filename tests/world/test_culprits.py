@@ -138,7 +138,7 @@ def test_a_topic_that_is_subscribed_and_does_not_come_is_blocked_by_a_neighbour(
     found = one.problem(BLOCKED_AFTER_S + 0.1)
     assert found is not None
     assert found.code == "topics_blocked"
-    assert "cbor-raw" in found.hint
+    assert "raw form" in found.hint
     one.follow([], 9.0)  # it came
     assert one.problem(9.0) is None
 

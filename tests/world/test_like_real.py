@@ -11,7 +11,7 @@ import pytest
 import websockets
 
 from server.cli import replay, simulate
-from server.rosbridge_server.server import RealOptions, RosBridge
+from server.rosbridge_server.server import RealOptions, RosBridge, ServiceFailed
 from server.simulator.service import CarService
 from tests.server.rosbridge_server.conftest import bridging
 
@@ -56,13 +56,6 @@ async def test_ros_1_reads_a_frame_over_ten_megabytes() -> None:
             assert (await answer_of(socket))["id"] == "t"
 
 
-async def test_ros_2_drops_a_connection_that_sends_bytes_which_are_no_text() -> None:
-    async with bridging(ros_version=2, like="real") as (_, port):
-        async with websockets.connect(f"ws://127.0.0.1:{port}") as socket:
-            await socket.send(b"\xff\xfe")
-            assert await end_of(socket) == 1006
-
-
 async def test_authenticate_closes_without_a_code_on_ros_1_and_does_nothing_on_ros_2() -> None:
     for ros in (1, 2):
         async with bridging(ros_version=ros, like="real", real=RealOptions(authenticate=True)) as (_, port):
@@ -95,12 +88,53 @@ async def test_a_killed_bridge_is_1006_and_refuses(ros: Any) -> None:
             await websockets.connect(f"ws://127.0.0.1:{port}")
 
 
-async def test_a_fragment_size_that_is_no_number_silences_the_connection() -> None:
+async def test_a_fragment_size_takes_answers_apart() -> None:
     async with bridging(like="real") as (_, port), websockets.connect(f"ws://127.0.0.1:{port}") as socket:
-        await socket.send(json.dumps({"op": "unsubscribe", "topic": "/x", "fragment_size": "x"}))
+        await socket.send(json.dumps({"op": "unsubscribe", "topic": "/x", "fragment_size": 60}))
         await socket.send(TIME)
-        with pytest.raises(TimeoutError):
-            await asyncio.wait_for(socket.recv(), 0.3)
+        pieces = [await answer_of(socket), await answer_of(socket)]
+        assert [one["op"] for one in pieces] == ["fragment"] * 2
+        assert len(pieces[0]["data"]) == 60
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+async def test_a_muted_topic_comes_to_those_who_subscribe_after_its_end(ros: Any) -> None:
+    word = {"op": "subscribe", "topic": "/word"}
+    async with bridging(ros_version=ros, like="real") as (bridge, port):
+        bridge.advertise("/word", bridge.message_type("std_msgs/String"))
+        async with websockets.connect(f"ws://127.0.0.1:{port}") as socket:
+            await socket.send(json.dumps(word))
+            await socket.send(TIME)
+            assert (await answer_of(socket))["id"] == "t"
+            bridge.publish("/word", {"data": "before"})
+            assert (await answer_of(socket))["msg"] == {"data": "before"}
+            bridge.mute("/word")
+            bridge.publish("/word", {"data": "while it is muted"})
+            bridge.unmute("/word")
+            bridge.publish("/word", {"data": "to an old subscription"})
+            await socket.send(json.dumps(word | {"op": "unsubscribe"}))
+            await socket.send(json.dumps(word))
+            await socket.send(TIME)
+            assert (await answer_of(socket))["id"] == "t"
+            bridge.publish("/word", {"data": "after"})
+            assert (await answer_of(socket))["msg"] == {"data": "after"}
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+async def test_a_question_that_fails_is_answered_and_the_next_too(ros: Any) -> None:
+    """Whatever a service raises is said to the caller; the services of its node stay."""
+    async with bridging(ros_version=ros, like="real") as (bridge, port):
+
+        def says_no(_: Any) -> Any:
+            raise ServiceFailed("no")
+
+        bridge.add_service("/car/no", bridge.message_type("std_srvs/Trigger"), says_no, node="/rosapi", request="")
+        async with websockets.connect(f"ws://127.0.0.1:{port}") as socket:
+            await socket.send(json.dumps({"op": "call_service", "service": "/car/no", "id": "n"}))
+            answer = await answer_of(socket)
+            assert (answer["id"], answer["result"]) == ("n", False)
+            await socket.send(TIME)
+            assert (await answer_of(socket))["result"] is True
 
 
 @pytest.mark.parametrize(("like", "statuses"), [("real", 0), ("helpful", 3)])

@@ -198,7 +198,7 @@ class _Writer:
 
     def _list(self, item: Any, count: str, depth: int) -> str:
         items = self._new_name()
-        self._write(f"if {count} > size: raise ValueError")  # a damaged length would loop for ever
+        self._write(f"if {count} > size: raise ValueError")  # a damaged length
         self._write(f"{items} = []")
         self._write(f"for _ in range({count}):")
         outer, self._indent = self._indent, self._indent + " "

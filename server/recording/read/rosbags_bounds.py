@@ -1,8 +1,7 @@
 """Bounds the rosbags library for files from elsewhere.
 
-The library unpacks whatever it is given, and reads YAML whose references can multiply without end. It has no options
-for either, so its own functions are replaced here. What a bag of ROS 2 says of quality of service and cannot be read
-within bounds is not known.
+The library bounds neither what it unpacks nor what it reads as YAML. It has no options for that, so its own functions
+are replaced here. What a bag of ROS 2 says of quality of service and cannot be read within bounds is not known.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ MOST_QOS = 64 << 10  # letters of the quality of service of one topic
 DEEPEST = 30
 MOST_ENTRIES = 100_000
 LEAVE_FREE = 1 << 30  # bytes of the disk with the temporary files
-_LOOK_EVERY = 32 << 20  # bytes unpacked between two checks of the disk
+LOOK_EVERY = 32 << 20  # bytes unpacked between two checks of the disk
 
 
 def install() -> None:
@@ -104,7 +103,7 @@ class _OntoDisk:
         data = bytes(self._stream.read(size))
         self._look_in -= len(data)
         if self._look_in < 0:
-            self._look_in = _LOOK_EVERY
+            self._look_in = LOOK_EVERY
             free = space.free_at(Path(tempfile.gettempdir()))
             if free < self._leave_free:
                 raise RecordingUnreadable(

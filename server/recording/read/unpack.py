@@ -1,4 +1,4 @@
-"""Unpacks one part of a recording, and never more of it than fits: a few kilobytes can unpack to many gigabytes."""
+"""Unpacks one part of a recording, and never more of it than fits."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from rosbags.typesys import get_types_from_msg
 from server.judge.ros_names import BadName
 from server.rosbridge_server.completion import zero
 from server.rosbridge_server.interface import ServiceHost
-from server.rosbridge_server.real.convert import Converter, Unfit, UnpackableMessage
+from server.rosbridge_server.real.convert import Converter, Unfit
 from server.rosbridge_server.real.shape import fields
 from server.rosbridge_server.services import Service
 
@@ -25,7 +25,7 @@ class Failure(Exception):
 
 
 class NoAnswer(Exception):
-    """The service's node has died with the call: the caller waits for ever."""
+    """The service's node was killed: the caller waits for ever."""
 
 
 async def call(bridge: ServiceHost, name: str, args: Any) -> Any:
@@ -50,9 +50,6 @@ async def call(bridge: ServiceHost, name: str, args: Any) -> Any:
     except asyncio.CancelledError:
         raise
     except Exception as error:  # whatever a node's handler raises
-        if bridge.ros_version == 2:
-            bridge.end_node(service.node)
-            raise NoAnswer from None
         text = f"error processing request: {error}".encode()
         raise Failure(f"service [{full}] responded with an error: {text!r}") from None
 
@@ -85,6 +82,6 @@ def _request(bridge: ServiceHost, service: Service, args: Any) -> dict[str, Any]
     converter = Converter(long, definitions, bridge.ros_version, bridge.now, root=f"{package}/{kind}{suffix}")
     try:
         found = converter.message(given)
-    except (Unfit, UnpackableMessage) as error:
+    except Unfit as error:
         raise Failure(str(error)) from None
     return {field.name: found.get(field.name, zero(field.type)) for field in fields(long, definitions)}

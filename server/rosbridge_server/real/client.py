@@ -19,7 +19,6 @@ from server.rosbridge_server.real import text as writing
 from server.rosbridge_server.real.calls import Failure, NoAnswer, call
 from server.rosbridge_server.real.client_topics import ClientTopics
 from server.rosbridge_server.real.fragments import RealFragments
-from server.rosbridge_server.real.intake import Intake, ReaderEnded
 from server.rosbridge_server.real.operation_fields import CALL, check
 from server.rosbridge_server.real.options import is_open
 from server.rosbridge_server.real.provider import Providers
@@ -45,9 +44,9 @@ class RealClient:
         self._connection = connection
         self._outbox = Outbox(connection, bridge.counters, limit_bytes=BACKLOG_BYTES)
         self._lane = Lane(0)
-        self._intake = Intake()
-        self._is_deaf = False
-        self._fragment_size: Any = bridge.real.max_message_bytes or (DEFAULT_BYTES if bridge.ros_version == 2 else None)
+        self._fragment_size: int | None = bridge.real.max_message_bytes or (
+            DEFAULT_BYTES if bridge.ros_version == 2 else None
+        )
         self._topics = ClientTopics(bridge, self.send)
         self._providers = Providers(bridge, self.send)
         self._calls: set[asyncio.Task[None]] = set()
@@ -91,40 +90,29 @@ class RealClient:
         if self._bridge.ros_version == 2 and len(raw if isinstance(raw, bytes) else raw.encode()) > limit:
             return False
         if isinstance(raw, bytes):
-            if self._bridge.ros_version == 1:
-                raw = str(raw)  # as Python shows bytes; JSON in it is found between its brackets
-            else:
-                try:
-                    raw = raw.decode()
-                except UnicodeDecodeError:
-                    self._connection.drop()
-                    return True
+            try:
+                raw = raw.decode()
+            except UnicodeDecodeError:
+                return True
         if self._bridge.ros_version == 1 and self._bridge.real.authenticate and self._refuses(raw):
             return True
         self.incoming(raw)
         return True
 
     def incoming(self, text: str) -> None:
-        """Execute the complete operations of the text."""
-        if self._is_deaf:
-            return
+        """Execute the operation of the text. Any other text is passed over; the real bridge may stop at it."""
         if self._blocking is not None:
             self._waiting.append(text)
             return
-        self._intake.add(text)
         try:
-            while True:
-                operation = self._intake.next()
-                if operation is None or not self._do(operation) or not self._intake.has_more():
-                    return
-        except ReaderEnded as why:
-            _log.debug("client stopped receiving: error=%s", why)
-            self._is_deaf = True
+            operation = json.loads(text)
+        except (ValueError, RecursionError):
+            return
+        if isinstance(operation, dict):
+            self._do(operation)
 
     def send(self, message: Any) -> None:
         """Sends an object as JSON, in fragments where it is long, or the bytes of a binary frame."""
-        if self._fragment_size is not None and not isinstance(self._fragment_size, int | float):
-            return  # the real one fails at the comparison, at every message from then on
         if isinstance(message, bytes):
             if self._fragment_size is None or len(message) <= self._fragment_size:  # else the real one fails
                 self._outbox.send(self._lane, binary_frame(message))
@@ -136,10 +124,9 @@ class RealClient:
         if self._fragment_size is None or len(text) <= self._fragment_size:
             self._write(text)
             return
-        if isinstance(self._fragment_size, int) and self._fragment_size > 0:
-            id = message.get("id")
-            for piece in writing.fragments(text, self._fragment_size, 0 if id is None else id):
-                self._write(writing.dumps(piece, self._bridge.ros_version))
+        id = message.get("id")
+        for piece in writing.fragments(text, self._fragment_size, 0 if id is None else id):
+            self._write(writing.dumps(piece, self._bridge.ros_version))
 
     def leave(self) -> None:
         """The client is gone. Its publishers stay a while."""
@@ -153,23 +140,18 @@ class RealClient:
     def _write(self, text: str) -> None:
         self._outbox.send(self._lane, text_frame(text.encode("utf-8", "surrogatepass")))
 
-    def _do(self, operation: dict[str, Any]) -> bool:
-        """Execute one operation; False if the real bridge stops reading the rest. Raises ReaderEnded."""
+    def _do(self, operation: dict[str, Any]) -> None:
         op = operation.get("op")
-        if isinstance(op, dict | list):
-            raise ReaderEnded(f"unhashable type: {type(op).__name__!r}")
         handler = self._operations.get(op) if isinstance(op, str) else None
         if handler is None:
-            return False
-        if "fragment_size" in operation:
-            self._fragment_size = operation["fragment_size"]
-        if "png" in operation and "msg" not in operation:
-            raise ReaderEnded("'msg'")
+            return
+        size = operation.get("fragment_size")
+        if type(size) is int and size > 0:
+            self._fragment_size = size
         try:
             handler(operation, operation.get("id"))
         except Exception as why:  # the real bridge only logs it
             _log.debug("%s: %s", op, why)
-        return True
 
     def _refuses(self, raw: str) -> bool:
         """A bridge with authenticate:=true closes on any JSON that is no auth; auth itself is no operation here."""

@@ -1,4 +1,4 @@
-"""What the real bridge makes of a message from a client: a ROS message, nothing, or the end of the topic."""
+"""What the real bridge makes of a message from a client: a ROS message, or nothing."""
 
 from __future__ import annotations
 
@@ -19,11 +19,7 @@ _PYTHON = {"bool": ("bool",), "int": tuple(INTEGERS), "float": tuple(FLOATS), "s
 
 
 class Unfit(Exception):
-    """The message is not of its type: the real bridge drops it. The text is the real one."""
-
-
-class UnpackableMessage(Exception):
-    """The message is of its type and cannot be packed: in ROS 1 this ends its topic."""
+    """The message is not of its type, or cannot be packed: it is dropped. The text is the real one."""
 
 
 class Converter:
@@ -39,9 +35,8 @@ class Converter:
         self._root = root or shown(type, version)
 
     def message(self, given: Any) -> dict[str, Any]:
-        """The whole message. Raises Unfit and, in ROS 1, UnpackableMessage."""
-        message = self._object(self._type, given, ())
-        return message
+        """The whole message. Raises Unfit."""
+        return self._object(self._type, given, ())
 
     def _object(self, type: str, given: Any, path: tuple[str, ...]) -> dict[str, Any]:
         if not isinstance(given, dict):
@@ -71,7 +66,7 @@ class Converter:
             return self._numbers(field, given)
         values = [self._item(field.item(), value, path, None) for value in given]
         if field.array == "fixed" and len(values) != field.length:
-            raise self._unpackable(f"{field.length} values, not {len(values)}")
+            raise Unfit(f"{field.length} values, not {len(values)}")
         return values
 
     def _item(self, field: Field, given: Any, path: tuple[str, ...], before: dict[str, int] | None) -> Any:
@@ -101,7 +96,7 @@ class Converter:
             try:
                 given.encode()
             except UnicodeEncodeError as error:
-                raise self._unpackable(str(error)) from None
+                raise Unfit(str(error)) from None
             return given
         if field.is_float:
             value = _float(given)
@@ -109,7 +104,7 @@ class Converter:
                 with np.errstate(over="ignore"):
                     short = float(np.float32(value))
                 if self._version == 1 and math.isinf(short) and not math.isinf(value):
-                    raise UnpackableMessage("float too large to pack with f format")
+                    raise Unfit("float too large to pack with f format")
                 return short
             return value
         return given if field.type == "bool" else self._integer(field, given, is_alone=is_alone)
@@ -120,7 +115,7 @@ class Converter:
         if isinstance(given, int) and int(limits.min) <= given <= int(limits.max):
             return int(given)
         if self._version == 1:
-            raise UnpackableMessage(f"{field.name} does not fit into {field.type}")
+            raise Unfit(f"{field.name} does not fit into {field.type}")
         if not isinstance(given, int) or not -(2**63) <= given < (2**64 if code.kind == "u" else 2**63):
             raise Unfit(f"{field.name} does not fit into {field.type}")
         if code.kind == "u" and given < 0:
@@ -152,13 +147,13 @@ class Converter:
             try:
                 data = base64.b64decode(given)
             except (binascii.Error, ValueError) as error:
-                raise self._unpackable(str(error)) from None
+                raise Unfit(str(error)) from None
         elif isinstance(given, list):
             if not all(isinstance(value, int) and 0 <= value <= 255 for value in given):
-                raise self._unpackable("ubyte format requires 0 <= number <= 255")
+                raise Unfit("ubyte format requires 0 <= number <= 255")
             data = bytes(given)
         else:
-            raise self._unpackable(f"{type(given).__name__} is no bytes")
+            raise Unfit(f"{type(given).__name__} is no bytes")
         if field.array == "fixed" and len(data) != field.length:
             if self._version == 2:
                 raise Unfit(f"{field.length} bytes, not {len(data)}")
@@ -184,7 +179,7 @@ class Converter:
         for name, lowest, highest in ((names[0], low, high), (names[1], rest_low, rest_high)):
             value = result[name]
             if isinstance(value, bool) or not isinstance(value, int) or not lowest <= value <= highest:
-                raise self._unpackable("argument out of range")
+                raise Unfit("argument out of range")
         return result
 
     def _zero(self, field: Field) -> Any:
@@ -202,9 +197,6 @@ class Converter:
             }
         return zero(field.type)
 
-    def _unpackable(self, text: str) -> Exception:
-        return UnpackableMessage(text) if self._version == 1 else Unfit(text)
-
     def _mismatch(self, expected: str, path: tuple[str, ...], given: Any) -> Unfit:
         if expected == self._root:
             return Unfit(f"Expected a JSON object for type {self._root} but received a {type(given)}")
@@ -216,7 +208,7 @@ def _float(value: Any) -> float:
     try:
         return float(value)
     except OverflowError:
-        raise UnpackableMessage("int too large to convert to float") from None
+        raise Unfit("int too large to convert to float") from None
 
 
 def _split(at_s: float) -> dict[str, int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-MOST_MESSAGES = 64  # unfinished, for all clients together; the real bridge keeps any number for ten minutes
+MOST_MESSAGES = 64  # unfinished, for all clients together
 
 
 class RealFragments:

@@ -19,7 +19,6 @@ class RealOptions:
     rosapi_params_glob: tuple[str, ...] = ()
     authenticate: bool = False  # ROS 1 only; without a rosauth node every login fails
     max_message_bytes: int | None = None  # None: no limit in ROS 1, 10 MB in ROS 2
-    distro: str | None = "humble"  # ROS_DISTRO of ROS 2's rosapi; without it get_ros_version ends rosapi
 
 
 def is_open(name: str, globs: tuple[str, ...]) -> bool:

@@ -1,4 +1,4 @@
-"""The ROS publishers that a real bridge keeps for its clients: shared, kept ten seconds, and in ROS 1 easily ended."""
+"""The ROS publishers that a real bridge keeps for its clients: shared, and kept ten seconds."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from server.judge.ros_names import canonical_name
 from server.rosbridge_server.graph import Topic
 from server.rosbridge_server.interface import TopicHost
-from server.rosbridge_server.real.convert import Converter, UnpackableMessage
+from server.rosbridge_server.real.convert import Converter
 from server.rosbridge_server.real.loader import load
 from server.rosbridge_server.real.subscribers import Conflict
 
@@ -25,7 +25,6 @@ class RosPublisher:
         self.latches = latches
         self.clients: set[object] = set()
         self.count = 0
-        self.is_poisoned = False  # something that could not be packed: nothing leaves any more
 
 
 class Publishers:
@@ -59,7 +58,7 @@ class Publishers:
         self._timers[spelling] = asyncio.get_running_loop().call_later(KEPT_S, self._end, spelling)
 
     def publish(self, client: object, spelling: str, given: Any, *, latches: bool) -> None:
-        """Raises Conflict, Unfit and UnpackableMessage: what the real bridge only writes to its log."""
+        """Raises Conflict and Unfit: what the real bridge only writes to its log."""
         self.register(client, spelling, None, latches=latches)
         found = self._found[spelling]
         definitions = self._bridge.types.definitions(found.type)
@@ -69,16 +68,10 @@ class Publishers:
             long = self._bridge.types.long_name(found.type)
             converter = Converter(long, definitions, self._bridge.ros_version, self._bridge.now)
             found.count += 1
-            try:
-                message = converter.message(given)
-            except UnpackableMessage:
-                found.is_poisoned = True
-                raise
+            message = converter.message(given)
             header = message.get("header")
             if self._bridge.ros_version == 1 and isinstance(header, dict) and "seq" in header:
                 header["seq"] = found.count
-        if found.is_poisoned:
-            return
         self._bridge.deliver(found.topic, found.type, message, latches=found.latches)
 
     def close(self) -> None:

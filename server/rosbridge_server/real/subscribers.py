@@ -16,7 +16,7 @@ from server.rosbridge_server.real.shape import Lost
 class Listening(Protocol):
     """One client's subscription to one topic."""
 
-    def on_message(self, message: RealOutgoing, *, is_raw: bool) -> None: ...
+    def on_message(self, message: RealOutgoing) -> None: ...
 
 
 class Conflict(Exception):
@@ -24,19 +24,20 @@ class Conflict(Exception):
 
 
 class RosSubscriber:
-    """Accept messages of one type, or of any if a client requested raw bytes first."""
+    """Accepts messages of one type. One that is muted passes nothing on, for as long as it lives."""
 
-    def __init__(self, topic: Topic, type: str | None) -> None:
+    def __init__(self, topic: Topic, type: str | None, *, is_muted: bool = False) -> None:
         self.topic = topic
-        self.type = type  # None: raw
+        self.type = type  # None: any
+        self.is_muted = is_muted
         self.clients: list[Listening] = []
 
     def offer(self, message: Outgoing) -> None:
-        if not isinstance(message, RealOutgoing) or self.type not in (None, message.type):
+        if self.is_muted or not isinstance(message, RealOutgoing) or self.type not in (None, message.type):
             return
         for client in list(self.clients):
             try:
-                client.on_message(message, is_raw=self.type is None)
+                client.on_message(message)
             except Lost:  # the real bridge writes a line to its log
                 continue
 
@@ -50,6 +51,17 @@ class Subscribers:
     def __init__(self, bridge: TopicHost) -> None:
         self._bridge = bridge
         self._found: dict[str, RosSubscriber] = {}
+        self._muted: set[str] = set()
+
+    def mute(self, topic: str) -> None:
+        """Clients of this topic get no messages from now on."""
+        self._muted.add(topic)
+        for found in self._found.values():
+            found.is_muted |= found.topic.name == topic
+
+    def unmute(self, topic: str) -> None:
+        """Whoever subscribes from now on gets messages; the subscriptions made while it was muted stay without."""
+        self._muted.discard(topic)
 
     def subscribe(self, spelling: str, client: Listening, type: str | None, *, is_raw: bool) -> None:
         """Raises Conflict, BadName and what the loader raises."""
@@ -58,7 +70,7 @@ class Subscribers:
             found = self._found[spelling] = self._make(spelling, type, is_raw=is_raw)
         elif self._bridge.ros_version == 2 and client not in found.clients:
             found.clients.append(client)  # before its type is looked at, as there
-        if type is not None and not is_raw:
+        if type is not None and found.type is not None:
             wanted = load(self._bridge, type)
             if found.type != wanted:
                 raise Conflict(
@@ -90,24 +102,21 @@ class Subscribers:
         known = self._bridge.known_type(full)
         if type is None and known is None and not (is_raw and self._bridge.ros_version == 1):
             raise Conflict(f"Cannot infer topic type for topic {spelling} as it is not yet advertised")
-        wanted: str | None = None
-        if not is_raw or self._bridge.ros_version == 2:
-            wanted = known if type is None else load(self._bridge, type)
-            if known is not None and known != wanted:
-                raise Conflict(
-                    f"Tried to register topic {spelling} with type {wanted} "
-                    f"but it is already established with type {known}"
-                )
+        wanted = known if type is None else load(self._bridge, type)
+        if known is not None and known != wanted:
+            raise Conflict(
+                f"Tried to register topic {spelling} with type {wanted} but it is already established with type {known}"
+            )
         topic = self._bridge.graph.find_or_make(full, wanted)
-        found = RosSubscriber(topic, None if is_raw else wanted)
+        found = RosSubscriber(topic, wanted, is_muted=full in self._muted)
         topic.subscribers[found] = found
         self._bridge.note_type(full, wanted)
         return found
 
     def _show_latched(self, found: RosSubscriber, client: Listening) -> None:
         latched = found.topic.latched
-        if isinstance(latched, RealOutgoing) and found.type in (None, latched.type):
+        if isinstance(latched, RealOutgoing) and not found.is_muted and found.type in (None, latched.type):
             try:
-                client.on_message(latched, is_raw=found.type is None)
+                client.on_message(latched)
             except Lost:
                 return

@@ -34,7 +34,7 @@ class RealSubscription:
         self._queue_length = 0
         self._compression = "none"
         self._last_at = -1e9
-        self._queue: deque[tuple[RealOutgoing, bool]] = deque()
+        self._queue: deque[RealOutgoing] = deque()
         self._timer: asyncio.TimerHandle | None = None
 
     def settle(self) -> None:
@@ -48,17 +48,17 @@ class RealSubscription:
         strongest = (name for name in ("cbor-raw", "cbor", "png") if name in compressions)
         self._compression = next(strongest, "none")
 
-    def on_message(self, message: RealOutgoing, *, is_raw: bool) -> None:
+    def on_message(self, message: RealOutgoing) -> None:
         """Sends, queues or leaves out a message. Raises Lost."""
         now = asyncio.get_running_loop().time()
         if self._throttle_s <= 0:
-            self._write(message, is_raw=is_raw)
+            self._write(message)
         elif self._queue_length <= 0:
             if now >= self._last_at + self._throttle_s:
                 self._last_at = now
-                self._write(message, is_raw=is_raw)
+                self._write(message)
         else:
-            self._queue.append((message, is_raw))
+            self._queue.append(message)
             while len(self._queue) > self._queue_length:
                 self._queue.popleft()
             if self._timer is None:
@@ -78,18 +78,16 @@ class RealSubscription:
             self._timer = loop.call_at(due, self._release)
             return
         if self._queue:
-            message, is_raw = self._queue.popleft()
+            message = self._queue.popleft()
             self._last_at = loop.time()
             try:
-                self._write(message, is_raw=is_raw)
+                self._write(message)
             except Lost:
                 pass
             if self._queue:
                 self._timer = loop.call_at(self._last_at + self._throttle_s, self._release)
 
-    def _write(self, message: RealOutgoing, *, is_raw: bool) -> None:
-        if (self._compression == "cbor-raw") != is_raw:
-            raise Lost("the bytes of a message and its fields are never both there")
+    def _write(self, message: RealOutgoing) -> None:
         if self._compression == "cbor-raw":
             self._send(message.raw_frame(self._spelling))
         elif self._compression == "cbor":

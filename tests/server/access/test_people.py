@@ -21,7 +21,7 @@ from tests.server.access.pairs import keyed, paired_server
 from tests.server.conftest import serving
 from tests.server.viewer import Viewer, viewer
 
-HOSTILE = ["<script>alert`1`</script>", "'; DROP TABLE--", "A\u202eB", "\U0001d56c. \U0001d576.", "{{7*7}}", "名前"]
+HOSTILE = ["<script>owned=1</script>", "'; DROP TABLE--", "A\u202eB", "\U0001d56c. \U0001d576.", "{{7*7}}", "名前"]
 DATA_FOLDER_FILES = ("people/people.toml", "people/duty.toml")
 
 

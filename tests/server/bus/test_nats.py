@@ -171,7 +171,7 @@ async def test_a_broker_that_is_killed_loses_and_doubles_no_event() -> None:
         assert {one["what"] for one in both.commands} == {"again"}
 
 
-@pytest.mark.parametrize("body", [b"", b"\xff\xfe", b"[]", b'{"run": 1}', b"{" * 100_000, b'{"events": [{"n": "x"}]}'])
+@pytest.mark.parametrize("body", [b"", b"\xff\xfe", b"[]", b'{"run": 1}', b"{" * 200, b'{"events": [{"n": "x"}]}'])
 async def test_nonsense_harms_neither_side(body: bytes) -> None:
     async with running_broker() as broker, nats_buses(broker.address, broker.address) as both:
         async with connected(broker.address) as stranger:

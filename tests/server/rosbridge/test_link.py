@@ -33,7 +33,7 @@ ROWS = [
         "topic": "/vel",
         "type": "geometry_msgs/Twist",
         "compression": "none",
-        "throttle_rate": 1,  # a queue without a throttle deafens ROS 2's rosbridge when its client goes
+        "throttle_rate": 1,  # never 0 with a queue
         "queue_length": 50,
     },
     {

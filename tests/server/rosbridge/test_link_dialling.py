@@ -231,9 +231,7 @@ async def test_no_such_host() -> None:
         assert (await ear.hears("failed")).code in ("no_such_host", "no_lookup")  # where no name server answers
 
 
-@pytest.mark.parametrize(
-    "typed", ["169.254.169.254", "2852039166:80", "[::ffff:169.254.169.254]", "0.0.0.0", "[ff02::1]"]
-)
+@pytest.mark.parametrize("typed", ["169.254.169.254", "3758096385:80", "[::ffff:224.0.0.1]", "0.0.0.0", "[ff02::1]"])
 @on_both_loops
 async def test_what_is_never_dialled_is_not(typed: str) -> None:
     ear = Ear()

@@ -16,6 +16,8 @@ import cbor2
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import ServerConnection, serve
 
+from server.rosbridge.codec import MAX_CONTAINERS, MAX_ELEMENTS, MAX_SLOW_ELEMENTS
+
 OTHER, JUDGED = "/heavy", "/diagnostics"
 TOPICS = {
     "/catvehicle/vel": "geometry_msgs/Twist",
@@ -32,17 +34,16 @@ def _cbor(topic: str, body: bytes) -> bytes:
     return b"\xa3" + b"".join(cbor2.dumps(text) for text in ("op", "publish", "topic", topic, "msg")) + body
 
 
-MESSAGES = {
-    "objects": lambda topic: _json(topic, "[" + ",".join(['{"a":1.5}'] * 1_400_000) + "]"),
-    "nests": lambda topic: _json(topic, "[" + ",".join(["[[[[[]]]]]"] * 1_000_000) + "]"),
-    "numbers": lambda topic: _json(topic, "[" + ",".join(["1.25"] * 2_500_000) + "]"),
-    "texts": lambda topic: _json(topic, "[" + ",".join(['"a"'] * 2_500_000) + "]"),
-    "nan": lambda topic: _json(topic, "[" + ",".join(["NaN"] * 2_500_000) + "]"),
-    "cbor lists": lambda topic: _cbor(topic, b"\xa1\x61a\x9a" + (10_000_000).to_bytes(4, "big") + b"\x80" * 10_000_000),
-    "cbor tags": lambda topic: _cbor(
-        topic, b"\xa1\x61a\x9a" + (5_000_000).to_bytes(4, "big") + b"\xd8\x55\x40" * 5_000_000
-    ),
-    "cbor promise": lambda topic: _cbor(topic, b"\xa1\x61a\x9b" + b"\x00\x00\xff" * 3_000_000),
+PARTS, ELEMENTS, SLOW = MAX_CONTAINERS + 1, MAX_ELEMENTS + 2, MAX_SLOW_ELEMENTS + 2
+MESSAGES = {  # a little beyond a bound
+    "objects": lambda topic: _json(topic, "[" + ",".join(['{"a":1.5}'] * PARTS) + "]"),
+    "nests": lambda topic: _json(topic, "[" + ",".join(["[[[[[]]]]]"] * (PARTS // 5 + 1)) + "]"),
+    "numbers": lambda topic: _json(topic, "[" + ",".join(["1.25"] * ELEMENTS) + "]"),
+    "texts": lambda topic: _json(topic, "[" + ",".join(['"a"'] * ELEMENTS) + "]"),
+    "nan": lambda topic: _json(topic, "[" + ",".join(["NaN"] * SLOW) + "]"),
+    "cbor lists": lambda topic: _cbor(topic, cbor2.dumps({"a": [[]] * PARTS})),
+    "cbor tags": lambda topic: _cbor(topic, cbor2.dumps({"a": [cbor2.CBORTag(85, b"")] * SLOW})),
+    "cbor cut off": lambda topic: _cbor(topic, cbor2.dumps({"a": [0.5] * 1000})[:-1]),
 }
 
 

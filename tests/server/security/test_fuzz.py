@@ -239,7 +239,7 @@ def _value(chance: random.Random, depth: int = 0) -> Any:
                     "../../etc/passwd",
                     "<script>alert(1)</script>",
                     "'; DROP TABLE events; --",
-                    "${jndi:ldap://x}",
+                    "${x}",
                     "%s%n",
                     "speed_limit",
                 ]

@@ -1,4 +1,4 @@
-"""A message of millions of parts, on a topic that is judged or only recorded, holds nothing up and costs no link."""
+"""A message beyond what is parsed, on a topic that is judged or only recorded, holds nothing up and costs no link."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def test_what_is_too_much_is_counted_before_it_is_parsed() -> None:
         with pytest.raises(Unreadable) as caught:
             decode(payload, is_binary=isinstance(made, bytes))
         assert time.thread_time() - began_s < 0.3, name
-        assert isinstance(caught.value, TooManyParts) or name == "cbor promise"
+        assert isinstance(caught.value, TooManyParts) or name == "cbor cut off"
 
 
 @pytest.mark.parametrize(

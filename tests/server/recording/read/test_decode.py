@@ -199,7 +199,7 @@ def test_types_that_cannot_be_read_say_why(definitions: dict[str, Any], why: str
 
 
 def test_a_definition_cannot_smuggle_in_code() -> None:
-    name = "x'] or __import__('os').abort() or v['"
+    name = "x'] or 1 / 0 or v['"
     decode = compile_decoder("a/msg/B", {"a/msg/B": ([], [(name, (Nodetype.BASE, ("uint8", 0)))])}, 1)
     assert decode(b"\x07") == {name: 7}
 
@@ -211,10 +211,10 @@ def test_other_encodings_are_named() -> None:
             decode(raw)
 
 
-def test_an_endless_list_of_nothing_ends() -> None:
+def test_a_list_that_is_longer_than_what_is_left_is_refused() -> None:
     definitions = {
         "a/msg/B": ([], [("voids", (Nodetype.SEQUENCE, ((Nodetype.NAME, "a/msg/Void"), 0)))]),
         "a/msg/Void": ([], []),
     }
     with pytest.raises(Undecodable):
-        compile_decoder("a/msg/B", definitions, 1)(b"\xff\xff\xff\xff")
+        compile_decoder("a/msg/B", definitions, 1)(b"\5\0\0\0")

@@ -148,7 +148,7 @@ BAD_HOSTS = [
     "user@localhost",
     "localhost/evil",
     "127.0.0.1 evil",
-    "2130706433",
+    "134744072",
 ]
 
 

@@ -1,4 +1,4 @@
-"""Recordings of some kilobytes that unpack to gigabytes, or say that they do. Written by hand: no writer makes them."""
+"""Recordings with one packed part, whose size need not be the one that they say. Written by hand."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def mcap(
     magic, packed, claimed = b"\x89MCAP0\r\n", zeros(kind, size), size if says is None else says
     times = struct.pack("<QQ", TIME_NS, TIME_NS + 10**9)
     chunk = _record(6, times + struct.pack("<QI", claimed, 0) + _text(kind) + struct.pack("<Q", len(packed)) + packed)
-    written = magic + _record(1, _text(profile) + _text("a bomb"))
+    written = magic + _record(1, _text(profile) + _text("by hand"))
     at = len(written)
     written += chunk
     index_at = len(written)
