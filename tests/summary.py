@@ -43,7 +43,7 @@ class StageResult:
 
     @property
     def failed_once(self) -> dict[str, str]:
-        """The failed tests that may have failed by chance: no crash of the worker, no timeout, none that never ended."""
+        """The failed tests that may have failed by chance: no crash, no timeout, none that never ended."""
         return {
             name: why
             for name, why in self.failed.items()

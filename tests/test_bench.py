@@ -35,6 +35,7 @@ def started_since(before: list[psutil.Process]) -> list[psutil.Process]:
     return [one for one in psutil.Process().children() if one not in before]
 
 
+@pytest.mark.field
 @pytest.mark.slow
 def test_a_run_has_a_figure_for_each_way_and_leaves_nothing_running(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -50,6 +51,7 @@ def test_a_run_has_a_figure_for_each_way_and_leaves_nothing_running(
         assert 0 < p50[way] <= p99[way] <= longest[way] < 5000
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.world(n=25)
 def test_the_growth_of_the_servers_memory_has_a_row(tmp_path: Path) -> None:
@@ -61,6 +63,7 @@ def test_the_growth_of_the_servers_memory_has_a_row(tmp_path: Path) -> None:
     assert used["catgraph"] > 20
 
 
+@pytest.mark.field
 @pytest.mark.slow
 def test_the_stalls_of_the_event_loop_have_a_row(tmp_path: Path) -> None:
     found = tmp_path / "found.json"
@@ -71,6 +74,7 @@ def test_the_stalls_of_the_event_loop_have_a_row(tmp_path: Path) -> None:
     assert 0 < p99["catgraph"] <= longest["catgraph"]
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.timeout(300)  # it starts ten processes, one after the other
 def test_cars_and_pages_of_a_fleet_have_rows_and_nothing_is_left_running(tmp_path: Path) -> None:
@@ -100,6 +104,7 @@ def test_a_line_goes_through_points_of_several_counts_and_tells_how_far_it_is_of
     assert fitted([((x,), y) for x, y in ((0.0, 1.0), (1.0, 3.0), (2.0, 1.0), (3.0, 3.0))]).residual > 0.5
 
 
+@pytest.mark.field
 def test_a_process_is_measured_by_its_own_work() -> None:
     busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
     idle = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
@@ -123,6 +128,7 @@ def test_a_program_that_does_not_start_says_why_and_leaves_nothing() -> None:
     assert started_since(before) == []
 
 
+@pytest.mark.field
 async def test_a_stall_of_the_event_loop_is_seen() -> None:
     lag = LoopLag()
     await lag.begin()
@@ -160,6 +166,7 @@ def test_a_slope_is_that_of_the_whole_time_and_not_of_one_step() -> None:
     assert growth_mb_an_hour(one_step) < 1.5 * 3.6
 
 
+@pytest.mark.field
 @pytest.mark.slow
 def test_a_process_that_fails_says_why_and_none_is_left() -> None:
     before = psutil.Process().children()
@@ -177,6 +184,7 @@ def test_a_process_that_does_not_start_says_why() -> None:
     assert started_since(before) == []
 
 
+@pytest.mark.field
 def test_commands_are_timed_as_they_come_to_the_port_and_nothing_else_is() -> None:
     """Short and long frames of a real client; another topic and another port are none of ours."""
     with serve(lambda one: list(one), "127.0.0.1", 0) as bridge, serve(lambda one: list(one), "127.0.0.1", 0) as other:

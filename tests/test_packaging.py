@@ -103,6 +103,7 @@ def test_the_commands_of_the_readme_exist(capsys: pytest.CaptureFixture[str]) ->
         assert re.search(rf"^ +{command} ", commands, re.M), command
 
 
+@pytest.mark.field
 @pytest.mark.slow
 def test_the_wheel_carries_the_page(tmp_path: Path) -> None:
     copy = tmp_path / "catgraph"

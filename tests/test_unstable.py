@@ -27,7 +27,9 @@ CRASHES = "import os\n\ndef test_crashes():\n    os._exit(3)\n"
 
 def run_in(folder: Path, *files: str, options: tuple[str, ...] = (), selection: tuple[str, ...] = (".",)) -> int:
     """Run these made-up test files as one stage."""
-    folder.joinpath("pytest.ini").write_text("[pytest]\nasyncio_default_fixture_loop_scope = function\n", encoding="utf-8")
+    folder.joinpath("pytest.ini").write_text(
+        "[pytest]\nasyncio_default_fixture_loop_scope = function\n", encoding="utf-8"
+    )
     for number, text in enumerate(files):
         folder.joinpath(f"test_{number}.py").write_text(text, encoding="utf-8")
     plain = ("-p", "no:cacheprovider", "-p", "no:schemathesis")

@@ -12,6 +12,8 @@ from server.simulator.service import CarService
 from tests.vehicle.conftest import Guard
 from tests.vehicle.over_bridge import CMD_VEL, RELEASE, client, run_controller, run_guard, run_operator, task, twist
 
+pytestmark = pytest.mark.field
+
 
 async def until(true: Callable[[], bool], seconds: float) -> float:
     """How long it took [s]."""

@@ -18,7 +18,7 @@ from tests.vehicle import ros_nodes
 from tests.vehicle.conftest import GUARD
 from tests.vehicle.ros_nodes import Car
 
-pytestmark = [pytest.mark.slow, pytest.mark.world(n=2), pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.world(n=2), pytest.mark.timeout(120), pytest.mark.field]
 FAST_MPS2 = 4.6  # so that the tests need not wait long for standstill
 DRIVING = {"controller": [3.0, 0.1], "speed": "obeys"}
 

@@ -11,7 +11,7 @@ from tests.server.slowdown.conftest import simulated, watching
 from tests.vehicle.conftest import Guard
 from tests.vehicle.over_bridge import run_controller, run_guard, task
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(100)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(100), pytest.mark.field]
 BARE = {"scenarios": ["controller-silent@0+600"], "has_stopper": False}  # only through the guard is it driven
 
 

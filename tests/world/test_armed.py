@@ -21,6 +21,7 @@ COMMAND = "/catvehicle/cmd_vel"
 SOON_S = 60.0  # on two busy cores
 
 
+@pytest.mark.field
 async def test_where_only_we_may_command_nothing_is_said_to_be_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -119,6 +119,7 @@ async def watched(port: int, data: Path) -> AsyncIterator[Viewer]:
         yield one
 
 
+@pytest.mark.field
 @pytest.mark.world(n=4)
 @pytest.mark.world(n=5)
 @pytest.mark.parametrize("version", [1, 2])
@@ -156,6 +157,7 @@ def hasten(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(delivery, "RECORDED_AGAIN_S", (2.0,))
 
 
+@pytest.mark.field
 @pytest.mark.world(n=4)
 @pytest.mark.parametrize("version", [1, 2])
 async def test_what_a_neighbour_blocks_is_named_and_comes_when_the_neighbour_has_gone(
@@ -197,6 +199,7 @@ async def test_the_file_names_what_was_not_received(tmp_path: Path, monkeypatch:
         assert recording.metadata["not_received"] == "/quiet"
 
 
+@pytest.mark.field
 @pytest.mark.world(n=9)
 @pytest.mark.parametrize("version", [1, 2])
 async def test_a_topic_that_nobody_publishes_carries_no_signal_until_somebody_does(

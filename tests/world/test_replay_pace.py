@@ -78,6 +78,7 @@ class Watched:
             began_s = at_s + 0.05
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("is_fresh", [True, False])
 @pytest.mark.parametrize(("rate", "start_s"), [(1.0, 0.0), (1.0, 25.0), (0.5, 20.0), (4.0, 0.0), (4.0, 30.0)])
 def test_a_replay_again_and_again_has_no_clock_that_jumps_and_no_negative_age(

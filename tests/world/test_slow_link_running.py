@@ -142,6 +142,7 @@ def steps(one: Viewer) -> list[int]:
     return [event["step"] for event in one.events if event["change"] == "reduced"]
 
 
+@pytest.mark.field
 async def test_old_looks_old_less_is_asked_for_and_all_of_it_once_the_link_is_fast_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -102,6 +102,7 @@ def test_a_bag_without_the_messages_kept_as_json_is_not_whole(
     assert "/tf (100 messages) is left out" in said
 
 
+@pytest.mark.field
 async def test_a_server_s_export_says_whether_it_is_whole(tmp_path: Path) -> None:
     path = drive(tmp_path, [*GOOD, ("/tf", "tf2_msgs/TFMessage", {"transforms": []})])
     made = await make_export(path, "csv", tmp_path)

@@ -357,6 +357,7 @@ async def test_the_moment_of_a_press_is_by_the_clock_of_the_agent() -> None:
     assert found["heard_ms"] == pytest.approx(1_000_000, abs=2)
 
 
+@pytest.mark.field
 async def test_it_takes_no_time() -> None:
     agent = Agent()
     messages = [agent.signed() for _ in range(50)]

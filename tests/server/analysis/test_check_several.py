@@ -86,6 +86,7 @@ def test_progress_only_grows_and_ends_whole(healthy: Path) -> None:
     assert 0.9 < seen[-1] <= 1.0
 
 
+@pytest.mark.field
 def test_ctrl_c_ends_all_of_it(healthy: Path) -> None:
     command = [sys.executable, "-m", "server", "check", *[str(healthy)] * 30]
     process = subprocess.Popen(

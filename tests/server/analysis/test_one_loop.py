@@ -36,7 +36,7 @@ from tests.server.vehicle.car_source import CarSource
 from tests.tree import RECORDINGS
 from tests.world.played import run
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.field]
 
 BEGAN_S = 1_790_000_000.0
 LENGTH_S = 62.0

@@ -45,6 +45,7 @@ def delay_of(rows: list[tuple[float, Any]]) -> RecordedDelay:
     return RecordedDelay(recording)
 
 
+@pytest.mark.field
 async def test_a_session_over_a_slow_link_is_judged_again_as_it_was(bridge: RosBridge, tmp_path: Path) -> None:
     port = int(bridge.address.rpartition(":")[2].strip("/"))  # type: ignore[attr-defined]
     async with slow_proxy(port, None) as proxy:

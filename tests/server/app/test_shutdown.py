@@ -19,6 +19,7 @@ from server.app.lifespan import lifespan
 from tests.tree import PROJECT
 
 
+@pytest.mark.field
 async def test_a_disk_that_hangs_is_not_waited_for_and_the_log_tells_what_is_not_written(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

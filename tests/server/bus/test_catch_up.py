@@ -18,6 +18,7 @@ from tests.server.viewer import Viewer, viewer
 AT_ONCE = 1000
 
 
+@pytest.mark.field
 @pytest.mark.parametrize(
     ("events", "within_s", "late_s"),
     [

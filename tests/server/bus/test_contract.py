@@ -72,6 +72,7 @@ async def test_bytes_come_as_bytes(opened: Opened) -> None:
         assert (await until(lambda: both.page.newest("ocelot", "scan"))).payload == b"\x00\xff\n\x01"
 
 
+@pytest.mark.field
 async def test_a_frame_that_was_not_replaced_is_outdated(opened: Opened) -> None:
     async with opened() as both:
         both.page.watch("ocelot", lambda _: None)
@@ -84,6 +85,7 @@ async def test_a_frame_that_was_not_replaced_is_outdated(opened: Opened) -> None
         assert both.page.newest("ocelot", "state") is None
 
 
+@pytest.mark.field
 async def test_a_frame_is_as_old_as_what_it_holds(opened: Opened) -> None:
     """A process may be stopped between the moment that a frame is of and the moment at which it is put."""
     async with opened() as both:

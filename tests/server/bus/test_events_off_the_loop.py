@@ -81,6 +81,7 @@ async def test_pages_are_woken_once_the_disk_has_the_event(disk: Disk) -> None:
     assert disk.bus.last_event("car") == 1
 
 
+@pytest.mark.field
 async def test_a_disk_that_does_not_answer_delays_no_event(disk: Disk) -> None:
     woken = asyncio.Event()
     disk.bus.watch("car", lambda _: woken.set())

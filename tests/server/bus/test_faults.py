@@ -82,6 +82,7 @@ async def page(node: str, part: Part, history: History) -> None:
         await asyncio.sleep(0.2)
 
 
+@pytest.mark.field
 @pytest.mark.parametrize(
     "rounds",
     [

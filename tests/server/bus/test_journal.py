@@ -78,6 +78,7 @@ def test_events_are_found_newest_first_on_the_disk_and_in_memory(
     journal.close()
 
 
+@pytest.mark.field
 def test_while_another_program_holds_the_file_events_wait_and_are_kept_afterwards(tmp_path: Path) -> None:
     path = tmp_path / "events.sqlite"
     journal = Journal(path)

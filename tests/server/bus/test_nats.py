@@ -67,6 +67,7 @@ async def test_a_frame_that_hung_in_the_air_is_as_old_as_it_is() -> None:
         assert len(came_late) <= 2, f"at most the one that was under way, then the newest: {came_late}"
 
 
+@pytest.mark.field
 async def test_frames_that_hang_for_longer_than_they_live_are_never_shown() -> None:
     async with over_radio() as (_, radio, both):
         both.page.watch("ocelot", lambda _: None)

@@ -100,6 +100,7 @@ async def test_bodies_of_any_size_come_whole_and_in_order() -> None:
             await read(node, asked("/file/", "POST"), bytes(http.MOST_PARTS * http.CHUNK + 1))
 
 
+@pytest.mark.field
 async def test_what_nobody_reads_is_not_made_and_ends_with_who_asked() -> None:
     app = Kept()
     async with both(app) as (node, agent, _):

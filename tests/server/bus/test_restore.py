@@ -15,6 +15,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 LIMIT_MPS = 17.25
 
 
+@pytest.mark.field
 async def test_an_agent_restored_from_a_copy_goes_on_where_the_copy_ends(tmp_path: Path) -> None:
     """It is killed first, so that the copy is of a folder that nobody closed."""
     data, kept = tmp_path / "ocelot", tmp_path / "kept"

@@ -249,6 +249,7 @@ async def slowed(
     await release(holder, car, one)
 
 
+@pytest.mark.field
 @pytest.mark.parametrize(
     ("rounds", "seed"),
     [

@@ -170,6 +170,7 @@ def test_the_worker_ends_with_the_server_and_sweeps_up(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["in"]
 
 
+@pytest.mark.field
 def test_interrupted_it_leaves_nothing(tmp_path: Path) -> None:
     long = record(tmp_path / "in" / "long.mcap", seconds=900.0)
     process = subprocess.Popen(

@@ -91,6 +91,7 @@ def as_sent(message: Any) -> Any:
 REAL_DRIVES = {CATVEHICLE: 14_228, "catvehicle_2016-06-01_mcap": 14_228, "lidar/scan_tools_hokuyo_demo.bag": 360}
 
 
+@pytest.mark.field
 async def test_real_drives_arrive_whole_and_equal(recordings: Path) -> None:
     async with asyncio.TaskGroup() as together:
         for file, count in REAL_DRIVES.items():
@@ -120,6 +121,7 @@ async def replay_whole(file: Path, count: int) -> None:
     assert f"{shown} sent to clients, 0 dropped" in out
 
 
+@pytest.mark.field
 async def test_spacing_is_that_of_the_drive(recordings: Path) -> None:
     with open_recording([recordings / CATVEHICLE]) as recording:
         recorded = [message.at_s for message in recording.messages(start_s=20.0)]
@@ -201,6 +203,7 @@ async def test_without_waiting_it_plays_to_nobody_and_ends(drive: Path) -> None:
     assert "0 sent to clients" in out
 
 
+@pytest.mark.field
 async def test_it_can_stay_after_the_end(drive: Path) -> None:
     async with replaying(drive, "--port", "0", "--stay", "--rate", "100") as replay:
         port = await replay.port()
@@ -213,6 +216,7 @@ async def test_it_can_stay_after_the_end(drive: Path) -> None:
     assert "runs until interrupted" in out
 
 
+@pytest.mark.field
 async def test_a_latched_topic_reaches_latecomers(tmp_path: Path) -> None:
     messages = [
         (0.0, "/map", "std_msgs/msg/String", {"data": "the map"}),

@@ -140,6 +140,7 @@ def test_without_any_input_it_drives_on() -> None:
         assert (process.returncode, errors) == (130, "")
 
 
+@pytest.mark.field
 async def test_typing_a_name_starts_a_scenario() -> None:
     with simulator("--ros", "2") as running:
         async with bridge_client(running.port) as client:
@@ -151,6 +152,7 @@ async def test_typing_a_name_starts_a_scenario() -> None:
             assert "geometry_msgs/msg/Wrench" in types
 
 
+@pytest.mark.field
 async def test_after_being_stopped_it_goes_on_from_now_without_a_flood() -> None:
     """As when the bridge's process is stopped and let go on: old messages are not made up for."""
     with simulator() as running:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import httpx
 import orjson
+import pytest
 import websockets
 
 from server.access.identity import Role
@@ -111,6 +112,7 @@ async def test_nonsense_about_presence_is_answered(server: str) -> None:
         assert (await ann.state())["reach"]["can"] == 1
 
 
+@pytest.mark.field
 async def test_a_page_that_is_closed_is_not_waited_for_and_one_that_breaks_off_is(server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann:
         async with operator(server, "Ben", "page-ben") as ben:
@@ -124,6 +126,7 @@ async def test_a_page_that_is_closed_is_not_waited_for_and_one_that_breaks_off_i
             assert (state["reach"]["of"], state["reach"]["why"]) == (2, "not heard")
 
 
+@pytest.mark.field
 async def test_nobody_hears_alarms_on_a_server_that_nobody_looks_at(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), httpx.AsyncClient(base_url=server) as program:
         async with asyncio.timeout(30):

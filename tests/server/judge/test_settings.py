@@ -177,6 +177,7 @@ def test_bytes_that_are_no_text_are_set_aside(tmp_path: Path) -> None:
     assert file.complaint
 
 
+@pytest.mark.field
 def test_a_file_far_too_large_is_not_read_whole(tmp_path: Path) -> None:
     with open(tmp_path / "car.toml", "wb") as file:
         file.truncate(2**33)  # 8 GiB, sparse
@@ -406,6 +407,7 @@ async def test_before_a_car_is_connected_no_topic_is_known() -> None:
         assert (await client.get("/api/signals")).json()["candidates"] is None
 
 
+@pytest.mark.field
 async def test_a_picked_topic_replaces_the_found_one(bridge: RosBridge, server: str) -> None:
     bridge.advertise("/other/vel", "geometry_msgs/TwistStamped")
     async with driving(bridge), viewer(server) as one:

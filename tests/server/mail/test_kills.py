@@ -85,6 +85,7 @@ def judge(post: Post, orders: int) -> int:
     return sum(len(copies) - 1 for copies in by_id.values())
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 async def test_none_is_lost_through_kills_refusals_and_lost_replies(tmp_path: Path) -> None:

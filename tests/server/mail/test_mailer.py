@@ -205,6 +205,7 @@ async def test_a_temporary_refusal_is_tried_again_under_the_same_name(tmp_path: 
         assert len({(one["message_id"], one["date"], one["sha256"]) for one in post.taken}) == 1, "which is known"
 
 
+@pytest.mark.field
 @pytest.mark.slow
 async def test_a_drive_of_sixty_megabytes_comes_in_parts_that_join(tmp_path: Path, shelf: Shelf, post: Post) -> None:
     content = hashlib.shake_256(b"drive").digest(60_000_000)

@@ -42,6 +42,7 @@ def described(folder: Path, id: str) -> list[tuple[str, int]]:
     return found
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 async def test_what_was_answered_survives(tmp_path: Path) -> None:

@@ -168,6 +168,7 @@ async def log_of(client: httpx.AsyncClient, change: str) -> list[dict[str, Any]]
     return found
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 async def test_what_was_answered_survives(bridge: RosBridge, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from tests.server.recording.store.s3 import S3
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("small_parts")]
 
 
+@pytest.mark.field
 async def test_late_marks_are_uploaded_once(car: Car, s3: S3) -> None:
     path = car.folder / f"{ID}.mcap"
     row: DriveMark = {

@@ -58,6 +58,7 @@ async def test_marks_and_their_media_are_in_the_file_of_the_drive(bridge: RosBri
         assert not Path(f"{path}.json").exists()
 
 
+@pytest.mark.field
 async def test_what_comes_too_late_is_kept_beside_and_found(bridge: RosBridge, tmp_path: Path) -> None:
     async with marked_drive(bridge, tmp_path) as drive:
         at_ms = now_ms()

@@ -49,6 +49,7 @@ def eight_hours() -> DriveTrends:
     return trends
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("part", [(0.0, math.inf), (3600.0, 7200.0), (28_000.0, 28_060.0)])
 def test_any_part_of_eight_hours_comes_within_0_3_s_and_60_kB(
     eight_hours: DriveTrends, part: tuple[float, float]

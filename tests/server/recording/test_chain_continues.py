@@ -41,6 +41,7 @@ def killed(root: Path, after_s: float) -> Path:
     return left
 
 
+@pytest.mark.field
 def test_after_kill_9_the_chain_continues(tmp_path: Path) -> None:
     left = killed(tmp_path, 1.2)
     before = verify(left)

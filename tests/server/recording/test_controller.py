@@ -189,6 +189,7 @@ async def test_a_second_part_tells_which_alarms_stand_when_it_begins(bridge: Ros
         assert [e.raised_s for e in recorded.episodes if e.alarm_id == "speed_limit"] == [0.0]
 
 
+@pytest.mark.field
 async def test_alarms_of_before_a_restart_stand_when_a_recording_begins(bridge: RosBridge, tmp_path: Path) -> None:
     address = bridge.address  # type: ignore[attr-defined]
     arguments = ("serve", "--port", "0", "--data", str(tmp_path), f"--vehicle=car={address}")
@@ -213,6 +214,7 @@ async def test_alarms_of_before_a_restart_stand_when_a_recording_begins(bridge: 
     assert stood["speed_limit"] == alarm["occurrence"]
 
 
+@pytest.mark.field
 async def test_a_link_that_returns_too_late_begins_another_recording(bridge: RosBridge, tmp_path: Path) -> None:
     async with watched(bridge, tmp_path) as (_, one), driving(bridge):
         assert (await one.ask(kind="set", values={"recording.hold_s": 0.0}))["ok"]
@@ -227,6 +229,7 @@ async def test_a_link_that_returns_too_late_begins_another_recording(bridge: Ros
         assert state["recording"]["name"] > name
 
 
+@pytest.mark.field
 async def test_by_hand_it_begins_and_ends_and_stays_ended(bridge: RosBridge, tmp_path: Path) -> None:
     async with watched(bridge, tmp_path) as (base, one), driving(bridge):
         state = await one.state(lambda s: s["recording"]["messages"] > 5, within_s=SOON_S)

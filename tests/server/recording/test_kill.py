@@ -17,6 +17,8 @@ from server.recording.mcap.mcap_file import latest
 from server.recording.recover import recover_all
 from tests.server.recording.recording_child import BEGAN_NS, MISSING, record_until_killed
 
+pytestmark = pytest.mark.field
+
 AT_ONCE = 2  # more of them would wait for each other on two cores
 OLD_S = 0.5
 

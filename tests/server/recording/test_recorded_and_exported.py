@@ -35,6 +35,7 @@ QUICKER = 2  # times true speed: the bridge keeps a burst of 0.13 s of it
 REORDERED_WITHIN_S = 0.005
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize("name", [BAG, MCAP])
@@ -80,6 +81,7 @@ def assert_same_order(before: list[Message], after: list[Message]) -> None:
 ODD = [math.nan, math.inf, -math.inf, -0.0, 1e-45, 3.0, 81.0]
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize("version", [1, 2])

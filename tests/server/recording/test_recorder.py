@@ -122,6 +122,7 @@ async def test_a_definition_that_the_bridge_gave_counts_from_then_on(tmp_path: P
         assert [m.message for m in recording.messages()] == [{"x": 1.5}, {"x": 2.5}]
 
 
+@pytest.mark.field
 async def test_it_is_on_the_disk_within_half_a_second_without_being_asked(tmp_path: Path) -> None:
     user = RecorderUser(tmp_path)
     part = user.part()
@@ -211,6 +212,7 @@ async def test_at_the_limit_it_stops_and_what_was_recorded_is_saved(
         assert [m.message["linear"]["x"] for m in recording.messages()] == [3.0]
 
 
+@pytest.mark.field
 async def test_after_it_stopped_by_itself_nothing_piles_up(tmp_path: Path) -> None:
     """The loop hands over what comes until somebody ends the part."""
     user = RecorderUser(tmp_path, Allowance(quota=0, min_free=1 << 62))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 
 from server.rosbridge_server.server import RosBridge
 from tests.server.cars import driving
@@ -34,6 +35,7 @@ async def beside(one: Viewer, at_s: float) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.field
 async def test_a_second_recording_is_led_apart_and_closed_while_the_first_stays(bridge: RosBridge, base: str) -> None:
     async with driving(bridge, speed=lambda n: 4.2), viewer(base) as one:
         assert (await order(one, "beside", recording=OTHER))["reason"] == "This page shows no replay."
@@ -66,6 +68,7 @@ async def test_a_second_recording_is_led_apart_and_closed_while_the_first_stays(
         assert len(replays()) == 1
 
 
+@pytest.mark.field
 async def test_leaving_the_replay_closes_both(bridge: RosBridge, base: str) -> None:
     async with driving(bridge), viewer(base) as one:
         await order(one, "open", recording=STREET)
@@ -94,6 +97,7 @@ async def test_what_is_no_recording_is_refused_in_words_and_the_first_stays(
         assert len(replays()) == 1
 
 
+@pytest.mark.field
 async def test_a_process_that_dies_ends_the_second_alone(bridge: RosBridge, base: str) -> None:
     async with viewer(base) as one:
         await order(one, "open", recording=STREET, at_s=3.0)

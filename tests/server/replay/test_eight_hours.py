@@ -21,6 +21,7 @@ LOST_S = (5000.0, 5060.0)
 ASKED: dict[str, Any] = {"kind": "drive_trends", "signals": ["speed", "distance", "brake", "steering"], "buckets": 500}
 
 
+@pytest.mark.field
 @pytest.mark.parametrize(
     "hours",
     [

@@ -47,6 +47,7 @@ async def at(one: Viewer, at_s: float) -> dict[str, Any]:
     )
 
 
+@pytest.mark.field
 async def test_a_recording_is_opened_led_and_left_while_live_goes_on(bridge: RosBridge, base: str) -> None:
     async with driving(bridge, speed=lambda n: 4.2), viewer(base) as other, viewer(base) as one:
         live = await one.state(lambda s: s["session"]["phase"] == "monitoring")
@@ -69,6 +70,7 @@ async def test_a_recording_is_opened_led_and_left_while_live_goes_on(bridge: Ros
         assert again["signals"]["speed"]["value"]["speed_mps"] == 4.2
 
 
+@pytest.mark.field
 async def test_two_pages_look_at_different_moments(bridge: RosBridge, base: str) -> None:
     async with driving(bridge), viewer(base) as one, viewer(base) as two:
         for page, at_s in ((one, 5.0), (two, 40.0)):
@@ -79,6 +81,7 @@ async def test_two_pages_look_at_different_moments(bridge: RosBridge, base: str)
         await at(two, 40.0)
 
 
+@pytest.mark.field
 async def test_the_time_line_the_track_and_the_minute_come_of_the_recording(bridge: RosBridge, base: str) -> None:
     async with driving(bridge), viewer(base) as one:
         await order(one, "open", recording="car_20260921T142640Z", at_s=15.0)
@@ -123,6 +126,7 @@ async def test_nothing_is_ordered_from_a_replay_but_a_position_is_told(bridge: R
         assert (await one.ask(kind="pause"))["ok"]
 
 
+@pytest.mark.field
 async def test_a_live_alarm_reaches_the_page_that_replays(bridge: RosBridge, base: str) -> None:
     speed = [4.2]
     async with driving(bridge, speed=lambda n: speed[0]), viewer(base, have_event=0) as one:
@@ -136,6 +140,7 @@ async def test_a_live_alarm_reaches_the_page_that_replays(bridge: RosBridge, bas
         assert frame["signals"]["speed"]["value"]["speed_mps"] < 10.0
 
 
+@pytest.mark.field
 async def test_scans_are_those_of_the_recording(bridge: RosBridge, base: str) -> None:
     async with driving(bridge, scans=True), viewer(base) as one:
         await order(one, "open", recording=STREET, at_s=5.0)
@@ -210,6 +215,7 @@ async def test_a_socket_that_begins_with_no_recording_is_told_and_goes_on_live(b
             await reading
 
 
+@pytest.mark.field
 async def test_so_many_replays_and_no_more(bridge: RosBridge, base: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(manager, "MOST_REPLAYS", 2)
     async with contextlib.AsyncExitStack() as stack:

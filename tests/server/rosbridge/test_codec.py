@@ -157,6 +157,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("payload", REFUSED.values(), ids=REFUSED)
 def test_binary_is_refused_at_once(payload: bytes) -> None:
     began_s = time.perf_counter()

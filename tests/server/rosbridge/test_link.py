@@ -79,6 +79,7 @@ async def leaving_nothing() -> AsyncIterator[None]:
     assert process.num_fds() == before[2]
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_the_table_is_sent_once_an_opening_in_order_before_anything_else() -> None:
     ear = Ear()
@@ -166,6 +167,7 @@ async def test_what_changes_while_down_counts_at_the_next_opening() -> None:
         assert bridge.operations == [ROWS[2], OVER]
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_nothing_is_sent_while_down_and_nothing_later() -> None:
     """Before the first opening, between two, while the other side says goodbye, and after the end."""
@@ -196,6 +198,7 @@ async def test_nothing_is_sent_while_down_and_nothing_later() -> None:
         assert bridge.connections == [[], [OVER]]
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_after_the_bridges_goodbye_nothing_is_sent_and_the_link_closes_at_once() -> None:
     """A bridge that says goodbye and then leaves the connection standing."""
@@ -218,6 +221,7 @@ async def test_after_the_bridges_goodbye_nothing_is_sent_and_the_link_closes_at_
             link.send_now(OVER)
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_a_goodbye_that_cannot_be_answered_ends_the_link_all_the_same() -> None:
     """The bridge reads nothing, so that our answer stays in the pipe for ever."""
@@ -284,6 +288,7 @@ async def test_hurried_while_waiting_it_dials_at_once(monkeypatch: pytest.Monkey
                 link.retry_now()
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_hurried_while_dialling_shaking_hands_or_open_there_is_never_a_second_connection() -> None:
     ear = Ear()
@@ -318,6 +323,7 @@ async def test_hurried_in_the_very_moment_of_closing_it_goes_on_trying() -> None
         await ear.hears("opened", 4)
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_the_wait_between_two_tries_grows_to_its_limit_and_not_beyond(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dialer, "FIRST_RETRY_S", 0.02)
@@ -345,6 +351,7 @@ async def test_ended_before_it_began() -> None:
         assert not link.is_open
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_ended_while_open() -> None:
     ear = Ear()
@@ -362,6 +369,7 @@ async def test_ended_while_open() -> None:
         assert [name for name, _ in ear.received] == ["opened"]
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_ended_while_shaking_hands() -> None:
     ear = Ear()
@@ -403,6 +411,7 @@ async def test_ended_just_before_the_handshake_is_done() -> None:
     assert ear.received == []
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_ended_while_waiting_for_the_next_try(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dialer, "FIRST_RETRY_S", 60.0)
@@ -441,6 +450,7 @@ async def test_ended_by_the_listener_itself() -> None:
             link.stop()
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_a_hundred_openings_leave_nothing_behind() -> None:
     ear = Ear()
@@ -523,6 +533,7 @@ async def test_a_failed_call_says_what_the_bridge_said(values: Any, said: str) -
         assert str(failure.value) == said
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_a_call_without_an_answer_fails_in_time_and_a_late_answer_harms_nothing() -> None:
     ear = Ear()

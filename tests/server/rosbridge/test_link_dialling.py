@@ -121,6 +121,7 @@ async def test_one_that_talks_without_end_fills_no_memory() -> None:
     assert psutil.Process().memory_info().rss - before < 30e6
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_a_handshake_that_comes_letter_by_letter_is_one() -> None:
     ear = Ear()
@@ -139,6 +140,7 @@ async def test_a_handshake_that_comes_letter_by_letter_is_one() -> None:
         assert [name for name, _ in ear.received] == ["opened", "status"]
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_what_comes_with_the_handshake_is_read_after_it() -> None:
     ear = Ear()
@@ -211,6 +213,7 @@ async def test_no_answer_at_all() -> None:
             assert link.attempts == 1
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_ended_while_dialling() -> None:
     ear = Ear()
@@ -299,6 +302,7 @@ async def test_a_name_server_that_hangs_is_asked_once_at_a_time(monkeypatch: pyt
         assert asked == ["car"]
 
 
+@pytest.mark.field
 async def test_ended_while_a_name_is_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
     answers = threading.Event()
     monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: answers.wait(8) and found("127.0.0.1"))
@@ -392,6 +396,7 @@ async def test_a_bridge_without_tls_dialled_with_wss() -> None:
         await ear.hears("failed", 2)
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("handler", [hang_up, saying(b"", first=True)], ids=["hangs up", "silent"])
 @on_both_loops
 async def test_something_without_words_dialled_with_wss(handler: Handler) -> None:

@@ -164,6 +164,7 @@ FAULTY = {
 }
 
 
+@pytest.mark.field
 @pytest.mark.parametrize(("frame", "words"), FAULTY.values(), ids=FAULTY)
 async def test_what_is_no_websocket_any_more_ends_the_connection_and_it_is_made_anew(frame: bytes, words: str) -> None:
     ear = Ear()
@@ -184,6 +185,7 @@ async def test_what_is_no_websocket_any_more_ends_the_connection_and_it_is_made_
         assert [name for name, _ in ear.received] == ["opened", "closed", "opened", "message"]
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_a_message_in_pieces_with_pings_between_is_whole() -> None:
     ear = Ear()
@@ -203,6 +205,7 @@ async def test_a_message_in_pieces_with_pings_between_is_whole() -> None:
         assert await ear.hears("message") == ("/a", {"data": 1}, None)
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_ten_thousand_messages_at_once_come_in_order() -> None:
     ear = Ear()
@@ -250,6 +253,7 @@ async def test_a_listener_that_stumbles_costs_one_message_and_is_told_once() -> 
         link_module.log.removeHandler(handler)
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_a_listener_that_stumbles_over_a_failed_dial_does_not_end_the_dialling() -> None:
     ear = Ear()
@@ -325,6 +329,7 @@ else:
 """
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("loop", ["asyncio", "uvloop"])
 def test_nothing_of_all_this_reaches_the_operators_terminal(loop: str) -> None:
     """However logging is set up: what a dropped connection means is told once, by us, in the page."""

@@ -18,6 +18,8 @@ from server.rosbridge.subscription import Subscription
 from tests.server.ear import Bridge, Ear, accept, answering, bridging, linked, text_frame
 from tests.server.loops import on_both_loops
 
+pytestmark = pytest.mark.field
+
 A_BRIDGE = """
 import asyncio
 from server.rosbridge_server.server import RosBridge

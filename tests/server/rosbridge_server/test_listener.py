@@ -82,6 +82,7 @@ async def test_a_frozen_bridge_answers_nothing_and_keeps_its_clients(talk: RosBr
     await (await asyncio.wait_for(newcomer, 2)).close()
 
 
+@pytest.mark.field
 async def test_a_freeze_is_total_for_a_client_that_sends_much(bridge: RosBridge, probe: Probe) -> None:
     handled = 0
 
@@ -107,6 +108,7 @@ async def test_a_freeze_is_total_for_a_client_that_sends_much(bridge: RosBridge,
     await asyncio.wait_for(pong, 2)
 
 
+@pytest.mark.field
 async def test_a_frozen_bridge_answers_nothing_even_when_websockets_resumes_reading(
     bridge: RosBridge, probe: Probe
 ) -> None:
@@ -158,6 +160,7 @@ async def test_flaps_leave_no_task_and_no_descriptor(talk: RosBridge, port: int)
     assert [topic.subscribers for topic in talk.graph.topics()] == [{}]
 
 
+@pytest.mark.field
 async def test_a_slow_client_delays_nobody_and_loses_only_its_own(port: int, talk: RosBridge, probe: Probe) -> None:
     await probe.subscribe("/talk")
     async with probing(port) as slow:
@@ -238,6 +241,7 @@ async def test_clients_beyond_the_limit_are_turned_away() -> None:
             assert (await another.call("/rosapi/get_time"))["result"] is True
 
 
+@pytest.mark.field
 async def test_sockets_that_say_nothing_are_bounded_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.rosbridge_server.listener.EXTRA_SOCKETS", 3)
     monkeypatch.setattr("server.rosbridge_server.connection.HANDSHAKE_S", 0.3)
@@ -291,6 +295,7 @@ async def test_a_browser_that_comes_by_mistake_gets_words(port: int) -> None:
     assert "WebSocket" in text
 
 
+@pytest.mark.field
 async def test_garbage_instead_of_a_handshake_harms_nothing(port: int, capfd: pytest.CaptureFixture[str]) -> None:
     for garbage in (b"\0" * 100, b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 1_000, b"\x16\x03\x01\x02\x00\x01", b"\r\n\r\n"):
         reader, writer = await asyncio.open_connection("127.0.0.1", port)

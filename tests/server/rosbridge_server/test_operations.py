@@ -146,6 +146,7 @@ async def test_a_latched_topic_gives_newcomers_its_last_message(bridge: RosBridg
     assert (await probe.hear())["msg"] == {"data": "new"}
 
 
+@pytest.mark.field
 async def test_throttling_leaves_out_and_counts_no_loss(vel: RosBridge, probe: Probe) -> None:
     await probe.subscribe("/vel", throttle_rate=60)
     ends = time.monotonic() + 0.3
@@ -161,6 +162,7 @@ async def test_throttling_leaves_out_and_counts_no_loss(vel: RosBridge, probe: P
     assert (vel.dropped, vel.counters.throttled) == (0, published - vel.sent)
 
 
+@pytest.mark.field
 async def test_throttling_with_a_queue_ends_with_the_newest(vel: RosBridge, probe: Probe) -> None:
     await probe.subscribe("/vel", throttle_rate=50, queue_length=1)
     began = time.monotonic()
@@ -248,6 +250,7 @@ async def test_a_client_that_goes_leaves_nothing_behind(bridge: RosBridge, port:
     assert bridge.graph.topics() == []
 
 
+@pytest.mark.field
 async def test_services_answer_now_later_or_not(bridge: RosBridge, probe: Probe) -> None:
     async def later(args: Json) -> Json:
         await asyncio.sleep(0.01)

@@ -71,6 +71,7 @@ async def test_what_is_late_catches_up_without_a_gap(numbers: RosBridge) -> None
     assert came_s[31:] == pytest.approx([n * 0.01 for n in range(31, 60)], abs=0.001)  # and in step again
 
 
+@pytest.mark.field
 async def test_on_the_real_clock_it_takes_its_time(numbers: RosBridge) -> None:
     began = time.monotonic()
     await play(drive(101), numbers, rate=2.0)
@@ -114,6 +115,7 @@ async def test_a_source_that_breaks_says_so_after_what_was_good(numbers: RosBrid
         assert len(played) == (5 if ahead < 2 else 0) or ahead == 64
 
 
+@pytest.mark.field
 async def test_cancelling_waits_for_the_reading_thread(numbers: RosBridge) -> None:
     inside = threading.Event()
     closed = threading.Event()

@@ -25,6 +25,8 @@ from server.protocol import commands
 from tests.server.recording.made import record
 from tests.tree import PROJECT
 
+pytestmark = pytest.mark.field
+
 ID = "car_20160601T120000Z"
 
 

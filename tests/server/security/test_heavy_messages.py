@@ -85,6 +85,7 @@ class Stalls:
             self.longest_s = max(self.longest_s, min(stood_s, time.process_time() - worked_s))
 
 
+@pytest.mark.field
 async def test_no_heavy_message_stalls_the_loop_or_costs_the_link(tmp_path: Path) -> None:
     async with heavy_bridge() as bridge, contextlib.AsyncExitStack() as stack:
         config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)

@@ -105,6 +105,7 @@ async def test_nesting_is_refused_on_every_route(opening: bytes) -> None:
             assert answer.status_code == 200
 
 
+@pytest.mark.field
 async def test_a_device_that_asks_without_end_is_told_when_to_come_back() -> None:
     limits = Limits(local_requests=Rate(per_s=1.0, at_once=20))
     async with serving(Config(limits=limits)) as base, httpx.AsyncClient(base_url=base) as client:
@@ -146,6 +147,7 @@ async def ended(reader: asyncio.StreamReader, within_s: float = 5.0) -> bytes:
             return b""
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("sent", [b"", b"GET / HT", b"GET /api/health HTTP/1.1\r\nHost: 127.0.0.1\r\nX: "], ids=repr)
 async def test_a_head_that_does_not_come_to_its_end_is_not_waited_for(sent: bytes) -> None:
     async with serving(Config(limits=Limits(head_s=0.5))) as base, plugged(base) as (reader, writer):
@@ -164,6 +166,7 @@ async def test_a_second_request_on_a_connection_is_not_waited_for_either() -> No
         await ended(reader, 3.0)
 
 
+@pytest.mark.field
 async def test_a_body_that_drips_is_given_up() -> None:
     async with serving(Config(limits=Limits(body_s=0.5))) as base, plugged(base) as (reader, writer):
         writer.write(b"POST /api/connect HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n")
@@ -192,6 +195,7 @@ async def test_what_is_no_http_is_answered_with_all_headers() -> None:
         assert b"server:" not in answer
 
 
+@pytest.mark.field
 async def test_one_address_gets_so_many_connections(monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of this machine are not counted, and a test has no other: for it, this machine is another."""
     monkeypatch.setattr(http_protocol, "is_loopback", lambda _: False)
@@ -229,6 +233,7 @@ def test_what_is_taken_for_granted_of_h11() -> None:
 # -- on the page's socket ---
 
 
+@pytest.mark.field
 async def test_orders_that_run_away_are_refused_in_words_and_the_page_lives() -> None:
     limits = Limits(commands=Rate(per_s=5.0, at_once=10))
     async with serving(Config(limits=limits)) as base, viewer(base) as one:

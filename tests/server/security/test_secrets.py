@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 import websockets
 from mcap.reader import make_reader
 
@@ -54,6 +55,7 @@ class Life:
         self._file.close()
 
 
+@pytest.mark.field
 async def test_no_secret_leaves_its_place(tmp_path: Path) -> None:
     bridge = RosBridge(ros_version=1)
     port = await bridge.start("127.0.0.1", 0)

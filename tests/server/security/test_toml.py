@@ -204,6 +204,7 @@ async def test_no_settings_file_holds_the_server_up() -> None:
     assert longest_s < 0.5
 
 
+@pytest.mark.field
 async def test_settings_are_read_beside_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     """A file that takes long, as none should, delays its own answer only."""
     from server.judge import active_settings

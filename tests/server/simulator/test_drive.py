@@ -69,6 +69,7 @@ def test_the_driver_goes_as_fast_as_the_sight_allows_and_no_faster(sight_m: floa
     assert clear_distance_m(speed_mps + 0.1) > sight_m - SPARE_M
 
 
+@pytest.mark.field
 def test_it_is_much_faster_than_real_time() -> None:
     """Twenty times real time on an idle core is asked for; a machine busy with other tests must still manage five."""
     car = SimulatedCar()

@@ -75,6 +75,7 @@ def test_a_scenario_breaks_its_own_rule_in_time_and_no_other(name: str) -> None:
         assert max(b - a for a, b in itertools.pairwise(times)) < 2.5, "it must break its rule once"
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXPECTED)
 @pytest.mark.parametrize("after_s", MOMENTS_S[1:])

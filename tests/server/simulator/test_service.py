@@ -38,6 +38,7 @@ async def test_the_bridge_offers_every_topic_of_the_car(ros_version: RosVersion)
         assert found == {published.topic: published.ros_type(ros_version) for published in PUBLISHED}
 
 
+@pytest.mark.field
 async def test_every_topic_speaks_at_its_rate(car: Car) -> None:
     _, port = car
     async with bridge_client(port) as client:
@@ -63,6 +64,7 @@ async def test_beams_without_a_return_are_null_on_the_wire(car: Car) -> None:
         assert all(0 <= distance <= 81 for distance in ranges if distance is not None)
 
 
+@pytest.mark.field
 async def test_the_cars_clock_is_that_of_the_machine(car: Car) -> None:
     service, port = car
     async with bridge_client(port) as client:
@@ -179,6 +181,7 @@ async def test_a_client_drives_the_car_by_cmd_vel_and_gives_it_back(car: Car) ->
         await client.next("/catvehicle/vel", lambda message: message["linear"]["x"] > 0.5)
 
 
+@pytest.mark.field
 async def test_a_frozen_bridge_keeps_its_connections_but_says_nothing() -> None:
     async with running_car() as (service, port), bridge_client(port) as client:
         await client.subscribe("/catvehicle/vel")
@@ -194,6 +197,7 @@ async def test_a_frozen_bridge_keeps_its_connections_but_says_nothing() -> None:
         await client.call(STATE_SERVICE)
 
 
+@pytest.mark.field
 async def test_a_frozen_bridge_is_thawed_by_stop() -> None:
     async with running_car() as (service, port), bridge_client(port) as client:
         await client.subscribe("/catvehicle/vel")
@@ -207,6 +211,7 @@ async def test_a_frozen_bridge_is_thawed_by_stop() -> None:
         await client.next("/catvehicle/vel")
 
 
+@pytest.mark.field
 async def test_a_killed_bridge_drops_everybody_and_comes_back_on_its_port() -> None:
     async with running_car() as (service, port):
         async with bridge_client(port) as client:
@@ -288,6 +293,7 @@ async def test_it_leaves_no_task_behind() -> None:
     assert asyncio.all_tasks() <= before
 
 
+@pytest.mark.field
 async def test_a_faster_rate_makes_a_faster_car() -> None:
     async with running_car(rate=5.0) as (service, _):
         began_s = time.monotonic()
@@ -295,6 +301,7 @@ async def test_a_faster_rate_makes_a_faster_car() -> None:
         assert time.monotonic() - began_s == pytest.approx(1.0, abs=0.4)
 
 
+@pytest.mark.field
 async def test_others_on_the_loop_are_hardly_disturbed() -> None:
     """The car works in pieces of less than 2 ms; half of all wakings must not even notice."""
     async with running_car():

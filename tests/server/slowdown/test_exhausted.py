@@ -30,6 +30,7 @@ def cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
+@pytest.mark.field
 async def test_an_order_goes_on_where_no_file_can_be_opened_any_more(tmp_path: Path) -> None:
     async with simulated() as (service, address), running(*server(tmp_path, address)) as process:
         assert process._process is not None

@@ -14,6 +14,7 @@ from tests.server.slowdown.conftest import Field, simulated
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(90)]
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("has_stopper", [True, False])
 async def test_after_a_kill_the_obstacle_stopper_brakes_and_a_bare_car_drives_on(
     tmp_path: Path, has_stopper: bool

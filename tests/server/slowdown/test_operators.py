@@ -64,6 +64,7 @@ async def phone(car: Field, name: str) -> AsyncIterator[Phone]:
                 await seen
 
 
+@pytest.mark.field
 async def test_anybody_may_slow_the_car_and_only_the_one_in_control_releases_it() -> None:
     async with field() as car, phone(car, "Ann") as ann, phone(car, "Ben") as ben:
         await car.until(lambda state: state["decelerate"]["state"] == "safe")
@@ -85,6 +86,7 @@ async def test_anybody_may_slow_the_car_and_only_the_one_in_control_releases_it(
         assert (await car.slow())["state"] == "armed"
 
 
+@pytest.mark.field
 @pytest.mark.parametrize(
     ("late", "is_obeyed"),
     [({"pressed_ago_s": 0.2}, True), ({"pressed_ago_s": 0.5}, False), ({"held_s": 0.0, "heard_ms": 1.7e12}, False)],
@@ -100,6 +102,7 @@ async def test_what_was_pressed_too_long_ago_is_refused(late: dict[str, float], 
             assert car.speeds == []
 
 
+@pytest.mark.field
 async def test_an_order_outlives_the_phone_that_gave_it() -> None:
     async with field() as car:
         async with phone(car, "Ann") as ann:

@@ -24,6 +24,7 @@ OUTAGES = [
 ]
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("outages", OUTAGES)
 async def test_no_command_arrives_late_and_none_twice(bridge: RosBridge, server: str, outages: int) -> None:
     """Of a stamped command the stamp tells when it was made. A bridge that freezes holds what had reached it already,
@@ -90,6 +91,7 @@ async def test_no_command_arrives_late_and_none_twice(bridge: RosBridge, server:
         assert sum(began_s <= stamp_s <= ended_s for stamp_s in made) <= 2  # what was under way when it froze
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["bridge-killed", "bridge-frozen"])
 async def test_the_ramp_goes_on_from_the_speed_that_is_measured(fault: str) -> None:
@@ -108,6 +110,7 @@ async def test_the_ramp_goes_on_from_the_speed_that_is_measured(fault: str) -> N
         assert all(b < a + 0.05 for a, b in itertools.pairwise(after[1:]))
 
 
+@pytest.mark.field
 @pytest.mark.slow
 async def test_a_bridge_that_talks_on_and_reads_no_command_is_doubted_and_dialled_anew() -> None:
     async with simulated() as (service, direct), one_way(int(direct.rpartition(":")[2])) as (way, address):

@@ -15,6 +15,7 @@ pytestmark = pytest.mark.slow
 RATES_KNOWN_S = 7.0  # a car's own rate is learned from its first 5 s; what is slow from the beginning is its rate
 
 
+@pytest.mark.field
 async def test_it_is_armed_ordered_proven_held_and_released() -> None:
     async with field() as car:
         await car.armed()
@@ -53,6 +54,7 @@ async def test_it_is_armed_ordered_proven_held_and_released() -> None:
         assert "slow_down_unconfirmed" not in raised
 
 
+@pytest.mark.field
 async def test_it_keeps_its_rate() -> None:
     async with field() as car:
         await car.armed()
@@ -76,6 +78,7 @@ async def test_what_is_not_armed_or_not_ordered_is_refused(body: dict[str, int] 
         assert car.speeds == []
 
 
+@pytest.mark.field
 async def test_a_rival_is_named_and_the_order_not_confirmed() -> None:
     async with field(gives_way=False) as car:
         await car.armed()
@@ -89,6 +92,7 @@ async def test_a_rival_is_named_and_the_order_not_confirmed() -> None:
         assert "not_confirmed" in await car.steps()
 
 
+@pytest.mark.field
 async def test_the_car_is_gone_and_back_and_the_order_goes_on_from_the_measured_speed() -> None:
     async with field() as car:
         await car.armed()
@@ -107,6 +111,7 @@ async def test_the_car_is_gone_and_back_and_the_order_goes_on_from_the_measured_
         assert "resumed" in steps
 
 
+@pytest.mark.field
 async def test_what_is_released_while_the_link_is_lost_is_not_taken_up_again() -> None:
     async with field() as car:
         await car.armed()
@@ -122,6 +127,7 @@ async def test_what_is_released_while_the_link_is_lost_is_not_taken_up_again() -
         assert len(car.speeds) == sent
 
 
+@pytest.mark.field
 async def test_without_a_link_it_is_refused_and_said() -> None:
     async with field() as car:
         await car.armed()
@@ -136,6 +142,7 @@ async def test_without_a_link_it_is_refused_and_said() -> None:
         assert car.speeds == []  # and it is not ordered later
 
 
+@pytest.mark.field
 async def test_a_server_that_is_started_again_goes_on_where_the_order_stood(tmp_path: Path) -> None:
     async with simulated() as (service, address):
         async with watching(service, address, tmp_path) as car:
@@ -151,6 +158,7 @@ async def test_a_server_that_is_started_again_goes_on_where_the_order_stood(tmp_
             assert (await car.post("release", number=state["decelerate"]["order"]["number"])).status_code == 200
 
 
+@pytest.mark.field
 async def test_what_was_released_before_the_restart_stays_released(tmp_path: Path) -> None:
     async with simulated() as (service, address):
         async with watching(service, address, tmp_path) as car:
@@ -164,6 +172,7 @@ async def test_what_was_released_before_the_restart_stays_released(tmp_path: Pat
             assert car.speeds == []
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("veto", [True, False])
 async def test_a_rule_counts_down_and_may_be_vetoed(veto: bool) -> None:
     async with field() as car:
@@ -184,6 +193,7 @@ async def test_a_rule_counts_down_and_may_be_vetoed(veto: bool) -> None:
         assert (await car.steps())[:3] == ["countdown", "ordered", "sent"]
 
 
+@pytest.mark.field
 @pytest.mark.parametrize(
     ("trigger", "switched_on", "scenario", "why"),
     [
@@ -215,6 +225,7 @@ async def test_each_rule_slows_the_car(
         await car.until(lambda _: car.speed_mps < began_mps - 1.0)
 
 
+@pytest.mark.field
 async def test_a_hold_that_nobody_releases_ends() -> None:
     """With the alarm slow_down_hold_ended: nothing holds the car any more, and that is never a surprise."""
     async with field() as car:
@@ -228,6 +239,7 @@ async def test_a_hold_that_nobody_releases_ends() -> None:
         await car.until(lambda _: car.speed_mps > 1.0)
 
 
+@pytest.mark.field
 async def test_a_second_order_is_the_same_order_and_the_second_press_is_answered_well() -> None:
     async with field() as car:
         await car.armed()
@@ -238,6 +250,7 @@ async def test_a_second_order_is_the_same_order_and_the_second_press_is_answered
         assert (await car.post("disarm")).status_code == 409  # first it is released
 
 
+@pytest.mark.field
 async def test_monitoring_that_is_stopped_ends_the_order_and_disarms() -> None:
     async with field() as car:
         await car.armed()

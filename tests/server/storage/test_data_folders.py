@@ -117,6 +117,7 @@ async def test_devices_settings_alarms_and_mail_are_as_they_were(kept: Kept, pho
     assert (await asked(phone, "/api/mail/settings")) == since_then | kept.answer("/api/mail/settings")
 
 
+@pytest.mark.field
 async def test_recordings_are_listed_replayed_and_exported_and_the_cut_off_one_is_recovered(
     kept: Kept, phone: httpx.AsyncClient
 ) -> None:

@@ -28,6 +28,7 @@ def described(one: dict[str, Any]) -> str:
     return f"{one['call']}({one['what']}) in {' < '.join(reversed(own or one['by']))}"
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.timeout(180)
 async def test_usual_work_opens_no_file_on_the_event_loop(tmp_path: Path) -> None:

@@ -55,6 +55,7 @@ async def served(config: Config) -> AsyncIterator[Server]:
         yield Server(client)
 
 
+@pytest.mark.field
 @pytest.mark.slow
 async def test_a_drive_with_each_scenario_and_a_restart(tmp_path: Path) -> None:
     service = CarService(scenarios=PLAN, seed=1)

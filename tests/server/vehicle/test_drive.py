@@ -22,6 +22,8 @@ from tests.server import scan_frames
 from tests.server.conftest import serving
 from tests.server.viewer import Viewer, viewer
 
+pytestmark = pytest.mark.field
+
 MESSAGES = {
     "speed": 1120,
     "brake": 1117,

@@ -89,6 +89,7 @@ async def test_alarms_survive_kill_9_as_they_stood(bridge: RosBridge, tmp_path: 
             assert sum("nothing was monitored meanwhile" in e["text"] for e in log) == 2
 
 
+@pytest.mark.field
 async def test_a_returned_alarm_and_a_shelf_survive_kill_9(bridge: RosBridge, tmp_path: Path) -> None:
     address = bridge.address  # type: ignore[attr-defined]
     async with server_of(tmp_path, address) as server, viewer(server.address, name="Ann") as one:
@@ -108,6 +109,7 @@ async def test_a_returned_alarm_and_a_shelf_survive_kill_9(bridge: RosBridge, tm
         await one.state(lambda s: alarm_of(s, "car_silent") is None)
 
 
+@pytest.mark.field
 async def test_a_pause_outlasts_a_restart_and_is_said(bridge: RosBridge, tmp_path: Path) -> None:
     address = bridge.address  # type: ignore[attr-defined]
     config = Config(vehicles=(Vehicle(name="car", address=address),), data=tmp_path)

@@ -79,6 +79,7 @@ async def test_events_reach_a_page_before_a_state_is_made(bridge: RosBridge) -> 
     assert any(was_heard_first)  # the machine may stand still between; with a state made at once none is
 
 
+@pytest.mark.field
 async def test_a_killed_bridge_is_said_at_once_and_data_flow_again(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), viewer(server) as one:
         await one.state(is_live)
@@ -90,6 +91,7 @@ async def test_a_killed_bridge_is_said_at_once_and_data_flow_again(bridge: RosBr
         await one.state(is_live, within_s=4.0)
 
 
+@pytest.mark.field
 async def test_a_frozen_bridge_is_said_within_2_s_and_data_flow_again(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), viewer(server) as one:
         await one.state(is_live)
@@ -113,6 +115,7 @@ async def test_a_silent_car_is_told_from_a_silent_bridge(bridge: RosBridge, serv
             await one.state(is_live, within_s=1.0)
 
 
+@pytest.mark.field
 async def test_nothing_after_connecting_is_said_after_5_s(server: str) -> None:
     start_s = time.monotonic()
     async with viewer(server) as one:
@@ -230,6 +233,7 @@ async def test_two_vehicles_in_one_process_do_not_mix(bridge: RosBridge) -> None
     await other.stop()
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("flaps", [8, pytest.param(200, marks=[pytest.mark.soak, pytest.mark.timeout(1800)])])
 async def test_flaps_leak_nothing_and_keep_the_subscriptions_whole(bridge: RosBridge, server: str, flaps: int) -> None:
     """Killed and frozen in turn: then as many tasks, threads and descriptors as before, one subscription a topic."""

@@ -15,6 +15,8 @@ from tests.server.conftest import serving
 from tests.server.vehicle.test_log_trouble import config_of, raised
 from tests.server.viewer import viewer
 
+pytestmark = pytest.mark.field
+
 LIMIT = "speed_limit.max_mps"
 
 

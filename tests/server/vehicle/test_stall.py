@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 
 from tests.page.drives import steady
 from tests.page.processes import replay, running, server
 
 
+@pytest.mark.field
 async def test_a_server_that_stood_still_says_so_and_does_not_accuse_the_car(tmp_path: Path) -> None:
     drive = steady(tmp_path / "slow.bag", 4.2)
     async with running(*replay(drive)) as car, running(*server(tmp_path / "data", car.address)) as watch:

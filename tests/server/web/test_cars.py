@@ -94,6 +94,7 @@ async def test_one_car_alone_sends_no_list(bridge: RosBridge, server: str) -> No
         assert all("cars" not in offer["of"] for offer in one.offers)
 
 
+@pytest.mark.field
 async def test_an_alarm_of_another_car_comes_at_once(bridge: RosBridge, other: RosBridge) -> None:
     async with serving(two(bridge, other)) as base, driving(bridge), viewer(base, vehicle="ocelot") as one:
         await one.until(lambda: named(one, "serval"))
@@ -191,6 +192,7 @@ async def test_a_program_names_the_car_where_there_are_several(bridge: RosBridge
             assert "meant for" not in named.json()["detail"]
 
 
+@pytest.mark.field
 @pytest.mark.slow
 async def test_a_slide_for_a_car_that_was_renamed_reaches_none() -> None:
     """By the page's address, and by the name on the slide; the car's new name reaches it."""

@@ -15,6 +15,8 @@ from server.bus.local import LocalBus
 from server.web.cars_board import FLEET, FRAME, LEAST_S, CarsBoard
 from tests.server.web.test_version_skew import NEWER
 
+pytestmark = pytest.mark.field
+
 MANY = 100
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import time
 
+import pytest
+
 from server.web.fair_wakeup import FairWakeup
 
 
@@ -44,6 +46,7 @@ async def test_who_left_is_not_woken() -> None:
     assert not left.is_set()
 
 
+@pytest.mark.field
 async def test_a_crowd_lets_a_timer_through() -> None:
     """Each of 200 works for 1 ms as it is woken: together they would hold up a timer for 200 ms."""
     turns = FairWakeup()

@@ -87,6 +87,7 @@ async def test_a_page_of_all_cars_gets_the_list_and_no_states(bridge: RosBridge,
         assert {kind for offer in one.offers for kind in offer["of"]} == {"cars"}
 
 
+@pytest.mark.field
 async def test_a_page_that_takes_nothing_is_sent_nothing_and_then_the_newest(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), viewer(server, fleet=True) as one:
         await one.until(lambda: cars(one))

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any, cast
 
+import pytest
+
 from server.access.identity import LOCAL
 from server.bus.journal import Journal
 from server.bus.local import LocalBus
@@ -15,6 +17,7 @@ from server.replay.view_source import ViewSource
 from server.web.page_commands import PageCommands
 
 
+@pytest.mark.field
 async def test_another_car_that_is_lost_does_not_hold_up_the_page() -> None:
     requested = asyncio.Event()
 

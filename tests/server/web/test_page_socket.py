@@ -17,6 +17,7 @@ from tests.server.cars import driving
 from tests.server.viewer import Viewer, viewer
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("gap_s", [3.0, pytest.param(30.0, marks=pytest.mark.soak)])
 async def test_a_viewer_that_stops_reading_finds_nothing_old(bridge: RosBridge, server: str, gap_s: float) -> None:
     """The pipe may hold an offer, and at most one batch of events, but no state."""
@@ -35,6 +36,7 @@ async def test_a_viewer_that_stops_reading_finds_nothing_old(bridge: RosBridge, 
         assert one.got_s[-1] - resumed_s < 0.2
 
 
+@pytest.mark.field
 async def test_one_offer_stands_unanswered_at_a_time(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), viewer(server) as one:
         await one.state()
@@ -48,6 +50,7 @@ async def test_one_offer_stands_unanswered_at_a_time(bridge: RosBridge, server: 
         await one.state()
 
 
+@pytest.mark.field
 async def test_a_stalled_page_delays_nobody(bridge: RosBridge, server: str) -> None:
     async with driving(bridge, scans=True), viewer(server) as live:
         stalled = [await websockets.connect(server.replace("http", "ws") + "/ws") for _ in range(3)]
@@ -80,6 +83,7 @@ async def test_events_come_exactly_once_over_a_reconnection(bridge: RosBridge, s
         assert two.events[0]["change"] == "resumed"
 
 
+@pytest.mark.field
 async def test_scans_go_only_to_pages_that_watch_them(bridge: RosBridge, server: str) -> None:
     async with driving(bridge, scans=True), viewer(server) as one, viewer(server) as other:
         await one.send({"kind": "watch", "scan": True})

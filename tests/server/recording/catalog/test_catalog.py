@@ -89,6 +89,7 @@ async def test_a_drive_keeps_the_sketch_of_its_signals_until_it_is_destroyed(tmp
         assert one._entries.trends(row["sha256"] or "") is None
 
 
+@pytest.mark.field
 async def test_what_is_in_the_folder_is_listed_newest_first(tmp_path: Path) -> None:
     some(tmp_path)
     async with catalog(tmp_path) as one:
@@ -112,6 +113,7 @@ async def test_what_is_in_the_folder_is_listed_newest_first(tmp_path: Path) -> N
         assert [raised["priority"] for raised in full["raised"]] == ["critical"]
 
 
+@pytest.mark.field
 async def test_a_lost_database_is_made_anew_to_the_same_rows(tmp_path: Path) -> None:
     some(tmp_path)
     async with catalog(tmp_path) as one:
@@ -482,6 +484,7 @@ def test_no_id_leads_out_of_the_folder(id: str) -> None:
     one._entries._database.close()
 
 
+@pytest.mark.field
 async def test_a_thousand_recordings_are_listed_fast(tmp_path: Path) -> None:
     folder = tmp_path / "recordings" / "car"
     source = record(tmp_path / "car" / "car_0.mcap", seconds=1.0)

@@ -196,6 +196,7 @@ def test_the_newest_list_says_which_items_there_are() -> None:
     assert due_on(6, *rows) == {"kept": (8, None, False, False)}
 
 
+@pytest.mark.field
 def test_nothing_and_very_much() -> None:
     assert logbook([], now_ms=MONDAY)["weeks"] == []
     rows = [row(n, MONDAY + n * 3_600_000) for n in range(5000)]

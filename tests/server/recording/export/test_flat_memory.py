@@ -37,6 +37,7 @@ def peak_mb(source: Path, format: str, folder: Path, *options: str) -> int:
     return int(peak)
 
 
+@pytest.mark.field
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_longer_drive_takes_no_more(tmp_path: Path) -> None:

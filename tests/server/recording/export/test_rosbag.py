@@ -74,6 +74,7 @@ def test_rosbag_info_understands_it(
     assert re.search(r"sensor_msgs/NavSatFix +\[2d3a8cd499b9b4a0249fb98fd05cfa48\]", text)
 
 
+@pytest.mark.field
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize(("name", "compression"), [(BAG, "none"), (BAG, "bz2"), (MCAP, "lz4")])
 def test_rosbag_play_plays_every_message_as_it_is(

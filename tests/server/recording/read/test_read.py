@@ -282,6 +282,7 @@ def test_the_real_drive_is_as_its_readme_says(recordings: Path) -> None:
     assert orjson.dumps({"z": commands[0]}) == b'{"z":null}'
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("file", REAL[:2])
 def test_reading_is_far_faster_than_driving(recordings: Path, file: str) -> None:
     best_s = 9.9

@@ -80,6 +80,7 @@ async def until_stored(client: httpx.AsyncClient, address: str) -> dict[str, obj
             await asyncio.sleep(0.1)
 
 
+@pytest.mark.field
 async def test_kill_9_in_the_middle_sends_no_finished_part_again_and_a_node_serves_the_file(
     tmp_path: Path, s3: S3
 ) -> None:

@@ -42,6 +42,7 @@ async def read(now: Running, path: Path) -> None:
     await now.until(is_read)
 
 
+@pytest.mark.field
 async def test_a_name_that_is_used_again_overwrites_nothing_in_the_store(car: Car, s3: S3) -> None:
     path = car.folder / f"{ID}.mcap"
     content = path.read_bytes()
@@ -87,6 +88,7 @@ async def test_only_what_was_uploaded_is_destroyed_in_the_trash(car: Car, s3: S3
     assert older.exists()
 
 
+@pytest.mark.field
 async def test_a_request_that_is_taken_back_ends_the_deletion(car: Car, s3: S3) -> None:
     path = car.folder / f"{ID}.mcap"
     async with car.running() as now:
@@ -130,6 +132,7 @@ async def test_a_note_that_comes_while_the_file_is_deleted_is_kept(car: Car, s3:
     assert (row["title"], row["note"]) == ("Brakes late", "at the gate")
 
 
+@pytest.mark.field
 async def test_a_clip_that_could_not_be_made_is_said_and_made_later(
     car: Car, s3: S3, monkeypatch: pytest.MonkeyPatch
 ) -> None:

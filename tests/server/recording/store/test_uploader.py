@@ -23,6 +23,7 @@ from tests.server.recording.store.s3 import S3
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("small_parts")]
 
 
+@pytest.mark.field
 async def test_rows_come_first_then_clips_then_whole_files(car: Car, s3: S3) -> None:
     record(car.folder / f"{OLD}.mcap", alarms=[(2.0, "advisory")], began_ms=BEGAN_MS - 3_600_000)
     car.rule = StoreRule(bytes_per_s=FAST, whole=WholeFiles.ALWAYS)
@@ -115,6 +116,7 @@ async def test_a_damaged_part_is_found_before_it_counts_as_stored(car: Car, s3: 
     assert len(s3.sent("part-00001")) == 1
 
 
+@pytest.mark.field
 async def test_a_recording_is_deleted_only_after_a_verified_copy_and_only_if_asked_for(car: Car, s3: S3) -> None:
     path = car.folder / f"{ID}.mcap"
     content = path.read_bytes()
@@ -152,6 +154,7 @@ async def test_a_file_that_changed_after_its_copy_was_verified_is_not_deleted(ca
         assert whole(s3) != bytes(body)
 
 
+@pytest.mark.field
 async def test_what_is_being_recorded_is_neither_listed_nor_deleted(car: Car, s3: S3) -> None:
     car.rule = StoreRule(bytes_per_s=FAST, clips=False, whole=WholeFiles.ALWAYS, deletes=True)
     running = car.folder / "car_20260921T151320Z.mcap"
@@ -172,6 +175,7 @@ async def test_a_setting_of_never_refuses_requests(car: Car) -> None:
             now.uploader.ask("nothing", deletes=False)
 
 
+@pytest.mark.field
 async def test_a_request_that_is_taken_back_ends_the_upload(car: Car, s3: S3) -> None:
     s3.delay_s = lambda method, path: 0.1 if "part-" in path else 0.0
     async with car.running() as now:
@@ -185,6 +189,7 @@ async def test_a_request_that_is_taken_back_ends_the_upload(car: Car, s3: S3) ->
         assert now.copy()["is_deletion_asked"] is False
 
 
+@pytest.mark.field
 @pytest.mark.parametrize(
     ("fault", "sentence"),
     [

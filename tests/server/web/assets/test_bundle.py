@@ -94,6 +94,7 @@ def test_the_page_of_all_cars_is_joined_for_itself(static: Path) -> None:
     assert parts_of(built, str, is_fleet=True)["script"] == f"/static/{built.fleet.script}"
 
 
+@pytest.mark.field
 def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(static: Path) -> None:
     built = find(static)
     assert built is not None
@@ -118,6 +119,7 @@ def test_the_script_of_a_thread_is_whole_in_itself_and_named_by_its_content(stat
     assert renewed.script != built.script, "what asks for another thread is another script"
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("changed", ["js/core/format.js", "js/later.js", "css/wide.css"])
 def test_after_a_change_the_joined_files_are_not_used(static: Path, changed: str) -> None:
     assert find(static) is not None
@@ -130,6 +132,7 @@ def test_after_a_change_the_joined_files_are_not_used(static: Path, changed: str
     assert find(static) is None
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("what", ["absent", "torn", "foreign", "lost"])
 def test_a_damaged_folder_is_no_folder(static: Path, what: str) -> None:
     listed = static / "built" / "built.json"

@@ -299,6 +299,7 @@ async def test_no_redirect_is_followed_and_no_other_host_dialled(source: Source,
         other.kill()
 
 
+@pytest.mark.field
 async def test_a_source_that_hangs_keeps_nobody_waiting_but_its_own(
     source: Source, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -489,6 +490,7 @@ def test_without_a_data_folder_there_is_no_upstream(source: Source) -> None:
         create_app(Config(map_upstream=source.upstream()))
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("command", ["serve", "demo"])
 def test_the_command_says_what_lacks(tmp_path: Path, command: str) -> None:
     arguments = ["--port", "0", "--data", str(tmp_path), "--map-upstream", GOOD]

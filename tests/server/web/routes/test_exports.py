@@ -99,6 +99,7 @@ async def test_an_export_is_begun_followed_and_fetched_in_parts(client: httpx.As
     assert (await client.get("/api/exports")).json()["exports"] == [again]
 
 
+@pytest.mark.field
 @pytest.mark.parametrize(
     ("format", "begins"),
     [("bag", b"#ROSBAG V2.0\n"), ("csv", b"PK"), ("gpx", b"<?xml"), ("geojson", b'{"type":'), ("html", b"<!doctype")],
@@ -110,6 +111,7 @@ async def test_every_format_by_one_address(client: httpx.AsyncClient, format: st
     assert int(answer.headers["content-length"]) == len(answer.content)
 
 
+@pytest.mark.field
 async def test_refusals(client: httpx.AsyncClient) -> None:
     assert problem(await client.get("/api/recordings/nobody/export/bag"), 404) == "There is no such recording."
     assert (await client.get("/api/recordings/..%2Fsecret/export/bag")).status_code == 404
@@ -141,6 +143,7 @@ async def test_cancelling_ends_the_work_and_leaves_nothing(client: httpx.AsyncCl
     assert list((data / "exports").glob("*/*")) == []
 
 
+@pytest.mark.field
 async def test_a_clip_is_a_recording_and_a_page(client: httpx.AsyncClient, data: Path) -> None:
     at_ms = BEGAN_MS + 5000
     answer = await client.post(f"/api/recordings/{DRIVE}/clip", json={"at_ms": at_ms, "before_s": 2, "after_s": 3})
@@ -162,6 +165,7 @@ async def test_a_clip_is_a_recording_and_a_page(client: httpx.AsyncClient, data:
     path.unlink()
 
 
+@pytest.mark.field
 async def test_clips_that_cannot_be(client: httpx.AsyncClient) -> None:
     async def clip(**body: Any) -> httpx.Response:
         return await client.post(f"/api/recordings/{DRIVE}/clip", json=body)
@@ -240,6 +244,7 @@ async def test_one_that_still_tidies_up_is_not_taken_for_an_old_one(bench: Bench
     assert job.state == "done"
 
 
+@pytest.mark.field
 async def test_the_oldest_goes_where_they_are_too_large_together(bench: Bench) -> None:
     jobs = []
     for n, format in enumerate(("geojson", "gpx", "csv")):
@@ -298,6 +303,7 @@ async def test_a_clip_of_what_is_being_recorded_waits_for_its_end(bench: Bench) 
     writing.close()
 
 
+@pytest.mark.field
 async def test_a_clip_of_a_recording_that_ended_does_not_wait_longer(bench: Bench) -> None:
     writing = OurFile(bench.root / "car" / "car_20261121T120000Z.mcap")
     now_ns = time.time_ns()
@@ -332,6 +338,7 @@ async def test_a_moment_far_ahead_is_refused(bench: Bench) -> None:
         await bench.exports.clip(DRIVE, Window(at_ns=time.time_ns() + 50_000_000_000))
 
 
+@pytest.mark.field
 async def test_an_export_does_not_hold_up_the_loop(bench: Bench) -> None:
     """Twenty times a second something wants to run, as the judge does: it is not kept waiting by an export."""
     record(bench.root / "car" / "long.mcap", seconds=600.0)

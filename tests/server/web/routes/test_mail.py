@@ -89,6 +89,7 @@ async def test_what_is_too_large_is_linked_by_the_address_the_page_used(api: htt
     assert (await over(api, placed["n"]))["way"] == "attached", "it is small"
 
 
+@pytest.mark.field
 @pytest.mark.parametrize(
     ("more", "status", "field", "words"),
     [
