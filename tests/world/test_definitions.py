@@ -80,7 +80,7 @@ async def test_nothing_is_asked_of_ros_2_that_can_end_rosapi() -> None:
     empty = {"topics": [], "types": [], "typedefs_full_text": []}
     for version, calls in ((1, 2), (2, 1), (None, 1)):
         link: Any = Link({"/rosapi/topics_and_raw_types": empty})
-        assert await discovery.fetch_definitions(link, {"car_msgs/Bounded"}, version) == {}  # type: ignore[arg-type]
+        assert await discovery.fetch_definitions(link, {"car_msgs/Mixed"}, version) == {}  # type: ignore[arg-type]
         assert len(link.called) == calls
 
 
