@@ -8,12 +8,12 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 import pytest_asyncio
 from playwright.async_api import async_playwright, expect
 
 from tests.chromium import FLAGS
+from tests.http import http_client
 from tests.page.conftest import PHONE
 from tests.page.processes import Process, replay, running, server
 from tests.recipes.project_copy import ProjectCopy
@@ -32,7 +32,7 @@ async def watch(extended: ProjectCopy, drive: Path, tmp_path_factory: pytest.Tem
 
 async def state_of(process: Process, is_reached: Any) -> Any:
     """The state, once it is as awaited."""
-    async with httpx.AsyncClient(base_url=process.address) as client:
+    async with http_client(base_url=process.address) as client:
         for _ in range(400):
             state = (await client.get("/api/state")).json()
             if is_reached(state):

@@ -49,7 +49,7 @@ class Ear:
     def all(self, kind: str) -> list[Any]:
         return [what for name, what in self.received if name == kind]
 
-    async def hears(self, kind: str, count: int = 1, *, within_s: float = 5.0) -> Any:
+    async def hears(self, kind: str, count: int = 1, *, within_s: float = 20.0) -> Any:
         """What was received the `count`-th time."""
         await until(
             lambda: len(self.all(kind)) >= count, within_s=within_s, or_say=lambda: f"no {kind}: {self.received}"
@@ -58,7 +58,7 @@ class Ear:
 
 
 async def until(
-    condition: Callable[[], Any], *, within_s: float = 5.0, or_say: Callable[[], str] = lambda: "it did not happen"
+    condition: Callable[[], Any], *, within_s: float = 20.0, or_say: Callable[[], str] = lambda: "it did not happen"
 ) -> None:
     deadline_s = time.monotonic() + within_s
     while not condition():

@@ -16,6 +16,7 @@ from server.access.keys import keys_of
 from server.app.app import create_app
 from server.app.config import Config, Tls
 from server.storage.storage_thread import StorageThread
+from tests.http import http_client
 from tests.server.conftest import serving_app
 
 OPERATOR_KEY = "operator-key-of-the-tests"
@@ -44,7 +45,7 @@ class Served:
 
     def browser(self, **headers: str) -> httpx.AsyncClient:
         """One that is not paired: its Origin is that of the page."""
-        return httpx.AsyncClient(base_url=self.base, headers={"Origin": self.base} | headers)
+        return http_client(base_url=self.base, headers={"Origin": self.base} | headers)
 
     @contextlib.asynccontextmanager
     async def paired(self, role: Role, name: str = "Pixel 7") -> AsyncIterator[httpx.AsyncClient]:

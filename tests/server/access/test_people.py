@@ -17,6 +17,7 @@ from server.app.config import Config
 from server.control.duty import HOUR_MS
 from server.vehicle.vehicle import Vehicle
 from server.web.page_sender import PageSender
+from tests.http import http_client
 from tests.server.access.pairs import keyed, paired_server
 from tests.server.conftest import serving
 from tests.server.viewer import Viewer, viewer
@@ -84,7 +85,7 @@ async def test_who_may_not(tmp_path: Path) -> None:
     ],
 )
 async def test_what_does_not_fit_is_refused(body: dict[str, Any], status: int) -> None:
-    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config()) as base, http_client(base_url=base) as client:
         answer = await client.post("/api/people", json=body)
         assert answer.status_code == status, answer.text
         assert (await client.get("/api/people")).json()["people"] == []
@@ -92,7 +93,7 @@ async def test_what_does_not_fit_is_refused(body: dict[str, Any], status: int) -
 
 async def test_pages_of_this_machine_are_told_apart_and_told_at_once(tmp_path: Path) -> None:
     config = Config(data=tmp_path, vehicles=(Vehicle(name="car"),))
-    async with serving(config) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(config) as base, http_client(base_url=base) as client:
         for name in HOSTILE:
             await add(client, " ".join(name.replace("\u202e", " ").split()))
         person = (await client.get("/api/people")).json()["people"][0]["id"]
@@ -117,7 +118,7 @@ async def test_pages_of_this_machine_are_told_apart_and_told_at_once(tmp_path: P
             assert (await client.get("/api/state")).json()["control"]["holder"] == f"{name} (page-one)"
     assert {path for path in DATA_FOLDER_FILES if (tmp_path / path).exists()} == set(DATA_FOLDER_FILES)
     assert tomllib.loads((tmp_path / "people/people.toml").read_text())["people"][0]["changed_ms"] > 0
-    async with serving(config) as base, httpx.AsyncClient(base_url=base) as client:  # a restart
+    async with serving(config) as base, http_client(base_url=base) as client:  # a restart
         found = (await client.get("/api/people", headers={"x-catgraph-page": "page-one"})).json()
         assert found["me"]["name"] == name
         assert len(found["people"]) == len(HOSTILE)
@@ -136,7 +137,7 @@ async def test_without_people_everything_is_as_before(tmp_path: Path) -> None:
     config = Config(data=tmp_path, vehicles=(Vehicle(name="car"),))
     async with (
         serving(config) as base,
-        httpx.AsyncClient(base_url=base) as client,
+        http_client(base_url=base) as client,
         viewer(base, name="Phone", page="page-one") as page,
     ):
         await page.send({"kind": "present", "visible": True, "sound": "ready", "awake": "ready"})
@@ -237,7 +238,7 @@ async def test_a_hand_over_ends_the_duty_at_the_other_device(
 
 
 async def test_adding_a_person_answers_their_id(tmp_path: Path) -> None:
-    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config()) as base, http_client(base_url=base) as client:
         for name in ("B.", "A."):
             answer = (await client.post("/api/people", json={"name": name})).json()
             assert next(one["name"] for one in answer["people"] if one["id"] == answer["added"]) == name

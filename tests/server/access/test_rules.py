@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
 
-import httpx
 import pytest
 from fastapi.routing import APIRoute, APIWebSocketRoute
 from starlette.routing import BaseRoute, Mount, Route
@@ -20,6 +19,7 @@ from server.access.identity import Role
 from server.access.rules import Needs, needs_of
 from server.app.app import create_app
 from server.protocol import commands
+from tests.http import http_client
 from tests.server.access.pairs import VIEWER_KEY, config, cookie_of, keyed, paired_server
 
 # What anybody may ask for, and what a viewer may order. A line here is a decision, and needs a reason like a door does.
@@ -109,7 +109,7 @@ async def test_no_route_answers_who_is_not_known_and_none_obeys_a_viewer(tmp_pat
         paired_server(keyed(tmp_path)) as served,
         served.browser() as stranger,
         served.paired(Role.VIEWER) as viewer,
-        httpx.AsyncClient(base_url=served.base, headers={"Authorization": f"Bearer {VIEWER_KEY}"}) as program,
+        http_client(base_url=served.base, headers={"Authorization": f"Bearer {VIEWER_KEY}"}) as program,
     ):
         for method, path in ROUTES:
             needs = needs_of(method, asked(path))

@@ -28,6 +28,7 @@ from server.tls.certificate_renewal import OwnCertificate
 from server.tls.names import Names, names_of
 from server.tls.probe import Probe
 from server.web.middleware import http_protocol
+from tests.http import http_client
 from tests.server.tls.certificates import pair
 
 
@@ -45,7 +46,7 @@ class Field:
         return ssl.create_default_context(cadata=self.secured.authority.pem.decode())
 
     def client(self) -> httpx.AsyncClient:
-        return httpx.AsyncClient(verify=self.trusted, base_url=f"https://127.0.0.1:{self.port}")
+        return http_client(verify=self.trusted, base_url=f"https://127.0.0.1:{self.port}")
 
 
 def listening() -> socket.socket:
@@ -87,7 +88,7 @@ async def test_a_device_that_trusts_the_authority_gets_the_page(served: Field) -
 
 
 async def test_a_device_that_does_not_is_turned_away(served: Field) -> None:
-    async with httpx.AsyncClient() as client:
+    async with http_client() as client:
         with pytest.raises(httpx.ConnectError, match="CERTIFICATE_VERIFY_FAILED"):
             await client.get(f"https://127.0.0.1:{served.port}/")
 
@@ -117,7 +118,7 @@ async def test_the_socket_of_a_page_goes_over_tls_compressed(served: Field) -> N
     "path", ["/api/health", "/docs", "/ws", "/static/js/main.js", "/../authority.pem", "/tls/leaf.pem"]
 )
 async def test_without_tls_nothing_but_the_plain_page_is_served(served: Field, port: str, path: str) -> None:
-    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{getattr(served, port)}") as client:
+    async with http_client(base_url=f"http://127.0.0.1:{getattr(served, port)}") as client:
         assert (await client.post(path)).headers["location"] == "/"  # the first on its connection
         answer = await client.get(path)
         assert (answer.status_code, answer.headers["location"]) == (303, "/")
@@ -235,7 +236,7 @@ async def test_a_page_goes_on_while_the_certificate_is_renewed_and_the_next_one_
             second = await shown(one)
             assert first != second
             await (await before.ping())  # the old one lives
-        async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{one.setup_port}") as client:
+        async with http_client(base_url=f"http://127.0.0.1:{one.setup_port}") as client:
             page = await client.get("/", headers={"Host": f"10.20.0.7:{one.setup_port}"})
             assert f'href="https://10.20.0.7:{one.port}/"' in page.text
 
@@ -255,7 +256,7 @@ async def test_a_given_certificate_is_served_and_plain_http_is_led_to_it(tmp_pat
     assert secured.authority is None
     async with field(secured, config) as one:
         context = ssl.create_default_context(cafile=files.cert)
-        async with httpx.AsyncClient(verify=context) as client:
+        async with http_client(verify=context) as client:
             answer = await client.get(f"https://localhost:{one.port}/api/health")
             assert answer.json()["status"] == "ok"
             assert "strict-transport-security" not in answer.headers  # localhost is a name of every server here

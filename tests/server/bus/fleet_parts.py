@@ -13,6 +13,7 @@ import httpx
 import orjson
 
 from server.bus import broker_users
+from tests.http import http_client
 from tests.page.processes import Process, running, simulate
 from tests.server.bus.apart import Apart, apart
 from tests.server.bus.broker import Broker, running_broker
@@ -94,7 +95,7 @@ async def settled(made: dict[str, Part]) -> None:
     """Both nodes have the car again."""
     async with asyncio.timeout(30):
         for node in NODES:
-            async with httpx.AsyncClient(base_url=made[node].process.address) as client:
+            async with http_client(base_url=made[node].process.address) as client:
                 while True:
                     with contextlib.suppress(httpx.HTTPError, KeyError):
                         answer = await client.get("/api/state", params={"vehicle": "ocelot"})
@@ -109,6 +110,6 @@ async def journal_of(agent: Part) -> list[dict[str, Any]]:
         program = f"import httpx; print(httpx.get({address!r}).text)"
         events = orjson.loads(await agent.net.read(sys.executable, "-c", program))
     else:
-        async with httpx.AsyncClient() as client:
+        async with http_client() as client:
             events = (await client.get(address)).json()
     return sorted(events, key=lambda event: event["n"])

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import httpx
 import nats
 import pytest
 from nats.aio.client import Client
@@ -23,6 +22,7 @@ from server.bus.broker import Broker
 from server.protocol.signed_order import short
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.bus.broker import running_broker
 from tests.server.bus.buses import until
 from tests.server.cars import driving
@@ -73,7 +73,7 @@ async def lying(folder: Path, bridge: RosBridge, **more: Any) -> AsyncIterator[t
 
 
 async def log_of(base: str) -> list[dict[str, Any]]:
-    async with httpx.AsyncClient(base_url=base) as car:
+    async with http_client(base_url=base) as car:
         events: list[dict[str, Any]] = (await car.get("/api/events")).json()["events"]
         return events
 
@@ -116,7 +116,7 @@ async def test_no_order_is_carried_out_that_its_device_did_not_sign(bridge: RosB
         old = ann.sign({"kind": "pause"}, vehicle="ocelot", by="Ann", challenge="1.0", page=PAGE)
         assert await refused(kind="pause", signed=old, **ann_says) == TOO_OLD
 
-        async with httpx.AsyncClient(base_url=base) as car:
+        async with http_client(base_url=base) as car:
             assert (await car.get("/api/state")).json()["session"]["paused"] is False, "nothing of that was carried out"
         events = await log_of(base)
         devices = [event["text"] for event in events if event["change"] == "device"]
@@ -160,7 +160,7 @@ async def test_a_program_signs_its_requests(bridge: RosBridge) -> None:
             serving(Config(broker=at, vehicles=(car,))),
             serving(Config(broker=at, is_node=True, vehicles=())) as room,
         ):
-            async with httpx.AsyncClient(base_url=room, params={"vehicle": "ocelot"}) as client:
+            async with http_client(base_url=room, params={"vehicle": "ocelot"}) as client:
                 async with asyncio.timeout(15):
                     while not (state := await client.get("/api/state")).is_success:
                         await asyncio.sleep(0.05)

@@ -6,9 +6,9 @@ import asyncio
 import shutil
 from pathlib import Path
 
-import httpx
 import pytest
 
+from tests.http import http_client
 from tests.server.bus.fleet_parts import journal_of, parts, settled
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
@@ -22,7 +22,7 @@ async def test_an_agent_restored_from_a_copy_goes_on_where_the_copy_ends(tmp_pat
     async with parts(tmp_path) as (_, made):
         await settled(made)
         agent, node = made["agent"], made["room-1"]
-        async with httpx.AsyncClient(base_url=node.process.address, params={"vehicle": "ocelot"}) as client:
+        async with http_client(base_url=node.process.address, params={"vehicle": "ocelot"}) as client:
             limit = {"values": {"speed_limit.max_mps": LIMIT_MPS}}
             assert (await client.patch("/api/settings", json=limit)).is_success
             async with asyncio.timeout(20):

@@ -8,10 +8,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from server.access.order_signer import OrderSigner
+from tests.http import http_client
 from tests.server.bus.broker import running_broker
 
 TRACE = "nightly-4711"
@@ -67,7 +67,7 @@ async def test_a_command_has_one_id_in_the_logs_of_node_and_agent(tmp_path: Path
         at = ("--broker", broker.address)
         agent = Logged("agent", *at, "--vehicle", "ocelot=ws://127.0.0.1:9", "--data", str(tmp_path / "agent"))
         node = Logged("web", *at, "--data", str(tmp_path / "node"))
-        async with agent, node, httpx.AsyncClient(base_url=node.address, params={"vehicle": "ocelot"}) as client:
+        async with agent, node, http_client(base_url=node.address, params={"vehicle": "ocelot"}) as client:
             while not (state := await client.get("/api/state")).is_success:
                 await asyncio.sleep(0.1)
             challenge = state.json()["server"]["challenge"]

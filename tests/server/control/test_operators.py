@@ -7,7 +7,6 @@ import contextlib
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-import httpx
 import orjson
 import pytest
 import websockets
@@ -17,6 +16,7 @@ from server.app.config import Config
 from server.recording.read.read import open_recording
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.access.pairs import OPERATOR_KEY, cookie_of, keyed, paired_server
 from tests.server.cars import driving
 from tests.server.conftest import serving
@@ -90,7 +90,7 @@ async def test_anybody_acknowledges_and_nobody_else_stops(bridge: RosBridge, ser
 
 
 async def test_this_machine_s_own_console_is_never_refused_and_named(server: str) -> None:
-    async with operator(server, "Ann", "page-ann") as ann, httpx.AsyncClient(base_url=server) as console:
+    async with operator(server, "Ann", "page-ann") as ann, http_client(base_url=server) as console:
         assert (await ann.ask(kind="control", do="take"))["ok"]
         assert (await console.post("/api/pause", headers={"X-Catgraph-Fence": "1"})).status_code == 200
         await ann.until(lambda: any(event["change"] == "paused" for event in ann.events))
@@ -128,7 +128,7 @@ async def test_a_page_that_is_closed_is_not_waited_for_and_one_that_breaks_off_i
 
 @pytest.mark.field
 async def test_nobody_hears_alarms_on_a_server_that_nobody_looks_at(bridge: RosBridge, server: str) -> None:
-    async with driving(bridge), httpx.AsyncClient(base_url=server) as program:
+    async with driving(bridge), http_client(base_url=server) as program:
         async with asyncio.timeout(30):
             while True:
                 found = (await program.get("/api/alarms")).json()["alarms"]

@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 import websockets
 
@@ -23,6 +22,7 @@ from server.judge.topics import candidates
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.queries import refusal
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.cars import driving, twist
 from tests.server.conftest import serving
 from tests.server.viewer import viewer
@@ -316,7 +316,7 @@ async def test_a_change_counts_at_once_is_logged_and_survives_a_restart(bridge: 
         serving(config) as server,
         driving(bridge, speed=lambda n: 5.0),
         viewer(server, have_event=0) as one,
-        httpx.AsyncClient(base_url=server) as client,
+        http_client(base_url=server) as client,
     ):
         await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
         before = (await client.get("/api/settings")).json()
@@ -332,7 +332,7 @@ async def test_a_change_counts_at_once_is_logged_and_survives_a_restart(bridge: 
         assert refused.json()["field"] == LIMIT
         assert any(event["change"] == "settings" and "Speed limit: 11 → 4" in event["text"] for event in one.events)
         toml = (await client.get("/api/settings.toml")).text
-    async with serving(config) as server, httpx.AsyncClient(base_url=server) as client:
+    async with serving(config) as server, http_client(base_url=server) as client:
         assert (await client.get("/api/settings")).json()["values"][LIMIT] == 4.0
         await client.patch("/api/settings", json={"values": {LIMIT: None}})
         assert (await client.get("/api/settings")).json()["values"][LIMIT] == 11.0
@@ -384,7 +384,7 @@ async def test_of_two_pages_that_change_at_once_one_is_told_to_look_again(server
     ],
 )
 async def test_hostile_changes_are_refused_in_words_and_the_state_goes_on(server: str, body: str) -> None:
-    async with httpx.AsyncClient(base_url=server) as client:
+    async with http_client(base_url=server) as client:
         answer = await client.patch("/api/settings", content=body, headers={"content-type": "application/json"})
         assert answer.status_code in (409, 422)
         assert answer.json()["detail"]
@@ -394,7 +394,7 @@ async def test_hostile_changes_are_refused_in_words_and_the_state_goes_on(server
 
 
 async def test_candidates_come_from_what_the_car_offers(bridge: RosBridge, server: str) -> None:
-    async with driving(bridge), viewer(server) as one, httpx.AsyncClient(base_url=server) as client:
+    async with driving(bridge), viewer(server) as one, http_client(base_url=server) as client:
         await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
         found = (await client.get("/api/signals")).json()["candidates"]
         assert found["speed"] == [{"topic": "/catvehicle/vel", "type": "geometry_msgs/Twist"}]
@@ -403,7 +403,7 @@ async def test_candidates_come_from_what_the_car_offers(bridge: RosBridge, serve
 
 
 async def test_before_a_car_is_connected_no_topic_is_known() -> None:
-    async with serving(Config(vehicles=(Vehicle(name="car"),))) as server, httpx.AsyncClient(base_url=server) as client:
+    async with serving(Config(vehicles=(Vehicle(name="car"),))) as server, http_client(base_url=server) as client:
         assert (await client.get("/api/signals")).json()["candidates"] is None
 
 
@@ -452,7 +452,7 @@ async def test_a_picked_topic_is_subscribed_though_the_bridge_tells_no_topics() 
 
 
 async def test_the_log_is_paged_filtered_and_exported(bridge: RosBridge, server: str) -> None:
-    async with driving(bridge), viewer(server) as one, httpx.AsyncClient(base_url=server) as client:
+    async with driving(bridge), viewer(server) as one, http_client(base_url=server) as client:
         for _ in range(3):
             await one.ask(kind="pause")
             await one.ask(kind="resume")

@@ -12,6 +12,7 @@ import pytest
 
 from server.app.config import Config
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.conftest import serving
 from tests.server.marks.media_samples import OGG, PHOTO, VOICE
 from tests.server.viewer import viewer
@@ -40,7 +41,7 @@ def config(tmp_path: Path) -> Config:
 
 
 async def test_a_mark_is_placed_changed_and_taken_back_once_each(config: Config) -> None:
-    async with serving(config) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(config) as base, http_client(base_url=base) as client:
         at_ms = now_ms() - 2000
         for _ in range(3):
             placed = await client.post("/api/mark", json={"mark": "m-1", "at_ms": at_ms, "words": "swerve"})
@@ -74,7 +75,7 @@ async def test_a_mark_is_placed_changed_and_taken_back_once_each(config: Config)
     ids=["an hour ahead", "an hour late", "40 days old", "just now"],
 )
 async def test_a_time_that_cannot_be_is_corrected_and_said(config: Config, off_ms: int, kept: bool, said: str) -> None:
-    async with serving(config) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(config) as base, http_client(base_url=base) as client:
         began_ms = now_ms()
         at_ms = began_ms + off_ms
         for _ in range(2):
@@ -89,14 +90,14 @@ async def test_fifty_marks_in_a_moment_are_all_kept(config: Config) -> None:
     async with serving(config) as base, viewer(base) as page:
         replies = await asyncio.gather(*(page.ask(kind="mark", mark=f"m-{n}", at_ms=now_ms()) for n in range(50)))
         assert all(reply["ok"] for reply in replies)
-        async with httpx.AsyncClient(base_url=base) as client:
+        async with http_client(base_url=base) as client:
             found = await marks(client)
             assert {row["mark"] for row in found} == {f"m-{n}" for n in range(50)}
             assert {row["source"] for row in found} == {"page"}
 
 
 async def test_a_voice_note_and_a_photo_are_kept_and_given_back(config: Config) -> None:
-    async with serving(config) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(config) as base, http_client(base_url=base) as client:
         early = await client.post("/api/marks/m/voice", content=VOICE, headers=WEBM)
         assert (early.status_code, early.json()["detail"]) == (
             409,
@@ -134,7 +135,7 @@ async def test_a_voice_note_and_a_photo_are_kept_and_given_back(config: Config) 
 async def test_what_is_no_voice_note_or_photo_is_refused(
     config: Config, kind: str, content: bytes, type: str, status: int, said: str
 ) -> None:
-    async with serving(config) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(config) as base, http_client(base_url=base) as client:
         await client.post("/api/mark", json={"mark": "m"})
         answer = await client.post(f"/api/marks/m/{kind}", content=content, headers={"content-type": type})
         assert answer.status_code == status

@@ -21,6 +21,7 @@ import pytest
 import websockets
 
 from server.rosbridge_server.server import RosBridge
+from tests.http import http_client
 from tests.server.cars import driving
 from tests.server.marks.marked_drive import WEBM, now_ms
 from tests.server.marks.media_samples import VOICE
@@ -60,7 +61,7 @@ async def served(data: Path, car: str) -> AsyncIterator[tuple[subprocess.Popen[b
                 assert process.poll() is None, out.read_text()
                 await asyncio.sleep(0.05)
         base = f"http://127.0.0.1:{found[1]}"
-        async with httpx.AsyncClient(base_url=base) as client, asyncio.timeout(60):
+        async with http_client(base_url=base) as client, asyncio.timeout(60):
             while True:
                 with contextlib.suppress(httpx.HTTPError):
                     await client.get("/api/health")

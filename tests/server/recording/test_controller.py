@@ -8,7 +8,6 @@ from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from server.analysis.recorded_log import read_recorded_log
@@ -23,6 +22,7 @@ from server.recording.recorded_topics import choose
 from server.recording.standing import read_standing
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.page.processes import Process
 from tests.server.cars import driving
 from tests.server.conftest import serving
@@ -56,7 +56,7 @@ def said_so_far(path: Path) -> Mapping[str, str]:
 
 
 async def listed(base: str) -> list[str]:
-    async with httpx.AsyncClient(base_url=base) as client:
+    async with http_client(base_url=base) as client:
         return [row["id"] for row in (await client.get("/api/recordings")).json()["recordings"]]
 
 
@@ -246,7 +246,7 @@ async def test_by_hand_it_begins_and_ends_and_stays_ended(bridge: RosBridge, tmp
         await asyncio.sleep(0.5)
         state = await one.state()
         assert state["recording"]["state"] == "off", "what a person ended does not begin by itself"
-        async with httpx.AsyncClient(base_url=base) as client:
+        async with http_client(base_url=base) as client:
             answer = await client.post("/api/record", json={"on": True})
             assert answer.status_code == 200
             answer = await client.post("/api/record", json={"on": True})
@@ -296,7 +296,7 @@ async def test_what_a_killed_server_left_is_recovered_and_listed_at_the_next_sta
         async with asyncio.timeout(10):
             while await listed(process.address) != [name]:
                 await asyncio.sleep(0.05)
-        async with httpx.AsyncClient(base_url=process.address) as client:
+        async with http_client(base_url=process.address) as client:
             log = (await client.get("/api/log.json", params={"change": "recovered"})).json()
     finally:
         await process.kill()

@@ -10,12 +10,12 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.page import drives
 from tests.server.conftest import serving
 from tests.server.recording import made
@@ -48,7 +48,7 @@ def data(tmp_path: Path, street: Path) -> Path:
 async def base(bridge: RosBridge, data: Path) -> AsyncIterator[str]:
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=data)  # type: ignore[attr-defined]
     async with serving(config) as address:
-        async with httpx.AsyncClient() as client, asyncio.timeout(20):
+        async with http_client() as client, asyncio.timeout(20):
             while len((await client.get(f"{address}/api/recordings")).json()["recordings"]) < 2:
                 await asyncio.sleep(0.1)
         yield address

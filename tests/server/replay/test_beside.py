@@ -7,10 +7,10 @@ import signal
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from server.rosbridge_server.server import RosBridge
+from tests.http import http_client
 from tests.server.cars import driving
 from tests.server.replay.conftest import STREET
 from tests.server.replay.test_replay_socket import at, order, replays
@@ -55,7 +55,7 @@ async def test_a_second_recording_is_led_apart_and_closed_while_the_first_stays(
         await order(one, "seek", at_s=14.0, beside=True)
         await beside(one, 14.0)
         await at(one, 25.0)
-        async with httpx.AsyncClient() as client:
+        async with http_client() as client:
             tokens = [frame["replay"]["token"] for frame in (first, second)]
             lengths = [
                 (await client.get(f"{base}/api/trends/drive", params={"replay": token})).json()["length_s"]

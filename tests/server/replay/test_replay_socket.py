@@ -9,13 +9,13 @@ import signal
 from pathlib import Path
 from typing import Any
 
-import httpx
 import psutil
 import pytest
 import websockets
 
 from server.replay import manager
 from server.rosbridge_server.server import RosBridge
+from tests.http import http_client
 from tests.server.cars import driving
 from tests.server.replay.conftest import STREET
 from tests.server.viewer import Viewer, viewer
@@ -92,7 +92,7 @@ async def test_the_time_line_the_track_and_the_minute_come_of_the_recording(brid
         )
         assert len(line["speed_mps"]) > 30
         token = frame["replay"]["token"]
-        async with httpx.AsyncClient() as client:
+        async with http_client() as client:
             points = (await client.get(f"{base}/api/track/points", params={"replay": token})).json()
             minute = (await client.get(f"{base}/api/trends", params={"replay": token})).json()
             drive = (await client.get(f"{base}/api/trends/drive", params={"replay": token})).json()

@@ -242,6 +242,7 @@ async def test_a_goodbye_that_cannot_be_answered_ends_the_link_all_the_same() ->
         assert (await ear.hears("closed", within_s=1.2)).code == "closed"
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_what_a_dropped_link_still_held_is_never_delivered() -> None:
     """The bridge stops reading with commands on their way to it: once the link is dropped, they are void."""
@@ -274,6 +275,7 @@ async def test_what_a_dropped_link_still_held_is_never_delivered() -> None:
         assert len(got) < 300_000  # what the bridge's own machine had taken already; a million was sent
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_hurried_while_waiting_it_dials_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dialer, "FIRST_RETRY_S", 60.0)

@@ -26,14 +26,14 @@ class Probe:
     async def send_text(self, text: str | bytes) -> None:
         await self.socket.send(text, text=True)
 
-    async def hear(self, within_s: float = 2.0) -> Operation:
+    async def hear(self, within_s: float = 20.0) -> Operation:
         """The next message, whether JSON or CBOR."""
         return decoded(await asyncio.wait_for(self.socket.recv(), within_s))
 
-    async def hear_raw(self, within_s: float = 2.0) -> str | bytes:
+    async def hear_raw(self, within_s: float = 20.0) -> str | bytes:
         return await asyncio.wait_for(self.socket.recv(), within_s)
 
-    async def hear_op(self, op: str, within_s: float = 2.0) -> Operation:
+    async def hear_op(self, op: str, within_s: float = 20.0) -> Operation:
         """The next message of this kind; others are passed over."""
         while True:
             heard = await self.hear(within_s)
@@ -76,7 +76,7 @@ async def probing(port: int, **options: Any) -> AsyncIterator[Probe]:
         yield Probe(socket)
 
 
-async def until(condition: Callable[[], bool], within_s: float = 5.0) -> None:
+async def until(condition: Callable[[], bool], within_s: float = 20.0) -> None:
     """Waits for something that another task does."""
     async with asyncio.timeout(within_s):
         while not condition():

@@ -284,7 +284,7 @@ async def test_a_flood_of_pings_without_reading_ends(
 async def test_a_browser_that_comes_by_mistake_gets_words(port: int) -> None:
     def fetch() -> tuple[int, str]:
         try:
-            with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=2) as answer:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=20) as answer:
                 return answer.status, answer.read().decode()
         except urllib.error.HTTPError as error:
             with error:

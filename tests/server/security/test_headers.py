@@ -26,6 +26,7 @@ from server.web.middleware.headers import (
     policy_of,
 )
 from server.web.routes.pages import early_of
+from tests.http import http_client
 from tests.server.conftest import serving, serving_app
 from tests.server.recording.made import record
 
@@ -63,7 +64,7 @@ async def test_every_answer_has_them(
 ) -> None:
     data = tmp_path / "data"
     record(data / "recordings" / "car" / f"{ID}.mcap", seconds=2.0)
-    async with serving(Config(data=data)) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config(data=data)) as base, http_client(base_url=base) as client:
         answer = await client.request(method, path, headers=sent, content=b"x" * 300_000 if status == 413 else None)
         assert status in (answer.status_code, None), answer.text
         _has_all(answer.headers, its_policy)
@@ -73,7 +74,7 @@ async def test_every_answer_has_them(
 
 
 async def test_what_is_kept_is_renewed_with_them() -> None:
-    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config()) as base, http_client(base_url=base) as client:
         for path, its_policy in (("/", POLICY_OF_PAGES), ("/static/js/main.js", POLICY_OF_PARTS)):
             first = await client.get(path)
             again = await client.get(path, headers={"If-None-Match": first.headers["etag"]})
@@ -89,7 +90,7 @@ async def test_a_mistake_of_ours_is_answered_with_them() -> None:
     async def mistake(request: Request) -> None:
         raise RuntimeError("secret words of a traceback")
 
-    async with serving_app(app, config) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving_app(app, config) as base, http_client(base_url=base) as client:
         answer = await client.get("/api/mistake")
         assert answer.status_code == 500
         assert answer.json()["detail"] == "Internal server error; the server's log has the details."
@@ -121,7 +122,7 @@ def _has_all(headers: httpx.Headers, its_policy: str) -> None:
 
 @pytest.mark.parametrize("path", ["/", "/offline"])
 async def test_the_one_script_in_a_page_is_allowed_by_its_content_and_nothing_else_is(path: str) -> None:
-    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config()) as base, http_client(base_url=base) as client:
         answer = await client.get(path)
     (script,) = re.findall(r"<script>(.*?)</script>", answer.text, re.DOTALL)
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()

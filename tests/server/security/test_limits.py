@@ -18,6 +18,7 @@ from server.app.config import Config
 from server.protocol.rate_limit import MAX_DEPTH, Allowance, Limits, Rate, nests_deeper
 from server.web.middleware import http_protocol
 from server.web.middleware.throttle import is_upload
+from tests.http import http_client
 from tests.server.conftest import serving
 from tests.server.viewer import viewer
 
@@ -108,7 +109,7 @@ async def test_nesting_is_refused_on_every_route(opening: bytes) -> None:
 @pytest.mark.field
 async def test_a_device_that_asks_without_end_is_told_when_to_come_back() -> None:
     limits = Limits(local_requests=Rate(per_s=1.0, at_once=20))
-    async with serving(Config(limits=limits)) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config(limits=limits)) as base, http_client(base_url=base) as client:
         answers = [await client.get("/api/health") for _ in range(40)]
         assert [answer.status_code for answer in answers[:20]] == [200] * 20
         late = answers[-1]
@@ -138,7 +139,7 @@ async def plugged(base: str) -> AsyncIterator[tuple[asyncio.StreamReader, asynci
             await writer.wait_closed()
 
 
-async def ended(reader: asyncio.StreamReader, within_s: float = 5.0) -> bytes:
+async def ended(reader: asyncio.StreamReader, within_s: float = 20.0) -> bytes:
     """All that still comes before the other side hangs up."""
     async with asyncio.timeout(within_s):
         try:
@@ -255,7 +256,7 @@ async def test_a_page_that_floods_is_let_go() -> None:
                     await socket.send('{"kind":"have","event":0}')
             await _to_its_end(socket)
             assert socket.close_code == 1008
-        async with httpx.AsyncClient() as client:
+        async with http_client() as client:
             assert (await client.get(f"{base}/api/health")).json()["pages"] == 0
 
 

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import httpx
 import pytest
 from starlette.routing import Mount, Route
 
@@ -29,6 +28,7 @@ from server.mail.compose import Attachment, Draft
 from server.rosbridge.address import BadAddress, parse, refuse_forbidden
 from server.vehicle.vehicle import Vehicle
 from server.web.middleware.ranges import disposition, file_name
+from tests.http import http_client
 from tests.server.conftest import serving
 from tests.server.recording.made import record
 from tests.server.viewer import viewer
@@ -117,7 +117,7 @@ async def test_no_path_leads_out(data: Path) -> None:
 
 
 async def test_no_name_in_a_query_a_body_or_an_order_leads_out(data: Path) -> None:
-    async with serving(Config(data=data)) as base, httpx.AsyncClient(base_url=base) as client, viewer(base) as page:
+    async with serving(Config(data=data)) as base, http_client(base_url=base) as client, viewer(base) as page:
         for text in TRAVERSAL:
             for path, name in (
                 ("/", "vehicle"), ("/api/state", "vehicle"), ("/api/log.csv", "vehicle"), ("/api/trends", "replay"),
@@ -208,7 +208,7 @@ async def test_a_redirect_is_not_followed() -> None:
 
 
 async def test_with_an_allow_list_nothing_else_is_dialled() -> None:
-    async with serving(Config(allowed_hosts=("car.example",))) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config(allowed_hosts=("car.example",))) as base, http_client(base_url=base) as client:
         for typed in ("127.0.0.1", "car.example.evil.example", "evil.example", "xcar.example", "[::1]"):
             answer = await client.post("/api/connect", json={"address": typed})
             assert answer.status_code == 409, (typed, answer.text)
@@ -277,7 +277,7 @@ def _with(text: str, file: Path) -> Iterator[dict[str, Any]]:
 
 async def test_no_header_and_no_title_adds_a_line_to_an_answer(data: Path) -> None:
     config = Config(data=data, vehicles=(Vehicle(name="car"),))
-    async with serving(config) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(config) as base, http_client(base_url=base) as client:
         async with asyncio.timeout(20):
             while (await client.get(f"/api/recordings/{ID}")).json().get("state") == "waiting":
                 await asyncio.sleep(0.05)

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 
-import httpx
 import pytest
 
 from server.app.config import Config
@@ -15,6 +14,7 @@ from server.protocol import commands, messages
 from server.rosbridge_server.server import RosBridge
 from server.system.clean_text import clean, cleaned
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.viewer import viewer
@@ -82,7 +82,7 @@ async def test_the_alarm_log_is_clean_whatever_the_car_and_a_page_say(bridge: Ro
             await one.until(lambda seen=seen: len(one.states) > seen, within_s=20.0)  # type: ignore[misc]
         assert any("motor" in json.dumps(event) for event in one.events), "the car's diagnostics are an alarm"
         await one.ask(kind="pause")
-        async with httpx.AsyncClient(base_url=base) as client:
+        async with http_client(base_url=base) as client:
             before = (await client.get("/api/log.json")).json()
             rows = (await client.get("/api/log.csv")).text
             log = (await client.get("/api/log.json")).json()

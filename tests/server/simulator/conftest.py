@@ -14,7 +14,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from server.simulator.service import CarService
 
-PATIENCE_S = 10.0  # the longest any answer may take on a busy machine
+PATIENCE_S = 20.0  # the longest any answer may take on a busy machine
 
 
 class BridgeClient:

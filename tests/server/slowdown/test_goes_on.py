@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 
-import httpx
 import pytest
 
 from server.app.config import Config
@@ -13,6 +12,7 @@ from server.protocol.rate_limit import Limits, Rate
 from server.slowdown.order import DESERTED_S
 from server.system.supervision import Supervisor
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.conftest import serving
 from tests.server.slowdown.conftest import simulated
 from tests.server.slowdown.rig import Rig
@@ -110,7 +110,7 @@ async def test_a_page_that_spent_its_commands_can_still_slow_the_car() -> None:
     )
     async with simulated() as (_, address):
         config = Config(vehicles=(Vehicle(name="car", address=address),), limits=spent)
-        async with serving(config) as base, viewer(base) as page, httpx.AsyncClient(base_url=base) as http:
+        async with serving(config) as base, viewer(base) as page, http_client(base_url=base) as http:
             page.takes = False
             async with asyncio.timeout(20):
                 while (await http.post("/api/slow-down/arm")).status_code != 200:

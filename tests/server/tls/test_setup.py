@@ -15,6 +15,7 @@ from server.tls import authority, steps
 from server.tls.profile import mobileconfig
 from server.tls.setup import CERTIFICATE, SetupAddresses, explaining, leading
 from server.tls.steps import PLATFORMS, platform_of
+from tests.http import http_client
 
 NOW = dt.datetime(2027, 3, 1, tzinfo=dt.UTC)
 OURS = authority.make(host="pit", now=NOW)
@@ -23,7 +24,7 @@ WHERE = SetupAddresses(hosts=("192.168.4.1", "pit.local", "fd00::2"), port=8000,
 
 def client(host: str = "192.168.4.1:8001") -> httpx.AsyncClient:
     app = explaining(OURS, lambda: WHERE)
-    return httpx.AsyncClient(transport=httpx.ASGITransport(app=app), base_url=f"http://{host}")
+    return http_client(transport=httpx.ASGITransport(app=app), base_url=f"http://{host}")
 
 
 async def test_the_certificate_is_handed_out_as_every_system_takes_it(tmp_path: Path) -> None:
@@ -103,7 +104,7 @@ async def test_everything_else_leads_to_the_page_itself(method: str, path: str) 
 
 async def test_a_given_certificate_needs_no_page() -> None:
     transport = httpx.ASGITransport(app=leading(lambda: WHERE))
-    async with httpx.AsyncClient(transport=transport, base_url="http://pit.local") as page:
+    async with http_client(transport=transport, base_url="http://pit.local") as page:
         for path in ("/", "/ca.crt"):
             assert (await page.get(path)).headers["location"] == "https://pit.local:8000/"
 

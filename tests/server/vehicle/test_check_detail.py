@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-import httpx
 import orjson
 
 from monitor.check_minute import CheckMinute
@@ -16,6 +15,7 @@ from server.protocol.check_state import CheckAnswer
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.check_detail import check_answer
 from tests.frames import check_shape
+from tests.http import http_client
 from tests.monitor.checks.known import known
 from tests.server.cars import driving
 from tests.server.viewer import viewer
@@ -65,7 +65,7 @@ def test_all_checks_of_a_tile_are_named() -> None:
 
 
 async def test_over_http(bridge: RosBridge, server: str) -> None:
-    async with viewer(server) as one, driving(bridge, speed=lambda n: 4.0), httpx.AsyncClient() as http:
+    async with viewer(server) as one, driving(bridge, speed=lambda n: 4.0), http_client() as http:
         await one.state(lambda s: any(tile["id"] == "speed" and tile["verdict"] == "ok" for tile in s["checks"]), 15)
         async with asyncio.timeout(15):
             while not (found := (await http.get(f"{server}/api/checks/speed_limit")).json())["minute"]["values"]:

@@ -11,6 +11,7 @@ import pytest
 from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.conftest import serving
 
 
@@ -28,7 +29,7 @@ async def phase(client: httpx.AsyncClient, wanted: str, vehicle: str = "ocelot")
 async def test_after_stop_an_empty_address_dials_the_car_that_was_configured(bridge: RosBridge) -> None:
     address = bridge.address  # type: ignore[attr-defined]
     cars = (Vehicle(name="ocelot", address=address), Vehicle(name="lynx", address=address), Vehicle(name="none"))
-    async with serving(Config(vehicles=cars)) as server, httpx.AsyncClient(base_url=server) as client:
+    async with serving(Config(vehicles=cars)) as server, http_client(base_url=server) as client:
         for number in range(2):
             await phase(client, "monitoring")
             assert (await client.post("/api/disconnect", params={"vehicle": "ocelot"})).is_success
@@ -50,7 +51,7 @@ async def test_after_stop_an_empty_address_dials_the_car_that_was_configured(bri
 async def test_another_car_that_was_typed_does_not_replace_the_configured_one(bridge: RosBridge) -> None:
     address = bridge.address  # type: ignore[attr-defined]
     config = Config(vehicles=(Vehicle(name="ocelot", address=address),))
-    async with serving(config) as server, httpx.AsyncClient(base_url=server) as client:
+    async with serving(config) as server, http_client(base_url=server) as client:
         await phase(client, "monitoring")
         await client.post("/api/disconnect")
         await client.post("/api/connect", json={"address": "127.0.0.1:1"})

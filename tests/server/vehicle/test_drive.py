@@ -10,7 +10,6 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from server.analysis.rehearse import rehearse
@@ -18,6 +17,7 @@ from server.app.config import Config
 from server.judge.pipeline import TICK_S
 from server.recording.read.read import open_recording
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server import scan_frames
 from tests.server.conftest import serving
 from tests.server.viewer import Viewer, viewer
@@ -77,7 +77,7 @@ async def test_the_real_drive_of_2016_06_01_both_ways(recordings: Path) -> None:
         serving(Config(vehicles=(Vehicle(name="bag", address=bag), Vehicle(name="mcap", address=mcap)))) as server,
         viewer(server, vehicle="bag") as of_bag,
         viewer(server, vehicle="mcap") as of_mcap,
-        httpx.AsyncClient() as client,
+        http_client() as client,
     ):
         for one in (of_bag, of_mcap):
             await one.until(lambda one=one: one.states and one.states[-1]["session"]["received"] >= 14228, within_s=100)

@@ -6,12 +6,12 @@ import sqlite3
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.viewer import Viewer, viewer
@@ -36,7 +36,7 @@ async def test_a_file_that_another_program_holds_stops_no_alarm_and_is_said(brid
     config = config_of(bridge, tmp_path)
     speeds = {"now": 2.0}
     async with driving(bridge, speed=lambda n: speeds["now"]):
-        async with serving(config) as server, viewer(server) as one, httpx.AsyncClient(base_url=server) as client:
+        async with serving(config) as server, viewer(server) as one, http_client(base_url=server) as client:
             await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
             other = sqlite3.connect(tmp_path / "events.sqlite", isolation_level=None)
             other.execute("BEGIN IMMEDIATE")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import httpx
 import pytest
 
 from monitor.phones import NO_PHONE, PhoneReport
@@ -18,6 +17,7 @@ from server.rosbridge_server.server import RosBridge
 from server.simulator.scenarios import planned
 from server.vehicle import phone
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.conftest import serving
 from tests.server.riding import WALL_MS, Ride, Rider, ride
 from tests.server.viewer import Viewer, viewer
@@ -192,7 +192,7 @@ async def test_a_phone_far_from_the_car_is_told_on_every_page(bridge: RosBridge)
         (alarm,) = [alarm for alarm in found["alarms"] if alarm["id"] == "phone_car"]
         assert alarm["place"] == "dialog"
         assert alarm["text"].startswith("The phone is 1109 m from the car")
-        async with httpx.AsyncClient() as client:
+        async with http_client() as client:
             assert (await client.get(f"{server}/api/state")).json()["phone"]["id"] == "0a1b2c3d"
             text = (await client.get(f"{server}/metrics")).text
         assert 'catgraph_phones{vehicle="car"} 1' in text

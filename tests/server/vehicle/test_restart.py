@@ -8,12 +8,12 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.page.processes import Process
 from tests.server.cars import driving
 from tests.server.conftest import serving
@@ -26,7 +26,7 @@ def alarm_of(state: dict[str, Any], name: str) -> dict[str, Any] | None:
     return next((alarm for alarm in state["alarms"] if alarm["id"] == name), None)
 
 
-async def alarm(one: Viewer, name: str, stands: str, within_s: float = 8.0) -> dict[str, Any]:
+async def alarm(one: Viewer, name: str, stands: str, within_s: float = 20.0) -> dict[str, Any]:
     """The alarm, once it stands as named."""
     state = await one.state(lambda s: (alarm_of(s, name) or {}).get("state") == stands, within_s)
     found = alarm_of(state, name)
@@ -45,7 +45,7 @@ async def server_of(data: Path, *vehicle: str) -> AsyncIterator[Process]:
 
 
 async def events(base: str, **filters: Any) -> list[dict[str, Any]]:
-    async with httpx.AsyncClient(base_url=base) as client:
+    async with http_client(base_url=base) as client:
         return list((await client.get("/api/log.json", params=filters)).json())
 
 

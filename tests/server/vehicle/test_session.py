@@ -6,7 +6,6 @@ import asyncio
 import time
 from typing import Any
 
-import httpx
 import numpy as np
 import orjson
 import psutil
@@ -17,6 +16,7 @@ from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
 from server.web.fair_wakeup import FairWakeup
+from tests.http import http_client
 from tests.server import scan_frames
 from tests.server.cars import driving, scan, twist
 from tests.server.conftest import serving, serving_app
@@ -104,6 +104,7 @@ async def test_a_frozen_bridge_is_said_within_2_s_and_data_flow_again(bridge: Ro
         await one.state(is_live, within_s=4.0)
 
 
+@pytest.mark.field
 async def test_a_silent_car_is_told_from_a_silent_bridge(bridge: RosBridge, server: str) -> None:
     async with viewer(server) as one:
         async with driving(bridge):
@@ -124,6 +125,7 @@ async def test_nothing_after_connecting_is_said_after_5_s(server: str) -> None:
         assert 4.0 < time.monotonic() - start_s < 6.5
 
 
+@pytest.mark.field
 async def test_connecting_to_nothing_names_the_reason_and_goes_on_trying(bridge: RosBridge) -> None:
     async with serving(Config()) as server, viewer(server) as one:
         assert (await one.state())["session"]["phase"] == "idle"
@@ -173,7 +175,7 @@ async def test_bad_messages_are_counted_with_their_reason(bridge: RosBridge, ser
         state = await one.state(lambda s: s["signals"]["speed"]["rejected"] == before + 6)
         assert state["signals"]["speed"]["rejected_why"]
         assert is_live(state)
-        async with httpx.AsyncClient() as client:
+        async with http_client() as client:
             body = (await client.get(f"{server}/api/signals")).json()
         assert sum(body["rejected"]["Speed"].values()) == 6
 

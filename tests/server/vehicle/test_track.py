@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import httpx
 import pytest
 
 from monitor.state import Snapshot, TrackPoint
@@ -12,6 +11,7 @@ from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle import queries
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.cars import twist
 from tests.server.conftest import serving
 from tests.server.vehicle.test_phone import gps
@@ -59,7 +59,7 @@ def test_as_geojson_a_line_ends_where_the_way_is_not_known() -> None:
 async def test_a_track_grows_is_told_by_number_and_another_connection_is_another(bridge: RosBridge) -> None:
     bridge.advertise("/gps_fix", "sensor_msgs/NavSatFix")
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
-    async with serving(config) as base, viewer(base) as one, httpx.AsyncClient(base_url=base) as client:
+    async with serving(config) as base, viewer(base) as one, http_client(base_url=base) as client:
         await one.state(lambda s: s["signals"]["position"]["topic"] == "/gps_fix")
         number = one.states[-1]["session"]["track"]["number"]
         assert one.states[-1]["session"]["track"]["last"] == 0

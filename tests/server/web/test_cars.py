@@ -10,7 +10,6 @@ from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 import websockets
 
@@ -20,6 +19,7 @@ from server.rosbridge_server.server import RosBridge
 from server.system.log_context import with_context
 from server.vehicle.command_handler import CommandHandler
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.cars import driving, twist
 from tests.server.conftest import serving, serving_app
 from tests.server.slowdown.conftest import simulated, watching
@@ -143,12 +143,13 @@ async def test_what_acts_on_a_car_is_refused_by_any_other(bridge: RosBridge, oth
 
 
 async def test_a_program_orders_without_a_body(bridge: RosBridge, other: RosBridge, tmp_path: Path) -> None:
-    async with serving(two(bridge, other)) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(two(bridge, other)) as base, http_client(base_url=base) as client:
         for path in ("arm", "disarm", "order"):
             answer = await client.post(f"/api/slow-down/{path}", params={"vehicle": "serval"})
             assert answer.status_code in (200, 409), (path, answer.text)
 
 
+@pytest.mark.field
 async def test_a_page_of_another_car_is_heard_where_it_announces_alarms(bridge: RosBridge, other: RosBridge) -> None:
     seen = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready"}
     async with (
@@ -178,7 +179,7 @@ async def test_a_page_of_another_car_is_heard_where_it_announces_alarms(bridge: 
 @pytest.mark.parametrize("path", ["arm", "disarm", "order", "release", "veto"])
 async def test_a_program_names_the_car_where_there_are_several(bridge: RosBridge, other: RosBridge, path: str) -> None:
     body = {"release": {"number": 1}, "veto": {"trigger": "on_speed"}}.get(path)
-    async with serving(two(bridge, other)) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(two(bridge, other)) as base, http_client(base_url=base) as client:
         unnamed = await client.post(f"/api/slow-down/{path}", json=body)
         assert (unnamed.status_code, unnamed.json()["detail"]) == (
             422,
@@ -217,7 +218,7 @@ async def test_a_slide_for_a_car_that_was_renamed_reaches_none() -> None:
 
 
 async def test_exported_events_name_their_car_where_there_are_several(bridge: RosBridge, other: RosBridge) -> None:
-    async with serving(two(bridge, other)) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(two(bridge, other)) as base, http_client(base_url=base) as client:
         for car in ("ocelot", "serval"):
             answer = await client.post("/api/slow-down/order", params={"vehicle": car})
             assert answer.status_code == 409
@@ -241,7 +242,7 @@ async def test_the_servers_log_names_the_car_that_a_line_is_about(
         lines.append(with_context(f"{self._vehicle} failed"))
 
     monkeypatch.setattr(CommandHandler, "_query", fail)
-    async with serving(two(bridge, other)) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(two(bridge, other)) as base, http_client(base_url=base) as client:
         for car in ("ocelot", "serval"):
             await client.post("/api/slow-down/order", params={"vehicle": car})
     assert [line.split(" trace=")[0] for line in lines if line.startswith(("ocelot", "serval"))] == [

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import httpx
 import pytest
 
 from server.protocol.answers import DriveTrendsAnswer
 from server.rosbridge_server.server import RosBridge
+from tests.http import http_client
 from tests.server.cars import driving
 from tests.server.viewer import viewer
 
 
 async def test_a_drive_is_told_in_buckets(bridge: RosBridge, server: str) -> None:
-    async with viewer(server) as one, driving(bridge, speed=lambda n: 4.0 + 0.1 * (n % 5)), httpx.AsyncClient() as http:
+    async with viewer(server) as one, driving(bridge, speed=lambda n: 4.0 + 0.1 * (n % 5)), http_client() as http:
         await one.state(lambda s: sum(x is not None for x in s["trends"]["lowest"]["speed"]) == 4, 15)
         answer = await http.get(f"{server}/api/trends/drive", params={"signals": "speed,brake", "buckets": 100})
         state = (await http.get(f"{server}/api/state")).json()
@@ -50,13 +50,13 @@ async def test_a_drive_is_told_in_buckets(bridge: RosBridge, server: str) -> Non
     ],
 )
 async def test_what_cannot_be_answered_is_refused_in_a_sentence(server: str, wrong: dict[str, str], said: str) -> None:
-    async with httpx.AsyncClient() as http:
+    async with http_client() as http:
         answer = await http.get(f"{server}/api/trends/drive", params=wrong)
     assert answer.status_code == 422
     assert said in answer.json()["detail"]
 
 
 async def test_no_such_vehicle_and_no_such_replay(server: str) -> None:
-    async with httpx.AsyncClient() as http:
+    async with http_client() as http:
         for missing in ({"vehicle": "none"}, {"replay": "0000"}):
             assert (await http.get(f"{server}/api/trends/drive", params=missing)).status_code == 404

@@ -8,7 +8,6 @@ import json
 from collections.abc import AsyncIterator
 from typing import Any
 
-import httpx
 import pytest
 import websockets
 
@@ -17,6 +16,7 @@ from server.app.config import Config
 from server.protocol.commands import BY_KIND
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.access.pairs import OPERATOR_KEY, VIEWER_KEY, keyed, paired_server
 from tests.server.cars import driving
 from tests.server.conftest import serving, serving_app
@@ -146,6 +146,7 @@ async def test_two_people_share_the_cars(bridge: RosBridge, other: RosBridge) ->
             assert logged(late) == expected, "the newest of the past"
 
 
+@pytest.mark.field
 async def test_a_page_of_all_cars_is_heard_by_every_car(bridge: RosBridge, other: RosBridge) -> None:
     async with serving(two(bridge, other)) as base, viewer(base, vehicle="serval", page="bbbb") as there:
         await there.until(lambda: there.states)
@@ -269,7 +270,7 @@ async def test_the_same_over_http(bridge: RosBridge, other: RosBridge) -> None:
         serving(two(bridge, other)) as base,
         speeding(other, 30.0),
         viewer(base, fleet=True) as one,
-        httpx.AsyncClient(base_url=base, headers={"X-Catgraph-Name": "dispatch"}) as client,
+        http_client(base_url=base, headers={"X-Catgraph-Name": "dispatch"}) as client,
     ):
         await one.until(lambda: item(one, "serval"))
         unnamed = await client.post("/api/attention/take", json={})

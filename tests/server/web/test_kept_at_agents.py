@@ -21,6 +21,7 @@ from server.app.config import Config
 from server.bus.broker import Broker
 from server.vehicle.vehicle import Vehicle
 from server.web.agents import kept
+from tests.http import http_client
 from tests.server.access.pairs import VIEWER_KEY, keyed
 from tests.server.bus.broker import running_broker
 from tests.server.conftest import serving
@@ -146,9 +147,7 @@ async def test_a_link_in_a_mail_leads_through_the_node(tmp_path: Path) -> None:
 async def test_a_viewer_at_a_node_reads_and_changes_nothing(tmp_path: Path) -> None:
     keys: Keys = keyed().keys
     async with fleet(tmp_path, host="0.0.0.0", keys=keys) as one:
-        async with httpx.AsyncClient(
-            base_url=one.room.base_url, headers={"Authorization": f"Bearer {VIEWER_KEY}"}
-        ) as room:
+        async with http_client(base_url=one.room.base_url, headers={"Authorization": f"Bearer {VIEWER_KEY}"}) as room:
             path = f"/agents/ocelot/api/recordings/{DRIVE}"
 
             async def is_read() -> bool:

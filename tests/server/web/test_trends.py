@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import httpx
 import pytest
 
 from server.rosbridge_server.server import RosBridge
+from tests.http import http_client
 from tests.server.cars import driving
 from tests.server.viewer import viewer
 
 
 async def test_a_page_that_comes_late_gets_what_it_missed(bridge: RosBridge, server: str) -> None:
-    async with viewer(server) as one, driving(bridge, speed=lambda n: 4.0 + 0.1 * (n % 5)), httpx.AsyncClient() as http:
+    async with viewer(server) as one, driving(bridge, speed=lambda n: 4.0 + 0.1 * (n % 5)), http_client() as http:
         state = await one.state(lambda s: sum(x is not None for x in s["trends"]["lowest"]["speed"]) == 4, 15)
         whole = (await http.get(f"{server}/api/trends")).json()
     carried = state["trends"]
@@ -27,7 +27,7 @@ async def test_a_page_that_comes_late_gets_what_it_missed(bridge: RosBridge, ser
 
 
 async def test_only_what_came_after(server: str) -> None:
-    async with httpx.AsyncClient() as http:
+    async with http_client() as http:
         now = int((await http.get(f"{server}/api/trends")).json()["now"])
         later = (await http.get(f"{server}/api/trends", params={"after": now + 5})).json()
         assert later["lowest"]["speed"] == []

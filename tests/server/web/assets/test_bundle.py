@@ -8,13 +8,13 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import httpx
 import pytest
 
 from server.app.config import Config
 from server.system.page_files import static_dir
 from server.web.assets.bundle import FLEET_STYLES, STYLES, find, join
 from server.web.routes.pages import parts_of
+from tests.http import http_client
 from tests.server.conftest import serving
 from tests.tree import PROJECT
 
@@ -157,7 +157,7 @@ def test_what_cannot_be_joined_is_said_with_the_reason(static: Path) -> None:
 
 @pytest.mark.parametrize("page", ["/", "/fleet"])
 async def test_the_page_begins_with_few_files_that_may_be_kept_for_ever(page: str) -> None:
-    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config()) as base, http_client(base_url=base) as client:
         served = await client.get(page)
         assert "script-src 'self' 'sha256-" in served.headers["content-security-policy"]
         text = served.text

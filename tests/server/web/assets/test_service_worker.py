@@ -21,6 +21,7 @@ from server.web.assets import icons
 from server.web.assets.bundle import Built, Entry
 from server.web.assets.manifest import manifest
 from server.web.assets.service_worker import build_of, shell_of, withdrawn
+from tests.http import http_client
 from tests.tree import PROJECT
 
 MODULES = PROJECT / "node_modules"
@@ -29,7 +30,7 @@ MODULES = PROJECT / "node_modules"
 @asynccontextmanager
 async def asking(**config: Any) -> AsyncIterator[httpx.AsyncClient]:
     app = create_app(Config(**config))
-    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
+    async with http_client(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
         yield client
     app.state.services.ground.close()
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 import gzip
 from pathlib import Path
 
-import httpx
-
 from server.app.config import Config
 from server.web.assets.static_files import _read
+from tests.http import http_client
 from tests.server.conftest import serving
 
 
 async def test_a_text_comes_small_to_whoever_can_unpack_it_and_is_asked_about_each_time() -> None:
-    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config()) as base, http_client(base_url=base) as client:
         for path in ("/", "/static/js/core/store.js", "/static/css/frame.css", "/static/icons/catgraph.svg"):
             small = await client.get(path, headers={"Accept-Encoding": "gzip"})
             plain = await client.get(path, headers={"Accept-Encoding": "identity"})

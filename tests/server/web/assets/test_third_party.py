@@ -7,13 +7,13 @@ from email.message import Message
 from importlib import metadata
 from urllib.parse import quote
 
-import httpx
 import pytest
 from packaging.utils import canonicalize_name
 
 from server.app.config import Config
 from server.system.page_files import static_dir
 from server.web.assets.third_party import _license, parts
+from tests.http import http_client
 from tests.server.conftest import serving
 
 
@@ -54,7 +54,7 @@ def test_how_a_licence_is_called(headers: dict[str, str], name: str) -> None:
 
 
 async def test_the_page_is_told_versions_and_texts() -> None:
-    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config()) as base, http_client(base_url=base) as client:
         about = (await client.get("/api/about")).json()
         assert about["python"].startswith("3.")
         assert {"name", "version", "license", "where"} == set(about["parts"][0])

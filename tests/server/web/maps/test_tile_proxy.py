@@ -24,6 +24,7 @@ from server.version import catgraph_version
 from server.web.maps.map_options import MapUpstream, checked
 from server.web.maps.mbtiles import MapFile, MapRefused
 from server.web.maps.tile_cache import Kept, TileCache
+from tests.http import http_client
 from tests.server.web.maps.tile_server import picture
 
 SERVER = Path(__file__).with_name("tile_server.py")
@@ -111,7 +112,7 @@ async def serving(upstream: MapUpstream, data: Path, clock: Clock | None = None,
     clock = clock or Clock()
     app = create_app(Config(map_upstream=upstream, data=data, **more), now=clock.now, wall_ms=clock.wall_ms)
     try:
-        async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
+        async with http_client(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
             yield Server(client, clock)
     finally:
         app.state.services.ground.close()

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from server.web.middleware import errors
 from server.web.middleware.ranges import MAX_NAME, disposition, file_answer, file_name
+from tests.http import http_client
 
 BYTES = bytes(range(256)) * 3000 + b"the end"  # more than two portions
 SIZE = len(BYTES)
@@ -38,7 +39,7 @@ async def client(path: Path) -> AsyncIterator[httpx.AsyncClient]:
     def answer(request: Request) -> Response:
         return file_answer(request, path, name="a drive.mcap", media_type="application/x-mcap")
 
-    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://car") as client:
+    async with http_client(transport=httpx.ASGITransport(app), base_url="http://car") as client:
         yield client
 
 

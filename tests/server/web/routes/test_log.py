@@ -7,7 +7,6 @@ import csv
 import io
 from typing import Any
 
-import httpx
 import pytest
 import pytest_asyncio
 
@@ -16,6 +15,7 @@ from server.bus.event_table import COLUMNS
 from server.control import display_name
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.viewer import viewer
@@ -62,7 +62,7 @@ def test_a_program_is_called_by_its_product(agent: str | None, name: str) -> Non
 
 
 async def who(server: str, change: str) -> list[Any]:
-    async with httpx.AsyncClient(base_url=server) as client:
+    async with http_client(base_url=server) as client:
         return [event["by"] for event in (await client.get("/api/log", params={"change": change})).json()["events"]]
 
 
@@ -81,7 +81,7 @@ async def test_whoever_gives_an_order_is_named_by_the_connection_not_by_the_orde
         assert (await nameless.ask(kind="pause"))["ok"]
         assert await who(server, "paused") == ["operator", "Ann"]
         assert await who(server, "resumed") == ["Ann B"]
-        async with httpx.AsyncClient(base_url=server) as client:
+        async with http_client(base_url=server) as client:
             await client.post("/api/resume", headers={"X-Catgraph-Name": "test rig  7"})
             await client.post("/api/pause", headers={"User-Agent": "curl/8.5.0"})
             await client.patch("/api/settings", json={"values": {LIMIT: 9.0}})
@@ -111,7 +111,7 @@ async def test_the_log_alone_says_what_was_judged_by_at_every_moment(bridge: Ros
     """Folding the settings events of the log gives the settings in force, whatever was changed and by whom."""
     bridge.advertise("/catvehicle/brake", "geometry_msgs/Wrench")  # so that it is taken for a CATVehicle
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
-    async with serving(config) as base, driving(bridge), httpx.AsyncClient(base_url=base) as client:
+    async with serving(config) as base, driving(bridge), http_client(base_url=base) as client:
         async with viewer(base, name="Ann") as one:
             await one.state(lambda s: s["session"]["profile"] == "CATVehicle")
             await one.ask(kind="set", values={LIMIT: 4.0, "speed_limit.deadband_mps": 0.2})
@@ -163,7 +163,7 @@ async def speeding(bridge: RosBridge) -> Any:
 
 
 async def test_every_transition_has_its_values_and_limits_in_every_export(speeding: str) -> None:
-    async with httpx.AsyncClient(base_url=speeding) as client:
+    async with http_client(base_url=speeding) as client:
         only = {"alarm": "speed_limit"}
         log = (await client.get("/api/log.json", params=only)).json()
         text = (await client.get("/api/log.csv", params=only)).text
@@ -208,18 +208,18 @@ async def test_every_transition_has_its_values_and_limits_in_every_export(speedi
     ],
 )
 async def test_a_query_that_makes_no_sense_is_refused(server: str, query: str) -> None:
-    async with httpx.AsyncClient(base_url=server) as client:
+    async with http_client(base_url=server) as client:
         assert (await client.get(f"/api/log?{query}")).status_code == 422
 
 
 async def test_an_empty_log_is_exported_as_its_columns() -> None:
-    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config()) as base, http_client(base_url=base) as client:
         assert (await client.get("/api/log.csv")).text.strip() == ",".join(COLUMNS)
         assert (await client.get("/api/log.json")).json() == []
 
 
 async def test_the_load_and_the_state_of_the_log_are_metrics(speeding: str) -> None:
-    async with httpx.AsyncClient(base_url=speeding) as client:
+    async with http_client(base_url=speeding) as client:
         lines = (await client.get("/metrics")).text.splitlines()
         state = (await client.get("/api/state")).json()
     assert 'catgraph_alarm_log_kept{vehicle="car"} 1' in lines

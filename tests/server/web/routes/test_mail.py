@@ -11,6 +11,7 @@ import httpx
 import pytest
 
 from server.app.config import Config
+from tests.http import http_client
 from tests.server.conftest import serving
 from tests.server.mail.post import Post, certificates, posting
 from tests.server.recording.made import record
@@ -229,7 +230,7 @@ async def test_the_outbox_is_told_page_by_page(api: httpx.AsyncClient, post: Pos
 
 
 async def test_a_server_that_keeps_nothing_mails_nothing() -> None:
-    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config()) as base, http_client(base_url=base) as client:
         answer = await client.get("/api/mail")
         assert (answer.status_code, answer.json()["detail"]) == (
             404,

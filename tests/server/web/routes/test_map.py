@@ -19,6 +19,7 @@ from server.app.config import Config
 from server.web.maps.image_type import media_type, plain_text
 from server.web.maps.mbtiles import MapFile, MapRefused
 from server.web.maps.site_image import site_image
+from tests.http import http_client
 from tests.server.web import map_files as maps
 from tests.server.web.map_files import png
 
@@ -37,7 +38,7 @@ def halves(tmp_path: Path) -> Path:
 @asynccontextmanager
 async def asking(**config: Any) -> AsyncIterator[httpx.AsyncClient]:
     app = create_app(Config(**config))
-    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
+    async with http_client(transport=httpx.ASGITransport(app), base_url="http://localhost") as client:
         yield client
     app.state.services.ground.close()
 

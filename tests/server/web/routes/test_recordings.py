@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from server.app.config import Config
 from server.recording.export.formats import FORMATS
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.conftest import serving
 from tests.server.recording.made import BEGAN_MS, record
 
@@ -174,7 +175,7 @@ async def test_counters(client: httpx.AsyncClient) -> None:
 
 
 async def test_a_server_that_keeps_nothing_says_so() -> None:
-    async with serving(Config()) as base, httpx.AsyncClient(base_url=base) as client:
+    async with serving(Config()) as base, http_client(base_url=base) as client:
         assert "--data" in problem(await client.get("/api/recordings"), 404)
         assert "--data" in problem(await client.delete("/api/recordings/x"), 404)
         assert (await client.get("/api/health")).json()["recordings"] is None

@@ -1,0 +1,14 @@
+"""An HTTP client for tests, which waits longer than httpx does by itself: a busy machine is no failure."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import httpx
+
+PATIENCE_S = 30.0
+
+
+def http_client(**options: Any) -> httpx.AsyncClient:
+    """A client with these options of httpx, that waits up to PATIENCE_S for each step of an answer."""
+    return httpx.AsyncClient(**{"timeout": PATIENCE_S} | options)
