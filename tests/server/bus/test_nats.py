@@ -185,6 +185,7 @@ async def test_nonsense_harms_neither_side(body: bytes) -> None:
         assert both.page.vehicles == ("margay", "ocelot")
 
 
+@pytest.mark.field
 async def test_a_flood_of_pulls_is_bounded() -> None:
     async with running_broker() as broker, nats_buses(broker.address, broker.address) as both:
         async with connected(broker.address) as stranger:
