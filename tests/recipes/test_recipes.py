@@ -59,6 +59,7 @@ def test_a_recipe_applies_alone_and_touches_no_more_files_than_it_promises(plain
     assert (len(files) - len(tests), len(tests)) == MOST_FILES[recipe]
 
 
+@pytest.mark.field
 @pytest.mark.timeout(300)
 def test_with_all_recipes_the_project_holds_its_rules(extended: ProjectCopy) -> None:
     tests = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *TESTS)
