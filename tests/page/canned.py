@@ -444,6 +444,7 @@ class Canned:
         """As it is at first: a calm drive."""
         self.state = live()
         self.silent = False
+        self.is_scanning = True
         self.heard: list[Json] = []
         self.refuses: dict[str, str] = {}  # why, by the kind of command
         self.role = "operator"
@@ -520,7 +521,7 @@ class Canned:
                 await socket.send_json(state | {"vehicle": self.vehicle})
                 if self.cars:
                     await socket.send_json({"kind": "cars", "time_ms": _now_ms(), "cars": self.cars})
-                if self._watching:
+                if self._watching and self.is_scanning:
                     await socket.send_bytes(scan(number))
             await asyncio.sleep(self.states_every_s)
 

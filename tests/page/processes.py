@@ -21,6 +21,14 @@ from tests.through_broker import NODE
 IS_PARTED = bool(os.environ.get("CATGRAPH_THROUGH_BROKER"))  # a server is an agent, a broker and a web node
 
 
+UNHURRIED = """[limits.link_late]
+late_s = 10.0
+critical_s = 20.0
+
+[limits.signals]
+slow_below_percent = 10.0
+"""
+
 AT_AGENT = "/agents/car" if IS_PARTED else ""  # what stands before addresses of the recordings and the mail of a car
 
 
@@ -145,13 +153,23 @@ def simulate(*options: str, port: int = 0) -> tuple[str, ...]:
     return ("simulate", "--port", str(port), *options)
 
 
+def unhurried(data: Path) -> Path:
+    """The data folder of a server that does not mind a machine that halts: messages may be late, and few of them come.
+
+    What it judges so is not what the test is about, and a dialog of it would cover what the test presses.
+    """
+    (data / "settings").mkdir(parents=True, exist_ok=True)
+    (data / "settings" / "car.toml").write_text(UNHURRIED)
+    return data
+
+
 Drive = tuple[Process, Process]  # a car and a server that watches it
 
 
 @contextlib.asynccontextmanager
 async def driving(data: Path) -> AsyncIterator[Drive]:
     """A simulated car and a server that watches it."""
-    async with running(*simulate()) as car, running(*server(data, car.address)) as watch:
+    async with running(*simulate()) as car, running(*server(unhurried(data), car.address)) as watch:
         yield car, watch
 
 

@@ -50,12 +50,10 @@ def acknowledged(served: Canned) -> list[tuple[Any, Any]]:
 
 async def heard(served: Canned, count: int, kind: str = "acknowledge") -> list[str]:
     """The alarms that were answered, once there are so many."""
-    for _ in range(60):
-        found = [one["alarm"] for one in served.heard if one["kind"] == kind]
-        if len(found) >= count:
-            return found
-        await asyncio.sleep(0.05)
-    raise AssertionError(f"{served.heard} are not {count} answers")
+    async with asyncio.timeout(20):
+        while len(found := [one["alarm"] for one in served.heard if one["kind"] == kind]) < count:
+            await asyncio.sleep(0.05)
+    return found
 
 
 def answer(served: Canned, names: list[str]) -> None:
@@ -66,6 +64,7 @@ def answer(served: Canned, names: list[str]) -> None:
     served.state["alarms"] = [one for one in served.state["alarms"] if one["id"] not in names or one["active"]]
 
 
+@pytest.mark.gate
 @pytest.mark.world(n=18)
 async def test_seven_alarms_are_acknowledged_with_four_taps(phone: Phone, canned: Canned) -> None:
     for width, height in ((412, 915), (360, 740)):
@@ -140,6 +139,7 @@ async def test_a_list_longer_than_the_screen_is_turned_and_no_row_is_sliced(phon
     await expect(phone.page.locator('[data-tab="scan"]')).to_have_attribute("aria-selected", "true")
 
 
+@pytest.mark.gate
 @pytest.mark.world(n=18)
 async def test_silence_takes_the_sound_of_one_alarm_and_says_by_whom(phone: Phone, canned: Canned) -> None:
     canned.state["alarms"] = [alarm("warn", "Laser silent", place="list", occurrence=3)]
@@ -157,6 +157,7 @@ async def test_silence_takes_the_sound_of_one_alarm_and_says_by_whom(phone: Phon
     await expect(row.locator("[data-do=acknowledge]")).to_be_visible()
 
 
+@pytest.mark.gate
 @pytest.mark.world(n=18)
 async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(phone: Phone, returned: Canned) -> None:
     await phone.open(returned.address)
@@ -174,10 +175,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     await expect(rows.nth(2)).to_contain_text("acknowledged by Ann")
     await expect(rows.nth(3)).to_contain_text("cause: Most signals are slow")
     await rows.nth(1).locator("[data-do=acknowledge]").tap()
-    for _ in range(40):
-        if acknowledged(returned):
-            break
-        await phone.page.wait_for_timeout(50)
+    await heard(returned, 1)
     assert acknowledged(returned) == [("gps_jump", 4)]
     returned.state["alarms"] = returned.state["alarms"][:1]
     await expect(rows).to_have_count(2)
@@ -186,10 +184,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     ended = phone.page.locator("[data-f=alarms-ended]")
     await expect(ended).to_have_text("Acknowledge all that ended 1")
     await ended.tap()
-    for _ in range(40):
-        if len(acknowledged(returned)) > 1:
-            break
-        await phone.page.wait_for_timeout(50)
+    await heard(returned, 2)
     assert acknowledged(returned)[1:] == [("link_lost", 1)]
     returned.state["alarms"] = []
     await expect(strip).to_contain_text("No alarms")
@@ -197,6 +192,7 @@ async def test_what_has_returned_is_acknowledged_with_one_tap_behind_the_strip(p
     assert await phone.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
+@pytest.mark.gate
 @pytest.mark.world(n=18)
 async def test_a_viewer_sees_the_list_without_keys(phone: Phone, returned: Canned) -> None:
     returned.role = "viewer"
@@ -208,6 +204,7 @@ async def test_a_viewer_sees_the_list_without_keys(phone: Phone, returned: Canne
     await expect(phone.page.locator("[data-f=alarms-note]")).to_have_text("A viewer cannot acknowledge.")
 
 
+@pytest.mark.gate
 @pytest.mark.world(n=18)
 async def test_a_warning_lies_over_the_tabs_and_never_over_the_list_of_alarms(phone: Phone, returned: Canned) -> None:
     returned.state["alarms"] = [
@@ -229,6 +226,7 @@ async def test_a_warning_lies_over_the_tabs_and_never_over_the_list_of_alarms(ph
     await expect(snackbar).to_be_visible()
 
 
+@pytest.mark.gate
 @pytest.mark.world(n=17)
 async def test_the_empty_list_of_a_paused_car_does_not_say_that_there_are_no_alarms(
     phone: Phone, returned: Canned
@@ -242,6 +240,7 @@ async def test_the_empty_list_of_a_paused_car_does_not_say_that_there_are_no_ala
     await expect(none).to_have_text("Monitoring is paused: no alarm can be raised.")
 
 
+@pytest.mark.gate
 async def test_a_quiet_list_says_what_was_lately_and_makes_way_for_what_waits(phone: Phone, canned: Canned) -> None:
     at_ms = 1_778_076_238_000
     common = {"alarm": "not_moving", "title": "Car not moving", "text": "", "occurrence": 1, "priority": "advisory"}

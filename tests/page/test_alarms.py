@@ -14,7 +14,7 @@ from playwright.async_api import expect
 
 from tests.page.conftest import Phone
 from tests.page.drives import diagnostics, number, steady, twist, write
-from tests.page.processes import Process, replay, running, server, watching
+from tests.page.processes import Process, replay, running, server, unhurried, watching
 from tests.page.test_tabs import TABS
 
 HOSTILE = (
@@ -30,7 +30,11 @@ async def track(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[tuple
     """Two cars, one at 12.6 m/s with the limit at 11.0 and one at 4.2 m/s, and a server that can watch either."""
     folder = tmp_path_factory.mktemp("drives")
     fast, slow = steady(folder / "fast.bag", 12.6), steady(folder / "slow.bag", 4.2)
-    async with running(*replay(fast)) as hare, running(*replay(slow)) as snail, running(*server(folder)) as watch:
+    async with (
+        running(*replay(fast)) as hare,
+        running(*replay(slow)) as snail,
+        running(*server(unhurried(folder))) as watch,
+    ):
         yield hare, snail, watch
 
 
@@ -48,6 +52,7 @@ async def calm(track: tuple[Process, Process, Process]) -> Process:
     return await watching(watch, snail.address)
 
 
+@pytest.mark.gate
 async def test_case_17_and_18_a_speed_alarm_on_each_tab_and_its_acknowledgement(
     phone: Phone, speeding: Process, track: tuple[Process, Process, Process]
 ) -> None:
@@ -78,6 +83,7 @@ async def test_case_17_and_18_a_speed_alarm_on_each_tab_and_its_acknowledgement(
         await expect(sheet).to_be_hidden()
 
 
+@pytest.mark.gate
 async def test_above_the_limit_the_gauge_and_the_tile_say_fault(phone: Phone, speeding: Process) -> None:
     await phone.open(speeding.address)
     await expect(phone.page.locator(".gauge")).to_have_attribute("data-over", "")
@@ -93,6 +99,7 @@ async def test_above_the_limit_the_gauge_and_the_tile_say_fault(phone: Phone, sp
     await expect(phone.page.locator("#sheet-alarm")).to_be_hidden()
 
 
+@pytest.mark.gate
 async def test_before_a_touch_the_page_says_that_it_cannot_sound(phone: Phone, speeding: Process) -> None:
     await phone.open(speeding.address)
     await expect(phone.f("sound-off")).to_be_visible()
@@ -101,6 +108,7 @@ async def test_before_a_touch_the_page_says_that_it_cannot_sound(phone: Phone, s
     await expect(phone.f("sound-off")).to_be_hidden()
 
 
+@pytest.mark.gate
 async def test_paused_no_alarm_comes_and_every_tab_says_so(phone: Phone, calm: Process) -> None:
     await phone.open(calm.address)
     await phone.live()
@@ -118,6 +126,7 @@ async def test_paused_no_alarm_comes_and_every_tab_says_so(phone: Phone, calm: P
     await expect(phone.page.locator(".frame")).not_to_have_attribute("data-mode", "paused")
 
 
+@pytest.mark.gate
 async def test_the_slow_down_says_why_it_is_off(phone: Phone, calm: Process) -> None:
     await phone.open(calm.address)
     await phone.live()
@@ -133,6 +142,7 @@ async def test_the_slow_down_says_why_it_is_off(phone: Phone, calm: Process) -> 
     await expect(sheet).to_contain_text("The safety driver stops the car.")
 
 
+@pytest.mark.gate
 async def test_texts_that_mean_harm_are_only_text(phone: Phone, tmp_path: Path) -> None:
     """Whatever a car says of itself stands on the page letter by letter, and breaks nothing."""
     drive = write(
@@ -144,7 +154,7 @@ async def test_texts_that_mean_harm_are_only_text(phone: Phone, tmp_path: Path) 
             "diagnostics": lambda _: diagnostics(*((text, 2, text) for text in HOSTILE)),
         },
     )
-    async with running(*replay(drive)) as car, running(*server(tmp_path / "data", car.address)) as watch:
+    async with running(*replay(drive)) as car, running(*server(unhurried(tmp_path / "data"), car.address)) as watch:
         await phone.open(watch.address)
         await phone.live()
         before = await phone.page.locator("script, img, iframe, object").count()
@@ -159,6 +169,7 @@ async def test_texts_that_mean_harm_are_only_text(phone: Phone, tmp_path: Path) 
         assert await phone.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
+@pytest.mark.gate
 @pytest.mark.own_phone
 async def test_who_acknowledged_stands_in_the_alarm_log_on_every_phone(phone: Phone, speeding: Process) -> None:
     await phone.page.add_init_script("localStorage.setItem('catgraph.device', 'Pixel 7 · a3f2')")

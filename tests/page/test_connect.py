@@ -64,6 +64,7 @@ async def change_address(phone: Phone) -> None:
     await expect(phone.page.locator("#sheet-failed")).to_be_hidden()
 
 
+@pytest.mark.gate
 @pytest.mark.own_phone
 async def test_from_the_address_to_a_live_car_and_back_by_stop(phone: Phone, idle: Process) -> None:
     await phone.page.context.grant_permissions(["geolocation"])
@@ -96,6 +97,7 @@ async def test_from_the_address_to_a_live_car_and_back_by_stop(phone: Phone, idl
         await expect(phone.page.locator("#address")).to_have_value(car.shown)
 
 
+@pytest.mark.gate
 async def test_case_11_a_refused_port_says_so_and_goes_home_by_itself_when_the_bridge_comes(
     phone: Phone, idle: Process
 ) -> None:

@@ -42,6 +42,7 @@ async def test_each_screen_behind_the_menu_shows_the_speed(phone: Phone, canned:
             await phone.page.screenshot(path=Path(folder) / f"head-{name}-{width}.png")
 
 
+@pytest.mark.gate
 async def test_the_speed_in_a_head_is_covered_once_it_is_not_renewed(phone: Phone, canned: Canned) -> None:
     await phone.open(canned.address)
     await phone.live()
@@ -52,6 +53,7 @@ async def test_the_speed_in_a_head_is_covered_once_it_is_not_renewed(phone: Phon
     await expect(cover).to_have_css("opacity", "1")
 
 
+@pytest.mark.gate
 async def test_the_speed_in_a_head_is_covered_with_the_values_when_the_page_hangs(phone: Phone, canned: Canned) -> None:
     """It goes by the animation of the veil, which every drawing rewinds and which needs no script."""
     await phone.open(canned.address)

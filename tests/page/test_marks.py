@@ -19,10 +19,9 @@ from playwright.async_api import Browser, Locator, async_playwright, expect
 from tests.chromium import FLAGS
 from tests.page.barriers import fits, no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import Process, free_port, running, server, simulate
+from tests.page.processes import Process, free_port, running, server, simulate, unhurried
 
 HOSTILE = "<img src=x onerror=alert(1)>"
-SLOW = "[limits.link_late]\nlate_s = 10.0\ncritical_s = 20.0\n"  # this machine is shared: that is not tested here
 pytestmark = pytest.mark.timeout(120)
 
 
@@ -101,14 +100,28 @@ async def hearing(chromium: str) -> AsyncIterator[Browser]:
 
 @contextlib.asynccontextmanager
 async def drive(browser: Browser, data: Path, car: Process, **more: Any) -> AsyncIterator[Drive]:
-    (data / "settings").mkdir()
-    (data / "settings" / "car.toml").write_text(SLOW)
     context = await browser.new_context(**PHONE | more)
-    async with running(*server(data, car.address, free_port())) as watch:
+    async with running(*server(unhurried(data), car.address, free_port())) as watch:
         one = Drive(await phone_in(context), watch)
         await one.open()
         yield one
     await context.close()
+
+
+@pytest.mark.gate
+async def test_a_tap_stores_a_mark_and_undo_takes_it_back(browser: Browser, car: Process, tmp_path: Path) -> None:
+    async with drive(browser, tmp_path, car) as one:
+        await one.key.tap()
+        await one.stored(1)
+        await expect(one.phone.page.locator(".fresh")).to_contain_text("stored")
+        await one.phone.page.keyboard.press("m")
+        await one.stored(2)
+        await one.phone.page.locator('[data-f="mark-undo"]').tap()
+        await one.stored(1)
+        await one.phone.page.reload()
+        await one.phone.live()
+        await one.stored(1)
+        assert one.phone.complaints == []
 
 
 async def test_a_mark_with_voice_photo_and_words(hearing: Browser, car: Process, tmp_path: Path) -> None:

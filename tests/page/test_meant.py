@@ -43,7 +43,7 @@ def answered(served: Canned) -> list[str]:
 
 
 async def until_answered(served: Canned, *names: str) -> None:
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(20):
         while answered(served) != list(names):
             await asyncio.sleep(0.05)
 
@@ -51,11 +51,12 @@ async def until_answered(served: Canned, *names: str) -> None:
 async def said_more(served: Canned) -> None:
     """Waits for a later message of the page: what it sent before is here by then."""
     before = len(served.heard)
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(20):
         while len(served.heard) <= before + 1:
             await asyncio.sleep(0.05)
 
 
+@pytest.mark.gate
 @pytest.mark.parametrize(
     ("selector", "make"),
     [("#sheet-alarm[open]", dialog), ('.snack[data-f="warning"]', alarm)],
@@ -70,7 +71,7 @@ async def test_an_alarm_that_has_just_come_is_not_acknowledged(
     for count, name in enumerate(("first", "second"), 1):  # the second one takes the place of the first
         canned.state["alarms"] = [make(name, f"Alarm {name}", raised_ms=count)]
         await expect(phone.page.locator(selector)).to_contain_text(f"Alarm {name}")
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(20):
             while await phone.page.evaluate("presses") < count:
                 await asyncio.sleep(0.05)
     assert answered(canned) == []
@@ -78,6 +79,7 @@ async def test_an_alarm_that_has_just_come_is_not_acknowledged(
     await until_answered(canned, "second")
 
 
+@pytest.mark.gate
 async def test_a_finger_that_rests_while_another_alarm_comes_acknowledges_neither(phone: Phone, canned: Canned) -> None:
     canned.state["alarms"] = [dialog("speed", "Speed above limit")]
     await phone.open(canned.address)
@@ -99,6 +101,7 @@ async def test_a_finger_that_rests_while_another_alarm_comes_acknowledges_neithe
     await until_answered(canned, "obstacle")
 
 
+@pytest.mark.gate
 async def test_escape_does_not_answer_a_dialog_that_has_just_come(phone: Phone, canned: Canned) -> None:
     await phone.open(canned.address)
     await phone.live()
@@ -145,6 +148,7 @@ async def test_a_finger_that_came_before_the_dialog_does_not_answer_it_on_a_busy
     assert answered(canned) == []
 
 
+@pytest.mark.gate
 async def test_a_row_of_the_list_that_has_just_moved_is_not_acknowledged(phone: Phone, canned: Canned) -> None:
     canned.state["alarms"] = [alarm("old", "Laser silent", place="list")]
     await phone.open(canned.address)

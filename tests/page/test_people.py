@@ -16,10 +16,9 @@ from playwright.async_api import TimeoutError as PlaywrightTimeout
 
 from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import Process, running, server, simulate
+from tests.page.processes import Process, running, server, simulate, unhurried
 
 HOSTILE = "<img src=x onerror=owned=1>"
-SLOW = "[limits.link_late]\nlate_s = 10.0\ncritical_s = 20.0\n"  # this machine is shared: that is not tested here
 
 
 class Shift:
@@ -63,10 +62,8 @@ async def car() -> AsyncIterator[Process]:
 
 @contextlib.asynccontextmanager
 async def shift(browser: Browser, data: Path, car: Process) -> AsyncIterator[Shift]:
-    (data / "settings").mkdir()
-    (data / "settings" / "car.toml").write_text(SLOW)
     phones = []
-    async with running(*server(data, car.address)) as watch, contextlib.AsyncExitStack() as stack:
+    async with running(*server(unhurried(data), car.address)) as watch, contextlib.AsyncExitStack() as stack:
         client = await stack.enter_async_context(httpx.AsyncClient(base_url=watch.address))
         console = await stack.enter_async_context(httpx.AsyncClient(base_url=watch.console))
         for name, role in (("A. K.", "operator"), ("M. R.", "safety_driver"), (HOSTILE, "supervisor")):
@@ -81,6 +78,20 @@ async def shift(browser: Browser, data: Path, car: Process) -> AsyncIterator[Shi
             phones.append(phone)
         yield Shift(phones[0], phones[1], client, console)
     assert [said for phone in phones for said in phone.complaints] == []
+
+
+@pytest.mark.gate
+async def test_who_signs_on_is_named_on_both_phones(browser: Browser, car: Process, tmp_path: Path) -> None:
+    async with shift(browser, tmp_path, car) as one:
+        await expect(row(one.ann, HOSTILE)).to_be_visible()  # as text, and nothing of it runs
+        await one.sign_on(one.ann, "A. K.")
+        await expect(one.ann.f("who-name")).to_have_text("AK on duty")
+        await one.sign_on(one.ben, "M. R.")
+        await one.order(one.ann, "Take control")
+        await expect(one.ann.f("who-name")).to_have_text("AK controls")
+        await expect(one.ben.f("who-name")).to_have_text("A. K. (Pixel 7)")
+        people = (await one.client.get("/api/people")).json()["people"]
+        assert {person["name"] for person in people if person["duty"]} == {"A. K.", "M. R."}
 
 
 @pytest.mark.timeout(150)

@@ -98,6 +98,7 @@ async def type_number(phone: Phone, text: str, name: str = LIMIT) -> None:
     await phone.page.keyboard.press("Enter")
 
 
+@pytest.mark.gate
 async def test_a_limit_dragged_below_the_speed_raises_the_alarm(
     phone: Phone, watch: Process, api: httpx.AsyncClient
 ) -> None:
@@ -113,6 +114,7 @@ async def test_a_limit_dragged_below_the_speed_raises_the_alarm(
     await expect(phone.page.locator("#tab-settings")).to_have_attribute("aria-selected", "true")  # no tab was swiped
 
 
+@pytest.mark.gate
 async def test_a_stroke_over_the_sliders_scrolls_and_sets_nothing(phone: Phone, canned: Canned) -> None:
     await settings(phone, canned)
     box = await slider(phone).bounding_box()
@@ -251,6 +253,7 @@ async def test_a_limit_shows_the_last_minute_of_its_signal_while_it_is_in_sight(
     assert [url for url in asked if "/api/trends" in url or "/api/checks" in url] == []
 
 
+@pytest.mark.gate
 async def test_a_search_shows_what_it_names_and_nothing_else(phone: Phone, canned: Canned) -> None:
     await settings(phone, canned)
     search = phone.page.locator(".find input")

@@ -22,6 +22,7 @@ def row(phone: Phone, id: str) -> Locator:
     return phone.page.locator(f'#panel-files [data-f=recordings] [data-id="{id}"]')
 
 
+@pytest.mark.gate
 @pytest.mark.own_phone
 async def test_each_row_says_where_its_copy_is_and_a_key_asks_for_it(phone: Phone, canned: Canned) -> None:
     stored: dict[str, Any] = {"car_1": FAILED, "car_2": NOT_STORED}
@@ -63,6 +64,7 @@ async def test_each_row_says_where_its_copy_is_and_a_key_asks_for_it(phone: Phon
     await expect(row(phone, "car_2").locator(".stored")).to_have_text("uploading 43 %")
 
 
+@pytest.mark.gate
 @pytest.mark.own_phone
 @pytest.mark.parametrize(("status", "why"), [(404, ""), (503, "The agent of ocelot does not answer.")])
 async def test_a_web_node_lists_what_agents_stored(phone: Phone, canned: Canned, status: int, why: str) -> None:

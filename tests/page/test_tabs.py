@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from playwright.async_api import expect
 
 from server.web.tabs import TABS as DECLARED
@@ -30,6 +31,7 @@ async def in_front(phone: Phone, tab: str) -> None:
     assert phone.page.url.endswith(f"#{tab}")
 
 
+@pytest.mark.gate
 async def test_ui_01_swiping_leads_through_all_five_tabs_and_back(phone: Phone, canned: Canned) -> None:
     await phone.open(canned.address)
     await phone.live()
@@ -51,6 +53,7 @@ async def test_a_short_touch_springs_back_and_a_swipe_up_scrolls(phone: Phone, c
     await in_front(phone, "home")
 
 
+@pytest.mark.gate
 async def test_keys_links_and_memory(phone: Phone, canned: Canned) -> None:
     await phone.open(f"{canned.address}/#scan")
     await phone.live()
@@ -68,6 +71,7 @@ async def test_keys_links_and_memory(phone: Phone, canned: Canned) -> None:
     await in_front(phone, "files")
 
 
+@pytest.mark.gate
 async def test_ui_report_fig_3_9_the_overflow_menu(phone: Phone, canned: Canned) -> None:
     await phone.open(canned.address)
     await phone.live()

@@ -211,6 +211,7 @@ async def test_the_chart_by_wheel_and_keys(phone: Phone, canned: Canned) -> None
     await expect(phone.page.locator(".trends-state")).to_be_hidden()
 
 
+@pytest.mark.gate
 @pytest.mark.own_phone
 async def test_signals_are_chosen_and_what_is_seen_is_saved(phone: Phone, canned: Canned) -> None:
     await phone.page.add_init_script("localStorage.setItem('catgraph.speed-unit', 'km/h')")
@@ -241,6 +242,7 @@ async def test_signals_are_chosen_and_what_is_seen_is_saved(phone: Phone, canned
     await expect(panes.locator(".lab")).to_have_text(["Brake", "Speed", "Nearest", "Steering"])
 
 
+@pytest.mark.gate
 @pytest.mark.own_phone
 async def test_without_an_answer_the_chart_does_not_look_live(phone: Phone, canned: Canned) -> None:
     await chart(phone, canned)

@@ -11,6 +11,7 @@ from tests.page.conftest import PHONE, phone_in
 pytestmark = [pytest.mark.browser, pytest.mark.asyncio(loop_scope="session")]
 
 
+@pytest.mark.gate
 async def test_a_viewer_may_take_the_file_and_orders_no_other_form_of_it(browser: Browser) -> None:
     server = Canned()
     server.role = "viewer"

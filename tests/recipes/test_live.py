@@ -18,7 +18,7 @@ from tests.page.conftest import PHONE
 from tests.page.processes import Process, replay, running, server
 from tests.recipes.project_copy import ProjectCopy
 
-pytestmark = [pytest.mark.browser, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [pytest.mark.browser, pytest.mark.field, pytest.mark.asyncio(loop_scope="module")]
 
 
 @pytest_asyncio.fixture(loop_scope="module", scope="module")
