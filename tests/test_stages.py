@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import re
 import subprocess
 import sys
@@ -51,14 +50,3 @@ def test_the_table_names_nothing_else() -> None:
 def test_each_test_of_the_table_is_in_its_stage() -> None:
     stages = collected()
     assert [(test, stage) for _, test, stage in rows() if test not in stages[stage]] == []
-
-
-def test_no_test_of_the_gate_is_tried_again() -> None:
-    """A mark `gate` beside a mark `flaky` on a test of the page."""
-    found = []
-    for path in sorted((PROJECT / "tests" / "page").glob("test_*.py")):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            marks = [ast.unparse(one) for one in getattr(node, "decorator_list", [])]
-            if "pytest.mark.gate" in marks and any("flaky" in one for one in marks):
-                found.append(f"{path.name}::{getattr(node, 'name', '')}")
-    assert found == []
