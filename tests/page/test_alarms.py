@@ -142,7 +142,6 @@ async def test_the_slow_down_says_why_it_is_off(phone: Phone, calm: Process) -> 
     await expect(sheet).to_contain_text("The safety driver stops the car.")
 
 
-@pytest.mark.gate
 async def test_texts_that_mean_harm_are_only_text(phone: Phone, tmp_path: Path) -> None:
     """Whatever a car says of itself stands on the page letter by letter, and breaks nothing."""
     drive = write(

@@ -79,7 +79,6 @@ async def press_long(phone: Phone, where: Locator) -> None:
     await stroke(phone.page, (x, y, x, y), steps=1, rest_s=0.8)
 
 
-@pytest.mark.gate
 async def test_case_7_6_2_pressing_a_file_opens_its_context_menu(opened: Phone) -> None:
     """By a press, a long one, the right button, the three dots and the keyboard."""
     item = row(opened, name_of(5))

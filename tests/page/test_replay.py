@@ -70,7 +70,6 @@ def clock(page: Page) -> Any:
     return page.locator(".scrub .clock b")
 
 
-@pytest.mark.gate
 async def test_a_link_leads_to_a_moment_and_one_tap_back_to_live(phone: Phone, watch: Watch) -> None:
     page = await replayed(phone, watch, 24.0)
     await expect(page.locator(".gauge .speed")).to_have_text("12.4")
@@ -177,7 +176,6 @@ async def test_the_scan_is_that_of_the_recording_and_does_not_grow_old(phone: Ph
     assert "stale" not in str(await page.locator("#panel-scan").inner_text()).lower()
 
 
-@pytest.mark.gate
 async def test_nothing_is_ordered_from_a_replay(phone: Phone, watch: Watch) -> None:
     page = await replayed(phone, watch, 3.0)
     async with httpx.AsyncClient() as client:

@@ -98,7 +98,6 @@ async def type_number(phone: Phone, text: str, name: str = LIMIT) -> None:
     await phone.page.keyboard.press("Enter")
 
 
-@pytest.mark.gate
 async def test_a_limit_dragged_below_the_speed_raises_the_alarm(
     phone: Phone, watch: Process, api: httpx.AsyncClient
 ) -> None:
