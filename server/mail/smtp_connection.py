@@ -19,7 +19,7 @@ import aiosmtplib
 from server.mail.replies import Trouble, clean
 from server.mail.smtp_dial import DIAL_S, Account, dial, own_name
 from server.mail.smtp_errors import in_words
-from server.mail.smtp_stream import next_piece, write
+from server.mail.smtp_stream import next_piece, opened, write
 
 REPLY_S = 60.0  # RFC 5321 4.5.3.2 has minutes; a server that thinks so long is tried again
 END_S = 300.0  # for the reply to a whole mail, which a server may take apart and scan first
@@ -131,7 +131,7 @@ class Connection:
         # A server may refuse in the midst of it: its answer is listened for from the start.
         answer = asyncio.ensure_future(protocol.read_response(timeout=None))
         try:
-            with contextlib.closing(await asyncio.to_thread(open, mail.file, "rb")) as file:
+            async with opened(mail.file) as file:
                 sent = 0
                 is_line_start = True
                 while not answer.done():

@@ -4,12 +4,32 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import AsyncIterator
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from aiosmtplib.protocol import SMTPProtocol
 
 STALL_S = 60.0  # without a byte taken; RFC 5321 4.5.3.2 has minutes
 _PIECE = 1 << 18
+
+
+@contextlib.asynccontextmanager
+async def opened(path: Path) -> AsyncIterator[BinaryIO]:
+    """The file, opened for reading in a thread; closed at the end, also if that comes while it is being opened."""
+    opening: asyncio.Future[BinaryIO] = asyncio.ensure_future(asyncio.to_thread(open, path, "rb"))
+    try:
+        file = await asyncio.shield(opening)
+    except asyncio.CancelledError:
+        opening.add_done_callback(_close)
+        raise
+    with file:
+        yield file
+
+
+def _close(opening: asyncio.Future[BinaryIO]) -> None:
+    if not opening.cancelled() and opening.exception() is None:
+        opening.result().close()
 
 
 def next_piece(file: BinaryIO, is_line_start: bool) -> tuple[bytes, bool, int]:

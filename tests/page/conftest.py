@@ -30,7 +30,7 @@ PHONE: dict[str, Any] = {
     "is_mobile": True,
     "service_workers": "block",  # what keeps the page's shell has its own tests; here every request is the page's
 }
-expect.set_options(timeout=8000)
+expect.set_options(timeout=20_000)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
