@@ -22,7 +22,6 @@ MOST_UNSTABLE = 5
 MOST_RUN_ALONE = 20  # more failures than this are no accident, and are not looked at one by one
 FOLDER = Path("out/tests")
 PASSED, FAILED = 0, 1  # pytest's exit codes of a run that reached its end
-XDIST = ("-n", "2", "--dist", "worksteal")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +41,19 @@ class Alone:
     failed: tuple[str, ...]
 
 
-# asyncio's debug mode is on here only, and in the tests' own process only.
-DEBUG = ("--asyncio-debug",)
+TWO, THREE = (("-n", number, "--dist", "worksteal") for number in "23")
 NOT_PAGE = "--ignore=tests/page"
 TARGETS = {
-    "check": (Stage("quick", (NOT_PAGE, *XDIST, "-q", "-m", "not (browser or slow or field or soak)"), DEBUG),),
+    # asyncio's debug mode is on here only, and in the tests' own process only: it takes a fifth more time.
+    "check": (
+        Stage("quick", (NOT_PAGE, *TWO, "-q", "-m", "not (browser or slow or field or soak)"), ("--asyncio-debug",)),
+    ),
     "test": (
-        Stage("server", (NOT_PAGE, *XDIST, "-m", "not (browser or field or soak)"), DEBUG),
-        Stage("page", ("tests/page", *XDIST, "-m", "gate and not soak")),
+        Stage("server", (NOT_PAGE, *THREE, "-m", "not (browser or field or soak)")),  # some wait for processes
+        Stage("page", ("tests/page", *TWO, "-m", "gate and not soak")),
     ),
     "test-field": (
-        Stage("field", (NOT_PAGE, *XDIST, "-m", "field and not (browser or soak)")),
+        Stage("field", (NOT_PAGE, *THREE, "-m", "field and not (browser or soak)")),
         Stage("field-page", ("tests/page", "tests/recipes", "-m", "browser and not (gate or soak)")),
     ),
 }

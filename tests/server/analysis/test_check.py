@@ -46,6 +46,7 @@ def test_an_alarm_that_is_not_critical_is_exit_0(check: Checking, healthy: Path)
     assert (ending.code, ending.raised()) == (0, ["pedals"])
 
 
+@pytest.mark.field
 @pytest.mark.parametrize("name", [s.name for s in SCENARIOS.values() if s.effect is not None or s.bridge is not None])
 def test_every_fault_of_messages_can_be_laid_over_a_recording(check: Checking, healthy: Path, name: str) -> None:
     """And what it does is told, or that this recording has nothing to do it to."""

@@ -113,6 +113,7 @@ async def test_indulgence_is_noted() -> None:
         assert note == "bare NaN or Infinity, read as unknown"
 
 
+@pytest.mark.field
 @on_both_loops
 async def test_a_message_of_20_mb_is_skipped_and_the_link_stays() -> None:
     """Hanging up would not help: the next message of that topic would be as large, and the link would flap for ever."""
