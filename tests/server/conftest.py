@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import time
 from collections.abc import AsyncIterator
 
 import pytest
@@ -21,7 +22,7 @@ from server.web.middleware import http_protocol
 @contextlib.asynccontextmanager
 async def serving(config: Config) -> AsyncIterator[str]:
     """The app on a real socket; yields its http address."""
-    async with serving_app(create_app(config), config) as base:
+    async with serving_app(create_app(config, now=time.monotonic), config) as base:
         yield base
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.server.slowdown.conftest import field, simulated, watching
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.virtual_time]
 RATES_KNOWN_S = 7.0  # a car's own rate is learned from its first 5 s; what is slow from the beginning is its rate
 
 
