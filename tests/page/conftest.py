@@ -17,7 +17,6 @@ import pytest_asyncio
 from playwright.async_api import Browser, BrowserContext, ConsoleMessage, Locator, Page, async_playwright, expect
 from playwright.async_api import Error as PlaywrightError
 
-from monitor.checks import link_late
 from tests.chromium import FLAGS
 from tests.page.canned import Canned
 from tests.page.processes import IS_PARTED
@@ -83,7 +82,17 @@ async def press(keys: Locator) -> None:
     await keys.evaluate_all("keys => keys.forEach((key) => key.click())")
 
 
-LATE_TITLE = link_late.CHECKS[0].alarm.title
+DRAWN = """(states) => new Promise((done) => {
+    const root = document.documentElement;
+    const until = Number(root.dataset.state ?? 0) + states;
+    const look = () => {
+        if (Number(root.dataset.state ?? 0) < until) return;
+        seen.disconnect();
+        done();
+    };
+    const seen = new MutationObserver(look);
+    seen.observe(root, { attributeFilter: ['data-state'] });
+})"""
 
 
 class Phone:
@@ -93,7 +102,6 @@ class Phone:
         self.page = page
         self.complaints: list[str] = []
         self.stutter_s = 0.0
-        self.machine_was_late = 0
         self._handled: list[Locator] = []
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on("console", lambda said: self.complaints.append(said.text) if is_complaint(said) else None)
@@ -133,6 +141,10 @@ class Phone:
         """A field of the page by its name in the templates."""
         return self.page.locator(f'{root} [data-f="{name}"]').first
 
+    async def drawn(self, states: int = 3) -> None:
+        """Waits until the page has drawn so many more fresh states: the first may have been under way before."""
+        await self.page.evaluate(DRAWN, states)
+
     async def live(self) -> None:
         """Waits until the values are live."""
         await expect(self.f("word")).to_have_text("Live", timeout=12_000)
@@ -171,22 +183,6 @@ class Phone:
                 with contextlib.suppress(AssertionError):
                     await expect(key).to_have_attribute("aria-pressed", other, timeout=1500)
 
-    async def acknowledge_late(self) -> None:
-        """Acknowledges the alarm of a late link, as an operator does: a machine that halts raises it, rightly.
-
-        Its dialog covers the page. Tests of that alarm itself are in tests/world and do not use this phone.
-        """
-
-        async def press_late(keys: Locator) -> None:
-            self.machine_was_late += 1
-            await press(keys)
-
-        shown = self.page.locator('#sheet-alarm[open], .snack[data-f="warning"]:not([hidden])').filter(
-            has_text=LATE_TITLE
-        )
-        key = shown.locator('[data-f="acknowledge"], .key.solid').first
-        await self.page.add_locator_handler(key, press_late, no_wait_after=True)
-
     async def has_speed(self) -> None:
         """Waits for a speed: any signal makes a car live."""
         await expect(self.page.locator(".gauge .speed")).to_have_text(re.compile(r"^\d+\.\d$"))
@@ -210,10 +206,8 @@ async def new_phone(browser: Browser, **more: Any) -> Phone:
 
 
 async def phone_in(context: BrowserContext) -> Phone:
-    """A new page of this context, at which a late link is acknowledged."""
-    phone = Phone(await context.new_page())
-    await phone.acknowledge_late()
-    return phone
+    """A new page of this context."""
+    return Phone(await context.new_page())
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="session")
@@ -261,7 +255,7 @@ async def picture(phone: Phone, name: str) -> None:
     """What a failed test saw: as text with its report, and as a picture."""
     with contextlib.suppress(PlaywrightError):  # the page may be what failed
         print(json.dumps(await phone.page.evaluate(SEEN), indent=1))
-        print(f"stutter {phone.stutter_s:.2f} s, late link acknowledged {phone.machine_was_late} ×")
+        print(f"stutter {phone.stutter_s:.2f} s")
         path = Path("out/tests/failed") / f"{re.sub(r'[^A-Za-z0-9]+', '-', name)[:120]}.png"
         await phone.page.screenshot(path=path, timeout=5000)
 

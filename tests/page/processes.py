@@ -143,8 +143,16 @@ async def running(
         await process.kill()
 
 
-def server(data: Path, vehicle: str | None = None, port: int = 0) -> tuple[str, ...]:
-    """Arguments of a server; with a `vehicle` it dials from the start."""
+def server(data: Path, vehicle: str | None = None, port: int = 0, *, is_hurried: bool = False) -> tuple[str, ...]:
+    """Arguments of a server; with a `vehicle` it dials from the start.
+
+    It does not mind a machine that halts: messages may be late, and few of them come. What it judges so is not what
+    the test is about, and a dialog of it would cover what the test presses. `is_hurried`: its limits are the defaults.
+    """
+    settings = data / "settings" / "car.toml"
+    if not is_hurried and not settings.exists():
+        settings.parent.mkdir(parents=True, exist_ok=True)
+        settings.write_text(UNHURRIED)
     dial = ("--vehicle", f"car={vehicle}") if vehicle else ()
     return ("serve", "--port", str(port), "--data", str(data), *dial)
 
@@ -153,23 +161,13 @@ def simulate(*options: str, port: int = 0) -> tuple[str, ...]:
     return ("simulate", "--port", str(port), *options)
 
 
-def unhurried(data: Path) -> Path:
-    """The data folder of a server that does not mind a machine that halts: messages may be late, and few of them come.
-
-    What it judges so is not what the test is about, and a dialog of it would cover what the test presses.
-    """
-    (data / "settings").mkdir(parents=True, exist_ok=True)
-    (data / "settings" / "car.toml").write_text(UNHURRIED)
-    return data
-
-
 Drive = tuple[Process, Process]  # a car and a server that watches it
 
 
 @contextlib.asynccontextmanager
 async def driving(data: Path) -> AsyncIterator[Drive]:
     """A simulated car and a server that watches it."""
-    async with running(*simulate()) as car, running(*server(unhurried(data), car.address)) as watch:
+    async with running(*simulate()) as car, running(*server(data, car.address)) as watch:
         yield car, watch
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import re
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -14,7 +13,7 @@ from playwright.async_api import expect
 
 from tests.page.conftest import Phone
 from tests.page.drives import diagnostics, number, steady, twist, write
-from tests.page.processes import Process, replay, running, server, unhurried, watching
+from tests.page.processes import Process, replay, running, server, watching
 from tests.page.test_tabs import TABS
 
 HOSTILE = (
@@ -33,7 +32,7 @@ async def track(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[tuple
     async with (
         running(*replay(fast)) as hare,
         running(*replay(slow)) as snail,
-        running(*server(unhurried(folder))) as watch,
+        running(*server(folder)) as watch,
     ):
         yield hare, snail, watch
 
@@ -79,7 +78,7 @@ async def test_case_17_and_18_a_speed_alarm_on_each_tab_and_its_acknowledgement(
         await expect(phone.page.locator(f"#tab-{tab}")).to_have_attribute("aria-selected", "true")
         await expect(phone.f("strip")).to_contain_text("Speed above limit")  # it stands, and is known
         await expect(phone.page.locator(".frame")).to_have_attribute("data-mode", "critical")
-        await asyncio.sleep(0.5)
+        await phone.drawn()
         await expect(sheet).to_be_hidden()
 
 
@@ -153,7 +152,7 @@ async def test_texts_that_mean_harm_are_only_text(phone: Phone, tmp_path: Path) 
             "diagnostics": lambda _: diagnostics(*((text, 2, text) for text in HOSTILE)),
         },
     )
-    async with running(*replay(drive)) as car, running(*server(unhurried(tmp_path / "data"), car.address)) as watch:
+    async with running(*replay(drive)) as car, running(*server(tmp_path / "data", car.address)) as watch:
         await phone.open(watch.address)
         await phone.live()
         before = await phone.page.locator("script, img, iframe, object").count()

@@ -18,7 +18,7 @@ from playwright.async_api import expect
 from tests.page.canned import Canned
 from tests.page.conftest import Phone
 from tests.page.drives import number, steady, twist, write
-from tests.page.processes import Drive, driving, free_port, replay, running, server, simulate, unhurried
+from tests.page.processes import Drive, driving, free_port, replay, running, server, simulate
 from tests.page.radio import Radio
 
 CAR_S = 2.0  # what the design allows; to each is added what the looking and a busy machine cost: phone.slack_s
@@ -163,7 +163,7 @@ async def test_a_frozen_server_is_said_by_the_page_alone(phone: Phone, drive: Dr
 async def test_a_server_that_is_killed_and_started_again_is_survived(phone: Phone, tmp_path: Path) -> None:
     port = free_port()
     async with running(*simulate()) as car:
-        async with running(*server(unhurried(tmp_path), car.address, port)) as first:
+        async with running(*server(tmp_path, car.address, port)) as first:
             await phone.open(first.address)
             await phone.live()
         await expect(phone.f("veil")).to_have_attribute("data-on", "all")
@@ -333,7 +333,7 @@ async def test_case_03_connected_but_no_message(phone: Phone, tmp_path: Path) ->
     drive = steady(tmp_path / "steady.bag", 4.2)
     async with (
         running("replay", str(drive), "--port", "0", "--stay", "--rate", "100") as car,
-        running(*server(unhurried(tmp_path / "data"))) as watch,
+        running(*server(tmp_path / "data")) as watch,
     ):
         await asyncio.sleep(1)  # it has all been said before anyone listened
         await phone.open(watch.address)

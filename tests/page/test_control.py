@@ -15,7 +15,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, BrowserContext, CDPSession, expect
 
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import Process, running, server, simulate, unhurried
+from tests.page.processes import Process, running, server, simulate
 
 NAMES = ("Ann", "Ben", "Cem")
 
@@ -110,7 +110,7 @@ async def car() -> AsyncIterator[Process]:
 @contextlib.asynccontextmanager
 async def crew(browser: Browser, data: Path, car: Process) -> AsyncIterator[Crew]:
     contexts, phones = [], {}
-    async with running(*server(unhurried(data), car.address)) as watch:
+    async with running(*server(data, car.address)) as watch:
         try:
             for name in NAMES:
                 context, phones[name] = await opened(browser, name, watch.address)

@@ -18,7 +18,7 @@ from tests.page.barriers import SIZES, no_barrier
 from tests.page.canned import Canned
 from tests.page.conftest import Phone
 from tests.page.drives import steady
-from tests.page.processes import AT_AGENT, Process, replay, running, server, unhurried
+from tests.page.processes import AT_AGENT, Process, replay, running, server
 from tests.page.touch import DRAWN, stroke
 from tests.server.recording.made import BEGAN_MS, record
 
@@ -50,7 +50,7 @@ async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Proce
     folder = tmp_path_factory.mktemp("files")
     fill(folder / "data")
     calm = steady(folder / "calm.bag", 3.0)
-    async with running(*replay(calm)) as car, running(*server(unhurried(folder / "data"), car.address)) as process:
+    async with running(*replay(calm)) as car, running(*server(folder / "data", car.address)) as process:
         yield process
 
 

@@ -10,7 +10,7 @@ from playwright.async_api import Browser, expect
 
 from tests.page.conftest import PHONE, Phone, phone_in
 from tests.page.drives import steady
-from tests.page.processes import replay, running, server, unhurried
+from tests.page.processes import replay, running, server
 
 pytestmark = [pytest.mark.gate, pytest.mark.timeout(120)]
 
@@ -18,7 +18,7 @@ pytestmark = [pytest.mark.gate, pytest.mark.timeout(120)]
 async def test_an_acknowledgement_reaches_a_second_phone(phone: Phone, browser: Browser, tmp_path: Path) -> None:
     """Both are asked; one answers, and the other sees by whom. What both have heard is in the log once."""
     fast = steady(tmp_path / "fast.bag", 12.6)
-    data = unhurried(tmp_path / "data")
+    data = tmp_path / "data"
     async with running(*replay(fast)) as car, running(*server(data, car.address)) as watch:
         context = await browser.new_context(**PHONE)
         second = await phone_in(context)
@@ -42,7 +42,7 @@ async def test_an_acknowledgement_reaches_a_second_phone(phone: Phone, browser: 
 
 async def test_what_is_recorded_is_ended_listed_and_replayed(phone: Phone, tmp_path: Path) -> None:
     slow = steady(tmp_path / "slow.bag", 4.2)
-    data = unhurried(tmp_path / "data")
+    data = tmp_path / "data"
     async with running(*replay(slow)) as car, running(*server(data, car.address)) as watch:
         page = phone.page
         await phone.open(f"{watch.address}/#files")

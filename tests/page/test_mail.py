@@ -16,7 +16,7 @@ from playwright.async_api import Locator, expect
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.conftest import Phone
 from tests.page.drives import steady
-from tests.page.processes import AT_AGENT, Process, replay, running, server, unhurried
+from tests.page.processes import AT_AGENT, Process, replay, running, server
 from tests.server.mail.post import Post, posting
 from tests.server.recording.made import BEGAN_MS, record
 
@@ -36,7 +36,7 @@ async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Proce
     folder = tmp_path_factory.mktemp("mail")
     record(folder / "data" / "recordings" / "car" / f"{DRIVE}.mcap", seconds=8.0)
     calm = steady(folder / "calm.bag", 3.0)
-    async with running(*replay(calm)) as car, running(*server(unhurried(folder / "data"), car.address)) as process:
+    async with running(*replay(calm)) as car, running(*server(folder / "data", car.address)) as process:
         yield process
 
 

@@ -19,7 +19,7 @@ from playwright.async_api import Browser, Locator, async_playwright, expect
 from tests.chromium import FLAGS
 from tests.page.barriers import fits, no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import Process, free_port, running, server, simulate, unhurried
+from tests.page.processes import Process, free_port, running, server, simulate
 
 HOSTILE = "<img src=x onerror=alert(1)>"
 pytestmark = pytest.mark.timeout(120)
@@ -101,7 +101,7 @@ async def hearing(chromium: str) -> AsyncIterator[Browser]:
 @contextlib.asynccontextmanager
 async def drive(browser: Browser, data: Path, car: Process, **more: Any) -> AsyncIterator[Drive]:
     context = await browser.new_context(**PHONE | more)
-    async with running(*server(unhurried(data), car.address, free_port())) as watch:
+    async with running(*server(data, car.address, free_port())) as watch:
         one = Drive(await phone_in(context), watch)
         await one.open()
         yield one

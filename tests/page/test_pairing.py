@@ -16,7 +16,7 @@ from playwright.async_api import Browser, expect
 
 from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import Process, page_data, running, simulate, unhurried
+from tests.page.processes import Process, page_data, running, simulate
 
 # What a browser itself writes of an answer that was no: a test asks for that.
 REFUSED = re.compile(r"responded with a status of (401|403|429)")
@@ -50,7 +50,7 @@ async def car() -> AsyncIterator[Process]:
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def site(car: Process, tmp_path: Path) -> AsyncIterator[Site]:
-    options = ("--host", "0.0.0.0", "--tls", "off", "--port", "0", "--data", str(unhurried(tmp_path)))
+    options = ("--host", "0.0.0.0", "--tls", "off", "--port", "0", "--data", str(tmp_path))
     async with running("serve", *options, "--vehicle", f"car={car.address}") as process:
         address = re.sub(r"//[^:]+:", "//127.0.0.1:", process.address)
         yield Site(address=address, data=page_data(tmp_path))

@@ -16,7 +16,7 @@ from playwright.async_api import TimeoutError as PlaywrightTimeout
 
 from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import Process, running, server, simulate, unhurried
+from tests.page.processes import Process, running, server, simulate
 
 HOSTILE = "<img src=x onerror=owned=1>"
 
@@ -63,7 +63,7 @@ async def car() -> AsyncIterator[Process]:
 @contextlib.asynccontextmanager
 async def shift(browser: Browser, data: Path, car: Process) -> AsyncIterator[Shift]:
     phones = []
-    async with running(*server(unhurried(data), car.address)) as watch, contextlib.AsyncExitStack() as stack:
+    async with running(*server(data, car.address)) as watch, contextlib.AsyncExitStack() as stack:
         client = await stack.enter_async_context(httpx.AsyncClient(base_url=watch.address))
         console = await stack.enter_async_context(httpx.AsyncClient(base_url=watch.console))
         for name, role in (("A. K.", "operator"), ("M. R.", "safety_driver"), (HOSTILE, "supervisor")):

@@ -13,7 +13,7 @@ import pytest
 from playwright.async_api import expect
 
 from tests.page.conftest import Phone
-from tests.page.processes import Process, running, server, simulate, unhurried
+from tests.page.processes import Process, running, server, simulate
 
 M_NORTH = 1 / 110_890.0
 
@@ -104,7 +104,7 @@ async def test_case_07_a_permission_taken_away_is_told_with_its_name_and_given_b
     await context.grant_permissions(["geolocation"])
     async with (
         running(*simulate()) as car,
-        running(*server(unhurried(tmp_path))) as watch,
+        running(*server(tmp_path)) as watch,
         riding(phone, watch) as ride,
     ):
         await connect(phone, watch, car)

@@ -17,7 +17,7 @@ from playwright.async_api import Browser, Page, expect
 from tests.page import drives
 from tests.page.barriers import no_barrier
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import Process, running, server, simulate, unhurried
+from tests.page.processes import Process, running, server, simulate
 from tests.page.replay_places import LONG_ONE, PLACES
 from tests.page.touch import DRAWN
 
@@ -46,7 +46,7 @@ async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Watch
         {"speed": speed, "scan": lambda t: None if 40 <= t < 46 else drives.street(t, gap_m=20.0)},
         seconds=70.0,
     )
-    async with running(*simulate()) as car, running(*server(unhurried(data), car.address)) as process:
+    async with running(*simulate()) as car, running(*server(data, car.address)) as process:
         async with httpx.AsyncClient() as client, asyncio.timeout(30):
             while not (rows := (await client.get(f"{process.address}/api/recordings")).json()["recordings"]):
                 await asyncio.sleep(0.2)

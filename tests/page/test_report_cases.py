@@ -16,7 +16,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
 from tests.page.conftest import PHONE, Phone
-from tests.page.processes import Drive, Process, driving, free_port, running, server, simulate, unhurried, watching
+from tests.page.processes import Drive, Process, driving, free_port, running, server, simulate, watching
 from tests.page.test_tabs import TABS
 
 LONG = 45_000  # ms: the car must first stop, or come to where the other one pulls out
@@ -90,7 +90,7 @@ async def test_case_01_an_address_without_a_car_opens_no_home(phone: Phone, tmp_
 @pytest.mark.gate
 async def test_case_02_the_right_address_opens_home(phone: Phone, drive: Drive, tmp_path: Path) -> None:
     car, _ = drive
-    async with running(*server(unhurried(tmp_path))) as watch:
+    async with running(*server(tmp_path)) as watch:
         await phone.open(watch.address)
         await phone.page.fill("#address", car.shown)
         await phone.page.keyboard.press("Enter")
@@ -108,7 +108,7 @@ async def test_case_04_a_lost_link_shows_its_dialog_and_what_was_recorded_is_sav
     """Saved and listed before the dialog says so, and before the connect screen; a link that returns goes on."""
     car = await Process(*simulate()).start()
     port = car.shown.split(":")[1]
-    async with running(*server(unhurried(tmp_path / "watch"), car.address)) as watch:
+    async with running(*server(tmp_path / "watch", car.address)) as watch:
         try:
             await phone.open(watch.address)
             await phone.live()

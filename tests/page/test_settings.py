@@ -17,7 +17,7 @@ from playwright.async_api import Browser, Locator, expect
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.canned import Canned
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import Process, running, server, simulate
+from tests.page.processes import UNHURRIED, Process, running, server, simulate
 from tests.page.touch import stroke
 
 LIMIT = "speed_limit.max_mps"
@@ -33,10 +33,10 @@ async def watch(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Proce
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def api(watch: Process) -> AsyncIterator[httpx.AsyncClient]:
-    """The server's own answers; at the end all settings are the defaults again, and what they raised is over."""
+    """The server's own answers; at the end all settings are as at first, and what they raised is over."""
     async with httpx.AsyncClient(base_url=watch.console, headers={"x-catgraph-name": "Another"}) as client:
         yield client
-        (await client.put("/api/settings.toml", content="")).raise_for_status()
+        (await client.put("/api/settings.toml", content=UNHURRIED)).raise_for_status()
         async with asyncio.timeout(20):
             while fast := [a for a in (await client.get("/api/alarms")).json()["alarms"] if a["id"] == "speed_limit"]:
                 body = {"occurrence": fast[0]["occurrence"]}

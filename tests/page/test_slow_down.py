@@ -17,7 +17,7 @@ from playwright.async_api import Browser, CDPSession, Locator, expect
 from tests.page.barriers import fits_all, no_barrier
 from tests.page.canned import Canned, alarm, live, slow, slowed
 from tests.page.conftest import PHONE, Phone, phone_in
-from tests.page.processes import running, server, simulate, unhurried
+from tests.page.processes import running, server, simulate
 from tests.page.test_meant import said_more
 from tests.vehicle.conftest import Guard
 from tests.vehicle.over_bridge import run_controller, run_guard, task
@@ -308,7 +308,7 @@ async def test_what_comes_by_itself_counts_down_above_everything_and_can_be_veto
     await expect(banner).to_contain_text(re.compile(r"Slows the car in 1\.[0-4] s"))
     car.state["alarms"] = [SPEEDING]  # a dialog comes after it
     await expect(thumb.phone.page.locator("#sheet-alarm")).to_be_visible()
-    await thumb.phone.page.wait_for_timeout(400)
+    await expect(banner).not_to_have_attribute("data-moved", "")
     veto = banner.get_by_role("button", name="Veto")
     assert await veto.evaluate(
         "one => { const box = one.getBoundingClientRect(); "
@@ -316,7 +316,7 @@ async def test_what_comes_by_itself_counts_down_above_everything_and_can_be_veto
     )
     await thumb.phone.page.keyboard.press("Escape")
     await thumb.phone.page.keyboard.press("Enter")
-    await thumb.phone.page.wait_for_timeout(300)
+    await thumb.phone.drawn()
     assert heard(car, "veto") == []  # leaving it, or a key that was meant for something else, is no veto
     await expect(banner).to_be_visible()
     await veto.tap()
@@ -414,7 +414,7 @@ async def armed_by_hand(phone: Phone, address: str, topic: str = "/catvehicle/cm
 @pytest.mark.gate
 @pytest.mark.timeout(120)
 async def test_the_simulated_car_slows_holds_and_is_released(phone: Phone, tmp_path: Path) -> None:
-    async with running(*simulate()) as sim, running(*server(unhurried(tmp_path), sim.address)) as watch:
+    async with running(*simulate()) as sim, running(*server(tmp_path, sim.address)) as watch:
         thumb = await armed_by_hand(phone, watch.address)
         await thumb.drag(1.0)
         await expect(thumb.slide()).to_have_attribute("data-kind", "go")

@@ -247,7 +247,7 @@ async def test_signals_are_chosen_and_what_is_seen_is_saved(phone: Phone, canned
 async def test_without_an_answer_the_chart_does_not_look_live(phone: Phone, canned: Canned) -> None:
     await chart(phone, canned)
     await phone.page.locator(".trends-tools button").first.tap()
-    await phone.page.wait_for_timeout(1200)
+    await expect(phone.page.locator(".trends-pane[data-signal=speed] .v")).to_have_text(re.compile(r"\d"))
     await phone.page.route("**/api/trends/drive**", lambda route: route.abort())
     await expect(phone.page.locator(".trends-state")).to_contain_text("No answer since", timeout=10_000)
     await expect(phone.page.locator(".trends-pane[data-signal=speed] .v")).to_have_text("–")

@@ -102,7 +102,7 @@ class ItemView {
   /** @type {Item} */
   item = /** @type {any} */ (null);
   #index = -1;
-  #meant = new Meant();
+  #meant;
 
   /** @param {(act: Act, key: HTMLElement) => void} act */
   constructor(act) {
@@ -118,6 +118,7 @@ class ItemView {
       this.keys.set(name, key);
       this.row.append(key);
     }
+    this.#meant = new Meant(this.element);
   }
 
   /** The key that comes first. */

@@ -7,7 +7,7 @@ import { ANSWER_MS } from './slow-slides.js';
 
 export class Countdown {
   #from_s = 0;
-  #meant = new Meant();
+  #meant;
   /** The trigger that was vetoed here; the frames confirm it a moment later. */
   #vetoed = '';
 
@@ -16,6 +16,7 @@ export class Countdown {
     this.store = store;
     this.banner = /** @type {HTMLDialogElement} */ (need(document, '#sheet-countdown'));
     this.veto = field(this.banner, 'veto');
+    this.#meant = new Meant(this.banner);
     if (store.frame) this.draw();
     this.stops = [
       store.on('draw', () => this.draw()),
