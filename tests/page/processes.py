@@ -69,7 +69,7 @@ class Process:
         )
         out = self._process.stdout
         assert out is not None
-        async with asyncio.timeout(90 if IS_PARTED else 30):
+        async with asyncio.timeout(90 if IS_PARTED else 60):
             while True:
                 line = (await out.readline()).decode()
                 assert line, f"{self._arguments} ended before it said its address"

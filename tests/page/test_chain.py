@@ -173,6 +173,7 @@ async def test_a_server_that_is_killed_and_started_again_is_survived(phone: Phon
             await expect(phone.page.locator("dialog[open]")).to_have_count(0)
 
 
+@pytest.mark.gate
 async def test_one_silent_signal_loses_its_ink_and_no_other(phone: Phone, drive: Drive) -> None:
     car, _ = drive
     await car.type("stale-gps 60")
