@@ -13,7 +13,8 @@ PATIENCE_S = 30.0
 
 def http_client(**options: Any) -> httpx.AsyncClient:
     """A client with these options of httpx, that waits up to PATIENCE_S for each step of an answer."""
-    return httpx.AsyncClient(**{"timeout": PATIENCE_S, "verify": _context()} | options)
+    usual: dict[str, Any] = {"timeout": PATIENCE_S, "verify": _context()}
+    return httpx.AsyncClient(**usual | options)
 
 
 @cache

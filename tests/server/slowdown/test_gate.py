@@ -116,6 +116,7 @@ def every_command() -> list[dict[str, Any]]:
     return [found[kind] for kind in found if kind not in ENDS + ORDERS] + [found["arm"]]
 
 
+@pytest.mark.slow
 @pytest.mark.virtual_time
 async def test_whatever_is_called_nothing_is_published_that_was_not_ordered(bridge: RosBridge) -> None:
     """Every route with every method, every command of a page: and arming alone says nothing to the car."""

@@ -13,7 +13,7 @@ import pytest
 from tests.server.slowdown.conftest import Field, field
 from tests.server.viewer import Viewer, viewer
 
-pytestmark = pytest.mark.virtual_time
+pytestmark = [pytest.mark.slow, pytest.mark.virtual_time]
 SEEN = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready"}
 
 

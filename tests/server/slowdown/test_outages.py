@@ -99,6 +99,7 @@ class Heard:
             assert sum(began_s <= stamp_s <= ended_s for stamp_s in made) <= 2  # under way when it froze
 
 
+@pytest.mark.slow
 @pytest.mark.virtual_time
 async def test_no_command_arrives_late_and_none_twice(bridge: RosBridge, server: str) -> None:
     heard = Heard(bridge, server)
@@ -128,6 +129,7 @@ async def test_it_keeps_its_rate_in_real_time() -> None:
         assert max(b - a for a, b in itertools.pairwise(times)) < 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.virtual_time
 @pytest.mark.parametrize("fault", ["bridge-killed", "bridge-frozen"])
 async def test_the_ramp_goes_on_from_the_speed_that_is_measured(fault: str) -> None:
@@ -149,6 +151,7 @@ async def test_the_ramp_goes_on_from_the_speed_that_is_measured(fault: str) -> N
         assert [step for step in await car.steps() if step in ("cut", "resumed")] == ["cut", "resumed"]
 
 
+@pytest.mark.slow
 @pytest.mark.virtual_time
 async def test_a_bridge_that_talks_on_and_reads_no_command_is_doubted_and_dialled_anew() -> None:
     async with simulated() as (service, direct), one_way(int(direct.rpartition(":")[2])) as (way, address):
