@@ -47,7 +47,7 @@ async def serving_app(app: FastAPI, config: Config) -> AsyncIterator[str]:
 @pytest.fixture
 async def bridge() -> AsyncIterator[RosBridge]:
     """A bridge with a car's speed and scan advertised; `bridge.address` is its ws address."""
-    one = RosBridge(ros_version=1)
+    one = RosBridge(ros_version=1, now=time.time)
     port = await one.start("127.0.0.1", 0)
     one.address = f"ws://127.0.0.1:{port}"  # type: ignore[attr-defined]
     one.advertise("/catvehicle/vel", "geometry_msgs/Twist")

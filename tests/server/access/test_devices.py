@@ -130,7 +130,7 @@ class HangingDisk:
         await self.storage.run(lambda: None)
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_paired_is_answered_once_the_disk_has_the_device(tmp_path: Path) -> None:
     disk = HangingDisk()
     access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 0, storage=disk.storage)
@@ -144,7 +144,7 @@ async def test_paired_is_answered_once_the_disk_has_the_device(tmp_path: Path) -
     disk.storage.close()
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_who_is_removed_is_out_before_the_disk_answers_and_stays_out(tmp_path: Path) -> None:
     disk = HangingDisk()
     access = access_of(config(tmp_path), now=lambda: 0.0, wall_ms=lambda: 0, storage=disk.storage)

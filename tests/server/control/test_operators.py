@@ -49,6 +49,7 @@ def acts(one: Viewer) -> list[str]:
     return [event["act"] for event in one.events if event["change"] == "control"]
 
 
+@pytest.mark.virtual_time
 async def test_two_pages_one_control_and_an_old_number_is_refused(server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann, operator(server, "Ben", "page-ben") as ben:
         first = await ann.ask(kind="pause")
@@ -70,6 +71,7 @@ async def test_two_pages_one_control_and_an_old_number_is_refused(server: str) -
         assert fences == sorted(set(fences))
 
 
+@pytest.mark.virtual_time
 async def test_anybody_acknowledges_and_nobody_else_stops(bridge: RosBridge, server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann, operator(server, "Ben", "page-ben") as ben:
         assert (await ann.ask(kind="control", do="take"))["ok"]
@@ -89,6 +91,7 @@ async def test_anybody_acknowledges_and_nobody_else_stops(bridge: RosBridge, ser
         assert [one["reason"] for one in refused] == ["Ann is in control."] * 6
 
 
+@pytest.mark.virtual_time
 async def test_this_machine_s_own_console_is_never_refused_and_named(server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann, http_client(base_url=server) as console:
         assert (await ann.ask(kind="control", do="take"))["ok"]
@@ -98,6 +101,7 @@ async def test_this_machine_s_own_console_is_never_refused_and_named(server: str
         assert (await ann.state())["control"]["holder"] == "Ann"
 
 
+@pytest.mark.virtual_time
 async def test_what_a_page_says_of_who_it_is_counts_for_nothing(server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann, operator(server, "Ben", "page-ben") as ben:
         assert (await ann.ask(kind="control", do="take"))["ok"]
@@ -105,6 +109,7 @@ async def test_what_a_page_says_of_who_it_is_counts_for_nothing(server: str) -> 
         assert answer["reason"] == "Ann is in control."
 
 
+@pytest.mark.virtual_time
 async def test_nonsense_about_presence_is_answered(server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann:
         await ann.send(SEEN | {"sound": "deafening"})
@@ -112,7 +117,7 @@ async def test_nonsense_about_presence_is_answered(server: str) -> None:
         assert (await ann.state())["reach"]["can"] == 1
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_a_page_that_is_closed_is_not_waited_for_and_one_that_breaks_off_is(server: str) -> None:
     async with operator(server, "Ann", "page-ann") as ann:
         async with operator(server, "Ben", "page-ben") as ben:
@@ -126,7 +131,7 @@ async def test_a_page_that_is_closed_is_not_waited_for_and_one_that_breaks_off_i
             assert (state["reach"]["of"], state["reach"]["why"]) == (2, "not heard")
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_nobody_hears_alarms_on_a_server_that_nobody_looks_at(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), http_client(base_url=server) as program:
         async with asyncio.timeout(30):
@@ -228,6 +233,7 @@ async def test_a_viewer_is_never_in_control_and_not_counted_on(tmp_path: Path) -
             reading.cancel()
 
 
+@pytest.mark.virtual_time
 async def test_a_page_that_tells_how_it_stands_before_who_it_is_is_counted_once(server: str) -> None:
     async with websockets.connect(f"{server.replace('http', 'ws')}/ws") as raw, viewer(server) as looks_on:
         await raw.send(orjson.dumps(SEEN).decode())

@@ -42,7 +42,7 @@ class Watch:
         return self.s
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("report_to", [TO, ()])
 async def test_a_drive_that_ended_is_mailed_once_where_wished(tmp_path: Path, report_to: tuple[str, ...]) -> None:
     shelf, watch = Shelf(tmp_path / "car"), Watch()
@@ -75,7 +75,7 @@ async def test_a_drive_that_ended_is_mailed_once_where_wished(tmp_path: Path, re
         await mailer.stop()
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_what_waits_at_the_end_of_the_server_is_kept(tmp_path: Path) -> None:
     shelf = Shelf(tmp_path / "car")
     mailer = Mailer(tmp_path / "mail", shelf, wall_ms=Clock())

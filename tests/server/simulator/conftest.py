@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
@@ -76,7 +77,7 @@ async def until(is_so: Callable[[], bool]) -> None:
 
 @asynccontextmanager
 async def running_car(**options: Any) -> AsyncIterator[tuple[CarService, int]]:
-    service = CarService(**options)
+    service = CarService(**{"clock": time.time} | options)
     port = await service.start()
     try:
         yield service, port

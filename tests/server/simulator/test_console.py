@@ -65,7 +65,7 @@ async def heard(service: CarService, file: int, pieces: list[bytes], write: int 
     return said
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_lines_come_through_a_pipe_in_any_pieces() -> None:
     read, write = os.pipe()
     service = CarService()
@@ -79,7 +79,7 @@ async def test_lines_come_through_a_pipe_in_any_pieces() -> None:
     assert running(service) == {"speeding", "slow-rate"}
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_an_endless_line_is_not_kept() -> None:
     read, write = os.pipe()
     try:
@@ -90,7 +90,7 @@ async def test_an_endless_line_is_not_kept() -> None:
     assert said, "it is answered before it ends"
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_the_end_of_the_input_ends_the_listening() -> None:
     read, write = os.pipe()
     os.write(write, b"speeding\nstop")
@@ -102,7 +102,7 @@ async def test_the_end_of_the_input_ends_the_listening() -> None:
     assert said[:1] == ["speeding started."]
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_a_file_is_read_and_dev_null_does_no_harm(tmp_path: Path) -> None:
     script = tmp_path / "script"
     script.write_bytes(b"speeding\n")

@@ -13,11 +13,12 @@ from server.simulator.driver import SPARE_M, clear_distance_m, fastest_mps
 from tests.server.simulator.rules import Rules
 
 
-def test_a_whole_lap_breaks_no_rule() -> None:
-    assert Rules().run(SimulatedCar().messages(), until_s=115).broken == {}
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_whole_lap_breaks_no_rule(seed: int) -> None:
+    assert Rules().run(SimulatedCar(seed=seed).messages(), until_s=115).broken == {}
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_ten_minutes_break_no_rule(seed: int) -> None:
     assert Rules().run(SimulatedCar(seed=seed).messages(), until_s=600).broken == {}

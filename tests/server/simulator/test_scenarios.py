@@ -20,23 +20,14 @@ NAMES = [
     "manual-takeover", "driver-brakes", "mode-flaps",
 ]  # fmt: skip
 
-# scenario → (rules that must be broken, within so many seconds; rules that may be)
+# What tests/server/judge/test_judged.py judges in the long run only: scenario → (rules that must be broken, within so
+# many seconds; rules that may be)
 EXPECTED: dict[str, tuple[dict[str, float], set[str]]] = {
     "speeding": ({"speed": 8.0}, set()),
-    "obstacle": ({"obstacle curved": 1.0, "nearest object": 1.0}, {"obstacle straight"}),  # and see documented
-    "pedal-conflict": ({"pedals": 0.5}, set()),
     "gps-drift": ({"gps drift": 15.0}, {"gps wander", "not moving"}),
-    "gps-jump": ({"gps jump": 0.6}, set()),
-    "stale-gps": ({"stale position": 1.1}, set()),
-    "silent-scan": ({"stale scan": 1.1}, set()),
-    "blind-laser": ({"blind laser": 1.1}, set()),
-    "frozen-speed": ({"frozen speed": 2.2}, set()),
-    "slow-rate": ({"slow speed": 5.0}, set()),
-    "diagnostics-error": ({"diagnostics": 1.0}, set()),
 }
 
-# Stations of the lap are reached at these times: wide bend, before the notch, in its first bend, at the stop line
-MOMENTS_S = [7.0, 27.0, 34.0, 47.5]
+BEGINS_S = 7.0  # in the wide bend
 
 
 def broken(name: str, after_s: float, until_s: float) -> dict[str, list[float]]:
@@ -65,29 +56,14 @@ def test_each_is_explained_and_does_something(scenario: Scenario) -> None:
 @pytest.mark.parametrize("name", EXPECTED)
 def test_a_scenario_breaks_its_own_rule_in_time_and_no_other(name: str) -> None:
     must, may = EXPECTED[name]
-    after_s = MOMENTS_S[0]
+    after_s = BEGINS_S
     found = broken(name, after_s, until_s=after_s + find(name).duration_s + 20)
     assert set(found) - may == set(must)
     for rule, within_s in must.items():
         times = found[rule]
         assert after_s - 0.1 <= times[0] <= after_s + within_s
-        assert times[-1] <= after_s + find(name).duration_s + 6.0  # slow-rate: the window of the rate
+        assert times[-1] <= after_s + find(name).duration_s + 6.0
         assert max(b - a for a, b in itertools.pairwise(times)) < 2.5, "it must break its rule once"
-
-
-@pytest.mark.field
-@pytest.mark.slow
-@pytest.mark.parametrize("name", EXPECTED)
-@pytest.mark.parametrize("after_s", MOMENTS_S[1:])
-def test_a_scenario_breaks_no_other_rule_wherever_it_begins(name: str, after_s: float) -> None:
-    must, may = EXPECTED[name]
-    documented = {
-        "frozen-speed": {"obstacle curved", "obstacle straight", "nearest object"},
-        "gps-jump": {"gps drift"},
-        "obstacle": {"not moving"},  # at the stop line
-    }
-    found = broken(name, after_s, until_s=after_s + find(name).duration_s + 20)
-    assert set(must) <= set(found) <= set(must) | may | {"gps wander"} | documented.get(name, set())
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from server.simulator.scenarios import SCENARIOS, UnknownScenario
 from server.simulator.service import SCENARIO_SERVICE, STATE_SERVICE, CarService, serve_car
 from tests.server.simulator.conftest import PATIENCE_S, bridge_client, running_car, until
 
+pytestmark = pytest.mark.virtual_time
 Car = tuple[CarService, int]
 BRAKE, ACCELERATOR = "/catvehicle/brake", "/catvehicle/accelerator"
 
@@ -38,7 +39,6 @@ async def test_the_bridge_offers_every_topic_of_the_car(ros_version: RosVersion)
         assert found == {published.topic: published.ros_type(ros_version) for published in PUBLISHED}
 
 
-@pytest.mark.field
 async def test_every_topic_speaks_at_its_rate(car: Car) -> None:
     _, port = car
     async with bridge_client(port) as client:
@@ -48,9 +48,9 @@ async def test_every_topic_speaks_at_its_rate(car: Car) -> None:
         until_s = time.monotonic() + 2.0
         while time.monotonic() < until_s:
             counts[(await client.receive())["topic"]] += 1
-    assert counts["/catvehicle/front_laser_points"] == pytest.approx(150, rel=0.2)
-    assert counts["/catvehicle/vel"] == pytest.approx(40, rel=0.2)
-    assert counts["/gps_fix"] == pytest.approx(20, rel=0.2)
+    assert counts["/catvehicle/front_laser_points"] == pytest.approx(150, abs=2)
+    assert counts["/catvehicle/vel"] == pytest.approx(40, abs=1)
+    assert counts["/gps_fix"] == pytest.approx(20, abs=1)
     assert len(counts) == len(PUBLISHED)
 
 
@@ -64,15 +64,14 @@ async def test_beams_without_a_return_are_null_on_the_wire(car: Car) -> None:
         assert all(0 <= distance <= 81 for distance in ranges if distance is not None)
 
 
-@pytest.mark.field
 async def test_the_cars_clock_is_that_of_the_machine(car: Car) -> None:
     service, port = car
     async with bridge_client(port) as client:
         await client.subscribe("/gps_fix")
         stamp = (await client.next("/gps_fix"))["header"]["stamp"]
-        assert stamp["secs"] + stamp["nsecs"] * 1e-9 == pytest.approx(time.time(), abs=0.5)
+        assert stamp["secs"] + stamp["nsecs"] * 1e-9 == pytest.approx(time.time(), abs=0.05)
         answer = (await client.call("/rosapi/get_time"))["values"]["time"]
-        assert answer["secs"] + answer["nsecs"] * 1e-9 == pytest.approx(service.car.now_s, abs=0.2)
+        assert answer["secs"] + answer["nsecs"] * 1e-9 == pytest.approx(service.car.now_s, abs=0.02)
 
 
 async def test_the_cars_clock_is_set_when_it_drives_off_however_long_that_took() -> None:
@@ -181,7 +180,6 @@ async def test_a_client_drives_the_car_by_cmd_vel_and_gives_it_back(car: Car) ->
         await client.next("/catvehicle/vel", lambda message: message["linear"]["x"] > 0.5)
 
 
-@pytest.mark.field
 async def test_a_frozen_bridge_keeps_its_connections_but_says_nothing() -> None:
     async with running_car() as (service, port), bridge_client(port) as client:
         await client.subscribe("/catvehicle/vel")
@@ -193,11 +191,10 @@ async def test_a_frozen_bridge_keeps_its_connections_but_says_nothing() -> None:
             heard_s = time.monotonic()
             await client.next("/catvehicle/vel")
             silences.append(time.monotonic() - heard_s)
-        assert max(silences) == pytest.approx(1.2, abs=0.4)
+        assert max(silences) == pytest.approx(1.2, abs=0.06)
         await client.call(STATE_SERVICE)
 
 
-@pytest.mark.field
 async def test_a_frozen_bridge_is_thawed_by_stop() -> None:
     async with running_car() as (service, port), bridge_client(port) as client:
         await client.subscribe("/catvehicle/vel")
@@ -211,7 +208,6 @@ async def test_a_frozen_bridge_is_thawed_by_stop() -> None:
         await client.next("/catvehicle/vel")
 
 
-@pytest.mark.field
 async def test_a_killed_bridge_drops_everybody_and_comes_back_on_its_port() -> None:
     async with running_car() as (service, port):
         async with bridge_client(port) as client:
@@ -221,7 +217,7 @@ async def test_a_killed_bridge_drops_everybody_and_comes_back_on_its_port() -> N
             began_s = time.monotonic()
             with pytest.raises(ConnectionClosed):
                 await client.listen()
-            assert time.monotonic() - began_s < 0.7
+            assert time.monotonic() - began_s < 0.05
         with pytest.raises(OSError, match=r"refused|Connect call failed"):
             async with bridge_client(port):
                 pass
@@ -234,7 +230,7 @@ async def test_a_killed_bridge_drops_everybody_and_comes_back_on_its_port() -> N
                         break
                 except OSError:
                     await asyncio.sleep(0.05)
-        assert time.monotonic() - began_s == pytest.approx(1.0, abs=0.6)
+        assert time.monotonic() - began_s == pytest.approx(1.0, abs=0.15)
 
 
 async def test_a_killed_bridge_waits_for_its_port_when_somebody_took_it() -> None:
@@ -293,24 +289,11 @@ async def test_it_leaves_no_task_behind() -> None:
     assert asyncio.all_tasks() <= before
 
 
-@pytest.mark.field
 async def test_a_faster_rate_makes_a_faster_car() -> None:
     async with running_car(rate=5.0) as (service, _):
         began_s = time.monotonic()
         await until(lambda: service.car.elapsed_s >= 5.0)
-        assert time.monotonic() - began_s == pytest.approx(1.0, abs=0.4)
-
-
-@pytest.mark.field
-async def test_others_on_the_loop_are_hardly_disturbed() -> None:
-    """The car works in pieces of less than 2 ms; half of all wakings must not even notice."""
-    async with running_car():
-        late_ms = []
-        for _ in range(300):
-            began_s = time.perf_counter()
-            await asyncio.sleep(0.003)
-            late_ms.append((time.perf_counter() - began_s - 0.003) * 1e3)
-        assert sorted(late_ms)[150] < 2.0
+        assert time.monotonic() - began_s == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize("options", [{"rate": 0.0}, {"rate": -1.0}, {"rate": 1e9}, {"scan_beams": 1}], ids=str)

@@ -14,9 +14,12 @@ import httpx
 from server.app.config import Config
 from server.simulator.service import CarService
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.conftest import serving
 
 PATIENCE_S = 20.0
+ASK_S = 0.1  # the server is asked so often
+LOOK_S = 0.02  # the car itself is looked at so often: that costs nothing
 
 
 class Field:
@@ -53,6 +56,10 @@ class Field:
     async def post(self, what: str, **body: Any) -> httpx.Response:
         return await self.client.post(f"/api/slow-down/{what}", json=body or None)
 
+    async def set(self, values: Mapping[str, float]) -> None:
+        """Changes settings by their full names."""
+        assert (await self.client.patch("/api/settings", json={"values": values})).is_success
+
     async def until(self, true: Callable[[Mapping[str, Any]], Any], seconds: float = PATIENCE_S) -> dict[str, Any]:
         """The first state of which it is true."""
         ends_s = time.monotonic() + seconds
@@ -61,13 +68,20 @@ class Field:
             if true(state):
                 return state
             assert time.monotonic() < ends_s, state["decelerate"]
-            await asyncio.sleep(0.02)
+            await asyncio.sleep(ASK_S)
+
+    async def until_car(self, true: Callable[[], Any], seconds: float = PATIENCE_S) -> None:
+        """Waits for what the car does, without asking the server."""
+        ends_s = time.monotonic() + seconds
+        while not true():
+            assert time.monotonic() < ends_s, self.speed_mps
+            await asyncio.sleep(LOOK_S)
 
     async def armed(self, speed_mps: float = 4.0) -> None:
         """Drives, and slow-down is armed."""
         await self.until(lambda state: state["decelerate"]["state"] == "safe")
         await self.until(lambda state: state["decelerate"]["rivals"] is not None)
-        await self.until(lambda _: self.speed_mps >= speed_mps)
+        await self.until_car(lambda: self.speed_mps >= speed_mps)
         assert (await self.post("arm")).status_code == 200
 
     async def events(self, change: str = "slow_down") -> list[dict[str, Any]]:
@@ -81,7 +95,7 @@ class Field:
 @contextlib.asynccontextmanager
 async def simulated(**how: Any) -> AsyncIterator[tuple[CarService, str]]:
     """A car that drives, and the address of its bridge; `how`: of the CarService."""
-    service = CarService(**how)
+    service = CarService(**{"clock": time.time} | how)
     port = await service.start()
     try:
         yield service, f"ws://127.0.0.1:{port}"
@@ -95,7 +109,7 @@ async def watching(
 ) -> AsyncIterator[Field]:
     """A server that watches it."""
     config = Config(vehicles=(Vehicle(name=name, address=address),), data=data)
-    async with serving(config) as base, httpx.AsyncClient(base_url=base, timeout=10.0) as client:
+    async with serving(config) as base, http_client(base_url=base, timeout=10.0) as client:
         yield Field(service, client)
 
 

@@ -10,7 +10,6 @@ import time
 from collections.abc import Iterator
 from typing import Any, get_args
 
-import httpx
 import pytest
 import websockets
 
@@ -19,6 +18,7 @@ from server.app.config import Config
 from server.protocol import commands, slowing_commands
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
 from tests.server.access.test_rules import all_routes
 from tests.server.cars import driving
 from tests.server.conftest import serving_app
@@ -116,19 +116,19 @@ def every_command() -> list[dict[str, Any]]:
     return [found[kind] for kind in found if kind not in ENDS + ORDERS] + [found["arm"]]
 
 
-@pytest.mark.field
 @pytest.mark.slow
+@pytest.mark.virtual_time
 async def test_whatever_is_called_nothing_is_published_that_was_not_ordered(bridge: RosBridge) -> None:
     """Every route with every method, every command of a page: and arming alone says nothing to the car."""
     bridge.advertise("/catvehicle/cmd_vel", "geometry_msgs/Twist")
     heard: list[str] = []
     bridge.on_publish.append(lambda topic, kind, said: heard.append(topic))
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),))  # type: ignore[attr-defined]
-    app = create_app(config)
+    app = create_app(config, now=time.monotonic)
     async with (
         driving(bridge, steers=True),
         serving_app(app, config) as base,
-        httpx.AsyncClient(base_url=base, timeout=10.0) as client,
+        http_client(base_url=base) as client,
         websockets.connect(base.replace("http", "ws") + "/ws") as page,
     ):
         async with asyncio.timeout(20):

@@ -34,6 +34,7 @@ def test_what_fails_beside_it_neither_stops_nor_delays_it(fails: tuple[str, ...]
     assert rig.link.speeds[-1] < 6.0 - 1.4 * 1.9
 
 
+@pytest.mark.virtual_time
 async def test_its_task_goes_on_after_a_cancellation_that_nobody_ordered() -> None:
     rig = Rig()
     rig.clock = asyncio.get_running_loop().time
@@ -101,6 +102,7 @@ def test_armed_by_a_program_without_any_page_it_stays_armed_and_so_it_does_where
     assert rig.slowing.frame()["state"] == "armed"  # the car is to be slowed because nobody is there
 
 
+@pytest.mark.virtual_time
 async def test_a_page_that_spent_its_commands_can_still_slow_the_car() -> None:
     """Over its socket, also beyond its allowance of messages; and over HTTP."""
     spent = Limits(
