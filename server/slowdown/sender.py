@@ -114,7 +114,9 @@ class Sender:
             if left_s > TIMER_S:
                 await asyncio.sleep(left_s)
                 continue  # one that was ordered meanwhile has its own time
-            self._due_s = max(self._due_s + PERIOD_S, self._now())
+            now_s, self._due_s = self._now(), self._due_s + PERIOD_S
+            if self._due_s < now_s + TIMER_S:  # after a stall: what was missed is not sent at once
+                self._due_s = now_s + PERIOD_S
             self.send_safely()
 
     def send_at_once(self) -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
+from collections.abc import Mapping
+from typing import Any
 
 import pytest
 
@@ -10,6 +13,7 @@ from server.app.config import Config
 from server.protocol import slowing_commands
 from server.protocol.rate_limit import Limits, Rate
 from server.slowdown.order import DESERTED_S
+from server.slowdown.sender import PERIOD_S
 from server.system.supervision import Supervisor
 from server.vehicle.vehicle import Vehicle
 from tests.http import http_client
@@ -32,6 +36,40 @@ def test_what_fails_beside_it_neither_stops_nor_delays_it(fails: tuple[str, ...]
     rig.pass_time(2.0)
     assert len(rig.link.speeds) >= 40
     assert rig.link.speeds[-1] < 6.0 - 1.4 * 1.9
+
+
+@pytest.mark.virtual_time
+async def test_after_a_stall_no_command_follows_at_once() -> None:
+    """A command that is late by more than a period is sent, and the next one a period later."""
+    rig = Rig()
+    stalled_s = 0.0
+    loop = asyncio.get_running_loop()
+    rig.clock = lambda: loop.time() + stalled_s
+    rig.now_s = rig.clock()
+    rig.link.heard_s = float("inf")
+    supervisor = Supervisor("test")
+    supervisor.keep("slow-down", rig.slowing.sender.send_loop)
+    sent_s: list[float] = []
+    send = rig.link.send_now
+
+    def note(message: Mapping[str, Any]) -> None:
+        send(message)
+        if message["op"] == "publish":
+            sent_s.append(rig.clock())
+
+    rig.link.send_now = note  # type: ignore[method-assign]
+    try:
+        rig.tick()
+        rig.obey("arm")
+        rig.obey("slow_down")
+        for late_s in (0.08, 0.21, 0.34, 0.6):
+            await asyncio.sleep(0.5)
+            stalled_s += late_s
+        await asyncio.sleep(0.5)
+        assert len(sent_s) > 40
+        assert min(b - a for a, b in itertools.pairwise(sent_s)) > PERIOD_S - 0.005
+    finally:
+        await supervisor.stop()
 
 
 @pytest.mark.virtual_time
