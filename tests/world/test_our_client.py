@@ -138,7 +138,7 @@ def same(mine: Any, other: Any) -> bool:
     return type(mine) is type(other) and mine == other
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 @each
 async def test_a_transcript_is_played_to_our_client(path: Path, caplog: pytest.LogCaptureFixture) -> None:
     name = name_of(path)

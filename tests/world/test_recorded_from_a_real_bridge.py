@@ -27,6 +27,8 @@ from tests.server.rosbridge_server.conftest import bridging
 from tests.server.rosbridge_server.probe import probing
 from tests.server.viewer import Viewer, viewer
 
+pytestmark = pytest.mark.virtual_time
+
 FIXED, NAMES, FLAGS = "float64[3] fixed\n", "string[] names\n", "bool[] flags\n"
 TF = "geometry_msgs/TransformStamped[] transforms\n"
 SOON_S = 60.0  # on two busy cores
@@ -119,7 +121,6 @@ async def watched(port: int, data: Path) -> AsyncIterator[Viewer]:
         yield one
 
 
-@pytest.mark.field
 @pytest.mark.world(n=4)
 @pytest.mark.world(n=5)
 @pytest.mark.parametrize("version", [1, 2])
@@ -157,7 +158,6 @@ def hasten(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(delivery, "RECORDED_AGAIN_S", (2.0,))
 
 
-@pytest.mark.field
 @pytest.mark.world(n=4)
 @pytest.mark.parametrize("version", [1, 2])
 async def test_what_a_neighbour_blocks_is_named_and_comes_when_the_neighbour_has_gone(
@@ -199,7 +199,6 @@ async def test_the_file_names_what_was_not_received(tmp_path: Path, monkeypatch:
         assert recording.metadata["not_received"] == "/quiet"
 
 
-@pytest.mark.field
 @pytest.mark.world(n=9)
 @pytest.mark.parametrize("version", [1, 2])
 async def test_a_topic_that_nobody_publishes_carries_no_signal_until_somebody_does(

@@ -45,7 +45,7 @@ def test_the_topic_stands_at_one_of_its_ends(frame: bytes, is_binary: bool, topi
     assert topic_of(frame[:ENDS_BYTES], frame[-ENDS_BYTES:], is_binary=is_binary) == topic
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_the_second_such_message_ends_its_subscription_and_names_the_topic(tmp_path: Path) -> None:
     picture = {"format": "jpeg", "data": b"\0" * MAX_MESSAGE_BYTES}
 
@@ -75,7 +75,7 @@ async def test_the_second_such_message_ends_its_subscription_and_names_the_topic
                 camera.cancel()
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_a_bridge_of_ros_2_sends_them_in_fragments_and_it_is_the_same(tmp_path: Path) -> None:
     """As CBOR such a message never comes; as JSON it comes in pieces of 10 MB."""
     cloud = {"layout": {"dim": [], "data_offset": 0}, "data": b"\0" * MAX_MESSAGE_BYTES}
