@@ -148,7 +148,7 @@ async def test_what_holds_too_much_to_be_read_as_cbor_is_recorded_as_json(tmp_pa
         async with driving(bridge), serving(config) as base, viewer(base) as one:
             drawing = asyncio.create_task(draw())
             try:
-                await one.state(lambda s: s["recording"]["as_json"] >= 2, 60.0)
+                await one.state(lambda s: s["recording"]["as_json"] >= 2, 30.0)
             finally:
                 drawing.cancel()
             assert one.states[-1]["link"]["unreadable_frames"] >= 1

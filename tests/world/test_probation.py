@@ -24,7 +24,7 @@ from tests.server.rosbridge_server.conftest import bridging
 from tests.server.viewer import viewer
 
 pytestmark = pytest.mark.world(n=10)
-SOON_S = 60.0  # on two busy cores
+SOON_S = 30.0
 
 
 def drive(one: Probation, *, bad: str, suspects: list[str], seconds: float = 60.0) -> tuple[int, list[str]]:

@@ -26,12 +26,13 @@ from tests.server.conftest import serving
 from tests.server.rosbridge_server.conftest import bridging
 from tests.server.rosbridge_server.probe import probing
 from tests.server.viewer import Viewer, viewer
+from tests.virtual_time import real_time
 
 pytestmark = pytest.mark.virtual_time
 
 FIXED, NAMES, FLAGS = "float64[3] fixed\n", "string[] names\n", "bool[] flags\n"
 TF = "geometry_msgs/TransformStamped[] transforms\n"
-SOON_S = 60.0  # on two busy cores
+SOON_S = 30.0
 
 
 def spelled(type: str, version: RosVersion) -> str:
@@ -131,8 +132,7 @@ async def test_every_topic_is_recorded_as_its_type_and_exported_whole(
         state = await one.state(lambda s: s["recording"]["messages"] > 200, SOON_S)
         name = state["recording"]["name"]
         assert state["recording"]["as_json"] == 0
-        assert (await one.ask(kind="disconnect"))["ok"]
-        await one.state(lambda s: s["recording"]["state"] == "off", SOON_S)
+        await stop_recording(one)
     path = RecordingsFolder(tmp_path / "recordings").path_of(name)
     assert path is not None
     with open_recording([path]) as recording:
@@ -150,6 +150,13 @@ async def test_every_topic_is_recorded_as_its_type_and_exported_whole(
         assert (code, capsys.readouterr().err) == (0, "")
     with open_recording([tmp_path / "out.bag"]) as bag:
         assert {topic: info.count for topic, info in bag.topics.items() if topic in counts} == counts
+
+
+async def stop_recording(one: Viewer) -> None:
+    """Disconnects the car, and returns when the file is closed."""
+    async with real_time():
+        assert (await one.ask(kind="disconnect"))["ok"]
+        await one.state(lambda s: s["recording"]["state"] == "off", SOON_S)
 
 
 def hasten(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,8 +198,7 @@ async def test_the_file_names_what_was_not_received(tmp_path: Path, monkeypatch:
         bridge.advertise("/quiet", "std_msgs/Float64")
         state = await one.state(lambda s: s["recording"]["not_received"] == ["/quiet"], SOON_S)
         name = state["recording"]["name"]
-        assert (await one.ask(kind="disconnect"))["ok"]
-        await one.state(lambda s: s["recording"]["state"] == "off", SOON_S)
+        await stop_recording(one)
     path = RecordingsFolder(tmp_path / "recordings").path_of(name)
     assert path is not None
     with open_recording([path]) as recording:
@@ -284,8 +290,7 @@ async def test_what_is_asked_for_before_its_definition_is_recorded_as_its_type(
             assert state["recording"]["as_json"] == 0
             may_answer.set()
             name = state["recording"]["name"]
-            assert (await one.ask(kind="disconnect"))["ok"]
-            await one.state(lambda s: s["recording"]["state"] == "off", SOON_S)
+            await stop_recording(one)
     path = RecordingsFolder(tmp_path / "recordings").path_of(name)
     assert path is not None
     with open_recording([path]) as recording:
