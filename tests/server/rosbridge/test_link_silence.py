@@ -16,7 +16,6 @@ import pytest
 from websockets.asyncio.server import ServerConnection
 from websockets.frames import Frame, Opcode
 
-from server.rosbridge import websocket
 from server.rosbridge.subscription import Subscription
 from tests.server.ear import Bridge, Ear, accept, answering, bridging, linked, text_frame
 
@@ -87,7 +86,7 @@ async def test_a_bridge_that_neither_reads_nor_pongs_is_found_within_2_s(talks_b
     async with answering(fall_silent) as port, linked(f"127.0.0.1:{port}", ear):
         await ear.hears("opened")
         assert (await ear.hears("closed", within_s=4.0)).code == "bridge_silent"
-        assert time.monotonic() - fell_silent_s == pytest.approx(websocket.SILENT_AFTER_S, abs=0.1)
+        assert 1.55 < time.monotonic() - fell_silent_s < 1.75
         assert len(ear.all("message")) == (30 if talks_before else 0)
 
 
@@ -135,13 +134,13 @@ async def test_pings_come_at_one_rate_also_where_the_car_talks() -> None:
         count_pings(bridge, pings)
         await asyncio.sleep(1.05)
         assert link.heard_s is not None
-        assert time.monotonic() - link.heard_s <= websocket.PING_EVERY_S
+        assert time.monotonic() - link.heard_s <= 0.1
         for _ in range(60):
             await bridge.say({"op": "publish", "topic": "/a", "msg": {}})
             await asyncio.sleep(0.013)
         gaps_s = [later - earlier for earlier, later in itertools.pairwise(pings)]
         assert len(gaps_s) >= 17  # in 1.83 s
-        assert gaps_s == pytest.approx([websocket.PING_EVERY_S] * len(gaps_s), abs=0.001)
+        assert gaps_s == pytest.approx([0.1] * len(gaps_s), abs=0.001)
 
 
 def hold_up(seconds: float) -> None:
