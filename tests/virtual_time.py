@@ -10,7 +10,10 @@ It is for stories in one process. What another process, a thread of its own or a
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import threading
 import time
+from collections.abc import AsyncIterator
 
 import looptime
 import pytest
@@ -46,3 +49,15 @@ class VirtualClock:
         """The functions of `time` show this clock from now on."""
         for name in ("monotonic", "monotonic_ns", "time", "time_ns"):
             monkeypatch.setattr(time, name, getattr(self, name))
+
+
+@contextlib.asynccontextmanager
+async def real_time() -> AsyncIterator[None]:
+    """Time passes as it really does: for a block that waits for a process or for a thread of its own."""
+    ended = threading.Event()
+    job = asyncio.get_running_loop().run_in_executor(None, ended.wait)
+    try:
+        yield
+    finally:
+        ended.set()
+        await job

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from typing import Any
 
 import orjson
@@ -24,37 +25,46 @@ class Ear:
 
     def __init__(self) -> None:
         self.received: list[tuple[str, Any]] = []
+        self._heard = asyncio.Event()
 
     def link_opened(self) -> None:
-        self.received.append(("opened", None))
+        self._note("opened", None)
 
     def link_closed(self, problem: Problem) -> None:
-        self.received.append(("closed", problem))
+        self._note("closed", problem)
 
     def dial_failed(self, problem: Problem) -> None:
-        self.received.append(("failed", problem))
+        self._note("failed", problem)
 
     def message_received(self, topic: str, message: Any, note: str | None) -> None:
-        self.received.append(("message", (topic, message, note)))
+        self._note("message", (topic, message, note))
 
     def status_received(self, level: str, text: str) -> None:
-        self.received.append(("status", (level, text)))
+        self._note("status", (level, text))
 
     def junk_received(self, why: str) -> None:
-        self.received.append(("junk", why))
+        self._note("junk", why)
 
     def large_skipped(self, topic: str | None, size: int) -> None:
-        self.received.append(("large", (topic, size)))
+        self._note("large", (topic, size))
 
     def all(self, kind: str) -> list[Any]:
         return [what for name, what in self.received if name == kind]
 
     async def hears(self, kind: str, count: int = 1, *, within_s: float = 20.0) -> Any:
         """What was received the `count`-th time."""
-        await until(
-            lambda: len(self.all(kind)) >= count, within_s=within_s, or_say=lambda: f"no {kind}: {self.received}"
-        )
+        try:
+            async with asyncio.timeout(within_s):
+                while len(self.all(kind)) < count:
+                    self._heard.clear()
+                    await self._heard.wait()
+        except TimeoutError:
+            raise AssertionError(f"no {kind}: {self.received}") from None
         return self.all(kind)[count - 1]
+
+    def _note(self, kind: str, what: Any) -> None:
+        self.received.append((kind, what))
+        self._heard.set()
 
 
 async def until(
@@ -180,3 +190,17 @@ async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> 
         b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         b"Sec-WebSocket-Accept: " + accept_key(key).encode() + b"\r\n\r\n"
     )
+
+
+@contextlib.contextmanager
+def black_hole() -> Iterator[int]:
+    """A port that takes no more connections and refuses none: its queue is full, as of a machine out of range."""
+    with contextlib.ExitStack() as held:
+        listening = held.enter_context(socket.socket())
+        listening.bind(("127.0.0.1", 0))
+        listening.listen(0)
+        for _ in range(4):
+            waiting = held.enter_context(socket.socket())
+            waiting.setblocking(False)
+            waiting.connect_ex(listening.getsockname())
+        yield listening.getsockname()[1]

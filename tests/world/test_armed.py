@@ -16,12 +16,11 @@ from tests.server.rosbridge_server.conftest import bridging
 from tests.server.rosbridge_server.probe import probing
 from tests.server.viewer import viewer
 
-pytestmark = pytest.mark.world(n=9)
+pytestmark = [pytest.mark.world(n=9), pytest.mark.virtual_time]
 COMMAND = "/catvehicle/cmd_vel"
-SOON_S = 60.0  # on two busy cores
+SOON_S = 30.0
 
 
-@pytest.mark.field
 async def test_where_only_we_may_command_nothing_is_said_to_be_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -130,7 +130,7 @@ def test_a_definition_that_holds_too_much_is_not_fit_and_takes_no_time() -> None
         assert time.process_time() - began_s < 5.0
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_what_holds_too_much_to_be_read_as_cbor_is_recorded_as_json(tmp_path: Path) -> None:
     """A path of 9000 poses, or a polygon of 60 000 points: it was counted as unreadable, and named nowhere."""
     polygon = {"points": [{"x": 1.0, "y": 2.0, "z": 0.5}] * 60_000}
@@ -148,7 +148,7 @@ async def test_what_holds_too_much_to_be_read_as_cbor_is_recorded_as_json(tmp_pa
         async with driving(bridge), serving(config) as base, viewer(base) as one:
             drawing = asyncio.create_task(draw())
             try:
-                await one.state(lambda s: s["recording"]["as_json"] >= 2, 60.0)
+                await one.state(lambda s: s["recording"]["as_json"] >= 2, 30.0)
             finally:
                 drawing.cancel()
             assert one.states[-1]["link"]["unreadable_frames"] >= 1

@@ -11,7 +11,7 @@ import pytest
 import websockets
 
 from server.cli import replay, simulate
-from server.rosbridge_server.server import RealOptions, RosBridge, ServiceFailed
+from server.rosbridge_server.server import RealOptions, ServiceFailed
 from server.simulator.service import CarService
 from tests.server.rosbridge_server.conftest import bridging
 
@@ -171,7 +171,3 @@ async def test_the_simulated_car_drives_behind_it(ros: Any) -> None:
                 assert isinstance(frame, str)
     finally:
         await service.stop()
-
-
-def test_the_bridge_is_helpful_where_nothing_else_is_said() -> None:
-    assert RosBridge().like == "helpful"

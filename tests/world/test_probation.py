@@ -24,7 +24,7 @@ from tests.server.rosbridge_server.conftest import bridging
 from tests.server.viewer import viewer
 
 pytestmark = pytest.mark.world(n=10)
-SOON_S = 60.0  # on two busy cores
+SOON_S = 30.0
 
 
 def drive(one: Probation, *, bad: str, suspects: list[str], seconds: float = 60.0) -> tuple[int, list[str]]:
@@ -106,7 +106,7 @@ def test_one_that_makes_all_others_late_is_found_and_left_and_the_others_are_rec
     assert recorded_s > 90.0
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_after_a_silence_of_the_bridge_the_large_ones_that_never_came_wait(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -26,10 +26,13 @@ from tests.server.conftest import serving
 from tests.server.rosbridge_server.conftest import bridging
 from tests.server.rosbridge_server.probe import probing
 from tests.server.viewer import Viewer, viewer
+from tests.virtual_time import real_time
+
+pytestmark = pytest.mark.virtual_time
 
 FIXED, NAMES, FLAGS = "float64[3] fixed\n", "string[] names\n", "bool[] flags\n"
 TF = "geometry_msgs/TransformStamped[] transforms\n"
-SOON_S = 60.0  # on two busy cores
+SOON_S = 30.0
 
 
 def spelled(type: str, version: RosVersion) -> str:
@@ -119,7 +122,6 @@ async def watched(port: int, data: Path) -> AsyncIterator[Viewer]:
         yield one
 
 
-@pytest.mark.field
 @pytest.mark.world(n=4)
 @pytest.mark.world(n=5)
 @pytest.mark.parametrize("version", [1, 2])
@@ -130,8 +132,7 @@ async def test_every_topic_is_recorded_as_its_type_and_exported_whole(
         state = await one.state(lambda s: s["recording"]["messages"] > 200, SOON_S)
         name = state["recording"]["name"]
         assert state["recording"]["as_json"] == 0
-        assert (await one.ask(kind="disconnect"))["ok"]
-        await one.state(lambda s: s["recording"]["state"] == "off", SOON_S)
+        await stop_recording(one)
     path = RecordingsFolder(tmp_path / "recordings").path_of(name)
     assert path is not None
     with open_recording([path]) as recording:
@@ -151,13 +152,19 @@ async def test_every_topic_is_recorded_as_its_type_and_exported_whole(
         assert {topic: info.count for topic, info in bag.topics.items() if topic in counts} == counts
 
 
+async def stop_recording(one: Viewer) -> None:
+    """Disconnects the car, and returns when the file is closed."""
+    async with real_time():
+        assert (await one.ask(kind="disconnect"))["ok"]
+        await one.state(lambda s: s["recording"]["state"] == "off", SOON_S)
+
+
 def hasten(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (("RECORDED_AFTER_S", 1.0), ("RENEW_AFTER_S", 1.5), ("SILENT_AGAIN_S", 2.0)):
         monkeypatch.setattr(delivery, name, value)
     monkeypatch.setattr(delivery, "RECORDED_AGAIN_S", (2.0,))
 
 
-@pytest.mark.field
 @pytest.mark.world(n=4)
 @pytest.mark.parametrize("version", [1, 2])
 async def test_what_a_neighbour_blocks_is_named_and_comes_when_the_neighbour_has_gone(
@@ -191,15 +198,13 @@ async def test_the_file_names_what_was_not_received(tmp_path: Path, monkeypatch:
         bridge.advertise("/quiet", "std_msgs/Float64")
         state = await one.state(lambda s: s["recording"]["not_received"] == ["/quiet"], SOON_S)
         name = state["recording"]["name"]
-        assert (await one.ask(kind="disconnect"))["ok"]
-        await one.state(lambda s: s["recording"]["state"] == "off", SOON_S)
+        await stop_recording(one)
     path = RecordingsFolder(tmp_path / "recordings").path_of(name)
     assert path is not None
     with open_recording([path]) as recording:
         assert recording.metadata["not_received"] == "/quiet"
 
 
-@pytest.mark.field
 @pytest.mark.world(n=9)
 @pytest.mark.parametrize("version", [1, 2])
 async def test_a_topic_that_nobody_publishes_carries_no_signal_until_somebody_does(
@@ -285,8 +290,7 @@ async def test_what_is_asked_for_before_its_definition_is_recorded_as_its_type(
             assert state["recording"]["as_json"] == 0
             may_answer.set()
             name = state["recording"]["name"]
-            assert (await one.ask(kind="disconnect"))["ok"]
-            await one.state(lambda s: s["recording"]["state"] == "off", SOON_S)
+            await stop_recording(one)
     path = RecordingsFolder(tmp_path / "recordings").path_of(name)
     assert path is not None
     with open_recording([path]) as recording:

@@ -45,7 +45,7 @@ def test_the_topic_stands_at_one_of_its_ends(frame: bytes, is_binary: bool, topi
     assert topic_of(frame[:ENDS_BYTES], frame[-ENDS_BYTES:], is_binary=is_binary) == topic
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_the_second_such_message_ends_its_subscription_and_names_the_topic(tmp_path: Path) -> None:
     picture = {"format": "jpeg", "data": b"\0" * MAX_MESSAGE_BYTES}
 
@@ -61,7 +61,7 @@ async def test_the_second_such_message_ends_its_subscription_and_names_the_topic
         async with serving(config) as base, driving(bridge), viewer(base) as one:
             camera = asyncio.create_task(shoot(bridge))
             try:
-                state = await one.state(lambda s: bool(s["recording"]["too_large"]), within_s=60)
+                state = await one.state(lambda s: bool(s["recording"]["too_large"]), within_s=30)
                 assert state["recording"]["too_large"] == [{"topic": "/camera", "mb": 21.3}]
                 assert "/camera" in state["recording"]["left_out"]
                 text = "/camera is no longer received: its messages have 21 MB, and 16 MB is the limit."
@@ -75,7 +75,7 @@ async def test_the_second_such_message_ends_its_subscription_and_names_the_topic
                 camera.cancel()
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_a_bridge_of_ros_2_sends_them_in_fragments_and_it_is_the_same(tmp_path: Path) -> None:
     """As CBOR such a message never comes; as JSON it comes in pieces of 10 MB."""
     cloud = {"layout": {"dim": [], "data_offset": 0}, "data": b"\0" * MAX_MESSAGE_BYTES}
@@ -92,7 +92,7 @@ async def test_a_bridge_of_ros_2_sends_them_in_fragments_and_it_is_the_same(tmp_
         async with serving(config) as base, driving(bridge), viewer(base) as one:
             clouds = asyncio.create_task(scan(bridge))
             try:
-                state = await one.state(lambda s: bool(s["recording"]["too_large"]), within_s=60)
+                state = await one.state(lambda s: bool(s["recording"]["too_large"]), within_s=30)
                 assert state["recording"]["too_large"] == [{"topic": "/cloud", "mb": 21.3}]
                 topic = bridge.graph.find("/cloud")
                 async with asyncio.timeout(10):

@@ -20,6 +20,8 @@ from roslibpy.comm.comm_asyncio import AsyncioRosBridgeClientFactory, AsyncioRos
 from server.rosbridge.link import ASSUMPTIONS
 from tests.server.ear import accept, answering, bridging, text_frame, until
 
+pytestmark = pytest.mark.virtual_time
+
 HELD: dict[str, Callable[..., Any]] = {}
 
 
@@ -153,7 +155,6 @@ async def test_it_dials_in_one_place_and_tries_again_by_one_way() -> None:
         assert protocol.calls == ["onOpen", "onClose"]
 
 
-@pytest.mark.field
 @holds("protocol")
 async def test_it_is_told_of_the_opening_and_once_of_the_end_opened_or_not() -> None:
     async with bridging() as bridge:
@@ -184,7 +185,6 @@ async def test_it_is_told_of_the_opening_and_once_of_the_end_opened_or_not() -> 
         assert protocol.wasNotCleanReason == "WebSocket connection upgrade failed [404]: Not Found"
 
 
-@pytest.mark.field
 @holds("frames")
 async def test_a_message_comes_frame_by_frame() -> None:
     async def speak(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -205,7 +205,6 @@ async def test_a_message_comes_frame_by_frame() -> None:
         assert WebSocketProtocol.onMessageEnd.__code__.co_names.count("_onMessage") == 1  # what the link leaves out
 
 
-@pytest.mark.field
 @holds("state")
 async def test_the_state_says_whether_it_is_open() -> None:
     async def say_goodbye(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -229,7 +228,6 @@ async def test_the_state_says_whether_it_is_open() -> None:
         assert protocol.state == protocol.STATE_CLOSED
 
 
-@pytest.mark.field
 @holds("unread")
 async def test_what_was_answered_to_the_handshake_is_still_there() -> None:
     async def speak(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -3,34 +3,21 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import datetime
 import ipaddress
 import socket
 import ssl
 import threading
-from collections.abc import Iterator
+import time
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
-from cryptography import x509
-from cryptography.hazmat.primitives import hashes, serialization
-from cryptography.hazmat.primitives.asymmetric import ec
 
 from server.rosbridge import dialer
-from tests.server.ear import Ear, Handler, accept, answering, bridging, linked, until
-from tests.server.loops import on_both_loops
+from tests.server.ear import Ear, Handler, accept, answering, black_hole, bridging, linked, until
 
-
-@pytest.fixture(autouse=True)
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The product's own patience is for radio links."""
-    monkeypatch.setattr(dialer, "DIAL_TIMEOUT_S", 1.0)
-    monkeypatch.setattr(dialer, "HANDSHAKE_TIMEOUT_S", 0.4)
-    monkeypatch.setattr(dialer, "LOOKUP_TIMEOUT_S", 0.3)
-    monkeypatch.setattr(dialer, "FIRST_RETRY_S", 0.05)
+pytestmark = pytest.mark.virtual_time
 
 
 def saying(answer: bytes, *, hang_up: bool = False, first: bool = False) -> Handler:
@@ -99,7 +86,6 @@ OTHERS: dict[str, tuple[Handler, str, str]] = {
 
 
 @pytest.mark.parametrize(("handler", "code", "words"), OTHERS.values(), ids=OTHERS)
-@on_both_loops
 async def test_something_else_answers(handler: Handler, code: str, words: str) -> None:
     ear = Ear()
     async with answering(handler) as port, linked(f"127.0.0.1:{port}", ear) as link:
@@ -112,7 +98,6 @@ async def test_something_else_answers(handler: Handler, code: str, words: str) -
         assert {name for name, _ in ear.received} == {"failed"}
 
 
-@on_both_loops
 async def test_one_that_talks_without_end_fills_no_memory() -> None:
     ear = Ear()
     before = psutil.Process().memory_info().rss
@@ -121,8 +106,6 @@ async def test_one_that_talks_without_end_fills_no_memory() -> None:
     assert psutil.Process().memory_info().rss - before < 30e6
 
 
-@pytest.mark.field
-@on_both_loops
 async def test_a_handshake_that_comes_letter_by_letter_is_one() -> None:
     ear = Ear()
 
@@ -140,8 +123,6 @@ async def test_a_handshake_that_comes_letter_by_letter_is_one() -> None:
         assert [name for name, _ in ear.received] == ["opened", "status"]
 
 
-@pytest.mark.field
-@on_both_loops
 async def test_what_comes_with_the_handshake_is_read_after_it() -> None:
     ear = Ear()
 
@@ -160,7 +141,6 @@ async def test_what_comes_with_the_handshake_is_read_after_it() -> None:
 # -- nothing answers -------------------------------------------------------------------------------------------------
 
 
-@on_both_loops
 async def test_refused() -> None:
     ear = Ear()
     with socket.socket() as closed:
@@ -173,7 +153,6 @@ async def test_refused() -> None:
             await ear.hears("failed", 3)
 
 
-@on_both_loops
 async def test_the_car_comes_up_later() -> None:
     ear = Ear()
     with socket.socket() as closed:
@@ -187,47 +166,19 @@ async def test_the_car_comes_up_later() -> None:
                 await ear.hears("opened")
 
 
-@contextlib.contextmanager
-def black_hole() -> Iterator[int]:
-    """A port that takes no more connections and refuses none: its queue is full, as of a machine out of range."""
-    with contextlib.ExitStack() as held:
-        listening = held.enter_context(socket.socket())
-        listening.bind(("127.0.0.1", 0))
-        listening.listen(0)
-        for _ in range(4):
-            waiting = held.enter_context(socket.socket())
-            waiting.setblocking(False)
-            waiting.connect_ex(listening.getsockname())
-        yield listening.getsockname()[1]
-
-
-@on_both_loops
 async def test_no_answer_at_all() -> None:
     ear = Ear()
     with black_hole() as port:
         async with linked(f"127.0.0.1:{port}", ear) as link:
+            began_s = time.monotonic()
             for _ in range(10):
                 link.retry_now()  # while dialling: no second dial
                 await asyncio.sleep(0.01)
             assert (await ear.hears("failed")).code == "timeout"
             assert link.attempts == 1
+            assert time.monotonic() - began_s == pytest.approx(dialer.DIAL_TIMEOUT_S, abs=0.01)
 
 
-@pytest.mark.field
-@on_both_loops
-async def test_ended_while_dialling() -> None:
-    ear = Ear()
-    with black_hole() as port:
-        before = asyncio.all_tasks()
-        fds = psutil.Process().num_fds()
-        async with linked(f"127.0.0.1:{port}", ear):
-            await asyncio.sleep(0.1)
-        await until(lambda: asyncio.all_tasks() == before, within_s=0.3)
-        await until(lambda: psutil.Process().num_fds() <= fds + 1, within_s=0.3)  # uvloop keeps one of its own
-    assert ear.received == []
-
-
-@on_both_loops
 async def test_no_such_host() -> None:
     ear = Ear()
     async with linked("no-such-host.invalid", ear):
@@ -235,7 +186,6 @@ async def test_no_such_host() -> None:
 
 
 @pytest.mark.parametrize("typed", ["169.254.169.254", "3758096385:80", "[::ffff:224.0.0.1]", "0.0.0.0", "[ff02::1]"])
-@on_both_loops
 async def test_what_is_never_dialled_is_not(typed: str) -> None:
     ear = Ear()
     async with linked(typed, ear):
@@ -284,14 +234,14 @@ async def test_every_address_of_a_host_is_tried_to_its_handshake(
 
 async def test_a_name_server_that_hangs_is_asked_once_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
-    answers = threading.Event()
+    answers = asyncio.Event()
 
-    def hang(host: str, *_: Any, **__: Any) -> list[Any]:
+    async def hang(host: str, *_: Any, **__: Any) -> list[Any]:
         asked.append(host)
-        answers.wait(8)
+        await answers.wait()
         return found("127.0.0.1")
 
-    monkeypatch.setattr(socket, "getaddrinfo", hang)
+    monkeypatch.setattr(asyncio.get_running_loop(), "getaddrinfo", hang)
     ear = Ear()
     async with bridging() as bridge, linked(f"car:{bridge.port}", ear):
         assert (await ear.hears("failed")).code == "no_lookup"
@@ -302,7 +252,6 @@ async def test_a_name_server_that_hangs_is_asked_once_at_a_time(monkeypatch: pyt
         assert asked == ["car"]
 
 
-@pytest.mark.field
 async def test_ended_while_a_name_is_looked_up(monkeypatch: pytest.MonkeyPatch) -> None:
     answers = threading.Event()
     monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: answers.wait(8) and found("127.0.0.1"))
@@ -319,54 +268,6 @@ async def test_ended_while_a_name_is_looked_up(monkeypatch: pytest.MonkeyPatch) 
 # -- TLS -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A certificate for 127.0.0.1 with its key, signed by itself."""
-    key = ec.generate_private_key(ec.SECP256R1())
-    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "a car")])
-    now = datetime.datetime.now(datetime.UTC)
-    one = (
-        x509.CertificateBuilder()
-        .subject_name(name)
-        .issuer_name(name)
-        .public_key(key.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - datetime.timedelta(days=1))
-        .not_valid_after(now + datetime.timedelta(days=1))
-        .add_extension(x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address("127.0.0.1"))]), critical=False)
-        .add_extension(x509.BasicConstraints(ca=True, path_length=None), critical=True)
-        .sign(key, hashes.SHA256())
-    )
-    path = tmp_path_factory.mktemp("tls") / "car.pem"
-    secret = key.private_bytes(
-        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
-    )
-    path.write_bytes(secret + one.public_bytes(serialization.Encoding.PEM))
-    return path
-
-
-@pytest.fixture
-def secure(certificate: Path) -> ssl.SSLContext:
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.load_cert_chain(certificate)
-    return context
-
-
-@on_both_loops
-async def test_secure(certificate: Path, secure: ssl.SSLContext, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
-    ear = Ear()
-    async with bridging(ssl=secure) as bridge, linked(f"wss://127.0.0.1:{bridge.port}", ear) as link:
-        await ear.hears("opened")
-        link.send_now({"op": "unsubscribe", "id": "a", "topic": "/a"})
-        await until(lambda: bridge.operations)
-        await bridge.say({"op": "publish", "topic": "/a", "msg": 1})
-        assert await ear.hears("message") == ("/a", 1, None)
-        link.abort()
-        await ear.hears("opened", 2)
-
-
-@on_both_loops
 async def test_secure_but_not_trusted(secure: ssl.SSLContext) -> None:
     ear = Ear()
     async with bridging(ssl=secure) as bridge, linked(f"wss://127.0.0.1:{bridge.port}", ear):
@@ -376,7 +277,6 @@ async def test_secure_but_not_trusted(secure: ssl.SSLContext) -> None:
         await ear.hears("failed", 2)
 
 
-@on_both_loops
 async def test_secure_for_another_host(
     certificate: Path, secure: ssl.SSLContext, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -386,7 +286,6 @@ async def test_secure_for_another_host(
         assert (await ear.hears("failed")).code == "tls_untrusted"
 
 
-@on_both_loops
 async def test_a_bridge_without_tls_dialled_with_wss() -> None:
     ear = Ear()
     async with bridging() as bridge, linked(f"wss://127.0.0.1:{bridge.port}", ear):
@@ -396,16 +295,13 @@ async def test_a_bridge_without_tls_dialled_with_wss() -> None:
         await ear.hears("failed", 2)
 
 
-@pytest.mark.field
 @pytest.mark.parametrize("handler", [hang_up, saying(b"", first=True)], ids=["hangs up", "silent"])
-@on_both_loops
 async def test_something_without_words_dialled_with_wss(handler: Handler) -> None:
     ear = Ear()
     async with answering(handler) as port, linked(f"wss://127.0.0.1:{port}", ear):
         assert (await ear.hears("failed")).code in ("tls", "timeout")
 
 
-@on_both_loops
 async def test_a_bridge_with_tls_dialled_with_ws(secure: ssl.SSLContext) -> None:
     ear = Ear()
     async with bridging(ssl=secure) as bridge, linked(f"ws://127.0.0.1:{bridge.port}", ear):

@@ -3,20 +3,29 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from typing import Any
 
 import pytest
 
-from server.rosbridge.paced import AT_ONCE, Paced
+from server.rosbridge.paced import AT_ONCE, PAUSE_S, Paced
 from server.rosbridge.sent_rows import SentRows
 from server.rosbridge.subscription import Subscription
+
+pytestmark = pytest.mark.virtual_time
 
 MOST_AT_ONCE = 16  # of rosbridge-server-rs, which closes the connection then
 
 
 async def test_a_few_at_a_time_and_each_once_in_order() -> None:
     sent: list[tuple[str, bool]] = []
-    paced = Paced(lambda topic, is_renewed: sent.append((topic, is_renewed)))
+    times_s: list[float] = []
+
+    def send(topic: str, is_renewed: bool) -> None:
+        sent.append((topic, is_renewed))
+        times_s.append(time.monotonic())
+
+    paced = Paced(send)
     topics = [str(n) for n in range(3 * AT_ONCE)]
     for topic in (*topics, topics[-1]):
         paced.put(topic)
@@ -27,6 +36,8 @@ async def test_a_few_at_a_time_and_each_once_in_order() -> None:
         while len(sent) < len(topics):
             await asyncio.sleep(0.005)
     assert sent == [*((topic, False) for topic in topics[:-1]), ("again", True)]
+    waits_s = [at_s - times_s[0] for at_s in times_s]
+    assert waits_s == pytest.approx([n // AT_ONCE * PAUSE_S for n in range(len(topics))], abs=0.001)
     paced.put("later")
     async with asyncio.timeout(5.0):
         while len(sent) == len(topics):

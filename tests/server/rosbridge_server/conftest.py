@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from collections.abc import AsyncIterator, Callable
 from typing import Any
 
@@ -16,7 +17,7 @@ Connect = Callable[[], "contextlib.AbstractAsyncContextManager[Probe]"]
 
 @contextlib.asynccontextmanager
 async def bridging(**options: Any) -> AsyncIterator[tuple[RosBridge, int]]:
-    bridge = RosBridge(**options)
+    bridge = RosBridge(**({"now": time.time} | options))  # the clock of now, which may be virtual
     port = await bridge.start()
     try:
         yield bridge, port

@@ -15,6 +15,7 @@ import pytest
 import websockets
 from websockets.frames import Frame, Opcode
 
+from server.rosbridge_server.connection import HANDSHAKE_S
 from server.rosbridge_server.server import CannotListen, RosBridge
 from tests.server.rosbridge_server.conftest import bridging
 from tests.server.rosbridge_server.probe import Probe, probing, until
@@ -65,6 +66,7 @@ async def test_stopping_says_goodbye_and_frees_the_port(talk: RosBridge, port: i
     await again.stop()
 
 
+@pytest.mark.virtual_time
 async def test_a_frozen_bridge_answers_nothing_and_keeps_its_clients(talk: RosBridge, port: int, probe: Probe) -> None:
     await probe.subscribe("/talk")
     talk.freeze()
@@ -108,7 +110,7 @@ async def test_a_freeze_is_total_for_a_client_that_sends_much(bridge: RosBridge,
     await asyncio.wait_for(pong, 2)
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_a_frozen_bridge_answers_nothing_even_when_websockets_resumes_reading(
     bridge: RosBridge, probe: Probe
 ) -> None:
@@ -199,6 +201,7 @@ async def test_without_a_queue_length_the_bytes_are_bounded(
         slow.socket.transport.abort()
 
 
+@pytest.mark.virtual_time
 async def test_a_client_that_asks_and_never_reads_is_not_listened_to(port: int, talk: RosBridge) -> None:
     asked = 0
 
@@ -241,16 +244,15 @@ async def test_clients_beyond_the_limit_are_turned_away() -> None:
             assert (await another.call("/rosapi/get_time"))["result"] is True
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_sockets_that_say_nothing_are_bounded_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.rosbridge_server.listener.EXTRA_SOCKETS", 3)
-    monkeypatch.setattr("server.rosbridge_server.connection.HANDSHAKE_S", 0.3)
     async with bridging(max_clients=2) as (_, port):
         silent = [await asyncio.open_connection("127.0.0.1", port) for _ in range(8)]
         ends = [asyncio.ensure_future(reader.read()) for reader, _ in silent]
-        done, _ = await asyncio.wait(ends, timeout=0.15)
+        done, _ = await asyncio.wait(ends, timeout=HANDSHAKE_S - 0.1)
         assert len(done) == 3  # five may wait, three found no place
-        done, waiting = await asyncio.wait(ends, timeout=2)
+        done, waiting = await asyncio.wait(ends, timeout=0.2)
         assert not waiting  # and who never becomes a WebSocket is sent away
         for end in ends:
             end.exception()
@@ -295,7 +297,7 @@ async def test_a_browser_that_comes_by_mistake_gets_words(port: int) -> None:
     assert "WebSocket" in text
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_garbage_instead_of_a_handshake_harms_nothing(port: int, capfd: pytest.CaptureFixture[str]) -> None:
     for garbage in (b"\0" * 100, b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 1_000, b"\x16\x03\x01\x02\x00\x01", b"\r\n\r\n"):
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
@@ -308,6 +310,7 @@ async def test_garbage_instead_of_a_handshake_harms_nothing(port: int, capfd: py
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.virtual_time
 async def test_draining_waits_for_slow_clients(port: int, talk: RosBridge) -> None:
     async with probing(port) as slow:
         await slow.subscribe("/talk")
