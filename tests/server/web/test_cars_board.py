@@ -15,7 +15,7 @@ from server.bus.local import LocalBus
 from server.web.cars_board import FLEET, FRAME, LEAST_S, CarsBoard
 from tests.server.web.test_version_skew import NEWER
 
-pytestmark = pytest.mark.field
+pytestmark = pytest.mark.virtual_time
 
 MANY = 100
 
@@ -136,6 +136,7 @@ async def test_pages_are_called_for_frames_and_not_for_each_car_that_states_some
     assert cars.bus.watched(ALL) == 0
 
 
+@pytest.mark.field
 async def test_a_frame_of_a_hundred_cars_costs_less_than_5_ms() -> None:
     names = [f"car{number}" for number in range(MANY)]
     cars = Cars(*names)
