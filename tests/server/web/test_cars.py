@@ -86,7 +86,7 @@ async def test_a_page_is_told_of_the_other_cars_twice_a_second(bridge: RosBridge
         )  # fmt: skip
         before = len(sent_ms(one))
         await one.until(lambda: len(sent_ms(one)) >= before + 4)
-        assert 2 / 6 <= (sent_ms(one)[before + 3] - sent_ms(one)[before]) / 3 / 1000 <= 2 / 2
+        assert (sent_ms(one)[before + 3] - sent_ms(one)[before]) / 3 == pytest.approx(500, abs=100)
 
 
 async def test_one_car_alone_sends_no_list(bridge: RosBridge, server: str) -> None:
@@ -102,7 +102,7 @@ async def test_an_alarm_of_another_car_comes_at_once(bridge: RosBridge, other: R
         begun_s = time.monotonic()
         async with speeding(other, 30.0):
             await one.until(lambda: ((named(one, "serval") or {}).get("worst") or {}).get("id") == "speed_limit")
-            assert time.monotonic() - begun_s < 1.0
+            assert time.monotonic() - begun_s < 0.4
             serval = named(one, "serval")
             assert serval is not None
             assert (serval["worst"]["priority"], serval["worst"]["state"]) == ("critical", "UNACKED")
