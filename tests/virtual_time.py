@@ -10,7 +10,10 @@ It is for stories in one process. What another process, a thread of its own or a
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import threading
 import time
+from collections.abc import AsyncIterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import partial
 from typing import Any
@@ -73,3 +76,15 @@ class VirtualClock:
 def _wait_for(loop: asyncio.AbstractEventLoop, job: Future[Any]) -> None:
     """Time passes as it really does until the job has ended."""
     loop.run_in_executor(_UnderWay(job), bool).add_done_callback(lambda ended: ended.cancelled() or ended.exception())
+
+
+@contextlib.asynccontextmanager
+async def real_time() -> AsyncIterator[None]:
+    """Time passes as it really does: for a block that waits for a process or for a thread of its own."""
+    ended = threading.Event()
+    job = asyncio.get_running_loop().run_in_executor(None, ended.wait)
+    try:
+        yield
+    finally:
+        ended.set()
+        await job

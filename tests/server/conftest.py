@@ -17,6 +17,7 @@ from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
 from server.web.middleware import http_protocol
+from tests.virtual_time import real_time
 
 
 @contextlib.asynccontextmanager
@@ -39,8 +40,9 @@ async def serving_app(app: FastAPI, config: Config) -> AsyncIterator[str]:
     try:
         yield f"http://127.0.0.1:{listening.getsockname()[1]}"
     finally:
-        server.should_exit = True
-        await running
+        async with real_time():  # a server's threads and processes end in theirs
+            server.should_exit = True
+            await running
         listening.close()
 
 
