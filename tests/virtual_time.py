@@ -2,7 +2,7 @@
 
 A test marked `virtual_time` runs on such a loop. `time.monotonic`, `time.time` and their `_ns` siblings show its time
 too, so that parts without a clock of their own live by it. Sockets and threads are real: time stands still while bytes
-wait to be read, and passes in real time while work of an executor of the loop is under way.
+wait to be read, and passes in real time while a job of a pool of threads is under way.
 
 It is for stories in one process. What another process, a thread of its own or a person's eye sees stays in real time.
 """
@@ -14,11 +14,24 @@ import contextlib
 import threading
 import time
 from collections.abc import AsyncIterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from functools import partial
+from typing import Any
 
 import looptime
 import pytest
 
 NS_PER_S = 1_000_000_000
+
+
+class _UnderWay(Executor):
+    """Gives the loop a job that runs already, so that it counts as work of an executor of the loop."""
+
+    def __init__(self, job: Future[Any]) -> None:
+        self._job = job
+
+    def submit(self, *_: Any, **__: Any) -> Future[Any]:
+        return self._job
 
 
 class VirtualClock:
@@ -49,6 +62,20 @@ class VirtualClock:
         """The functions of `time` show this clock from now on."""
         for name in ("monotonic", "monotonic_ns", "time", "time_ns"):
             monkeypatch.setattr(time, name, getattr(self, name))
+        submit = ThreadPoolExecutor.submit
+
+        def noted(executor: ThreadPoolExecutor, work: Any, /, *args: Any, **options: Any) -> Future[Any]:
+            job = submit(executor, work, *args, **options)
+            if self._loop is not None and not self._loop.is_closed():
+                self._loop.call_soon_threadsafe(partial(_wait_for, self._loop, job))
+            return job
+
+        monkeypatch.setattr(ThreadPoolExecutor, "submit", noted)
+
+
+def _wait_for(loop: asyncio.AbstractEventLoop, job: Future[Any]) -> None:
+    """Time passes as it really does until the job has ended."""
+    loop.run_in_executor(_UnderWay(job), bool).add_done_callback(lambda ended: ended.cancelled() or ended.exception())
 
 
 @contextlib.asynccontextmanager

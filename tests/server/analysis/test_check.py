@@ -33,7 +33,7 @@ def test_a_healthy_drive_has_no_alarm(check: Checking, healthy: Path) -> None:
 
 
 def test_a_critical_alarm_is_exit_1(check: Checking, healthy: Path) -> None:
-    ending = check(healthy, "--inject", "near-object@10", "--json", "-")
+    ending = check(healthy, "--inject", "near-object@10", "--duration", "14", "--json", "-")
     assert ending.code == 1
     assert ending.raised() == ["obstacle_nearest"]
     (alarm,) = ending.json["alarms"]
@@ -42,7 +42,7 @@ def test_a_critical_alarm_is_exit_1(check: Checking, healthy: Path) -> None:
 
 
 def test_an_alarm_that_is_not_critical_is_exit_0(check: Checking, healthy: Path) -> None:
-    ending = check(healthy, "--inject", "pedal-conflict@10", "--json", "-")
+    ending = check(healthy, "--inject", "pedal-conflict@10", "--duration", "14", "--json", "-")
     assert (ending.code, ending.raised()) == (0, ["pedals"])
 
 
@@ -172,18 +172,18 @@ def test_it_tells_when_the_car_would_have_been_slowed(check: Checking, healthy: 
     """By a rule that is on, after its time and the count-down; by one that is off never."""
     rules = tmp_path / "rules.toml"
     rules.write_text("version = 1\n[limits.slow_down]\non_obstacle = 1\non_obstacle_after_s = 0.5\n")
-    ending = check(healthy, "--inject", "near-object@10+5", "--settings", rules, "--json", "-")
-    (slowed,) = ending.json["slow_downs"]
+    page, found, until = tmp_path / "page.html", tmp_path / "found.json", ("--duration", "16")
+    near = ("--inject", "near-object@10+5", *until)
+    said = check(healthy, *near, "--settings", rules, "--json", found, "--html", page).out
+    (slowed,) = orjson.loads(found.read_bytes())["slow_downs"]
     assert slowed["trigger"] == "obstacle"
     assert slowed["countdown_s"] == pytest.approx(10.5, abs=0.3)
     assert slowed["at_s"] == pytest.approx(slowed["countdown_s"] + 2.0)
-    page = tmp_path / "page.html"
-    said = check(healthy, "--inject", "near-object@10+5", "--settings", rules, "--html", page).out
     assert re.search(r"Would have slowed the car.*\n +12\.\d s +Obstacle within the stopping distance", said)
     assert "Would have slowed the car" in page.read_text()
-    short = check(healthy, "--inject", "near-object@10+1.5", "--settings", rules, "--json", "-")
+    short = check(healthy, "--inject", "near-object@10+1.5", *until, "--settings", rules, "--json", "-")
     assert short.json["slow_downs"] == []  # gone before the count-down ended
-    assert check(healthy, "--inject", "near-object@10+5", "--json", "-").json["slow_downs"] == []
+    assert check(healthy, *near, "--json", "-").json["slow_downs"] == []
 
 
 def test_wrong_settings_are_all_named(check: Checking, healthy: Path, tmp_path: Path) -> None:
@@ -198,27 +198,29 @@ def test_wrong_settings_are_all_named(check: Checking, healthy: Path, tmp_path: 
     assert any("[obstacles]" in line and "obstacle is near" in line for line in lines)
 
 
-def test_two_settings_are_compared(check: Checking, tmp_path: Path) -> None:
-    healthy = recorded(tmp_path / "longer", 40.0)  # an obstacle comes near in its second half
-    (tmp_path / "a.toml").write_text("[speed_limit]\nmax_mps = 3.0\n[not_moving]\nafter_s = 5.0\n")
-    (tmp_path / "b.toml").write_text("[speed_limit]\nmax_mps = 4.0\n[obstacle]\nstandoff_m = 50.0\n")
-    ending = check(healthy, "--compare", tmp_path / "a.toml", tmp_path / "b.toml", "--json", "-")
-    assert ending.code == 1
-    changes = {(change["change"], change["alarm"]) for change in ending.json["compared"]["changes"]}
-    assert ("moves", "speed_limit") in changes
-    assert ("appears", "obstacle_nearest") in changes or ("appears", "obstacle") in changes
-    compared = check(healthy, "--compare", tmp_path / "a.toml", tmp_path / "b.toml")
+def test_two_settings_are_compared(check: Checking, healthy: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text("[speed_limit]\nmax_mps = 3.0\n")
+    (tmp_path / "b.toml").write_text("[speed_limit]\nmax_mps = 4.0\n[gps_fix]\nstrict = 1\n")
+    found = tmp_path / "found.json"
+    compared = check(
+        healthy, "--compare", tmp_path / "a.toml", tmp_path / "b.toml", "--duration", "14", "--json", found
+    )
+    assert compared.code == 1
+    changes = {
+        (change["change"], change["alarm"]) for change in orjson.loads(found.read_bytes())["compared"]["changes"]
+    }
+    assert changes == {("moves", "speed_limit"), ("appears", "gps_quality")}
     assert "a.toml → b.toml" in compared.out
     assert "Speed limit: 3 → 4 m/s" in compared.out
-    back = check(healthy, "--compare", tmp_path / "b.toml", tmp_path / "a.toml", "--json", "-")
-    assert {("vanishes", name) for kind, name in changes if kind == "appears"} <= {
+    back = check(healthy, "--compare", tmp_path / "b.toml", tmp_path / "a.toml", "--duration", "14", "--json", "-")
+    assert ("vanishes", "gps_quality") in {
         (change["change"], change["alarm"]) for change in back.json["compared"]["changes"]
     }
 
 
 def test_the_same_settings_twice_change_nothing(check: Checking, healthy: Path, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("[speed_limit]\nmax_mps = 3.0\n")
-    ending = check(healthy, "--compare", tmp_path / "a.toml", tmp_path / "a.toml")
+    ending = check(healthy, "--compare", tmp_path / "a.toml", tmp_path / "a.toml", "--duration", "10")
     assert "No alarm appears, vanishes or moves" in ending.out
 
 
@@ -244,7 +246,7 @@ def test_several_files_are_one_recording_where_that_is_said(check: Checking, tmp
 
 def test_the_page_is_one_file_and_works_offline(check: Checking, healthy: Path, tmp_path: Path) -> None:
     page = tmp_path / "drive.html"
-    ending = check(healthy, "--inject", "gps-jump@10", "--html", page)
+    ending = check(healthy, "--inject", "gps-jump@10", "--duration", "14", "--html", page)
     assert ending.code == 0
     assert f"Page: {page}" in ending.out
     text = page.read_text()
@@ -264,7 +266,7 @@ def test_json_goes_to_a_file_whole(check: Checking, healthy: Path, tmp_path: Pat
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_terminal_sees_how_far_it_is(count: int, healthy: Path) -> None:
     """On a long job, in one bar for all recordings; a pipe gets nothing of it."""
-    command = [sys.executable, "-c", _SLOW, "check", *[str(healthy)] * count]
+    command = [sys.executable, "-c", _SLOW, "check", *[str(healthy)] * count, "--duration", "8"]
     ours, theirs = pty.openpty()
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=theirs) as process:
         os.close(theirs)

@@ -18,7 +18,8 @@ def test_a_whole_lap_breaks_no_rule(seed: int) -> None:
     assert Rules().run(SimulatedCar(seed=seed).messages(), until_s=115).broken == {}
 
 
-@pytest.mark.soak
+@pytest.mark.field
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_ten_minutes_break_no_rule(seed: int) -> None:
     assert Rules().run(SimulatedCar(seed=seed).messages(), until_s=600).broken == {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from tests.server.cars import driving
 from tests.server.conftest import serving_app
 from tests.server.viewer import viewer
 
-pytestmark = pytest.mark.world(n=16)
+pytestmark = [pytest.mark.virtual_time, pytest.mark.world(n=16)]
 
 
 def fails(*_: Any, **__: Any) -> Any:
@@ -29,7 +30,7 @@ async def test_a_limit_counts_although_the_log_fails_and_its_event_comes_later(
     bridge: RosBridge, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
-    app = create_app(config)
+    app = create_app(config, now=time.monotonic)
     bus = app.state.services.bus
     async with serving_app(app, config) as base, driving(bridge, speed=lambda _: 4.2), viewer(base) as page:
         await page.state(lambda state: state["signals"]["speed"]["freshness"] == "fresh")
@@ -58,7 +59,7 @@ async def test_an_order_that_was_obeyed_is_answered_so(
     bridge: RosBridge, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, broken: str
 ) -> None:
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
-    app = create_app(config)
+    app = create_app(config, now=time.monotonic)
     session: Session = app.state.services.sessions["car"]
     async with serving_app(app, config) as base, driving(bridge, speed=lambda _: 4.2), viewer(base) as page:
         await page.state(lambda state: state["signals"]["speed"]["freshness"] == "fresh")
@@ -79,7 +80,7 @@ async def test_a_limit_counts_before_it_is_logged(
     bridge: RosBridge, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
-    app = create_app(config)
+    app = create_app(config, now=time.monotonic)
     session: Session = app.state.services.sessions["car"]
     judged_by: list[float] = []
     monkeypatch.setattr(

@@ -14,6 +14,8 @@ from server.vehicle.vehicle import Vehicle
 from tests.http import http_client
 from tests.server.conftest import serving
 
+pytestmark = pytest.mark.virtual_time
+
 
 async def phase(client: httpx.AsyncClient, wanted: str, vehicle: str = "ocelot") -> dict[str, Any]:
     """The session of a state, once it is in this phase."""

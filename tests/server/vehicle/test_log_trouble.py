@@ -16,6 +16,8 @@ from tests.server.cars import driving
 from tests.server.conftest import serving
 from tests.server.viewer import Viewer, viewer
 
+pytestmark = pytest.mark.virtual_time
+
 
 def config_of(bridge: RosBridge, data: Path) -> Config:
     return Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=data)  # type: ignore[attr-defined]

@@ -170,7 +170,7 @@ def gps(lat_deg: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_a_phone_far_from_the_car_is_told_on_every_page(bridge: RosBridge) -> None:
     """Page → server → check → alarm on another page, and how the state shows it."""
     bridge.advertise("/gps_fix", "sensor_msgs/NavSatFix")
@@ -198,7 +198,7 @@ async def test_a_phone_far_from_the_car_is_told_on_every_page(bridge: RosBridge)
         assert 'catgraph_phones{vehicle="car"} 1' in text
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_what_does_not_fit_or_is_not_wanted_is_refused(bridge: RosBridge) -> None:
     async with serving(Config()) as server, viewer(server) as one:
         assert (await one.state())["phone"] is None

@@ -109,7 +109,7 @@ async def test_a_returned_alarm_and_a_shelf_survive_kill_9(bridge: RosBridge, tm
         await one.state(lambda s: alarm_of(s, "car_silent") is None)
 
 
-@pytest.mark.field
+@pytest.mark.virtual_time
 async def test_a_pause_outlasts_a_restart_and_is_said(bridge: RosBridge, tmp_path: Path) -> None:
     address = bridge.address  # type: ignore[attr-defined]
     config = Config(vehicles=(Vehicle(name="car", address=address),), data=tmp_path)
@@ -130,6 +130,7 @@ async def test_a_pause_outlasts_a_restart_and_is_said(bridge: RosBridge, tmp_pat
             assert not state["session"]["paused"]
 
 
+@pytest.mark.virtual_time
 @pytest.mark.parametrize("same", [True, False])
 async def test_alarms_of_a_car_typed_by_hand_wait_for_that_car(bridge: RosBridge, tmp_path: Path, same: bool) -> None:
     """Started without an address the server dials nobody; of another car's alarms nothing is shown, and they end."""
@@ -160,6 +161,7 @@ async def test_alarms_of_a_car_typed_by_hand_wait_for_that_car(bridge: RosBridge
     await other.stop()
 
 
+@pytest.mark.virtual_time
 async def test_an_end_by_the_operator_leaves_nothing_to_come_back(bridge: RosBridge, tmp_path: Path) -> None:
     address = bridge.address  # type: ignore[attr-defined]
     config = Config(vehicles=(Vehicle(name="car", address=address),), data=tmp_path)

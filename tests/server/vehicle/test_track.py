@@ -17,6 +17,8 @@ from tests.server.conftest import serving
 from tests.server.vehicle.test_phone import gps
 from tests.server.viewer import viewer
 
+pytestmark = pytest.mark.virtual_time
+
 
 def point(number: int, **more: Any) -> TrackPoint:
     return TrackPoint(at_s=10.0 * number, lat_deg=32.0 + number, lon_deg=-110.0, distance_m=1.0, number=number, **more)

@@ -25,6 +25,8 @@ from tests.server.conftest import serving, serving_app
 from tests.server.slowdown.conftest import simulated, watching
 from tests.server.viewer import Viewer, viewer
 
+pytestmark = pytest.mark.virtual_time
+
 
 @pytest.fixture
 async def other() -> AsyncIterator[RosBridge]:
@@ -84,7 +86,7 @@ async def test_a_page_is_told_of_the_other_cars_twice_a_second(bridge: RosBridge
         )  # fmt: skip
         before = len(sent_ms(one))
         await one.until(lambda: len(sent_ms(one)) >= before + 4)
-        assert 2 / 6 <= (sent_ms(one)[before + 3] - sent_ms(one)[before]) / 3 / 1000 <= 2 / 2
+        assert (sent_ms(one)[before + 3] - sent_ms(one)[before]) / 3 == pytest.approx(500, abs=100)
 
 
 async def test_one_car_alone_sends_no_list(bridge: RosBridge, server: str) -> None:
@@ -94,14 +96,13 @@ async def test_one_car_alone_sends_no_list(bridge: RosBridge, server: str) -> No
         assert all("cars" not in offer["of"] for offer in one.offers)
 
 
-@pytest.mark.field
 async def test_an_alarm_of_another_car_comes_at_once(bridge: RosBridge, other: RosBridge) -> None:
     async with serving(two(bridge, other)) as base, driving(bridge), viewer(base, vehicle="ocelot") as one:
         await one.until(lambda: named(one, "serval"))
         begun_s = time.monotonic()
         async with speeding(other, 30.0):
             await one.until(lambda: ((named(one, "serval") or {}).get("worst") or {}).get("id") == "speed_limit")
-            assert time.monotonic() - begun_s < 1.0
+            assert time.monotonic() - begun_s < 0.4
             serval = named(one, "serval")
             assert serval is not None
             assert (serval["worst"]["priority"], serval["worst"]["state"]) == ("critical", "UNACKED")
@@ -110,7 +111,7 @@ async def test_an_alarm_of_another_car_comes_at_once(bridge: RosBridge, other: R
 
 async def test_a_car_whose_session_stopped_is_unknown_and_its_age_grows(bridge: RosBridge, other: RosBridge) -> None:
     config = two(bridge, other)
-    app = create_app(config)
+    app = create_app(config, now=time.monotonic)
     async with (
         serving_app(app, config) as base,
         driving(bridge),
@@ -149,7 +150,6 @@ async def test_a_program_orders_without_a_body(bridge: RosBridge, other: RosBrid
             assert answer.status_code in (200, 409), (path, answer.text)
 
 
-@pytest.mark.field
 async def test_a_page_of_another_car_is_heard_where_it_announces_alarms(bridge: RosBridge, other: RosBridge) -> None:
     seen = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready"}
     async with (
@@ -193,7 +193,6 @@ async def test_a_program_names_the_car_where_there_are_several(bridge: RosBridge
             assert "meant for" not in named.json()["detail"]
 
 
-@pytest.mark.field
 @pytest.mark.slow
 async def test_a_slide_for_a_car_that_was_renamed_reaches_none() -> None:
     """By the page's address, and by the name on the slide; the car's new name reaches it."""

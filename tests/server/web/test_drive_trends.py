@@ -10,6 +10,8 @@ from tests.http import http_client
 from tests.server.cars import driving
 from tests.server.viewer import viewer
 
+pytestmark = pytest.mark.virtual_time
+
 
 async def test_a_drive_is_told_in_buckets(bridge: RosBridge, server: str) -> None:
     async with viewer(server) as one, driving(bridge, speed=lambda n: 4.0 + 0.1 * (n % 5)), http_client() as http:

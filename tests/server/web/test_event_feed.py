@@ -12,6 +12,8 @@ from server.web import event_feed
 from server.web.event_feed import EventFeed
 from tests.server.bus.buses import until
 
+pytestmark = pytest.mark.virtual_time
+
 
 class Agent:
     """A bus whose events are elsewhere; the first question is not answered."""
@@ -43,7 +45,6 @@ async def test_what_an_agent_did_not_answer_is_asked_again(monkeypatch: pytest.M
     feed.close()
 
 
-@pytest.mark.field
 async def test_a_page_that_has_left_asks_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(event_feed, "AGAIN_S", 0.01)
     agent, woken = Agent(), list[int]()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import time
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -22,6 +23,8 @@ from tests.server.cars import driving
 from tests.server.conftest import serving, serving_app
 from tests.server.viewer import Viewer, viewer
 from tests.server.web.test_cars import cars, named, speeding
+
+pytestmark = pytest.mark.virtual_time
 
 SEEN = {"kind": "present", "visible": True, "sound": "ready", "awake": "ready"}
 ITEM = ("take_item", "release_item", "offer_item", "answer_item", "withdraw_item")
@@ -87,7 +90,6 @@ async def test_a_page_of_all_cars_gets_the_list_and_no_states(bridge: RosBridge,
         assert {kind for offer in one.offers for kind in offer["of"]} == {"cars"}
 
 
-@pytest.mark.field
 async def test_a_page_that_takes_nothing_is_sent_nothing_and_then_the_newest(bridge: RosBridge, server: str) -> None:
     async with driving(bridge), viewer(server, fleet=True) as one:
         await one.until(lambda: cars(one))
@@ -146,7 +148,6 @@ async def test_two_people_share_the_cars(bridge: RosBridge, other: RosBridge) ->
             assert logged(late) == expected, "the newest of the past"
 
 
-@pytest.mark.field
 async def test_a_page_of_all_cars_is_heard_by_every_car(bridge: RosBridge, other: RosBridge) -> None:
     async with serving(two(bridge, other)) as base, viewer(base, vehicle="serval", page="bbbb") as there:
         await there.until(lambda: there.states)
@@ -304,7 +305,7 @@ async def test_on_its_own_page_a_car_is_not_named(bridge: RosBridge, server: str
 
 async def test_a_car_whose_session_stopped_stays_listed(bridge: RosBridge, other: RosBridge) -> None:
     config = two(bridge, other)
-    app = create_app(config)
+    app = create_app(config, now=time.monotonic)
     async with serving_app(app, config) as base, viewer(base, fleet=True) as one:
         await one.until(lambda: named(one, "serval") and named(one, "ocelot"))
         for session in app.state.services.sessions.values():

@@ -16,8 +16,9 @@ from server.protocol.rate_limit import Limits
 from server.replay.view_source import ViewSource
 from server.web.page_commands import PageCommands
 
+pytestmark = pytest.mark.virtual_time
 
-@pytest.mark.field
+
 async def test_another_car_that_is_lost_does_not_hold_up_the_page() -> None:
     requested = asyncio.Event()
 

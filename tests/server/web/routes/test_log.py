@@ -66,6 +66,7 @@ async def who(server: str, change: str) -> list[Any]:
         return [event["by"] for event in (await client.get("/api/log", params={"change": change})).json()["events"]]
 
 
+@pytest.mark.virtual_time
 async def test_whoever_gives_an_order_is_named_by_the_connection_not_by_the_order(
     bridge: RosBridge,
     server: str,
@@ -92,6 +93,7 @@ async def test_whoever_gives_an_order_is_named_by_the_connection_not_by_the_orde
         assert await who(server, "stopped") == ["api · python-httpx"]
 
 
+@pytest.mark.virtual_time
 async def test_an_alarm_tells_who_acknowledged_and_who_shelved_it(
     bridge: RosBridge,
     server: str,
@@ -107,6 +109,7 @@ async def test_an_alarm_tells_who_acknowledged_and_who_shelved_it(
         assert next(a for a in state["alarms"] if a["id"] == "car_silent")["acknowledged_by"] == "Ann"
 
 
+@pytest.mark.virtual_time
 async def test_the_log_alone_says_what_was_judged_by_at_every_moment(bridge: RosBridge) -> None:
     """Folding the settings events of the log gives the settings in force, whatever was changed and by whom."""
     bridge.advertise("/catvehicle/brake", "geometry_msgs/Wrench")  # so that it is taken for a CATVehicle
@@ -218,6 +221,7 @@ async def test_an_empty_log_is_exported_as_its_columns() -> None:
         assert (await client.get("/api/log.json")).json() == []
 
 
+@pytest.mark.virtual_time
 async def test_the_load_and_the_state_of_the_log_are_metrics(speeding: str) -> None:
     async with http_client(base_url=speeding) as client:
         lines = (await client.get("/metrics")).text.splitlines()
