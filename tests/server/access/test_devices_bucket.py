@@ -59,6 +59,7 @@ def keys(folder: Path) -> list[Path]:
     return found
 
 
+@pytest.mark.field
 async def test_two_nodes_have_the_same_devices_also_after_the_broker_was_killed(tmp_path: Path) -> None:
     (tmp_path / "conf").mkdir()
     first_key, second_key = keys(tmp_path / "conf")

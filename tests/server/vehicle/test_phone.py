@@ -220,8 +220,8 @@ def raised(found: Ride) -> list[tuple[str, float]]:
     ("accuracy_m", "seed", "seconds"),
     [
         (5.0, 1, 100.0),
-        pytest.param(3.0, 2, 300.0, marks=pytest.mark.slow),
-        pytest.param(10.0, 3, 300.0, marks=pytest.mark.slow),
+        pytest.param(3.0, 2, 300.0, marks=(pytest.mark.field, pytest.mark.slow)),
+        pytest.param(10.0, 3, 300.0, marks=(pytest.mark.field, pytest.mark.slow)),
         pytest.param(20.0, 4, 300.0, marks=pytest.mark.slow),
     ],
 )

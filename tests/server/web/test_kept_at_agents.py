@@ -161,6 +161,7 @@ async def test_a_viewer_at_a_node_reads_and_changes_nothing(tmp_path: Path) -> N
         assert (await one.room.get(path)).status_code == 401
 
 
+@pytest.mark.field
 async def test_a_replay_runs_at_the_agent_and_only_its_newest_frames_come(tmp_path: Path) -> None:
     async with fleet(tmp_path) as one:
         await read(one)
