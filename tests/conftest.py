@@ -14,7 +14,7 @@ from tests.chromium import find_chromium
 from tests.tree import RECORDINGS
 from tests.virtual_time import VirtualClock
 
-# What takes about a second or more: `python -m tests.summary --slow` prints it from the logs of a run.
+# What takes about 0.3 s or more: `python -m tests.summary --slow` prints it from the logs of a run.
 SLOW_TESTS = frozenset(Path(__file__).with_name("slow_tests.txt").read_text(encoding="utf-8").split())
 
 

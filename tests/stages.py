@@ -46,7 +46,7 @@ NOT_PAGE = "--ignore=tests/page"
 TARGETS = {
     # asyncio's debug mode is on here only, and in the tests' own process only: it takes a fifth more time.
     "check": (
-        Stage("quick", (NOT_PAGE, *TWO, "-q", "-m", "not (browser or slow or field or soak)"), ("--asyncio-debug",)),
+        Stage("quick", (NOT_PAGE, *THREE, "-q", "-m", "not (browser or slow or field or soak)"), ("--asyncio-debug",)),
     ),
     "test": (
         Stage("server", (NOT_PAGE, *THREE, "-m", "not (browser or field or soak)")),  # some wait for processes

@@ -5,7 +5,7 @@
     python -m tests.summary --slow out/tests/server.jsonl > tests/slow_tests.txt
 
 With `--each`, every test is a row, with the last line that it printed: what it measured. With `--slow`, only the names
-of the tests that took more than a second are printed, for the file from which they are marked.
+of the tests that took more than 0.3 s are printed, for the file from which they are marked.
 Each file is the log of one stage as pytest-reportlog writes it: a line of JSON for each phase of each test. What failed
 and what never ended goes to the error output, as the last lines there.
 """
@@ -23,7 +23,7 @@ from typing import Any
 
 SLOWEST = 10
 LONGEST_REASON = 200  # characters
-SLOW_S = 1.0
+SLOW_S = 0.3
 TIMED_OUT = re.compile(r"Timeout \(>[\d.]+ ?s\) from pytest-timeout")
 CRASHED = "???"  # the phase that pytest-xdist reports of a test whose worker ended
 

@@ -71,7 +71,7 @@ def test_each_proof_is_a_row_with_what_it_measured(tmp_path: Path, capsys: pytes
 
 
 def test_slow_functions_are_named_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    fast = whole("t::a[1]", 0, 1.2) + whole("t::a[2]", 2, 3) + whole("t::b", 5, 0.9)
+    fast = whole("t::a[1]", 0, 1.2) + whole("t::a[2]", 2, 3) + whole("t::b", 5, 0.2)
     logs = [write(tmp_path / "fast.jsonl", fast), write(tmp_path / "slow.jsonl", whole("t::T::c", 6, 2))]
     assert main(["--slow", *logs]) == 0
     assert capsys.readouterr().out == "t::T::c\nt::a\n"
