@@ -95,15 +95,21 @@ def scan(file: IO[bytes], *, with_messages: bool = True) -> Index:
             break
         opcode, length = _HEAD.unpack(head)
         end = at + HEAD_BYTES + length
+        if opcode == 0 and run is not None:
+            run.drop_torn(file, at, index.counts)
         if opcode == 0 or end > size:  # no record, or torn
             break
-        if opcode == Opcode.MESSAGE and length >= _MESSAGE_BYTES:
+        is_message = opcode == Opcode.MESSAGE and length >= _MESSAGE_BYTES
+        if run is not None and not is_message:
+            index.parts.append(run.part(at))
+            run = None
+        if is_message:
             if with_messages:
                 if run is None or at - run.at >= RUN_BYTES:
-                    index.parts += [run.part] if run is not None else []
+                    index.parts += [run.part(at)] if run is not None else []
                     run = _Run(at)
                 channel, _, time_ns = _MESSAGE.unpack(file.read(_MESSAGE.size))
-                run.add(channel, time_ns, end)
+                run.add(channel, time_ns, at)
                 index.counts[channel] += 1
         elif opcode == Opcode.CHUNK:
             if with_messages:
@@ -116,11 +122,10 @@ def scan(file: IO[bytes], *, with_messages: bool = True) -> Index:
             break
         elif opcode in _DECLARING:
             _declared(index, opcode, file.read(length) if length <= MOST_TEXT else b"")
-        if run is not None and opcode != Opcode.MESSAGE:
-            index.parts.append(run.part)
-            run = None
+        elif opcode == Opcode.MESSAGE:
+            index.pieces += 1
         at = end
-    index.parts += [run.part] if run is not None else []
+    index.parts += [run.part(at)] if run is not None and run.count else []
     return index
 
 
@@ -129,22 +134,34 @@ class _Run:
 
     def __init__(self, at: int) -> None:
         self.at = at
-        self._end = at
+        self.count = 0
+        self._torn_at: int | None = None
         self._first_ns, self._last_ns = 2**64, 0
         self._channels: set[int] = set()
+        self._newest = (0, 0)  # place and channel of the last message
 
-    def add(self, channel: int, time_ns: int, end: int) -> None:
-        self._end = end
+    def add(self, channel: int, time_ns: int, at: int) -> None:
+        self.count += 1
         self._first_ns, self._last_ns = min(self._first_ns, time_ns), max(self._last_ns, time_ns)
         self._channels.add(channel)
+        self._newest = at, channel
 
-    @property
-    def part(self) -> Part:
+    def drop_torn(self, file: IO[bytes], end: int, counts: Counter[int]) -> None:
+        """Leave out the last message where it ends in zeros and zeros follow, as behind a power loss: its rest may
+        never have reached the disk, and there is no checksum."""
+        file.seek(end - 1)
+        if self.count and file.read(1) == b"\0":
+            self._torn_at, channel = self._newest
+            self.count -= 1
+            counts[channel] -= 1
+
+    def part(self, end: int) -> Part:
+        """The run, which ends at a place in the file."""
         return Part(
             message_start_time=self._first_ns,
             message_end_time=self._last_ns,
             at=self.at,
-            run_bytes=self._end - self.at,
+            run_bytes=(self._torn_at or end) - self.at,
             channels=frozenset(self._channels),
         )
 

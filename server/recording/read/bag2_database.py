@@ -20,6 +20,7 @@ _FORMATS: dict[str, DefinitionFormat] = {"ros2msg": "msg", "ros2idl": "idl"}
 _LOGS = ("-wal", "-journal")  # what SQLite leaves beside a database that was not closed
 _LOG_HEAD, _FRAME_HEAD = 32, 24  # bytes of a write-ahead log, and of each page in it
 _LAST_NS = 2**63 - 1
+_WHOLE = "typeof(timestamp) = 'integer' AND typeof(data) = 'blob'"  # SQLite takes anything into any column
 
 
 class Bag2Database:
@@ -57,13 +58,10 @@ class Bag2Database:
         marks = ",".join("?" * len(numbers))
         rows = self._execute(
             f"SELECT timestamp, topic_id, data FROM messages WHERE topic_id IN ({marks}) AND timestamp >= ? "
-            "ORDER BY timestamp",
+            f"AND {_WHOLE} ORDER BY timestamp",
             [*numbers, max(start_ns, -_LAST_NS)],
         )
         for time_ns, number, raw in rows:
-            if type(time_ns) is not int or type(raw) is not bytes:
-                self.damage.pieces += 1
-                continue
             message = unpacked(raw) if raw[:4] == PACKED else raw
             if message is None:
                 self.damage.pieces += 1
@@ -105,7 +103,10 @@ class Bag2Database:
             raise RecordingUnreadable(f"{self.path} is not a recording of ROS 2: a database with missing tables")
         definitions = self._definitions() if "message_definitions" in tables else {}
         self.distro = self._distro() if "schema" in tables else None
-        spans = self._execute("SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages GROUP BY 1")
+        spans = self._execute(
+            f"SELECT topic_id, COUNT(CASE WHEN {_WHOLE} THEN 1 END), MIN(CASE WHEN {_WHOLE} THEN timestamp END), "
+            f"MAX(CASE WHEN {_WHOLE} THEN timestamp END), COUNT(*) FROM messages GROUP BY topic_id"
+        )
         counted = {number: span for number, *span in spans}
         columns = {row[1] for row in self._execute("PRAGMA table_info(topics)")}
         qos = "offered_qos_profiles" if "offered_qos_profiles" in columns else "''"
@@ -116,10 +117,11 @@ class Bag2Database:
             )
         ]
         known = {channel.number for channel in self.channels}
-        self._strays = sum(span[0] for number, span in counted.items() if number not in known)
-        times = [span[1:] for span in counted.values() if type(span[1]) is int and type(span[2]) is int]
-        self.start_ns = min((first for first, _ in times), default=0)
-        self.end_ns = max((last for _, last in times), default=0)
+        self._strays = sum(span[3] for number, span in counted.items() if number not in known)
+        self._strays += sum(span[3] - span[0] for number, span in counted.items() if number in known)
+        filled = [span for number, span in counted.items() if number in known and span[0]]
+        self.start_ns = min((first for _, first, *_ in filled), default=0)
+        self.end_ns = max((last for _, _, last, *_ in filled), default=0)
 
     def _definitions(self) -> dict[str, tuple[str, str]]:
         """Encoding and text by type."""

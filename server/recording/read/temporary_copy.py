@@ -52,7 +52,8 @@ class TemporaryCopy:
         return target
 
     def _write(self, blocks: Iterable[bytes], copy: IO[bytes]) -> None:
-        for data in blocks:
+        pieces = (block[at : at + LOOK_EVERY] for block in blocks for at in range(0, len(block), LOOK_EVERY))
+        for data in pieces:
             copy.write(data)
             self._look_in -= len(data)
             if self._look_in < 0:
