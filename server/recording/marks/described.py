@@ -73,6 +73,8 @@ def late_of(path: Path, logged: Mapping[str, InterventionDescription]) -> list[I
 
     `logged`: what the log has of interventions of the vehicle.
     """
+    if path.is_dir():  # a bag of others
+        return None
     try:
         with contextlib.closing(finished(path)) as source:
             interventions, said = _in_file(_entries(source))
@@ -86,6 +88,8 @@ def late_of(path: Path, logged: Mapping[str, InterventionDescription]) -> list[I
 
 def holds(path: Path, intervention: str) -> bool:
     """Whether a file has this intervention; of one that cannot be read it is not known. Raises OSError."""
+    if path.is_dir():
+        return False
     try:
         with contextlib.closing(finished(path)) as source:
             return any(

@@ -46,6 +46,8 @@ NOTHING = InFile(start_ms=0.0, end_ms=0.0, marks={}, removed=frozenset(), media=
 
 def in_file(path: Path) -> InFile:
     """Of one file; nothing where it was never closed, or is none of ours. Raises OSError."""
+    if path.is_dir():
+        return NOTHING
     try:
         with contextlib.closing(finished(path)) as source, path.open("rb") as file:
             marks, removed = folded(islice(own_entries(source, TOPIC), MOST))
@@ -93,6 +95,8 @@ def read_media(path: Path, mark: str, kind: Kind) -> tuple[MediaName, bytes] | N
 
 def attached(path: Path) -> Iterator[tuple[MediaName, bytes]]:
     """The voice notes and photos in a file, the newest first, without damaged ones. Raises OSError."""
+    if path.is_dir():
+        return
     with path.open("rb") as file:
         try:
             indexes = attachments_of(file)
