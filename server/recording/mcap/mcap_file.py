@@ -49,6 +49,8 @@ class McapFile:
         self._copy = copy
         self._missing = missing
         self._file = (content or path).open("rb")
+        if copy is not None:
+            copy.release()
         try:
             self.is_cut = _is_cut(self._file)
             index = self._index()

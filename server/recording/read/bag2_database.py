@@ -46,6 +46,8 @@ class Bag2Database:
         try:
             self._database = self._open(content or path)
             self._read_tables()
+            if self._copy is not None:
+                self._copy.release()
         except BaseException:
             self.close()
             raise

@@ -76,7 +76,7 @@ class Recording:
 
     def __init__(self, sources: Sequence[FileSource]) -> None:
         self._sources = sources
-        self.ros_version: RosVersion = sources[0].ros_version
+        self.ros_version: RosVersion = next((s for s in sources if s.channels), sources[0]).ros_version
         self.topics: dict[str, TopicInfo] = {}
         self.notes: list[str] = []  # topics left out, each with the reason, for a person
         self.metadata: dict[str, str] = next(

@@ -5,6 +5,7 @@ A recording is never changed, and its folder may not be writable.
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -32,6 +33,12 @@ class TemporaryCopy:
 
     def close(self) -> None:
         self._folder.cleanup()
+
+    def release(self) -> None:
+        """Removes the copies as soon as they are open, where the system keeps open files: a process that is killed
+        leaves none."""
+        if os.name == "posix":
+            self.close()
 
     def unpack(self, packed: Path) -> tuple[Path, bool]:
         """A file packed with zstd, unpacked, and whether it ends where it should; what is whole of it is there.
