@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from server.recording.own import own_schema
 from server.recording.read.errors import Undecodable
 from server.recording.read.read import Recording
 from server.recording.read.schemas import Schema, TypeBook
-from server.recording.read.source import Channel, Damage
+from server.recording.read.source import Channel
 from server.recording.standing import Stood, read_standing
 
 BEFORE_S = AFTER_S = 30.0
@@ -245,7 +245,7 @@ def _short(window: Window, first_ns: int, last_ns: int) -> Iterator[str]:
 def _damage(recording: Recording, first_ns: int) -> Iterator[str]:
     """What could not be read. That a file has no end yet is no damage to a clip: see `_short`."""
     for file in recording.files:
-        lost = Damage(parts=file.damage.parts, lost=file.damage.lost, too_large=file.damage.too_large)
+        lost = replace(file.damage, is_cut=False)
         yield from (f"{sentence}." for sentence in lost.sentences(file.path.name, first_ns, file.end_ns))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -16,6 +16,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 
 from server.recording.mcap import mcap_file
+from server.recording.mcap.chunks import HEAD_BYTES, MAGIC
 from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema
 from server.recording.read.read import RecordingUnreadable, open_recording
@@ -42,6 +43,11 @@ class Variant:
     metadata: bool
 
 
+END_BYTES = 13 + 29 + 8  # DataEnd, footer and magic: the end of a file without a summary
+PLAIN = Variant(
+    messages=(), foreign=False, profile="ros2", chunking=True, chunk_size=200, compression=CompressionType.LZ4,
+    indexes=frozenset(), statistics=False, offsets=False, channels=False, schemas=False, crcs=False, metadata=False,
+)  # fmt: skip
 VARIANTS = st.builds(
     Variant,
     messages=st.lists(st.tuples(st.integers(0, 2), st.integers(1, 50)), min_size=1, max_size=40).map(tuple),
@@ -144,6 +150,28 @@ def test_every_variant_that_is_cut_is_read_as_far_as_it_is_whole(tmp_path: Path,
     rows, _, damage, _ = by_us(path)
     assert rows == expected
     assert any("was never closed" in sentence for sentence in damage)
+
+
+@pytest.mark.parametrize("order", [(True, False), (False, True), (True, False, True), (False, True, False)])
+def test_a_file_with_messages_in_chunks_and_outside_of_them(tmp_path: Path, order: tuple[bool, ...]) -> None:
+    """The format allows it, though the library's writer does not do it."""
+    bodies: list[bytes] = []
+    expected: list[tuple[int, bytes]] = []
+    end = b""
+    for number, chunking in enumerate(order):
+        times = tuple((0, 100 * number + n) for n in range(1, 20))
+        one = replace(PLAIN, messages=times, chunking=chunking, chunk_size=200)
+        write(tmp_path / "one.mcap", one)
+        content = (tmp_path / "one.mcap").read_bytes()
+        expected += by_library(tmp_path / "one.mcap")
+        header = len(MAGIC) + HEAD_BYTES + int.from_bytes(content[9:17], "little")
+        bodies.append(content[:header] if not bodies else b"")
+        bodies.append(content[header:-END_BYTES])
+        end = content[-END_BYTES:]
+    (tmp_path / "a.mcap").write_bytes(b"".join([*bodies, end]))
+    assert by_library(tmp_path / "a.mcap") == sorted(expected)
+    rows, _, damage, _ = by_us(tmp_path / "a.mcap")
+    assert (rows, damage) == (sorted(expected), [])
 
 
 def scanned(*_: object, **__: object) -> object:
