@@ -79,6 +79,8 @@ class Report:
             why = self._recording.why_rejected[topic]
             say(f"  Note: {_counted(count, 'message')} on {topic} left out: {why}")
         for sentence in self._recording.damage:
+            say(f"  Note: {sentence}")
+        for sentence in self._recording.damage:
             say(f"  Note: {sentence}.")
 
 

@@ -89,6 +89,8 @@ async def _exported(
         path = await asyncio.to_thread(source.path_of, recording)
         if path is None:
             raise CannotPrepare(f"The recording {recording} no longer exists.")
+        if order.format == "mcap" and path.is_dir():
+            raise CannotPrepare(f"{recording} is a folder of several files: send it in another format.")
         if order.format != "mcap":
             into = work / f"{i}"
             await asyncio.to_thread(into.mkdir)

@@ -208,7 +208,7 @@ class Recording(TypedDict):
     is_clip: bool
     clip_of: str | None
     file: Annotated[str, doc("its name in the folder")]
-    format: Annotated[str, doc("mcap · bag · db3")]
+    format: Annotated[str, doc("mcap · bag · db3 · zstd · folder")]
     sha256: str | None
     head: Annotated[str | None, doc("SHA-256 of the last record of its hash chain [hex], not verified; null: none")]
     verified: Annotated[VerificationAnswer | None, doc("null: this file was not verified since the server started")]

@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 
 from server.recording.catalog import annotations as annotation_store
+from server.recording.catalog.discovery import logs_of
 
 
 def move(source: Path, target: Path) -> None:
@@ -30,6 +31,9 @@ def move(source: Path, target: Path) -> None:
                 shutil.copytree(media, media_there, copy_function=_link)
             with contextlib.suppress(FileNotFoundError):
                 os.rename(source, target)
+            for log, moved in zip(logs_of(source), logs_of(target), strict=True):
+                with contextlib.suppress(FileNotFoundError):
+                    os.rename(log, moved)
         except OSError:
             with contextlib.suppress(OSError):
                 there.unlink()
@@ -40,6 +44,15 @@ def move(source: Path, target: Path) -> None:
             said.unlink()
         with contextlib.suppress(OSError):
             remove_folder(media)
+
+
+def remove(recording: Path) -> None:
+    """A recording's file with what belongs to it, or its folder, where it is there. Raises OSError."""
+    if recording.is_dir() and not recording.is_symlink():
+        remove_folder(recording)
+        return
+    for file in (recording, *logs_of(recording)):
+        file.unlink(missing_ok=True)
 
 
 def remove_folder(folder: Path) -> None:

@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,10 @@ from server.recording.catalog import annotations as annotation_store
 from server.recording.folder import DAMAGED, FINISHED, is_id
 
 TRASH = ".trash"
-_ENDINGS = (FINISHED, ".bag", ".db3", DAMAGED)
+_ENDINGS = (FINISHED, ".bag", ".db3", ".mcap.zstd", ".db3.zstd", DAMAGED)
+_PART = re.compile(r"(.+)_\d+\.(?:mcap|db3)(?:\.zstd)?")  # of a split bag of ROS 2
+_METADATA = "metadata.yaml"
+_LOGS = ("-wal", "-journal")  # of a database that was not closed
 _DEEP = 3  # folders below the root that are looked into
 _STAMP = re.compile(r"(\d{8}T\d{6})Z")
 
@@ -52,7 +55,7 @@ def started_ms_of(found: dict[str, Any] | None, name: str, changed_ns: int) -> i
 
 
 def files_below(folder: Path) -> Iterator[Path]:
-    """The recordings below a folder, and those in its trash; no link is followed."""
+    """The recordings below a folder, and those in its trash; a split bag is its folder. No link is followed."""
     for at, folders, names in os.walk(folder):
         inside = Path(at).relative_to(folder).parts
         is_trash = inside[:1] == (TRASH,)
@@ -67,10 +70,40 @@ def files_below(folder: Path) -> Iterator[Path]:
         ]
         if is_trash and len(inside) < 2:
             continue
+        parts = _parts_of_bag(Path(at).name, names) if len(inside) > 2 * is_trash else frozenset()
+        if parts:
+            yield Path(at)
         for name in names:
+            if name in parts:
+                continue
             path = Path(at, name)
             if name.endswith(_ENDINGS) and not name.startswith(".") and path.is_file() and not path.is_symlink():
                 yield path
+
+
+def _parts_of_bag(folder: str, names: Sequence[str]) -> frozenset[str]:
+    """Which files in a folder are one split bag, as its recorder lays it out; empty: there is none."""
+    series: dict[str, set[str]] = {}
+    for name in names:
+        if (part := _PART.fullmatch(name)) is not None:
+            series.setdefault(part[1], set()).add(name)
+    parts = max(series.values(), key=len, default=set[str]())
+    others = [name for name in names if name not in parts and name.endswith(_ENDINGS)]
+    is_bag = _METADATA in names or (not others and folder in series)
+    return frozenset(parts) if len(parts) > 1 and is_bag else frozenset()
+
+
+def files_of(path: Path) -> list[Path]:
+    """The files that are one recording, in the order of their names: of a folder its parts, of a database also its log.
+    Raises OSError."""
+    if path.is_dir():
+        return sorted(file for file in path.iterdir() if file.is_file() and not file.is_symlink())
+    return [path, *(log for log in logs_of(path) if log.is_file())]
+
+
+def logs_of(path: Path) -> list[Path]:
+    """What SQLite may have left beside a database."""
+    return [path.with_name(path.name + end) for end in _LOGS] if path.name.endswith(".db3") else []
 
 
 def shape_of(folder: Path) -> list[tuple[str, int]]:

@@ -17,7 +17,7 @@ from server.recording.catalog.catalog_db import Entry, Which
 from server.recording.catalog.entries import Entries
 from server.recording.catalog.errors import Refused
 from server.recording.catalog.verifications import Verifications
-from server.recording.folder import DAMAGED, FINISHED
+from server.recording.folder import DAMAGED, FINISHED, FOLDER
 
 MAX_ROWS = 200  # a page
 _CURSOR = re.compile(r"(-?\d{1,16})\.([A-Za-z0-9][A-Za-z0-9_-]{0,89})")
@@ -51,6 +51,11 @@ def page_of(entries: Entries, which: Which, verifications: Verifications, *, cur
         rows=[row_of(entry, verifications.of(entry)) for entry in page],
         next=f"{at_ms}.{last.id}" if more and last else None,
     )
+
+
+def _format(name: str) -> str:
+    """By the ending of the file; without one it is a folder."""
+    return "mcap" if name.endswith((FINISHED, DAMAGED)) else Path(name).suffix[1:] or FOLDER
 
 
 def _digest_of_late(entry: Entry) -> str:
@@ -93,7 +98,7 @@ def row_of(entry: Entry, verified: VerificationAnswer | None = None) -> Recordin
         "is_clip": found.get("is_clip", False),
         "clip_of": found.get("clip_of"),
         "file": annotation_store.line(name),
-        "format": "mcap" if name.endswith((FINISHED, DAMAGED)) else Path(name).suffix[1:],
+        "format": _format(name),
         "sha256": found.get("sha256"),
         "head": found.get("head"),
         "verified": verified,

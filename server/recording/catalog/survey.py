@@ -30,6 +30,7 @@ from server.judge.speed_trace import SpeedTrace
 from server.protocol.drive_trends import DriveFacts, DriveTrendsAnswer, Wanted, answer
 from server.protocol.marks import DriveMark
 from server.recording.catalog.annotations import MAX_MARKS, line
+from server.recording.catalog.discovery import files_of
 from server.recording.catalog.sketch import sketch
 from server.recording.drive.course import course_of
 from server.recording.drive.facts import facts_of, figures_of, limits_of, undescribed_of
@@ -39,7 +40,7 @@ from server.recording.marks.of_drive import in_recording
 from server.recording.mcap.chain import read_head
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 
-VERSION = 8  # of what is found: with another one, files are read again
+VERSION = 9  # of what is found: with another one, files are read again
 PRIORITIES = ("critical", "warning", "advisory")
 MAX_RAISED = 200  # alarms listed one by one; all are counted
 MAX_SENTENCES = 10
@@ -63,7 +64,7 @@ def survey(path: Path) -> dict[str, Any]:
     except MemoryError:
         return {"problem": _sentence(f"{path} has a part that is larger than this machine's memory", path)}
     found["sha256"] = _digest(path)
-    head = read_head(path, "")
+    head = None if path.is_dir() else read_head(path, "")
     found["head"] = head.digest if head is not None else None
     return found
 
@@ -222,6 +223,9 @@ def _sentence(words: str, path: Path) -> str:
 
 
 def _digest(path: Path) -> str:
+    """Of a file; of a folder, of the digests of its files."""
+    if path.is_dir():
+        return hashlib.sha256("".join(map(_digest, files_of(path))).encode()).hexdigest()
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -70,7 +70,7 @@ class Trash:
             try:
                 for entry in chosen:
                     path = self._folder / entry.path
-                    path.unlink(missing_ok=True)
+                    atomic_move.remove(path)
                     annotation_store.beside(path).unlink(missing_ok=True)
                     atomic_move.remove_folder(annotation_store.media_beside(path))
                     gone.append(entry)

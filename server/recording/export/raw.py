@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from server.recording.read.errors import RecordingUnreadable
 from server.recording.read.read import Recording
 from server.recording.read.source import Channel, FileSource
+from server.recording.read.time_order import Stream, in_time_order
 
 OWN = "/catgraph/"  # topics that catgraph itself wrote: alarms, phone, settings …
 PROGRESS_EVERY = 2000  # messages
@@ -48,10 +48,12 @@ def raw_messages(
     first_ns, last_ns = span_ns(recording)
     begin_ns = first_ns if start_ns is None else start_ns
     until_ns = last_ns if end_ns is None else end_ns
-    streams = [_of_file(number, file, wanted, begin_ns) for number, file in enumerate(recording.files)]
+    streams = [
+        Stream(start_ns=file.start_ns, end_ns=file.end_ns, rows=_of_file(number, file, wanted, begin_ns))
+        for number, file in enumerate(recording.files)
+    ]
     length_ns = max(until_ns - begin_ns, 1)
-    merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=lambda raw: raw.time_ns)
-    for count, raw in enumerate(merged):
+    for count, raw in enumerate(in_time_order(streams, lambda raw: raw.time_ns)):
         if raw.time_ns > until_ns:
             return
         if count % PROGRESS_EVERY == 0:

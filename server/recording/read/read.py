@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import heapq
 import operator
+import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,17 +13,15 @@ from typing import Any, Self
 import orjson
 
 from server.judge.message import Json, Message, RosVersion
-from server.recording.mcap import truncated
-from server.recording.mcap.mcap_file import McapFile, is_bag2
+from server.recording.mcap.mcap_file import McapFile
 from server.recording.own import PREFIX
-from server.recording.read import rosbag1_truncated
 from server.recording.read.decode import Decode, compile_decoder
 from server.recording.read.definitions import definitions_of
 from server.recording.read.errors import RecordingUnreadable, Undecodable
-from server.recording.read.recognise import Kind, recognise
-from server.recording.read.rosbag1 import Bag1
-from server.recording.read.rosbag2 import Bag2
-from server.recording.read.source import Channel, FileSource
+from server.recording.read.open_file import open_file
+from server.recording.read.recognise import Found, recognise
+from server.recording.read.source import UNDECLARED, Channel, FileSource
+from server.recording.read.time_order import Stream, in_time_order
 from server.recording.read.unpack import PartTooLarge
 
 __all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
@@ -48,6 +46,7 @@ class _ChannelReader:
     decode: Decode
 
 
+_ROS_TYPE = re.compile(r"[A-Za-z]\w*(/msg)?/[A-Za-z]\w*")
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, content
 
 
@@ -62,9 +61,8 @@ def open_recording(paths: Sequence[Path]) -> Recording:
     sources: list[FileSource] = []
     try:
         for path in paths:
-            for file, kind in recognise(Path(path)):
-                sources.append(_open(file, kind))
-        if len({source.ros_version for source in sources}) > 1:
+            sources += map(_open, recognise(Path(path)))
+        if len({source.ros_version for source in sources if source.channels}) > 1:
             raise RecordingUnreadable("recordings of ROS 1 and ROS 2 cannot be read as one")
         return Recording(sources)
     except BaseException:
@@ -78,7 +76,7 @@ class Recording:
 
     def __init__(self, sources: Sequence[FileSource]) -> None:
         self._sources = sources
-        self.ros_version: RosVersion = sources[0].ros_version
+        self.ros_version: RosVersion = next((s for s in sources if s.channels), sources[0]).ros_version
         self.topics: dict[str, TopicInfo] = {}
         self.notes: list[str] = []  # topics left out, each with the reason, for a person
         self.metadata: dict[str, str] = next(
@@ -131,11 +129,11 @@ class Recording:
         """
         start_ns = self._start_ns + round(start_s * 1e9)
         streams = [
-            self._read(source, readers, start_ns, topics)
+            Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._read(source, readers, start_ns, topics))
             for source, readers in zip(self._sources, self._readers, strict=True)
             if readers
         ]
-        return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=operator.itemgetter(0))
+        return in_time_order(streams, operator.itemgetter(0))
 
     def own(self, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
         """What catgraph itself wrote on one of its channels ("/catgraph/alarms"), in time order: seconds since 1970,
@@ -223,19 +221,13 @@ def _nothing(raw: bytes) -> dict[str, Any]:
     return {}
 
 
-def _open(path: Path, kind: Kind) -> FileSource:
+def _open(found: Found) -> FileSource:
     try:
-        if kind == "bag":
-            return rosbag1_truncated.CutBag1(path) if rosbag1_truncated.is_cut(path) else Bag1(path)
-        if kind == "mcap" and truncated.is_cut(path):
-            return truncated.CutMcapFile(path)
-        if kind == "mcap" and not is_bag2(path):
-            return McapFile(path)
-        return Bag2(path, kind)
+        return open_file(found)
     except (RecordingUnreadable, MemoryError):  # what is too large is not damaged
         raise
     except Exception as error:  # as above
-        raise RecordingUnreadable(_what_is_wrong(path, error)) from None
+        raise RecordingUnreadable(_what_is_wrong(found.path, error)) from None
 
 
 # Messages of other readers for a missing end of a file, and thus a missing index.
@@ -268,14 +260,25 @@ def _decoder(channel: Channel, source: FileSource) -> Decode:
     version = source.ros_version
     match channel.encoding:
         case "json":
+            if not _is_own(source) and not _ROS_TYPE.fullmatch(channel.type):
+                raise Undecodable("its messages are JSON, and of no ROS type")
             return _decode_json
         case "ros1" if version == 1:
             pass
         case "cdr" if version == 2:
             pass
+        case other if other == UNDECLARED:
+            raise Undecodable("the file does not declare what they are")
         case other:
-            raise Undecodable(f"messages encoded as {other!r} are not supported")
+            raise Undecodable(f"messages encoded as {other[:40]!r} are not supported")
     return compile_decoder(channel.type, definitions_of(channel, version, source.distro), version)
+
+
+def _is_own(source: FileSource) -> bool:
+    """Whether it is a recording of catgraph, whoever copied it: there messages of unknown types are JSON."""
+    return isinstance(source, McapFile) and (
+        bool(source.metadata) or any(channel.topic.startswith(PREFIX) for channel in source.channels)
+    )
 
 
 def _decode_json(raw: bytes) -> dict[str, Any]:

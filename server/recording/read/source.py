@@ -11,6 +11,7 @@ from server.judge.message import RosVersion
 from server.recording.read.unpack import PartTooLarge
 
 DefinitionFormat = Literal["none", "msg", "idl"]
+UNDECLARED = ""  # the encoding of messages whose channel the file does not declare
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +23,7 @@ class Channel:
     type: str  # as rosbags spells it, "pkg/msg/Type" in both versions
     definition: str
     format: DefinitionFormat
-    encoding: Literal["ros1", "cdr", "json"]
+    encoding: str  # "ros1", "cdr", "json"; others are named and not read
     count: int
     is_latched: bool
 
@@ -37,6 +38,7 @@ class Damage:
     too_large: int = 0  # of the lost ones: larger, unpacked, than may be read
     is_cut: bool = False  # its end is missing too, of unknown length
     pieces: int = 0  # without checksums or times of their own, that could not be read either
+    missing: tuple[str, ...] = ()  # names of files that belong to it and are not there
 
     def leave_out(self, start_ns: int, end_ns: int, why: Exception) -> None:
         """One part cannot be read."""
@@ -69,6 +71,11 @@ class Damage:
         if self.pieces:
             which = "1 piece of it is" if self.pieces == 1 else f"{self.pieces} pieces of it are"
             said.append(f"{name} is damaged: {which} left out")
+        if self.missing:
+            names = ", ".join(self.missing[:4])
+            which = "is" if len(self.missing) == 1 else f"and {len(self.missing) - 4} more are"
+            which = "are" if 1 < len(self.missing) <= 4 else which
+            said.append(f"{names} {which} missing beside {name}: metadata.yaml names {_them(self.missing)}")
         if self.is_cut:
             said.append(
                 f"{name} was never closed: it is read to its last whole part, {(end_ns - origin_ns) / 1e9:.1f} s"
@@ -76,8 +83,12 @@ class Damage:
         return said
 
 
+def _them(names: Sequence[str]) -> str:
+    return "it" if len(names) == 1 else "them"
+
+
 class FileSource(Protocol):
-    """One open recording: a file, or a directory that is one ROS 2 bag."""
+    """One open file of a recording."""
 
     path: Path
     ros_version: RosVersion

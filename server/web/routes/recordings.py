@@ -167,6 +167,8 @@ def file(request: Request, id: Id) -> Response:
     row, path = recordings.row(id), recordings.path(id)
     if row is None or path is None:
         raise HTTPException(404, "There is no such recording.")
+    if path.is_dir():
+        raise HTTPException(409, "This recording is a folder of several files: export it, or copy it from the disk.")
     name = f"{id} {row['title']}".strip() + f".{row['format']}"
     return file_answer(request, path, name=name, media_type=_TYPES.get(row["format"], "application/octet-stream"))
 

@@ -1710,7 +1710,7 @@ export interface Recording {
   clip_of: string | null;
   /** its name in the folder */
   file: string;
-  /** mcap · bag · db3 */
+  /** mcap · bag · db3 · zstd · folder */
   format: string;
   sha256: string | null;
   /** SHA-256 of the last record of its hash chain [hex], not verified; null: none */

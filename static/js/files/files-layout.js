@@ -70,7 +70,7 @@ export function originWords(row, now_ms) {
     row.vehicle,
     row.is_clip ? 'clip' : '',
     (row.part ?? 1) > 1 ? `part ${row.part}` : '',
-    row.format === 'bag' ? 'ROS 1 bag' : row.format === 'db3' ? 'ROS 2 db3' : '',
+    row.format === 'bag' ? 'ROS 1 bag' : row.format === 'db3' ? 'ROS 2 db3' : row.format === 'folder' ? 'split ROS 2 bag' : '',
     row.ended === 'recovered' ? 'recovered' : '',
     row.damage.length ? 'damaged' : '',
     row.trashed_ms === null ? '' : `deleted ${whenWords(row.trashed_ms, now_ms)}`,

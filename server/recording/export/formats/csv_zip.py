@@ -63,10 +63,8 @@ def write_csv_zip(recording: Recording, path: Path, *, progress: Progress = noth
         if not tables.rows and not texts:
             raise ExportRefused("Nothing in this recording fits a table.")
         outcome.entries = sum(tables.rows.values())
-        outcome.notes = [*_without_table(drive), *unfit, *drive.losses()]
-        outcome.notices = [f"{note}." for note in recording.notes]
-        notes = [*outcome.notices, *outcome.notes]
-        about = readme(drive, [Written(name=name, rows=rows) for name, rows in tables.rows.items()], notes)
+        outcome.notes = [*(f"{note}." for note in recording.notes), *_without_table(drive), *unfit, *drive.losses()]
+        about = readme(drive, [Written(name=name, rows=rows) for name, rows in tables.rows.items()], outcome.notes)
         _pack(path, Path(folder), list(tables.rows), {"README.txt": about, **texts}, recording, progress)
     return outcome
 
