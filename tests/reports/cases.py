@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from server.analysis.rehearse import rehearse
+from server.analysis.report import Report
 from server.recording.read.read import open_recording
 from tests.tree import RECORDINGS
 
@@ -57,3 +59,15 @@ def counted(*paths: Path) -> tuple[int, list[str]]:
         assert recording.count == len(times)
         assert recording.rejected == {}
         return len(times), [*recording.notes, *recording.damage]
+
+
+def judged(*files: Path) -> Report:
+    """What `catgraph check` finds in a recording."""
+    with open_recording(list(files)) as recording:
+        run = rehearse(recording)
+        return Report(files=[str(path) for path in files], recording=recording, run=run)
+
+
+def raised(report: Report) -> dict[str, float]:
+    """The alarms that were raised, each with its first moment [s]."""
+    return {one.alarm_id: one.raised_s for one in reversed(report.run.episodes)}

@@ -180,7 +180,11 @@ def track(request: Request, id: Id) -> Response:
         raise HTTPException(404, "There is no such recording.")
     drawn = sketch.from_json(row["sketch"])
     marks = 0 if drawn is None else len(drawn.marks)
-    words = "No position was recorded" if drawn is None else f"The track, with {marks} alarm{'s' * (marks != 1)} on it"
+    words = (
+        "No usable position was recorded"
+        if drawn is None
+        else f"The track, with {marks} alarm{'s' * (marks != 1)} on it"
+    )
     return Response(
         sketch.svg(drawn, words), media_type="image/svg+xml", headers={"Cache-Control": "private, max-age=60"}
     )

@@ -93,7 +93,7 @@ async def test_a_recording_and_its_picture(client: httpx.AsyncClient) -> None:
     assert picture.headers["content-type"].startswith("image/svg+xml")
     assert picture.headers["content-security-policy"].startswith("default-src 'none'")
     assert "The track, with 1 alarm on it" in picture.text
-    assert "No position was recorded" in (await client.get(f"/api/recordings/{SECOND}/track.svg")).text
+    assert "No usable position was recorded" in (await client.get(f"/api/recordings/{SECOND}/track.svg")).text
     assert problem(await client.get("/api/recordings/none/track.svg"), 404)
 
 
