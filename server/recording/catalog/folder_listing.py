@@ -68,8 +68,9 @@ class FolderListing:
             self._entries.put([entry for entry in now if entry is not None])
 
     def _is_gone(self, path: str, seen: Container[str]) -> bool:
-        """Whether a file is there no more, or is now listed with others as one recording."""
-        return path.rpartition("/")[0] in seen or not (self._folder / path).exists()
+        """Whether a file is there no more, or is now listed with others as one recording; or a folder is none."""
+        place = self._folder / path
+        return path.rpartition("/")[0] in seen or not place.exists() or (place.is_dir() and not files_of(place))
 
     def walk_if_changed(self) -> None:
         """Walks only where a folder or a file has changed.

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 from pathlib import Path
+from typing import Any
 
+import pytest
 import zstandard
 
+from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.discovery import files_below
+from server.recording.catalog.errors import Refused
 from server.recording.catalog.survey import survey
 from tests.server.recording.bags import Drive, write_ros2
 from tests.server.recording.read.test_bag2 import EACH, PARTS, left_open, split
@@ -90,7 +96,7 @@ def test_a_split_bag_and_a_database_with_its_log_go_into_the_trash_and_back(tmp_
     assert len(ids) == 2
     for id in ids:
         listed.delete(id)
-    assert not bag.exists()
+    assert list(bag.iterdir()) == []
     assert list((tmp_path / "r" / "killed").iterdir()) == []
     listed.walk()
     assert listed.rows().rows == []
@@ -101,3 +107,132 @@ def test_a_split_bag_and_a_database_with_its_log_go_into_the_trash_and_back(tmp_
         listed.delete(id)
     assert listed.destroy(None)["count"] == 2
     assert [file for file in (tmp_path / "r").rglob("*") if file.is_file()] == []
+
+
+def bag_in(vehicle: Path) -> list[Path]:
+    """The parts and the metadata of a split bag, right in a vehicle's folder."""
+    made = split(vehicle.parent / "made", "mcap")
+    vehicle.mkdir(parents=True, exist_ok=True)
+    files = [Path(shutil.copy(file, vehicle)) for file in sorted(made.iterdir())]
+    shutil.rmtree(made.parent)
+    return files
+
+
+@pytest.mark.parametrize("has_metadata", [True, False])
+@pytest.mark.parametrize(
+    "other",
+    ["car_20260101T000000Z.mcap.writing", "car_20260101T000000Z.mcap.recovering", "car_20260101T000000Z.mcap", "a.bag",
+     "other_0.db3", "inner/notes.txt"],
+)  # fmt: skip
+def test_a_folder_with_anything_else_in_it_is_no_recording(tmp_path: Path, other: str, has_metadata: bool) -> None:
+    vehicle = tmp_path / "r" / "drive"
+    files = bag_in(vehicle)
+    if not has_metadata:
+        files.pop().unlink()
+    assert list(files_below(tmp_path / "r")) == [vehicle]
+    (vehicle / other).parent.mkdir(exist_ok=True)
+    (vehicle / other).write_bytes(files[0].read_bytes())
+    listed = catalog(tmp_path / "r")
+    assert {f"drive_{n}.mcap" for n in range(PARTS)} <= {row["file"] for row in listed.rows().rows}
+    assert "folder" not in {row["format"] for row in listed.rows().rows}
+    listed.delete(next(row["id"] for row in listed.rows().rows if row["file"] == "drive_1.mcap"))
+    listed.destroy(None)
+    assert sorted(file for file in vehicle.rglob("*") if file.is_file()) == sorted(
+        {*files, vehicle / other} - {vehicle / "drive_1.mcap"}
+    )
+
+
+def test_what_came_into_the_folder_of_a_bag_since_it_was_listed_stays(tmp_path: Path) -> None:
+    vehicle = tmp_path / "r" / "car"
+    files = bag_in(vehicle)
+    (vehicle / "read me.txt").write_text("not of the recording")
+    listed = catalog(tmp_path / "r")
+    (row,) = listed.rows().rows
+    writing = vehicle / "car_20260101T000000Z.mcap.writing"
+    writing.write_bytes(b"is being recorded")
+    with pytest.raises(Refused, match="holds other recordings"):
+        listed.delete(row["id"])
+    assert all(file.exists() for file in (*files, writing))
+    listed.walk()
+    assert {row["file"] for row in listed.rows().rows} == {file.name for file in files if file.suffix == ".mcap"}
+    writing.unlink()
+    listed.walk()
+    listed.delete(row["id"])
+    assert list(vehicle.iterdir()) == [vehicle / "read me.txt"]
+    writing.write_bytes(b"is being recorded")
+    listed.restore(row["id"])
+    assert sorted(vehicle.iterdir()) == sorted([*files, writing, vehicle / "read me.txt"])
+    listed.walk()
+    assert {row["file"] for row in listed.rows().rows} == {file.name for file in files if file.suffix == ".mcap"}
+
+
+def test_what_is_put_into_a_bag_in_the_trash_is_not_destroyed_with_it(tmp_path: Path) -> None:
+    bag_in(tmp_path / "r" / "drive")
+    listed = catalog(tmp_path / "r")
+    (row,) = listed.rows().rows
+    listed.delete(row["id"])
+    (there,) = (tmp_path / "r" / ".trash").glob("*/drive")
+    (there / "notes.txt").write_text("kept")
+    listed.destroy(None)
+    assert list(there.iterdir()) == [there / "notes.txt"]
+
+
+@pytest.mark.parametrize("links", [True, False])
+@pytest.mark.parametrize("at", range(PARTS + 1))
+def test_a_bag_of_which_one_file_cannot_be_moved_stays_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: int, links: bool
+) -> None:
+    files = bag_in(tmp_path / "r" / "drive")
+    annotation_store.write(tmp_path / "r" / "drive", annotation_store.Annotations(title="kept"))
+    listed = catalog(tmp_path / "r")
+    (row,) = listed.rows().rows
+    link, rename = os.link, os.rename
+
+    def broken(how: Any) -> Any:
+        def call(source: Any, target: Any) -> None:
+            if Path(source) == files[at]:
+                raise OSError(errno.EIO, "input/output error")
+            how(source, target)
+
+        return call
+
+    def none(source: Any, target: Any) -> None:
+        raise OSError(errno.EPERM, "no hard links")
+
+    monkeypatch.setattr(os, "link", broken(link) if links else none)
+    monkeypatch.setattr(os, "rename", broken(rename))
+    with pytest.raises(Refused):
+        listed.delete(row["id"])
+    monkeypatch.undo()
+    assert sorted((tmp_path / "r" / "drive").iterdir()) == files
+    assert listed.rows().rows[0]["title"] == "kept"
+    assert not [file for file in (tmp_path / "r" / ".trash").rglob("*") if file.is_file()]
+    listed.delete(row["id"])
+    assert list((tmp_path / "r" / "drive").iterdir()) == []
+
+
+@pytest.mark.parametrize("failing", ["link", "rename"])
+@pytest.mark.parametrize("why", [OSError(errno.EIO, "input/output error"), KeyboardInterrupt()])
+def test_a_database_is_never_without_its_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str, why: BaseException
+) -> None:
+    """Whether a disk fails or the server is killed in the middle."""
+    path = tmp_path / "r" / "killed" / "drive_0.db3"
+    shutil.copytree(left_open(tmp_path / "made").parent, path.parent)
+    before = {file: file.read_bytes() for file in path.parent.iterdir()}
+    listed = catalog(tmp_path / "r")
+    (row,) = listed.rows().rows
+
+    def fail(*_: Any) -> None:
+        raise why
+
+    monkeypatch.setattr(os, failing, fail)
+    if failing == "link":
+        monkeypatch.setattr(shutil, "copy2", fail)
+    with pytest.raises((Refused, KeyboardInterrupt)):
+        listed.delete(row["id"])
+    monkeypatch.undo()
+    assert {file: file.read_bytes() for file in path.parent.iterdir()} == before
+    listed.delete(row["id"])
+    listed.restore(row["id"])
+    assert {file: file.read_bytes() for file in path.parent.iterdir()} == before
