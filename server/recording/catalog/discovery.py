@@ -111,6 +111,16 @@ def files_of(path: Path) -> list[Path]:
     return [path, *(log for log in logs_of(path) if log.is_file())]
 
 
+def why_not_one_file(path: Path) -> str | None:
+    """What a recording is of which no single file is a copy, as words behind "it is"; None: its file is all of it."""
+    if path.is_dir():
+        return "a folder of several files"
+    with contextlib.suppress(FileNotFoundError):
+        if any(file.stat().st_size for file in files_of(path)[1:]):
+            return "a database with a log that holds a part of it"
+    return None
+
+
 def logs_of(path: Path) -> list[Path]:
     """What SQLite may have left beside a database."""
     return [path.with_name(path.name + end) for end in _LOGS] if path.name.endswith(".db3") else []

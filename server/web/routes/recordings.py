@@ -16,6 +16,7 @@ from server.recording.catalog import sketch
 from server.recording.catalog.annotations import BadAnnotation
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.catalog_db import Which
+from server.recording.catalog.discovery import why_not_one_file
 from server.recording.catalog.errors import NotThere, Refused
 from server.recording.catalog.rows import MAX_ROWS
 from server.recording.export.formats import FORMATS
@@ -167,8 +168,8 @@ def file(request: Request, id: Id) -> Response:
     row, path = recordings.row(id), recordings.path(id)
     if row is None or path is None:
         raise HTTPException(404, "There is no such recording.")
-    if path.is_dir():
-        raise HTTPException(409, "This recording is a folder of several files: export it, or copy it from the disk.")
+    if (what := why_not_one_file(path)) is not None:
+        raise HTTPException(409, f"This recording is {what}: export it, or copy it from the disk.")
     name = f"{id} {row['title']}".strip() + f".{row['format']}"
     return file_answer(request, path, name=name, media_type=_TYPES.get(row["format"], "application/octet-stream"))
 
