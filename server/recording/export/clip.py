@@ -244,6 +244,7 @@ def _short(window: Window, first_ns: int, last_ns: int) -> Iterator[str]:
 
 def _damage(recording: Recording, first_ns: int) -> Iterator[str]:
     """What could not be read. That a file has no end yet is no damage to a clip: see `_short`."""
+    yield from (f"{sentence}." for sentence in recording.lacking)
     for file in recording.files:
         lost = replace(file.damage, is_cut=False)
         yield from (f"{sentence}." for sentence in lost.sentences(file.path.name, first_ns, file.end_ns))

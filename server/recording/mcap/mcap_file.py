@@ -37,17 +37,14 @@ class McapFile:
         *,
         content: Path | None = None,
         copy: TemporaryCopy | None = None,
-        missing: tuple[str, ...] = (),
     ) -> None:
-        """`path`: how it is named; `content`: where it is, which is in `copy` where that is given; `missing`: files
-        that belong to it.
+        """`path`: how it is named; `content`: where it is, which is in `copy` where that is given.
 
         Raises RecordingUnreadable where no message is whole, PartTooLarge, OSError and MemoryError.
         """
         self.path = path
         self.distro: str | None = None
         self._copy = copy
-        self._missing = missing
         self._file = (content or path).open("rb")
         if copy is not None:
             copy.release()
@@ -113,7 +110,7 @@ class McapFile:
         return rows
 
     def _new_damage(self) -> Damage:
-        return Damage(is_cut=self.is_cut, pieces=self._pieces, missing=self._missing)
+        return Damage(is_cut=self.is_cut, pieces=self._pieces)
 
     def close(self) -> None:
         self._file.close()

@@ -34,13 +34,13 @@ class Bag2Database:
         *,
         content: Path | None = None,
         copy: TemporaryCopy | None = None,
-        missing: tuple[str, ...] = (),
     ) -> None:
-        """`path`: how it is named; `content`: where it is, which is in `copy` where that is given; `missing`: files
-        that belong to it. Raises RecordingUnreadable, sqlite3.Error, OSError."""
+        """`path`: how it is named; `content`: where it is, which is in `copy` where that is given.
+
+        Raises RecordingUnreadable, sqlite3.Error, OSError.
+        """
         self.path = path
         self._copy = copy
-        self._missing = missing
         self._is_torn = False
         self._database: sqlite3.Connection | None = None
         try:
@@ -137,7 +137,7 @@ class Bag2Database:
         return None
 
     def _new_damage(self) -> Damage:
-        return Damage(pieces=self._strays, is_cut=self._is_torn, missing=self._missing)
+        return Damage(pieces=self._strays, is_cut=self._is_torn)
 
 
 def _assert_whole(path: Path) -> None:

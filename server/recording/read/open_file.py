@@ -25,9 +25,9 @@ def open_file(found: Found) -> FileSource:
         content, is_whole = copy.unpack(path) if copy is not None else (path, True)
         source: McapFile | Bag2Database
         if found.kind == "mcap":
-            source = McapFile(path, content=content, copy=copy, missing=found.missing)
+            source = McapFile(path, content=content, copy=copy)
         elif is_whole:
-            source = Bag2Database(path, content=content, copy=copy, missing=found.missing)
+            source = Bag2Database(path, content=content, copy=copy)
         else:
             raise RecordingUnreadable(f"{path} is not complete: it ends too early")
     except BaseException:

@@ -19,7 +19,7 @@ from server.recording.read.decode import Decode, compile_decoder
 from server.recording.read.definitions import definitions_of
 from server.recording.read.errors import RecordingUnreadable, Undecodable
 from server.recording.read.open_file import open_file
-from server.recording.read.recognise import Found, recognise
+from server.recording.read.recognise import Found, FoundRecording, by_name, recognise
 from server.recording.read.source import UNDECLARED, Channel, FileSource
 from server.recording.read.time_order import Stream, in_time_order
 from server.recording.read.unpack import PartTooLarge
@@ -59,12 +59,13 @@ def open_recording(paths: Sequence[Path]) -> Recording:
     if not paths:
         raise RecordingUnreadable("no recording was given")
     sources: list[FileSource] = []
+    lacking: list[str] = []
     try:
         for path in paths:
-            sources += map(_open, recognise(Path(path)))
+            _open_parts(recognise(Path(path)), sources, lacking)
         if len({source.ros_version for source in sources if source.channels}) > 1:
             raise RecordingUnreadable("recordings of ROS 1 and ROS 2 cannot be read as one")
-        return Recording(sources)
+        return Recording(sources, lacking)
     except BaseException:
         for source in sources:
             source.close()
@@ -74,8 +75,10 @@ def open_recording(paths: Sequence[Path]) -> Recording:
 class Recording:
     """A drive on disk. Use it as a context manager, or close it."""
 
-    def __init__(self, sources: Sequence[FileSource]) -> None:
+    def __init__(self, sources: Sequence[FileSource], lacking: Sequence[str] = ()) -> None:
+        """`lacking`: parts that are missing or cannot be read at all, a sentence each."""
         self._sources = sources
+        self.lacking = lacking
         self.ros_version: RosVersion = next((s for s in sources if s.channels), sources[0]).ros_version
         self.topics: dict[str, TopicInfo] = {}
         self.notes: list[str] = []  # topics left out, each with the reason, for a person
@@ -97,7 +100,7 @@ class Recording:
     @property
     def damage(self) -> list[str]:
         """What the newest reading had to leave out because it is damaged or was never written, in sentences."""
-        return [
+        return [*self.lacking] + [
             sentence
             for source in self._sources
             for sentence in source.damage.sentences(source.path.name, self._start_ns, source.end_ns)
@@ -107,6 +110,12 @@ class Recording:
     def files(self) -> Sequence[FileSource]:
         """The source files, for copying messages unchanged."""
         return self._sources
+
+    def assert_some(self, source: FileSource) -> None:
+        """Check, when a file was read, that it or another one is not damaged everywhere. Raises RecordingUnreadable."""
+        filled = [one for one in self._sources if any(channel.count for channel in one.channels)]
+        if all(one.damage.is_total for one in filled):
+            raise RecordingUnreadable(source.damage.why_nothing(source.path))
 
     @property
     def count(self) -> int:
@@ -205,7 +214,7 @@ class Recording:
                     continue
                 yield time_ns / 1e9, topic, type, message
             if source.damage.is_total:
-                raise RecordingUnreadable(source.damage.why_nothing(source.path))
+                self.assert_some(source)
         except (RecordingUnreadable, MemoryError):
             raise
         except Exception as error:  # a damaged file makes the readers fail in every way there is
@@ -219,6 +228,24 @@ def _definition_of(channel: Channel) -> str | None:
 
 def _nothing(raw: bytes) -> dict[str, Any]:
     return {}
+
+
+def _open_parts(found: FoundRecording, sources: list[FileSource], lacking: list[str]) -> None:
+    """Adds the files that can be opened, and sentences on the others. Raises RecordingUnreadable where none can."""
+    opened: list[FileSource] = []
+    why_not: list[str] = []
+    for file in found.files:
+        try:
+            opened.append(_open(file))
+            sources.append(opened[-1])
+        except RecordingUnreadable as why:
+            if len(found.files) == 1 and not found.lacking:
+                raise
+            why_not.append(by_name(why, file.path))
+    lacking += [*why_not, *found.lacking]
+    if not opened:
+        folder = found.files[0].path.parent
+        raise RecordingUnreadable(f"{folder} has no file that can be read: {why_not[0]}")
 
 
 def _open(found: Found) -> FileSource:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 from typing import IO, Literal
 
@@ -48,10 +49,17 @@ class Found:
     kind: Kind
     is_packed: bool = False  # as a whole, with zstd, as rosbag2 does it once it is complete
     bag: BagMetadata | None = None  # of the bag in whose folder it is
-    missing: tuple[str, ...] = ()  # files that the bag's metadata name and that are not there, told with its first file
 
 
-def recognise(path: Path) -> list[Found]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundRecording:
+    """The files of one recording."""
+
+    files: list[Found]
+    lacking: list[str] = field(default_factory=list)  # parts that are missing or not readable, in sentences
+
+
+def recognise(path: Path) -> FoundRecording:
     """The files of a path: itself, or those of a directory, which is one recording.
 
     Raises RecordingUnreadable where there are none.
@@ -60,7 +68,7 @@ def recognise(path: Path) -> list[Found]:
         if not path.exists():
             raise RecordingUnreadable(f"{path} does not exist")
         if not path.is_dir():
-            return [_found(path)]
+            return FoundRecording(files=[_found(path)])
         if (path / METADATA).exists():
             return _of_bag(path)
         inside = _files_in(path)
@@ -74,10 +82,10 @@ def recognise(path: Path) -> list[Found]:
     if len(kinds) > 1 or (len(inside) > 1 and kinds == {".bag"}):
         names = ", ".join(file.name for file in inside[:4])
         raise RecordingUnreadable(f"{path} holds several recordings ({names}): name the one to read")
-    return [_found(file) for file in inside]
+    return _parts(inside)
 
 
-def _of_bag(folder: Path) -> list[Found]:
+def _of_bag(folder: Path) -> FoundRecording:
     """The files that a bag's metadata name, and the parts that a recorder wrote after them without naming them."""
     bag = read_metadata(folder)
     there = {_plain(file.name): file for file in _files_in(folder)}
@@ -90,8 +98,37 @@ def _of_bag(folder: Path) -> list[Found]:
         raise RecordingUnreadable(
             f"{folder} is not complete: {', '.join(missing[:4]) or 'every file'} of its {METADATA} is missing"
         )
-    found = [replace(_found(file), bag=bag) for _, file in sorted(files.items())]
-    return [replace(found[0], missing=missing), *found[1:]]
+    found = _parts([file for _, file in sorted(files.items())])
+    lacking = [_missing(missing, found.files[0].path.name)] if missing else []
+    return FoundRecording(files=[replace(one, bag=bag) for one in found.files], lacking=[*found.lacking, *lacking])
+
+
+def _parts(files: Sequence[Path]) -> FoundRecording:
+    """Those that are recordings: a recorder that was killed can leave an empty one. Raises RecordingUnreadable where
+    none is one."""
+    found: list[Found] = []
+    lacking: list[str] = []
+    for file in files:
+        try:
+            found.append(_found(file))
+        except RecordingUnreadable as why:
+            if len(files) == 1:
+                raise
+            lacking.append(by_name(why, file))
+    if not found:
+        raise RecordingUnreadable(f"{files[0].parent} has no file that can be read: {lacking[0]}")
+    return FoundRecording(files=found, lacking=lacking)
+
+
+def by_name(why: Exception, file: Path) -> str:
+    """A sentence on a file with its name in place of its path."""
+    return str(why).replace(str(file), file.name)
+
+
+def _missing(names: Sequence[str], beside: str) -> str:
+    which = "is" if len(names) == 1 else "are" if len(names) <= 4 else f"and {len(names) - 4} more are"
+    them = "it" if len(names) == 1 else "them"
+    return f"{', '.join(names[:4])} {which} missing beside {beside}: {METADATA} names {them}"
 
 
 def _files_in(folder: Path) -> list[Path]:

@@ -38,7 +38,6 @@ class Damage:
     too_large: int = 0  # of the lost ones: larger, unpacked, than may be read
     is_cut: bool = False  # its end is missing too, of unknown length
     pieces: int = 0  # without checksums or times of their own, that could not be read either
-    missing: tuple[str, ...] = ()  # names of files that belong to it and are not there
 
     def leave_out(self, start_ns: int, end_ns: int, why: Exception) -> None:
         """One part cannot be read."""
@@ -71,20 +70,11 @@ class Damage:
         if self.pieces:
             which = "1 piece of it is" if self.pieces == 1 else f"{self.pieces} pieces of it are"
             said.append(f"{name} is damaged: {which} left out")
-        if self.missing:
-            names = ", ".join(self.missing[:4])
-            which = "is" if len(self.missing) == 1 else f"and {len(self.missing) - 4} more are"
-            which = "are" if 1 < len(self.missing) <= 4 else which
-            said.append(f"{names} {which} missing beside {name}: metadata.yaml names {_them(self.missing)}")
         if self.is_cut:
             said.append(
                 f"{name} was never closed: it is read to its last whole part, {(end_ns - origin_ns) / 1e9:.1f} s"
             )
         return said
-
-
-def _them(names: Sequence[str]) -> str:
-    return "it" if len(names) == 1 else "them"
 
 
 class FileSource(Protocol):

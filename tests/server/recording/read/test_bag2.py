@@ -87,6 +87,73 @@ def test_a_part_that_the_metadata_do_not_name_yet_is_read(tmp_path: Path, storag
     assert numbers(folder)[0] == list(range(PARTS * EACH))
 
 
+@STORAGES
+@pytest.mark.parametrize("part", [0, 1, PARTS - 1])
+@pytest.mark.parametrize(
+    ("bytes_left", "filler", "said"),
+    [(0, b"", "is empty: it has 0 bytes"), (60, b"", ""), (0, b"a text", "is not a recording: it is a text file")],
+)
+def test_a_part_that_cannot_be_read_is_named_and_the_rest_read(
+    tmp_path: Path, storage: Storage, part: int, bytes_left: int, filler: bytes, said: str
+) -> None:
+    """As a recorder leaves its last part that is killed."""
+    folder = split(tmp_path, storage)
+    torn = next(folder.glob(f"drive_{part}.*"))
+    next(folder.glob(f"drive_{(part + 2) % PARTS}.*")).unlink()
+    torn.write_bytes(torn.read_bytes()[:bytes_left] + filler)
+    for _ in range(2):
+        read, damage = numbers(folder)
+        assert read == sorted(read)
+        assert len(read) == (PARTS - 2) * EACH
+        assert len([one for one in damage if one.startswith(f"{torn.name} {said}")]) == 1
+        assert len(damage) == 1 + (folder / "metadata.yaml").exists()
+        assert str(tmp_path) not in " ".join(damage)
+        (folder / "metadata.yaml").unlink(missing_ok=True)
+
+
+@STORAGES
+def test_parts_none_of_which_can_be_read_are_no_recording(tmp_path: Path, storage: Storage) -> None:
+    folder = split(tmp_path, storage)
+    for content in (b"", b"\x89MCAP0\r\n" if storage == "mcap" else b"SQLite format 3\0"):
+        for file in folder.glob("drive_*"):
+            file.write_bytes(content)
+        with pytest.raises(RecordingUnreadable, match=r"has no file that can be read: drive_0\."):
+            numbers(folder)
+
+
+def test_a_part_without_a_whole_chunk_is_named_and_the_rest_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = split(tmp_path, "mcap")
+    files = sorted(folder.glob("drive_*"))
+    last = files[-1].read_bytes()
+    for number, file in enumerate((files[1], files[0], *files[2:])):
+        content = bytearray(file.read_bytes())
+        at = content.index(b"\x00\x01\x00\x00")  # the first message, in its chunk
+        content[at] ^= 0xFF
+        file.write_bytes(content)
+        if number < PARTS - 1:
+            read, damage = numbers(folder)
+            assert len(read) == (PARTS - 1 - number) * EACH
+            assert len([one for one in damage if one.startswith(f"{file.name} is damaged")]) == 1
+    assert main(["export", str(folder), "--format", "bag", "--out", str(tmp_path / "no.bag")]) == 2
+    with pytest.raises(RecordingUnreadable, match="none of its 1 parts is whole"):
+        numbers(folder)
+    files[-1].write_bytes(last)
+    assert main(["export", str(folder), "--format", "bag", "--out", str(tmp_path / "out.bag")]) == 1
+    clip = ["export", str(folder), "--format", "mcap", "--at", "8", "--out", str(tmp_path / "out.mcap")]
+    assert main(clip) == 1
+    assert "drive_1.mcap is damaged" in capsys.readouterr().err
+
+
+def test_a_clip_names_a_part_that_cannot_be_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = split(tmp_path, "mcap")
+    (folder / "drive_2.mcap").write_bytes(b"")
+    clip = ["export", str(folder), "--format", "mcap", "--at", "8", "--out", str(tmp_path / "out.mcap")]
+    assert main(clip) == 1
+    assert "drive_2.mcap is empty" in capsys.readouterr().err
+
+
 def test_another_recording_in_the_folder_is_none_of_its_parts(tmp_path: Path) -> None:
     folder = split(tmp_path, "mcap")
     shutil.copy(folder / "drive_0.mcap", folder / "clip.mcap")
