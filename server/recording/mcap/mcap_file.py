@@ -86,13 +86,17 @@ class McapFile:
             else RecordingUnreadable(f"{self.path} is damaged: {which} is whole")
         )
 
-    def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-        self.damage = self._new_damage()
+    def messages(
+        self, numbers: set[int], start_ns: int, damage: Damage | None = None
+    ) -> Iterator[tuple[int, int, bytes]]:
+        noted = damage
+        if noted is None:
+            noted = self.damage = self._new_damage()
         parts = [part for part in self._parts if _matters(part, numbers, start_ns)]
-        self.damage.parts = len(parts)
-        yield from in_order(parts, lambda part: self._whole(part, numbers, start_ns))
+        noted.parts = len(parts)
+        yield from in_order(parts, lambda part: self._whole(part, numbers, start_ns, noted))
 
-    def _whole(self, part: Part, numbers: set[int], start_ns: int) -> list[ChunkRow]:
+    def _whole(self, part: Part, numbers: set[int], start_ns: int, damage: Damage) -> list[ChunkRow]:
         """The messages of a part that are wanted; none where it is damaged."""
         try:
             if part.run_bytes:
@@ -102,11 +106,11 @@ class McapFile:
         except MemoryError:
             raise
         except Exception as why:  # damage makes the readers fail in every way there is
-            self.damage.leave_out(part.message_start_time, part.message_end_time, why)
+            damage.leave_out(part.message_start_time, part.message_end_time, why)
             return []
         if any(raw[:4] == PACKED for _, _, raw in rows):
             rows, lost = unpacked_rows(rows, self._cdr)
-            self.damage.pieces += lost
+            damage.pieces += lost
         return rows
 
     def _new_damage(self) -> Damage:

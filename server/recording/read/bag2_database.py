@@ -53,8 +53,11 @@ class Bag2Database:
             raise
         self.damage = self._new_damage()
 
-    def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-        self.damage = self._new_damage()
+    def messages(
+        self, numbers: set[int], start_ns: int, damage: Damage | None = None
+    ) -> Iterator[tuple[int, int, bytes]]:
+        if damage is None:
+            damage = self.damage = self._new_damage()
         if not numbers:
             return
         marks = ",".join("?" * len(numbers))
@@ -66,7 +69,7 @@ class Bag2Database:
         for time_ns, number, raw in rows:
             message = unpacked(raw) if raw[:4] == PACKED else raw
             if message is None:
-                self.damage.pieces += 1
+                damage.pieces += 1
             else:
                 yield time_ns, number, message
 

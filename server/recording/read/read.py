@@ -20,7 +20,7 @@ from server.recording.read.definitions import definitions_of
 from server.recording.read.errors import RecordingUnreadable, Undecodable
 from server.recording.read.open_file import open_file
 from server.recording.read.recognise import Found, FoundRecording, by_name, recognise
-from server.recording.read.source import UNDECLARED, Channel, FileSource
+from server.recording.read.source import UNDECLARED, Channel, Damage, FileSource
 from server.recording.read.time_order import Stream, in_time_order
 from server.recording.read.unpack import PartTooLarge
 
@@ -146,15 +146,22 @@ class Recording:
 
     def own(self, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
         """What catgraph itself wrote on one of its channels ("/catgraph/alarms"), in time order: seconds since 1970,
-        and what it says. None of it is among `topics` and `messages()`."""
-        for source in self._sources:
-            numbers = {channel.number for channel in source.channels if channel.topic == topic}
-            if numbers and topic.startswith(PREFIX):
-                for time_ns, _, raw in source.messages(numbers, 0):
-                    try:
-                        yield time_ns / 1e9, _decode_json(raw)
-                    except Undecodable:
-                        self.rejected[topic] = self.rejected.get(topic, 0) + 1
+        and what it says. None of it is among `topics` and `messages()`, and `damage` stays that of the newest reading
+        of those."""
+        streams = [
+            Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._own(source, topic))
+            for source in self._sources
+            if topic.startswith(PREFIX)
+        ]
+        return in_time_order(streams, operator.itemgetter(0))
+
+    def _own(self, source: FileSource, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
+        numbers = {channel.number for channel in source.channels if channel.topic == topic}
+        for time_ns, _, raw in source.messages(numbers, 0, Damage()) if numbers else ():
+            try:
+                yield time_ns / 1e9, _decode_json(raw)
+            except Undecodable:
+                self.rejected[topic] = self.rejected.get(topic, 0) + 1
 
     def close(self) -> None:
         for source in self._sources:

@@ -89,13 +89,16 @@ class FileSource(Protocol):
 
     @property
     def damage(self) -> Damage:
-        """Of the newest reading."""
+        """Of the newest reading that has no other place for it."""
         ...
 
-    def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
+    def messages(
+        self, numbers: set[int], start_ns: int, damage: Damage | None = None
+    ) -> Iterator[tuple[int, int, bytes]]:
         """(time in ns, number of the channel, raw message) in time order, from `start_ns` on.
 
-        Where the file has checksums of its parts, damaged ones are left out and noted in `damage`."""
+        Where the file has checksums of its parts, damaged ones are left out and noted: in `damage` where that is given,
+        else in that of the file."""
         ...
 
     def close(self) -> None: ...
