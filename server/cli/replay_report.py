@@ -80,8 +80,6 @@ class Report:
             say(f"  Note: {_counted(count, 'message')} on {topic} left out: {why}")
         for sentence in self._recording.damage:
             say(f"  Note: {sentence}")
-        for sentence in self._recording.damage:
-            say(f"  Note: {sentence}.")
 
 
 def say(text: str, end: str = "\n") -> None:
