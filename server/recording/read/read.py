@@ -65,7 +65,7 @@ def open_recording(paths: Sequence[Path]) -> Recording:
             _open_parts(recognise(Path(path)), sources, lacking)
         if len({source.ros_version for source in sources if source.channels}) > 1:
             raise RecordingUnreadable("recordings of ROS 1 and ROS 2 cannot be read as one")
-        return Recording(sources, lacking)
+        return Recording(sources, lacking, list(map(Path, paths)))
     except BaseException:
         for source in sources:
             source.close()
@@ -75,10 +75,11 @@ def open_recording(paths: Sequence[Path]) -> Recording:
 class Recording:
     """A drive on disk. Use it as a context manager, or close it."""
 
-    def __init__(self, sources: Sequence[FileSource], lacking: Sequence[str] = ()) -> None:
-        """`lacking`: parts that are missing or cannot be read at all, a sentence each."""
+    def __init__(self, sources: Sequence[FileSource], lacking: Sequence[str], paths: Sequence[Path]) -> None:
+        """`lacking`: parts that are missing or cannot be read at all, a sentence each; `paths`: files and folders."""
         self._sources = sources
         self.lacking = lacking
+        self.paths = paths
         self.ros_version: RosVersion = next((s for s in sources if s.channels), sources[0]).ros_version
         self.topics: dict[str, TopicInfo] = {}
         self.notes: list[str] = []  # topics left out, each with the reason, for a person

@@ -11,11 +11,16 @@ from typing import Any
 import pytest
 import zstandard
 
+from server.analysis.drive.drive_report import DriveReport
+from server.protocol.marks import DriveMark
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.discovery import files_below
 from server.recording.catalog.errors import Refused
 from server.recording.catalog.survey import survey
+from server.recording.marks.of_drive import marks_of
+from server.recording.marks.rows import row_of
+from server.recording.read.read import open_recording
 from tests.server.recording.bags import Drive, write_ros2
 from tests.server.recording.read.test_bag2 import EACH, PARTS, left_open, split
 
@@ -236,3 +241,42 @@ def test_a_database_is_never_without_its_log(
     listed.delete(row["id"])
     listed.restore(row["id"])
     assert {file: file.read_bytes() for file in path.parent.iterdir()} == before
+
+
+def late_mark(words: str) -> DriveMark:
+    row = row_of({"mark": "m1", "marked_ms": 5000, "category": None, "words": words})
+    assert row is not None
+    return row
+
+
+@pytest.mark.parametrize("kind", ["words", "media"])
+def test_a_part_with_notes_of_its_own_keeps_them_and_its_row(tmp_path: Path, kind: str) -> None:
+    files = bag_in(tmp_path / "r" / "drive")
+    if kind == "words":
+        annotation_store.write(files[1], annotation_store.Annotations(title="the gate"))
+        annotation_store.write_marks(files[1], [late_mark("late")], [])
+    else:
+        annotation_store.media_beside(files[1]).mkdir()
+        (annotation_store.media_beside(files[1]) / "m1.photo.png").write_bytes(b"a photo")
+    before = {file: file.read_bytes() for file in (tmp_path / "r").rglob("*") if file.is_file()}
+    listed = catalog(tmp_path / "r")
+    rows = {row["file"]: row for row in listed.rows().rows}
+    assert set(rows) == {file.name for file in files if file.suffix == ".mcap"}
+    found = rows[files[1].name]
+    assert (found["title"], found["marks"]) == (("the gate", 1) if kind == "words" else ("", 0))
+    listed.delete(rows[files[0].name]["id"])
+    listed.restore(rows[files[0].name]["id"])
+    assert {file: file.read_bytes() for file in (tmp_path / "r").rglob("*") if file.is_file()} == before
+
+
+def test_what_is_said_of_a_split_bag_is_in_its_report_and_among_its_marks(tmp_path: Path) -> None:
+    bag_in(tmp_path / "r" / "drive")
+    listed = catalog(tmp_path / "r")
+    (row,) = listed.rows().rows
+    listed.annotate(row["id"], title="the gate")
+    path = listed.path(row["id"])
+    assert path is not None
+    annotation_store.write_marks(path, [late_mark("late")], [])
+    with open_recording([path]) as recording:
+        assert [mark["words"] for mark in marks_of(recording)] == ["late"]
+        assert DriveReport.read(recording, name="drive").found["title"] == "the gate"
