@@ -38,6 +38,7 @@ from server.recording.drive.motion import Motion
 from server.recording.event_channels import read_recorded_events
 from server.recording.marks.of_drive import in_recording
 from server.recording.mcap.chain import read_head
+from server.recording.read.errors import NoRoom
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 
 VERSION = 9  # of what is found: with another one, files are read again
@@ -52,13 +53,16 @@ _ALARMS = "/catgraph/alarms"
 
 
 def survey(path: Path) -> dict[str, Any]:
-    """The survey of one file. `problem` is the reason why it cannot be read; then it is the only entry.
+    """The survey of one file. `problem` is the reason why it cannot be read; then it is the only entry, but for
+    `is_passing` where it can be read later.
 
     Lengths in m and s, speeds in m/s, times in ms since 1970. Unknown is None; `alarms` is None if none were recorded.
     """
     try:
         with open_recording([path]) as recording:
             found = _read(recording, path)
+    except NoRoom as why:
+        return {"problem": _sentence(str(why), path), "is_passing": True}
     except RecordingUnreadable as why:
         return {"problem": _sentence(str(why), path)}
     except MemoryError:

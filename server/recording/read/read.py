@@ -17,7 +17,7 @@ from server.recording.mcap.mcap_file import McapFile
 from server.recording.own import PREFIX
 from server.recording.read.decode import Decode, compile_decoder
 from server.recording.read.definitions import definitions_of
-from server.recording.read.errors import RecordingUnreadable, Undecodable
+from server.recording.read.errors import NoRoom, RecordingUnreadable, Undecodable
 from server.recording.read.open_file import open_file
 from server.recording.read.recognise import Found, FoundRecording, by_name, recognise
 from server.recording.read.source import UNDECLARED, Channel, Damage, FileSource
@@ -246,6 +246,8 @@ def _open_parts(found: FoundRecording, sources: list[FileSource], lacking: list[
         try:
             opened.append(_open(file))
             sources.append(opened[-1])
+        except NoRoom:  # nothing is known of the file
+            raise
         except RecordingUnreadable as why:
             if len(found.files) == 1 and not found.lacking:
                 raise

@@ -5,6 +5,8 @@ A recording is never changed, and its folder may not be writable.
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -14,7 +16,7 @@ from typing import IO
 import zstandard
 
 from server.recording import space
-from server.recording.read.errors import RecordingUnreadable
+from server.recording.read.errors import NoRoom
 
 LEAVE_FREE = 1 << 30  # bytes of the disk with the temporary files
 LOOK_EVERY = 32 << 20  # bytes written between two checks of the disk
@@ -26,7 +28,8 @@ class TemporaryCopy:
     """A folder with copies, which goes with `close`. The disk keeps room for others that record meanwhile."""
 
     def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="catgraph-")
+        with _room():
+            self._folder = tempfile.TemporaryDirectory(prefix="catgraph-")
         self.path = Path(self._folder.name)
         self._leave_free = max(LEAVE_FREE, space.free_at(self.path.parent) // 2)
         self._look_in = 0
@@ -43,10 +46,10 @@ class TemporaryCopy:
     def unpack(self, packed: Path) -> tuple[Path, bool]:
         """A file packed with zstd, unpacked, and whether it ends where it should; what is whole of it is there.
 
-        Raises RecordingUnreadable where it does not fit on the disk, OSError.
+        Raises NoRoom where it does not fit on the disk, OSError.
         """
         target = self.path / packed.stem
-        with packed.open("rb") as source, target.open("wb") as copy:
+        with _room(), packed.open("rb") as source, target.open("wb") as copy:
             frames = _Frames(source)
             self._write(frames.blocks(), copy)
         return target, frames.is_whole
@@ -54,7 +57,7 @@ class TemporaryCopy:
     def copy(self, file: Path) -> Path:
         """A file as it is. Raises as `unpack`."""
         target = self.path / file.name
-        with file.open("rb") as source, target.open("wb") as copy:
+        with _room(), file.open("rb") as source, target.open("wb") as copy:
             self._write(iter(lambda: source.read(_BLOCK), b""), copy)
         return target
 
@@ -67,9 +70,20 @@ class TemporaryCopy:
                 self._look_in = LOOK_EVERY
                 free = space.free_at(self.path.parent)
                 if free < self._leave_free:
-                    raise RecordingUnreadable(
+                    raise NoRoom(
                         f"a file of this recording, unpacked, does not fit on the disk: {space.amount(free)} are free"
                     )
+
+
+@contextlib.contextmanager
+def _room() -> Iterator[None]:
+    """Raises NoRoom where the disk takes no more."""
+    try:
+        yield
+    except OSError as why:
+        if why.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise NoRoom("a file of this recording, unpacked, does not fit on the disk: it is full") from None
 
 
 class _Frames:

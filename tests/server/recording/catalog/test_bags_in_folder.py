@@ -13,6 +13,7 @@ import zstandard
 
 from server.analysis.drive.drive_report import DriveReport
 from server.protocol.marks import DriveMark
+from server.recording import space
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.discovery import files_below
@@ -20,6 +21,7 @@ from server.recording.catalog.errors import Refused
 from server.recording.catalog.survey import survey
 from server.recording.marks.of_drive import marks_of
 from server.recording.marks.rows import row_of
+from server.recording.read import temporary_copy
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import Drive, write_ros2
 from tests.server.recording.read.test_bag2 import EACH, PARTS, left_open, split
@@ -280,3 +282,37 @@ def test_what_is_said_of_a_split_bag_is_in_its_report_and_among_its_marks(tmp_pa
     with open_recording([path]) as recording:
         assert [mark["words"] for mark in marks_of(recording)] == ["late"]
         assert DriveReport.read(recording, name="drive").found["title"] == "the gate"
+
+
+@pytest.mark.parametrize("how", ["little room", "full"])
+def test_a_file_for_whose_copy_there_was_no_room_is_read_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    bag = write_ros2(tmp_path / "made", Drive(messages=[(0.0, "/n", "std_msgs/msg/Int32", {"data": 1})]))
+    vehicle = tmp_path / "r" / "drive"
+    vehicle.mkdir(parents=True)
+    for part in range(2):  # the other one could be read
+        content = (bag / "made.mcap").read_bytes()
+        end, content = (".zstd", zstandard.ZstdCompressor().compress(content)) if part else ("", content)
+        (vehicle / f"drive_{part}.mcap{end}").write_bytes(content)
+    listed = catalog(tmp_path / "r")
+    with monkeypatch.context() as now:
+        if how == "full":
+            now.setattr(temporary_copy.TemporaryCopy, "_write", full)
+        else:
+            now.setattr(space, "free_at", lambda path: 0)
+        (entry,) = listed._entries.select("", [])
+        listed._survey._keep(entry, survey(vehicle))
+    (row,) = listed.rows().rows
+    assert row["state"] == "unreadable"
+    assert "does not fit on the disk" in (row["problem"] or "")
+    listed.walk()
+    (entry,) = listed._entries.select("", [])
+    assert entry.found is None
+    listed._survey._keep(entry, survey(vehicle))
+    listed.walk()
+    assert [row["state"] for row in listed.rows().rows] == ["read"]
+
+
+def full(*_: Any) -> None:
+    raise OSError(errno.ENOSPC, "no space left on device")
