@@ -20,6 +20,7 @@ _OTHERS = (*_ENDINGS, WRITING, RECOVERING)  # beside the parts of a bag: other r
 _PART = re.compile(r"(.+)_\d+\.(mcap|db3)(?:\.zstd)?")  # of a split bag of ROS 2
 _METADATA = "metadata.yaml"
 _LOGS = ("-wal", "-journal")  # of a database that was not closed
+SEVERAL = "a folder of several files"  # what a split bag is
 _DEEP = 3  # folders below the root that are looked into
 _STAMP = re.compile(r"(\d{8}T\d{6})Z")
 
@@ -114,7 +115,7 @@ def files_of(path: Path) -> list[Path]:
 def why_not_one_file(path: Path) -> str | None:
     """What a recording is of which no single file is a copy, as words behind "it is"; None: its file is all of it."""
     if path.is_dir():
-        return "a folder of several files"
+        return SEVERAL
     with contextlib.suppress(FileNotFoundError):
         if any(file.stat().st_size for file in files_of(path)[1:]):
             return "a database with a log that holds a part of it"

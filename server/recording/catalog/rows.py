@@ -14,6 +14,7 @@ from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import catalog_db
 from server.recording.catalog.annotations import LATE
 from server.recording.catalog.catalog_db import Entry, Which
+from server.recording.catalog.discovery import SEVERAL
 from server.recording.catalog.entries import Entries
 from server.recording.catalog.errors import Refused
 from server.recording.catalog.verifications import Verifications
@@ -88,6 +89,7 @@ def row_of(entry: Entry, verified: VerificationAnswer | None = None) -> Recordin
         "state": "waiting" if entry.found is None else "unreadable" if problem else "read",
         "problem": problem,
         "damage": found.get("damage", []),
+        "unread": found.get("unread", []),
         "left_out": found.get("left_out", []),
         "left_out_count": found.get("left_out_count", 0),
         "not_received": found.get("not_received", []),
@@ -99,6 +101,7 @@ def row_of(entry: Entry, verified: VerificationAnswer | None = None) -> Recordin
         "clip_of": found.get("clip_of"),
         "file": annotation_store.line(name),
         "format": _format(name),
+        "several_files": found.get("several_files") or (SEVERAL if _format(name) == FOLDER else None),
         "sha256": found.get("sha256"),
         "head": found.get("head"),
         "verified": verified,

@@ -30,7 +30,7 @@ from server.judge.speed_trace import SpeedTrace
 from server.protocol.drive_trends import DriveFacts, DriveTrendsAnswer, Wanted, answer
 from server.protocol.marks import DriveMark
 from server.recording.catalog.annotations import MAX_MARKS, line
-from server.recording.catalog.discovery import files_of
+from server.recording.catalog.discovery import files_of, why_not_one_file
 from server.recording.catalog.sketch import sketch
 from server.recording.drive.course import course_of
 from server.recording.drive.facts import facts_of, figures_of, limits_of, undescribed_of
@@ -41,7 +41,7 @@ from server.recording.mcap.chain import read_head
 from server.recording.read.errors import NoRoom
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 
-VERSION = 9  # of what is found: with another one, files are read again
+VERSION = 10  # of what is found: with another one, files are read again
 PRIORITIES = ("critical", "warning", "advisory")
 MAX_RAISED = 200  # alarms listed one by one; all are counted
 MAX_SENTENCES = 10
@@ -109,6 +109,8 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "not_received": _names(metadata.get("not_received", "")),
         "not_received_count": _count(metadata, "not_received"),
         "damage": damage[:MAX_SENTENCES],
+        "unread": [_sentence(note, path) for note in recording.notes[:MAX_SENTENCES]],
+        "several_files": why_not_one_file(path),
         "sketch": None if drawn is None else drawn.as_json(),
         "marks": _marks(recording),
         "trends": motion.sketch(recording),

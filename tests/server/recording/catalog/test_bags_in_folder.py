@@ -24,7 +24,7 @@ from server.recording.marks.rows import row_of
 from server.recording.read import temporary_copy
 from server.recording.read.read import open_recording
 from tests.server.recording.bags import Drive, write_ros2
-from tests.server.recording.read.test_bag2 import EACH, PARTS, left_open, split
+from tests.server.recording.read.test_bag2 import EACH, PARTS, database, left_open, split
 
 
 def catalog(folder: Path) -> Catalog:
@@ -42,6 +42,7 @@ def test_a_split_bag_is_one_recording(tmp_path: Path) -> None:
     assert (row["file"], row["format"]) == ("drive", "folder")
     assert row["size_bytes"] == sum(file.stat().st_size for file in bag.iterdir())
     assert listed.path(row["id"]) == bag
+    assert row["several_files"] == "a folder of several files"
     found = survey(bag)
     assert (found["messages"], found["damage"]) == (PARTS * EACH, [])
     assert len(found["sha256"]) == 64
@@ -312,6 +313,22 @@ def test_a_file_for_whose_copy_there_was_no_room_is_read_again(
     listed._survey._keep(entry, survey(vehicle))
     listed.walk()
     assert [row["state"] for row in listed.rows().rows] == ["read"]
+
+
+def test_the_row_says_what_is_left_out_and_what_is_in_a_log(tmp_path: Path) -> None:
+    path = tmp_path / "r" / "drive.db3"
+    path.parent.mkdir()
+    database(path, "INSERT INTO topics VALUES (2, '/x', 'a/msg/X', 'cdr_xml')",
+             "INSERT INTO messages VALUES (3, 2, 3000000000, x'00')")  # fmt: skip
+    shutil.copytree(left_open(tmp_path / "made").parent, tmp_path / "r" / "killed")
+    listed = catalog(tmp_path / "r")
+    for entry in listed._entries.select("", []):
+        listed._survey._keep(entry, survey(tmp_path / "r" / entry.path))
+    rows = {row["file"]: row for row in listed.rows().rows}
+    found, killed = rows["drive.db3"], rows["drive_0.db3"]
+    assert found["unread"] == ["/x (1 messages) is left out: messages encoded as 'cdr_xml' are not supported."]
+    assert (found["damage"], found["several_files"]) == ([], None)
+    assert (killed["unread"], killed["several_files"]) == ([], "a database with a log that holds a part of it")
 
 
 def full(*_: Any) -> None:
