@@ -55,10 +55,12 @@ class Index:
 
     @property
     def span_ns(self) -> tuple[int, int]:
-        """First and last message; (0, 0) where there is none."""
-        if not self.parts:
+        """First and last message of the whole parts; where none is whole as they are declared, (0, 0) where there is
+        none."""
+        parts = [part for part in self.parts if part.channels] or self.parts  # those of damaged ones can be anything
+        if not parts:
             return 0, 0
-        return min(p.message_start_time for p in self.parts), max(p.message_end_time for p in self.parts)
+        return min(part.message_start_time for part in parts), max(part.message_end_time for part in parts)
 
     def take(self, opcode: int, body: bytes) -> None:
         """Notes what a record declares. Of the same id the first counts; damage raises any exception."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
@@ -222,6 +223,26 @@ def test_a_file_that_was_never_closed_is_read_to_its_last_whole_part(
     with open_recording([path]) as recording:
         assert recording.topics["/text"].count == len(came)
         assert recording.duration_s == pytest.approx(last_ns / 1e9)
+
+
+@PROFILES
+@pytest.mark.parametrize("number", [0, 2, -1])
+def test_the_times_of_a_damaged_part_are_not_those_of_the_drive(tmp_path: Path, profile: str, number: int) -> None:
+    path = written(tmp_path / "a.mcap", profile=profile, times=lambda n: 10**18 + n * EVERY_NS)
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    content, at = bytearray(path.read_bytes()), summary.chunk_indexes[number].chunk_start_offset
+    content[at + 9 : at + 25] = struct.pack("<QQ", 5, 2**63)  # behind opcode and length
+    content[at + summary.chunk_indexes[number].chunk_length - 20] ^= 1
+    path.write_bytes(content[:-8])
+    with open_recording([path]) as recording:
+        times = [message.at_s for message in recording.messages()]
+        assert recording.start_s == times[0]
+        assert recording.duration_s == pytest.approx(times[-1] - times[0])
+        assert times[0] >= 1e9
+        assert len(times) > 300
+        assert "is damaged: 1 part of" in recording.damage[0]
 
 
 @PROFILES
