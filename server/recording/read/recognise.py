@@ -152,7 +152,7 @@ def _found(path: Path) -> Found:
             if start.startswith(_ZSTD):
                 file.seek(0)
                 kind = _kind(_first_unpacked(file))
-                if kind is not None:
+                if kind in ("mcap", "db3"):  # rosbag packs no whole files
                     return Found(path=path, kind=kind, is_packed=True)
     except PermissionError:
         raise RecordingUnreadable(f"{path} may not be read by this user: permission denied") from None
