@@ -49,7 +49,7 @@ class McapFile:
         if copy is not None:
             copy.release()
         try:
-            self.is_cut = _is_cut(self._file)
+            self.is_cut = is_cut(self._file)
             index = self._index()
         except BaseException:
             self._file.close()
@@ -122,7 +122,7 @@ class McapFile:
             self._copy.close()
 
 
-def _is_cut(file: IO[bytes]) -> bool:
+def is_cut(file: IO[bytes]) -> bool:
     """Whether a file was never closed, or lost its end."""
     size = file.seek(0, os.SEEK_END)
     file.seek(max(0, size - len(MAGIC)))

@@ -11,7 +11,7 @@ import orjson
 from mcap.reader import make_reader
 from mcap.records import AttachmentIndex
 
-from server.recording.mcap.mcap_file import McapFile
+from server.recording.mcap.mcap_file import McapFile, is_cut
 from server.recording.mcap.scan import scan
 
 
@@ -27,11 +27,10 @@ def own_entries(source: McapFile, topic: str) -> Iterator[dict[str, Any]]:
 
 def finished(path: Path) -> McapFile:
     """The file, open. Raises ValueError where it was never closed, OSError, and whatever damage makes of it."""
-    source = McapFile(path)
-    if source.is_cut:
-        source.close()
-        raise ValueError(f"{path.name} was never closed")
-    return source
+    with path.open("rb") as file:
+        if is_cut(file):  # before its index is made, for which all of it is unpacked
+            raise ValueError(f"{path.name} was never closed")
+    return McapFile(path)
 
 
 def attachments_of(file: IO[bytes]) -> list[AttachmentIndex]:
