@@ -160,7 +160,7 @@ def _write(
     module, _, function = form.writer.partition(":")
     known: dict[str, Any] = {"compression": args.compression, "with_own": not args.without_own, "name": name}
     options = {option: known[option] for option in form.options}
-    unread = [(note.partition(" is left out")[0], f"{note}.") for note in recording.notes]
+    unread = [(f"{note.partition(' (')[0]} (", f"{note}.") for note in recording.notes]
     outcome: Outcome = getattr(importlib.import_module(module), function)(recording, path, progress=progress, **options)
     named = tuple(outcome.notes)
     outcome.notes += [note for topic, note in unread if not any(one.startswith(topic) for one in named)]

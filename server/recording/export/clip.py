@@ -29,7 +29,7 @@ from server.recording.own import own_schema
 from server.recording.read.errors import Undecodable
 from server.recording.read.read import Recording
 from server.recording.read.schemas import Schema, TypeBook
-from server.recording.read.source import Channel
+from server.recording.read.source import Channel, why_not_decoded
 from server.recording.standing import Stood, read_standing
 
 BEFORE_S = AFTER_S = 30.0
@@ -125,16 +125,15 @@ _LOOKING = 0.4  # of the work: the rest is copying
 
 def _copy(recording: Recording, file: PartFile, window: Window, before: _Before, progress: Progress) -> Outcome:
     outcome = Outcome()
-    channels: dict[tuple[int, int], int | None] = {}  # None: it cannot be in a clip
-    left_out: Counter[tuple[str, str]] = Counter()  # topic and reason
+    channels: dict[tuple[int, int], int | tuple[str, str]] = {}  # or topic and reason: it cannot be in a clip
+    left_out: Counter[tuple[str, str]] = Counter()  # messages by topic and reason
     books: dict[int, TypeBook] = {}
 
-    def number_of(raw: Raw) -> int | None:
+    def number_of(raw: Raw) -> int | tuple[str, str]:
         try:
             schema = _schema(recording, raw.channel, books)
         except Undecodable as why:
-            left_out[raw.channel.topic, str(why)] += raw.channel.count
-            return None
+            return raw.channel.topic, str(why)
         return file.channel(raw.channel.topic, schema, _LATCHED if raw.channel.is_latched else None)
 
     def add(raw: Raw, at_ns: int) -> None:
@@ -142,7 +141,9 @@ def _copy(recording: Recording, file: PartFile, window: Window, before: _Before,
         if place not in channels:
             channels[place] = number_of(raw)
         number = channels[place]
-        if number is not None:
+        if isinstance(number, tuple):
+            left_out[number] += 1
+        else:
             file.add(number, at_ns, raw.data)
 
     first_ns, last_ns = span_ns(recording)
@@ -205,7 +206,7 @@ def _schema(recording: Recording, channel: Channel, books: dict[int, TypeBook]) 
         data = channel.definition or '{"type":"object"}'
         return Schema(name=name, encoding="jsonschema", data=data.encode(), message_encoding="json", encode=None)
     if channel.encoding not in ("ros1", "cdr"):
-        raise Undecodable(f"messages encoded as {channel.encoding[:40]!r} are not supported")
+        raise Undecodable(why_not_decoded(channel.encoding))
     definition = channel.definition
     if channel.format == "none":
         version = recording.ros_version

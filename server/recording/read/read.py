@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 import re
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,7 @@ from server.recording.read.definitions import definitions_of
 from server.recording.read.errors import NoRoom, RecordingUnreadable, Undecodable
 from server.recording.read.open_file import open_file
 from server.recording.read.recognise import Found, FoundRecording, by_name, recognise
-from server.recording.read.source import UNDECLARED, Channel, Damage, FileSource
+from server.recording.read.source import Channel, Damage, FileSource, why_not_decoded
 from server.recording.read.time_order import Stream, in_time_order
 from server.recording.read.unpack import PartTooLarge
 
@@ -82,7 +83,6 @@ class Recording:
         self.paths = paths
         self.ros_version: RosVersion = next((s for s in sources if s.channels), sources[0]).ros_version
         self.topics: dict[str, TopicInfo] = {}
-        self.notes: list[str] = []  # topics left out, each with the reason, for a person
         self.metadata: dict[str, str] = next(
             (s.metadata for s in sources if isinstance(s, McapFile) and s.metadata), {}
         )
@@ -90,8 +90,12 @@ class Recording:
         self.why_rejected: dict[str, str] = {}
         self._readers: list[dict[int, _ChannelReader]] = []
         decoders: dict[tuple[str, str, str], Decode] = {}
+        left_out: Counter[tuple[str, str]] = Counter()  # messages by topic and reason
         for source in sources:
-            self._readers.append(self._readers_of(source, decoders))
+            self._readers.append(self._readers_of(source, decoders, left_out))
+        self.notes = [  # topics left out, each with the reason, for a person
+            f"{topic} ({count} messages) is left out: {why}" for (topic, why), count in left_out.items()
+        ]
         filled = [source for source in sources if any(channel.count for channel in source.channels)]
         self._start_ns = min((source.start_ns for source in filled), default=0)
         end_ns = max((source.end_ns for source in filled), default=self._start_ns)
@@ -177,7 +181,10 @@ class Recording:
         self.close()
 
     def _readers_of(
-        self, source: FileSource, decoders: dict[tuple[str, str, str], Decode]
+        self,
+        source: FileSource,
+        decoders: dict[tuple[str, str, str], Decode],
+        left_out: Counter[tuple[str, str]],
     ) -> dict[int, _ChannelReader]:
         readers: dict[int, _ChannelReader] = {}
         for channel in source.channels:
@@ -193,7 +200,7 @@ class Recording:
                     decoders[key] = _decoder(channel, source)
             except Undecodable as why:
                 if channel.count:
-                    self.notes.append(f"{channel.topic} ({channel.count} messages) is left out: {why}")
+                    left_out[channel.topic, str(why)] += channel.count
                 continue
             readers[channel.number] = _ChannelReader(topic=channel.topic, type=type, decode=decoders[key])
             self.topics[channel.topic] = TopicInfo(
@@ -304,10 +311,8 @@ def _decoder(channel: Channel, source: FileSource) -> Decode:
             pass
         case "cdr" if version == 2:
             pass
-        case other if other == UNDECLARED:
-            raise Undecodable("the file does not declare what they are")
         case other:
-            raise Undecodable(f"messages encoded as {other[:40]!r} are not supported")
+            raise Undecodable(why_not_decoded(other))
     return compile_decoder(channel.type, definitions_of(channel, version, source.distro), version)
 
 

@@ -14,6 +14,13 @@ DefinitionFormat = Literal["none", "msg", "idl"]
 UNDECLARED = ""  # the encoding of messages whose channel the file does not declare
 
 
+def why_not_decoded(encoding: str) -> str:
+    """Why messages of an encoding that is none of ours are left out."""
+    if encoding == UNDECLARED:
+        return "the file does not declare what they are"
+    return f"messages encoded as {encoding[:40]!r} are not supported"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
     """Messages of one topic and type in one file."""
