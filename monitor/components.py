@@ -2,37 +2,79 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
+
 from monitor.values import Component, Diagnostics
 
-SILENT_AFTER_S = 5.0  # as ROS's diagnostic aggregator
-SILENT_PERIODS = 3  # for components that report slowly
-FORGOTTEN_AFTER_S = 60.0  # a node that was ended on purpose does not alarm for ever
+SILENT_AFTER_S = 5.0  # at least, as ROS's diagnostic aggregator …
+SILENT_PERIODS = 3  # … and so many of the component's own intervals
+INTERVALS = 8  # the longest of the newest ones is a component's own: reports also come out of turn
+ONE_INTERVAL_S = 60.0  # at least, while there is only one: two reports of a start are no habit
+SELDOM_S = 150.0  # healthy components report every two minutes, and between two reports nothing else may come
+TOPIC_SILENT_S = 10.0  # at least, of the whole topic
+FORGOTTEN_AFTER_S = 60.0  # at least, and twice the allowed silence: a node that was ended does not alarm for ever
+FORGOTTEN_UNKNOWN_S = 3600.0  # of a component that reported once
 MOST = 1000
 STALE = 3  # diagnostic_msgs/DiagnosticStatus
 
 
+class _Reports:
+    """What one component reported."""
+
+    __slots__ = ("_intervals", "allowed_s", "at_s", "newest")
+
+    def __init__(self, newest: Component, at_s: float) -> None:
+        self.newest, self.at_s = newest, at_s
+        self.allowed_s = math.inf  # the silence that its own interval explains; infinite after a single report
+        self._intervals: deque[float] = deque(maxlen=INTERVALS)
+
+    def add(self, newest: Component, at_s: float) -> None:
+        if at_s > self.at_s:
+            self._intervals.append(at_s - self.at_s)
+            least_s = SILENT_AFTER_S if len(self._intervals) > 1 else ONE_INTERVAL_S
+            self.allowed_s = max(least_s, SILENT_PERIODS * max(self._intervals))
+        self.newest, self.at_s = newest, at_s
+
+    def is_kept(self, now_s: float) -> bool:
+        allowed_s = self.allowed_s
+        kept_s = FORGOTTEN_UNKNOWN_S if math.isinf(allowed_s) else max(FORGOTTEN_AFTER_S, 2 * allowed_s)
+        return -1.0 <= now_s - self.at_s <= kept_s
+
+    def is_due(self, now_s: float) -> bool:
+        return now_s - self.at_s > self.allowed_s
+
+    def at(self, now_s: float) -> Component:
+        if not self.is_due(now_s):
+            return self.newest
+        return Component(name=self.newest.name, level=STALE, message=f"no report for {now_s - self.at_s:.0f} s")
+
+
 class Components:
-    """Merges messages into one list of components; one that falls silent turns STALE, and is forgotten in the end."""
+    """Merges messages into one list of components.
+
+    Each is judged against its own interval: one that falls silent turns STALE, and is forgotten in the end.
+    """
 
     def __init__(self) -> None:
-        # By name: the newest report, its time, and the interval to the previous one.
-        self._heard: dict[str, tuple[Component, float, float]] = {}
+        self._heard: dict[str, _Reports] = {}
 
     def merge(self, said: Diagnostics, at_s: float) -> Diagnostics:
-        """All components known after this message, in the order in which they first spoke."""
+        """All components known after this message, in the order in which they first reported."""
+        heard = self._heard
         for component in said.components:
-            before = self._heard.get(component.name)
-            if before is None and len(self._heard) >= MOST:
-                continue
-            period_s = at_s - before[1] if before is not None and at_s > before[1] else 0.0
-            self._heard[component.name] = (component, at_s, period_s)
-        self._heard = {name: word for name, word in self._heard.items() if -1.0 <= at_s - word[1] <= FORGOTTEN_AFTER_S}
-        return Diagnostics(components=tuple(self._now(word, at_s) for word in self._heard.values()))
+            before = heard.get(component.name)
+            if before is None:
+                heard[component.name] = _Reports(component, at_s)
+            else:
+                before.add(component, at_s)
+        if len(heard) > MOST:  # those that were silent longest make room
+            for name in sorted(heard, key=lambda name: heard[name].at_s)[: len(heard) - MOST]:
+                del heard[name]
+        self._heard = {name: reports for name, reports in heard.items() if reports.is_kept(at_s)}
+        return Diagnostics(components=tuple(reports.at(at_s) for reports in self._heard.values()))
 
-    @staticmethod
-    def _now(word: tuple[Component, float, float], at_s: float) -> Component:
-        component, heard_s, period_s = word
-        silent_s = at_s - heard_s
-        if silent_s <= max(SILENT_AFTER_S, SILENT_PERIODS * period_s):
-            return component
-        return Component(name=component.name, level=STALE, message=f"no report for {silent_s:.0f} s")
+    def horizon_s(self, now_s: float) -> float:
+        """The silence of all together that the intervals of those that still report explain [s]."""
+        allowed_s = min((one.allowed_s for one in self._heard.values() if not one.is_due(now_s)), default=math.inf)
+        return SELDOM_S if math.isinf(allowed_s) else max(TOPIC_SILENT_S, allowed_s)

@@ -19,7 +19,7 @@ class DerivedSignals:
     """Follows the readings of one vehicle. A derived signal never replaces one that the car publishes."""
 
     def __init__(self, table: ReadingTable) -> None:
-        """`table`: the newest readings of all signals, the one passed to `receive` included; only read here."""
+        """`table`: the newest readings of all signals, the one passed to `receive` included."""
         self._table = table
         self._slope = Slope()
         self._headings = HeadingFusion()
@@ -56,6 +56,14 @@ class DerivedSignals:
             delay_s=reading.delay_s,
             derived_from=signal,
         )
+
+    def not_measured(self, signal: str) -> None:
+        """The car declares that it does not measure `signal`: its reading goes, and a derived one may come."""
+        known = self._table.newest.get(signal)
+        if known is not None and known.derived_from is None:
+            self._table.drop(signal)
+        if signal == "heading":
+            self._headings.is_published = False
 
     def _heading_on_course(self, reading: Reading[GpsFix]) -> Value | None:
         fix, at_s, table = reading.value, reading.received_s, self._table

@@ -8,6 +8,13 @@ from dataclasses import dataclass
 _A_M = 6_378_137.0  # semi-major axis of WGS84
 _E2 = 6.694_379_990_14e-3  # first eccentricity squared of WGS84
 
+NEAR_ZERO_DEG = 1e-9  # a tenth of a millimetre: zero, converted from radians
+
+
+def is_at_zero(lat_deg: float, lon_deg: float) -> bool:
+    """Whether coordinates are both 0, as in a message whose fields are not filled yet."""
+    return abs(lat_deg) <= NEAR_ZERO_DEG and abs(lon_deg) <= NEAR_ZERO_DEG
+
 
 def radii_m(lat_deg: float) -> tuple[float, float]:
     """Radii of curvature [m] at a latitude: in the meridian M, and of the parallel N·cos φ.

@@ -50,6 +50,7 @@ class RateMeter:
         "_declared_hz",
         "_first_s",
         "_heard",
+        "_held_s",
         "_is_settled",
         "_last_block_hz",
         "_last_s",
@@ -63,7 +64,8 @@ class RateMeter:
 
     # Both are asked at every message, and change seldom.
     period_s: float | None  # between two messages as far as known; until settled the longer of declared and observed
-    horizon_s: float  # age from which a reading is stale: max(10 periods, 1 s), more patient until the rate is settled
+    # Age from which a reading is stale: max(10 periods, 1 s), more until the rate is settled, or as `hold` has it.
+    horizon_s: float
 
     def __init__(self, declared_hz: float | None, set_hz: float | None = None) -> None:
         self._declared_hz = declared_hz
@@ -74,6 +76,7 @@ class RateMeter:
         self._blocks = 0
         self._arrivals: deque[float] = deque(maxlen=20_000)
         self._is_settled = False
+        self._held_s: float | None = None
         self.restart()
 
     def restart(self) -> None:
@@ -90,6 +93,12 @@ class RateMeter:
         """The operator's own figure; None or 0 hands back to learning."""
         self._set_hz = set_hz or None
         self._settle()
+
+    def hold(self, horizon_s: float) -> None:
+        """The horizon [s] from now on, unless the operator set a rate: of a signal that comes in parts."""
+        if horizon_s != self._held_s:
+            self._held_s = horizon_s
+            self._settle()
 
     def receive(self, at_s: float) -> None:
         last_s = self._last_s
@@ -192,10 +201,12 @@ class RateMeter:
         if self._is_settled and expected_hz is not None:
             self.period_s = 1.0 / expected_hz
             self.horizon_s = max(STALE_PERIODS * self.period_s, STALE_FLOOR_S)
-            return
-        self.period_s = self._observed_s(expected_hz)
-        floor_s = STARTING_S if self._declared_hz is not None else UNDECLARED_S
-        self.horizon_s = max(STALE_PERIODS * (self.period_s or 0.0), floor_s)
+        else:
+            self.period_s = self._observed_s(expected_hz)
+            floor_s = STARTING_S if self._declared_hz is not None else UNDECLARED_S
+            self.horizon_s = max(STALE_PERIODS * (self.period_s or 0.0), floor_s)
+        if self._held_s is not None and not self._set_hz:
+            self.horizon_s = self._held_s
 
     def _observed_s(self, expected_hz: float | None) -> float | None:
         if self._heard < 2 or self._last_s is None:

@@ -16,7 +16,7 @@ class ReadingTable:
     __slots__ = ("_extents", "_extents_shared", "_readings_shared", "newest")
 
     def __init__(self) -> None:
-        self.newest: dict[str, Reading[Any]] = {}  # by signal; to read, `put` alone changes it
+        self.newest: dict[str, Reading[Any]] = {}  # by signal; to read, `put` and `drop` alone change it
         self._extents: dict[str, Extent] = {}
         self._readings_shared: Mapping[str, Reading[Any]] | None = None
         self._extents_shared: Mapping[str, Extent] | None = None
@@ -27,6 +27,11 @@ class ReadingTable:
             self.newest = self.newest.copy()
             self._readings_shared = None
         self.newest[signal] = reading
+
+    def drop(self, signal: str) -> None:
+        """Forget the newest reading of a signal."""
+        self.newest = {name: reading for name, reading in self.newest.items() if name != signal}
+        self._readings_shared = None
 
     def put_extent(self, signal: str, lowest: float, highest: float) -> None:
         """Replace the range of a signal's headline number."""

@@ -29,6 +29,7 @@ class Signal:
     about: str  # a sentence for readers of its exported table
     trend: bool = False  # the last minute of its headline number is kept, for Home
     event_like: bool = False  # is published on events only: silence is no fault unless the operator sets a rate
+    by_parts: bool = False  # several publishers, each with its own interval: no rate of all together is expected
     chart: Charted | None = None  # what is drawn over the drive where it is not the headline
     limit: str | None = None  # the threshold that is drawn beside it
 
@@ -159,6 +160,7 @@ SIGNALS: dict[str, Signal] = _declare(
         expected_hz=1.0,
         headline="worst",
         optional=False,
+        by_parts=True,
         about="The car's own diagnostics, one row a component. Level 0 OK, 1 WARN, 2 ERROR, 3 STALE.",
     ),
     Signal(

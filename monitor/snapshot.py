@@ -66,6 +66,7 @@ class Snapshot:
     phone: PhoneView = NO_PHONE  # the operator's phone beside the car
     phones: tuple[PhoneView, ...] = ()  # every phone that shares its position, in order of arrival
     scan_before: Reading[LaserScan] | None = None  # some 0.4 s before the newest
+    scan_habit: frozenset[int] | None = None  # see `scan_shape.ScanHabit.usual`
     distance_before: Reading[Distance] | None = None
     standing_since_s: float | None = None  # when the wheels stopped; None: the car moves, or unknown
     speed_slope_mps2: float | None = None  # slope of the wheel speed over 0.6 s; None: too few messages

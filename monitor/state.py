@@ -19,6 +19,7 @@ from monitor.reading import Extent, Freshness, Reading
 from monitor.reading_history import ReadingHistory
 from monitor.reading_table import ReadingTable
 from monitor.recorder import RecorderFacts
+from monitor.scan_shape import ScanHabit
 from monitor.signal_stats import SignalStats
 from monitor.signals import SIGNALS
 from monitor.slow_proof import ProofFollower
@@ -27,7 +28,7 @@ from monitor.snapshot import NotFresh, Snapshot
 from monitor.stamps import MANY_WRITERS, ClockJump, merged
 from monitor.tracks import TrackPoint
 from monitor.unusable import Unusable, refused, without
-from monitor.values import Diagnostics, DriveMode, GpsFix, Twist, Value
+from monitor.values import Diagnostics, DriveMode, GpsFix, LaserScan, Twist, Value
 
 __all__ = ["Extent", "Freshness", "LinkFacts", "NotFresh", "Phase", "Reading", "Snapshot", "State", "TrackPoint"]
 
@@ -58,6 +59,7 @@ class State:
         self._wheels = Wheels()
         self._clock_jump: ClockJump | None = None
         self._components = Components()
+        self._scan_habit = ScanHabit()
         self._phones = Phones()
         self._fix_s = -math.inf  # when the newest position was sent
         self._rides: str | None = None
@@ -99,6 +101,9 @@ class State:
             self._slow_proof.add(received_s, value.speed_mps)  # type: ignore[union-attr, arg-type]
         elif kind is Diagnostics:
             value = self._components.merge(value, received_s)  # type: ignore[arg-type]
+            self._stats[signal].meter.hold(self._components.horizon_s(received_s))
+        elif kind is LaserScan:
+            self._scan_habit.add(value)  # type: ignore[arg-type]
         elif kind is DriveMode:
             self._modes.add(received_s, value)  # type: ignore[arg-type]
         stats = self._stats[signal]
@@ -121,13 +126,18 @@ class State:
         self._keep_derived(*derived)
         return signal, derived[0]
 
-    def refuse(self, signal: str, reason: str, received_s: float) -> None:
-        """A message without a usable value of this signal, and the reason."""
+    def refuse(self, signal: str, reason: str, received_s: float, *, is_declared: bool = False) -> None:
+        """A message without a usable value of this signal, and the reason. `is_declared`: it declares the value as not
+        measured; an earlier value is then no longer known, and what is derived may take its place."""
         self._follow_clock(received_s)
+        if is_declared:
+            self._derived.not_measured(signal)
         meter = self._stats[signal].meter
         meter.receive(received_s)
         self._heard_s = received_s
-        self._unusable = refused(self._unusable, signal, reason, received_s, meter.horizon_s, meter.period_s)
+        self._unusable = refused(
+            self._unusable, signal, reason, received_s, meter.horizon_s, meter.period_s, is_declared=is_declared
+        )
 
     def receive_phone(self, report: PhoneReport, now_s: float) -> None:
         """Take the report of an operator's phone; judged on the next tick."""
@@ -155,6 +165,7 @@ class State:
             for stats in self._stats.values():
                 stats.restart()
             self._clock_jump = None
+            self._scan_habit = ScanHabit()
             self._unusable = MappingProxyType({})
 
     def recorder(self, facts: RecorderFacts) -> None:
@@ -201,6 +212,7 @@ class State:
             gps=derived.gps,
             phone=self._phones.view,
             phones=self._phones.views,
+            scan_habit=self._scan_habit.usual,
             scan_before=self._scan_history.before,
             distance_before=self._distance_history.before,
             standing_since_s=derived.standstill.since_s if table.is_fresh("speed", now_s) else None,

@@ -1,4 +1,5 @@
-"""Messages that come and cannot be used: not a number, out of range, of another shape. That is no silence."""
+"""Messages that come without a value: not a number, out of range, of another shape, or by their own definition not
+measured. That is no silence."""
 
 from __future__ import annotations
 
@@ -19,6 +20,7 @@ class Unusable:
     count: int  # in a row
     horizon_s: float  # a silence of this signal longer than that is one
     period_s: float | None = None
+    is_declared: bool = False  # the newest one declares the value as not measured: no fault of the sensor
 
     @property
     def words(self) -> str:
@@ -31,10 +33,19 @@ class Unusable:
 
 
 def refused(
-    before: Mapping[str, Unusable], signal: str, reason: str, at_s: float, horizon_s: float, period_s: float | None
+    before: Mapping[str, Unusable],
+    signal: str,
+    reason: str,
+    at_s: float,
+    horizon_s: float,
+    period_s: float | None,
+    *,
+    is_declared: bool = False,
 ) -> Mapping[str, Unusable]:
-    """The unusable signals after one more message of `signal` that cannot be used."""
+    """The unusable signals after one more message of `signal` without a value."""
     known = before.get(signal)
+    if known is not None and known.is_declared != is_declared:
+        known = None
     now = Unusable(
         reason=reason,
         at_s=at_s,
@@ -42,6 +53,7 @@ def refused(
         count=1 if known is None else known.count + 1,
         horizon_s=horizon_s,
         period_s=period_s,
+        is_declared=is_declared,
     )
     return MappingProxyType({**before, signal: now})
 

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from monitor import scan as _scan
 
+NO_FIX = -1  # sensor_msgs/NavSatStatus
+STATUS_UNSET = -2  # of ROS 2 since Kilted
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Twist:
@@ -61,10 +64,11 @@ class Bearing:
 class GpsFix:
     """A position on the WGS84 ellipsoid with its horizontal one-sigma error."""
 
-    lat_deg: float
+    lat_deg: float  # NaN, as the longitude: no place, which only a receiver without a fix may report
     lon_deg: float
     alt_m: float | None = None  # above the ellipsoid
-    status: int = 0  # NavSatStatus: −1 no fix, 0 fix, 1 satellite augmented, 2 ground augmented
+    status: int = 0  # NavSatStatus: −2 not set, −1 no fix, 0 fix, 1 satellite augmented, 2 ground augmented
+    is_unset: bool = False  # the receiver states a fix with zero coordinates; `status` is then −1
     covariance_type: int = 0
     sigma_m: float | None = None  # None: quality unknown
     covariance_m2: tuple[float, float, float] | None = None  # east, north, east-north; None: as `sigma_m` all around

@@ -55,7 +55,7 @@ def _shares(snapshot: Snapshot, limits: SlowLimits) -> list[float]:
         and name in readings
         and readings[name].derived_from is None
         and name not in snapshot.link.throttled
-        and not (SIGNALS[name].event_like and set_hz(limits, name) == 0.0)
+        and not ((SIGNALS[name].event_like or SIGNALS[name].by_parts) and set_hz(limits, name) == 0.0)
     ]
 
 

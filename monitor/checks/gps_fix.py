@@ -26,8 +26,7 @@ from monitor.check import (
 )
 from monitor.figures import beside
 from monitor.snapshot import Snapshot
-
-STATUS_UNSET = -2  # sensor_msgs/NavSatStatus of ROS 2: "status is not yet set"
+from monitor.values import STATUS_UNSET
 
 
 class FixLimits(Limits):
@@ -55,6 +54,9 @@ def has_fix(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
     fix = snapshot.need("position")
     if fix.status == STATUS_UNSET:
         return fault("The receiver does not say whether it has a fix", brief="fix unset", causes=("position",))
+    if fix.is_unset:
+        text = "The receiver reports a fix with coordinates 0, 0: it has no position yet"
+        return fault(text, brief="no place", causes=("position",))
     if fix.status < 0:
         return fault("The receiver has no fix; its coordinates are invalid", brief="no fix", causes=("position",))
     if fix.sigma_m is None:

@@ -28,6 +28,7 @@ from monitor.figures import beside
 from monitor.gps_watch import FIXES
 from monitor.motion import STANDS_BELOW_MPS
 from monitor.snapshot import Snapshot
+from monitor.values import STATUS_UNSET
 
 SIGMA_UNKNOWN_M = 2.5  # of a receiver without quality
 DRIFT_SIGMAS = 4.3
@@ -53,8 +54,10 @@ def _why_not(snapshot: Snapshot) -> Finding | None:
     """Why positions cannot be judged against the wheels, None where they can."""
     if snapshot.get("position") is None and "position" not in snapshot.link.published:
         return absent("Position is not published")
-    if snapshot.need("position").status < 0:
-        return unknown("The receiver has no fix", short="no fix")
+    status = snapshot.need("position").status
+    if status < 0:
+        what = "does not report whether it has a fix" if status == STATUS_UNSET else "has no fix"
+        return unknown(f"The receiver {what}", short="no fix")
     return None
 
 

@@ -1,12 +1,11 @@
 """Can the laser see, and does its scan agree with itself?
 
 A beam without a return is never free (28 to 69 % of a healthy laser's beams are such): only a corridor almost all of
-whose beams are unusable is blindness. The expected count is computed for each message: a real SICK is interlaced.
+whose beams are unusable is blindness. The expected count is computed for each message: a real SICK is interlaced. Many
+drivers count one beam more or less in every scan; that is theirs, and a change of it is a fault.
 """
 
 from __future__ import annotations
-
-import math
 
 from monitor.check import (
     Action,
@@ -26,8 +25,8 @@ from monitor.check import (
     unknown,
 )
 from monitor.corridor import Corridor, look
+from monitor.scan_shape import difference, habit_words
 from monitor.snapshot import Snapshot
-from monitor.values import LaserScan
 
 CORRIDOR = Corridor(half_width_m=1.2, wheelbase_m=2.62, laser_ahead_m=2.5)
 LOOK_AHEAD_M = 5.0  # where the beams of the corridor are counted
@@ -70,36 +69,34 @@ def sees(snapshot: Snapshot, limits: BlindLimits, was_active: bool) -> Finding:
     return ok(text, measured=measured, limit=limit)
 
 
-def _steps(scan: LaserScan) -> float:
-    """From the first beam to the last; NaN, infinite or negative where the angles contradict each other."""
-    if scan.angle_increment_rad == 0.0:
-        return math.nan
-    return (scan.angle_max_rad - scan.angle_min_rad) / scan.angle_increment_rad
-
-
 def agrees(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
-    """Beams = round((angle_max − angle_min) / angle_increment) + 1; time per beam within the time of a scan."""
+    """Beams = (angle_max − angle_min) / angle_increment + 1, or one off as the driver always counts; time per beam
+    within the time of a scan."""
     if _laser_is_absent(snapshot):
         return absent("The laser is not published")
     scan = snapshot.need("scan")
-    steps = _steps(scan)
-    if not 0.0 <= steps < math.inf:
+    off = difference(scan)
+    if off is None:
         if scan.beams > 1:
             return fault("The scan's angles contradict each other", brief="angles", causes=("angles",), level=2)
         return unknown("One beam or none: nothing to compare", short="1 beam")
-    expected = round(steps) + 1
+    expected = scan.beams - off
     measured = Quantity(label="Beams", value=scan.beams, unit="")
     limit = Quantity(label="Expected", value=expected, unit="")
     text = f"{scan.beams} beams, {expected} expected"
-    if abs(scan.beams - expected) > 1:
+    if abs(off) > 1:
         return fault(text, brief=f"{scan.beams} beams", measured=measured, limit=limit, causes=("beams",), level=2)
     sweep_s = (scan.beams - 1) * scan.time_increment_s
     if scan.scan_time_s > 0.0 and sweep_s > SWEEP_SLACK * scan.scan_time_s:
         took = f"{sweep_s * 1000:.0f} ms a sweep, {scan.scan_time_s * 1000:.0f} ms a scan"
         return fault(f"The scan's times contradict each other: {took}", brief="times", causes=("times",), level=1)
-    if scan.beams != expected:
-        return fault(f"{text}: off by one", brief=f"{scan.beams} beams", causes=("off by one",), level=1)
-    return ok(text, measured=measured, limit=limit)
+    usual = snapshot.scan_habit
+    if off and usual is None:
+        return unknown(f"{text}: how its driver counts is not yet known", short="waiting")
+    if usual is not None and off not in usual:
+        was = f"{text}; so far {' or '.join(str(expected + one) for one in sorted(usual))}"
+        return fault(was, brief=f"{scan.beams} beams", causes=("off by one",), level=1)
+    return ok(f"{text}: {habit_words(usual)}" if off else text, measured=measured, limit=limit)
 
 
 def _alarm(title: str, advice: str, *, on_delay_s: float, actions: tuple[Action, ...]) -> AlarmSpec:

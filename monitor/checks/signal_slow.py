@@ -33,6 +33,8 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
         return absent(f"{signal.label}: no rate to measure")  # a signal never received has its own alarm
     if signal.event_like and set_hz(limits, signal.name) == 0.0:
         return absent(f"{signal.label} is published on events only", brief="no fixed rate")
+    if signal.by_parts and set_hz(limits, signal.name) == 0.0:
+        return absent(f"{signal.label}: each of its components has its own interval", brief="no fixed rate")
     if signal.name in snapshot.link.throttled:
         return absent(f"{signal.label}: throttled because the link is slow", brief="throttled")
     snapshot.need(signal.name)  # a stale signal has no rate

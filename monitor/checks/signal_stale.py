@@ -20,6 +20,7 @@ from monitor.check import (
     ok,
     unknown,
 )
+from monitor.components import SELDOM_S
 from monitor.inhibition import GRACE_S
 from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
 from monitor.signals import SIGNALS, Signal
@@ -72,7 +73,8 @@ def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Findi
     if not is_wanted:
         return absent(f"{signal.label}: nothing received yet", brief="nothing received")
     opened_s = snapshot.link.opened_s
-    if opened_s is None or snapshot.now_s - opened_s < NEVER_AFTER_S:
+    after_s = SELDOM_S if signal.by_parts and set_hz(limits, signal.name) == 0.0 else NEVER_AFTER_S
+    if opened_s is None or snapshot.now_s - opened_s < after_s:
         return unknown(f"{signal.label}: waiting for its first message", short="waiting")
     if _car_is_quiet(snapshot):
         return unknown(f"{signal.label}: the whole car is silent", short="silent")

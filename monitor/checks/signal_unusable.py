@@ -37,6 +37,9 @@ def find(signal: Signal, snapshot: Snapshot, limits: Limits, was_active: bool) -
     for_s = snapshot.now_s - found.since_s
     if not found.is_coming(snapshot.now_s):
         return unknown(f"{signal.label}: no message for {snapshot.now_s - found.at_s:.1f} s", short="silent")
+    if found.is_declared:
+        text = f"{signal.label}: {found.words}"
+        return ok(text) if was_active else absent(text, brief="not measured")
     if not was_active and (for_s < AFTER_S or found.count < AT_LEAST):
         return unknown(f"{signal.label}: {found.words}", short="unusable")
     return fault(
@@ -52,7 +55,10 @@ def find_all(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     useless = {
         name: one
         for name, one in snapshot.unusable.items()
-        if not SIGNALS[name].event_like and one.is_coming(now_s) and one.horizon_s <= FAST_HORIZON_S
+        if not SIGNALS[name].event_like
+        and not one.is_declared
+        and one.is_coming(now_s)
+        and one.horizon_s <= FAST_HORIZON_S
     }
     usable = [
         name

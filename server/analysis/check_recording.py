@@ -65,7 +65,12 @@ def check_recording(
     try:
         with bounded_memory(memory_part), _prompt_threads(), open_recording(files) as recording:
             _demand_extract(recording, options)
+            unread = [f"{note}." for note in recording.notes]
             report = _report(files, recording, options, on_progress, began_s)
+            unread += [
+                f"{count} messages on {topic} are left out: {recording.why_rejected.get(topic, 'not JSON')}."
+                for topic, count in sorted(recording.rejected.items())
+            ]
             text, json, page = summary.text(report), None, None
             if options.with_json:
                 json = orjson.dumps(as_json(report), option=orjson.OPT_INDENT_2)
@@ -84,8 +89,8 @@ def check_recording(
     errors = [*report.run.damage, *([report.run.broke_off] if report.run.broke_off is not None else [])]
     if not errors and report.why_nothing is not None:
         errors = [report.why_nothing]
-    code = CANNOT if errors else CRITICAL if report.has_critical else NO_CRITICAL
-    return Checked(code=code, errors=errors, text=text, json=json, page=page)
+    code = CANNOT if errors else CRITICAL if report.has_critical else CANNOT if unread else NO_CRITICAL
+    return Checked(code=code, errors=[*errors, *unread], text=text, json=json, page=page)
 
 
 @contextlib.contextmanager

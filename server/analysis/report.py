@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 
 from monitor import catalog
 from monitor.alarm_spec import Priority
+from monitor.scan_shape import habit_words
 from monitor.signals import SIGNALS
 from server.analysis.compare import Change, compare
 from server.analysis.recorded_log import RecordedLog
@@ -97,7 +98,7 @@ class Report:
 
 def why_nothing(run: Rehearsed, recording: Recording) -> str | None:
     """A run in which no message of any signal could be read says nothing of the car, whatever it raised."""
-    if any(tally.received > tally.rejected for tally in run.reception.by_signal.values()):
+    if any(tally.received > tally.rejected + tally.not_measured for tally in run.reception.by_signal.values()):
         return None
     if not recording.count:
         return "Nothing could be evaluated: the recording has no message."
@@ -151,13 +152,13 @@ def name_of(override: SettingsOverride) -> str:
 def _row(run: Rehearsed, name: str) -> SignalRow:
     signal, source, tally = SIGNALS[name], run.sources.get(name), run.reception.by_signal.get(name)
     extent, rate = run.snapshot.extents.get(name), run.snapshot.rates.get(name)
-    proper = 0 if tally is None else tally.received - tally.rejected
+    proper = 0 if tally is None else tally.received - tally.rejected - tally.not_measured
     return SignalRow(
         name=name,
         label=signal.label,
         topic=None if source is None else source.topic,
         type=None if source is None else source.type,
-        note=None if source is None else source.note,
+        note=_note(run, name),
         count=0 if tally is None else tally.received,
         rate_hz=proper / run.judged_s if proper > 1 and run.judged_s > 0 else None,
         expected_hz=None if rate is None or not rate.settled else rate.expected_hz,
@@ -168,3 +169,14 @@ def _row(run: Rehearsed, name: str) -> SignalRow:
         unit=signal.unit,
         optional=signal.optional,
     )
+
+
+def _note(run: Rehearsed, name: str) -> str | None:
+    """What is to be known of a signal's source."""
+    source, tally = run.sources.get(name), run.reception.by_signal.get(name)
+    notes = [] if source is None or source.note is None else [source.note]
+    if tally is not None and tally.not_measured:
+        notes.append(f"{tally.not_measured} of {tally.received} {tally.why_not_measured or 'not measured'}")
+    if name == "scan" and (habit := habit_words(run.snapshot.scan_habit)) is not None:
+        notes.append(habit)
+    return "; ".join(notes) or None

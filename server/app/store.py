@@ -7,7 +7,6 @@ from pathlib import Path
 
 from server.app.config import Store
 from server.recording.store.rules import Place, Situation, rule_of
-from server.vehicle.car_summary import NO_FIX
 from server.vehicle.session import Session
 from server.web.services import Services
 
@@ -49,7 +48,7 @@ def situation(session: Session, now_s: float) -> Situation:
     """The settings of a car and where it is; what is old or has no fix is not known."""
     readings = session.judgement.state.snapshot(now_s).readings
     position, speed = readings.get("position"), readings.get("speed")
-    has_place = position is not None and position.is_fresh(now_s) and position.value.status != NO_FIX
+    has_place = position is not None and position.is_fresh(now_s) and position.value.status >= 0
     place = Place(
         lat_deg=position.value.lat_deg if position is not None and has_place else None,
         lon_deg=position.value.lon_deg if position is not None and has_place else None,

@@ -61,8 +61,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return 0: no critical alarm (with --compare: by B), 1: a critical alarm, 2: unknown, because part of a recording
-    cannot be read or nothing in it could be evaluated. Of several recordings the highest counts."""
+    """Return 0: all was read and no critical alarm (with --compare: by B), 1: a critical alarm, 2: unknown, because
+    part of a recording cannot be read or nothing in it could be evaluated. Of several recordings the highest
+    counts."""
     try:
         recordings = [args.files] if args.one_recording or len(args.files) == 1 else by_recording(args.files)
         _demand_sense(args, recordings)

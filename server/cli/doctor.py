@@ -221,7 +221,11 @@ def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Listener, s
             print(f"{'':<14}{source.note}")
         if tally is not None and tally.rejected:
             print(f"{'':<14}{tally.rejected} of {tally.received} rejected: {tally.last_reason}")
-        if not count or source.decode is None or (tally is not None and tally.rejected == tally.received):
+        if tally is not None and tally.not_measured:
+            why = tally.why_not_measured or "not measured"
+            print(f"{'':<14}{tally.not_measured} of {tally.received}: {why}")
+        is_empty = tally is not None and tally.rejected + tally.not_measured == tally.received
+        if not count or source.decode is None or is_empty:
             missing.append(row.signal)
     others = sorted(set(offer.topics) - {source.topic for source in sources.values()})
     print(f"\n{len(others)} other topics" + (":" if others else ""))

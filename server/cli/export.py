@@ -160,7 +160,10 @@ def _write(
     module, _, function = form.writer.partition(":")
     known: dict[str, Any] = {"compression": args.compression, "with_own": not args.without_own, "name": name}
     options = {option: known[option] for option in form.options}
+    unread = [(f"{note.partition(' (')[0]} (", f"{note}.") for note in recording.notes]
     outcome: Outcome = getattr(importlib.import_module(module), function)(recording, path, progress=progress, **options)
+    named = tuple(outcome.notes)
+    outcome.notes += [note for topic, note in unread if not any(one.startswith(topic) for one in named)]
     return outcome
 
 
@@ -203,7 +206,7 @@ def _moment_ns(recording: Recording, text: str) -> int:
 
 def _stem(path: Path) -> str:
     name = path.resolve().name
-    for ending in (".mcap.writing", ".mcap", ".bag", ".db3"):
+    for ending in (".mcap.writing", ".mcap", ".bag", ".db3", ".mcap.zstd", ".db3.zstd"):
         if name.endswith(ending):
             return name.removesuffix(ending)
     return name

@@ -79,7 +79,7 @@ class Report:
             why = self._recording.why_rejected[topic]
             say(f"  Note: {_counted(count, 'message')} on {topic} left out: {why}")
         for sentence in self._recording.damage:
-            say(f"  Note: {sentence}.")
+            say(f"  Note: {sentence}")
 
 
 def say(text: str, end: str = "\n") -> None:

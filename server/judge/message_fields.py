@@ -21,6 +21,10 @@ class Rejected(ValueError):
     """Not a proper message; `str()` is the reason, short, the same for the same kind of fault."""
 
 
+class NotMeasured(Rejected):
+    """A proper message that declares, as its definition has it, that the value is not measured."""
+
+
 def number(message: Any, *path: str) -> float:
     """The number at a path of fields; NaN for null, and for infinity, which is null in JSON too, so that a recording
     and its replay agree. Raises Rejected if it is missing or not a number."""

@@ -63,9 +63,13 @@ def receive(
     for source in sources:
         value = reception.read(source, message, note)
         if value is None:
+            tally = reception.tally(source.signal)
+            if tally.why_not_measured is not None:
+                state.refuse(source.signal, tally.why_not_measured, at_s, is_declared=True)
+                continue
             is_proper = False
             if source.decode is not None:
-                state.refuse(source.signal, reception.tally(source.signal).last_reason or "unreadable", at_s)
+                state.refuse(source.signal, tally.last_reason or "unreadable", at_s)
             continue
         if type(value) is Steering:
             value = steered(value, profile, tyre_rad_per_unit)

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from server.judge.message_fields import Rejected
+from server.judge.message_fields import NotMeasured, Rejected
 from server.judge.topics import Source
 
 MAX_REASONS = 20  # a hostile bridge must not fill the memory with reasons
@@ -23,9 +23,12 @@ class Tally:
     reasons: Counter[str] = field(default_factory=Counter)
     last_reason: str | None = None
     repaired_why: str | None = None
+    not_measured: int = 0  # proper messages that declare the value as not measured
+    why_not_measured: str | None = None  # of the newest message without a value; None: that one was rejected
 
     def reject(self, reason: str) -> None:
         self.rejected += 1
+        self.why_not_measured = None
         key = reason if reason in self.reasons or len(self.reasons) < MAX_REASONS else OTHER
         self.reasons[key] += 1
         self.last_reason = reason
@@ -48,7 +51,7 @@ class Reception:
         return found
 
     def read(self, source: Source, message: Any, note: str | None) -> Any | None:
-        """The decoded value, or None where it was rejected; either way it is counted."""
+        """The decoded value, or None where it was rejected or is not measured; all are counted."""
         tally = self.by_signal.get(source.signal) or self.tally(source.signal)
         tally.received += 1
         if note is not None:
@@ -59,6 +62,9 @@ class Reception:
             return None
         try:
             return source.decode(message)
+        except NotMeasured as why:
+            tally.not_measured += 1
+            tally.why_not_measured = str(why)
         except Rejected as why:
             tally.reject(str(why))
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError, IndexError) as error:

@@ -17,6 +17,7 @@ from server.mail.order import Composed, Letter, Prepared, Way
 from server.mail.pack import NoRoom, Pack, cut, need_room, pack
 from server.mail.settings import MailSettings
 from server.mail.source import Source
+from server.recording.catalog.discovery import why_not_one_file
 from server.recording.mcap.chain import read_head
 from server.storage.durable_file import sync_folder
 
@@ -89,6 +90,9 @@ async def _exported(
         path = await asyncio.to_thread(source.path_of, recording)
         if path is None:
             raise CannotPrepare(f"The recording {recording} no longer exists.")
+        what = await asyncio.to_thread(why_not_one_file, path)
+        if order.format == "mcap" and what is not None:
+            raise CannotPrepare(f"{recording} is {what}: send it in another format.")
         if order.format != "mcap":
             into = work / f"{i}"
             await asyncio.to_thread(into.mkdir)

@@ -196,6 +196,7 @@ class Recording(TypedDict):
     state: Annotated[Literal["waiting", "read", "unreadable"], doc("waiting: listed by its name, and read soon")]
     problem: Annotated[str | None, doc("why it cannot be read, as a sentence")]
     damage: Annotated[list[str], doc("what of it cannot be read, a sentence each")]
+    unread: Annotated[list[str], doc("topics whose messages are of no use here, a sentence each; at most 10")]
     left_out: Annotated[list[str], doc("topics that were not recorded; at most 10")]
     left_out_count: int
     not_received: Annotated[
@@ -208,7 +209,10 @@ class Recording(TypedDict):
     is_clip: bool
     clip_of: str | None
     file: Annotated[str, doc("its name in the folder")]
-    format: Annotated[str, doc("mcap · bag · db3")]
+    format: Annotated[str, doc("mcap · bag · db3 · zstd · folder")]
+    several_files: Annotated[
+        str | None, doc("why no single file is a copy of it, as words behind “it is”; null: its file is all of it")
+    ]
     sha256: str | None
     head: Annotated[str | None, doc("SHA-256 of the last record of its hash chain [hex], not verified; null: none")]
     verified: Annotated[VerificationAnswer | None, doc("null: this file was not verified since the server started")]

@@ -18,6 +18,8 @@ WRITING = ".mcap.writing"
 DAMAGED = ".mcap.damaged"
 RECOVERING = ".mcap.recovering"  # the new file while it is made; worth nothing when the maker was killed
 
+FOLDER = "folder"  # the format of a recording that is a folder: a split bag of ROS 2
+
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,79}")
 _TRASH = ".trash"
 

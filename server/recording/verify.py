@@ -248,7 +248,12 @@ class _Run:
         return self._found("unfinished", sentence, self._last.digest.hex())
 
     def _without_chain(self, is_ended: bool) -> Verified:
-        if self._library is not None and self._library.startswith(LIBRARY) and self._first:
+        if self._library is not None and self._first:
+            if not self._library.startswith(LIBRARY):
+                return self._found(
+                    "no chain",
+                    f"Has no chain: a recording of catgraph, written anew by {self._library[:60] or 'another tool'}.",
+                )
             version = self._first.get("version")
             by = f"catgraph {version}" if version else "a version of catgraph"
             return self._found("no chain", f"Has no chain: recorded by {by} before recordings had one.")

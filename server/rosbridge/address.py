@@ -8,7 +8,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from urllib.parse import SplitResult, quote, urlsplit
 
-DEFAULT_PORT = 9090  # rosbridge's own
+DEFAULT_PORT = 9090  # rosbridge's own, of an address without a scheme
+SCHEME_PORTS = {"ws": 80, "wss": 443}  # of a URL without a port (RFC 6455, 3)
 MASTER_PORT = 11311  # a ROS master, which uses XML-RPC and not rosbridge
 LONGEST = 300  # letters; a host name has at most 253
 
@@ -65,6 +66,7 @@ class Address:
 def parse(text: str) -> Address:
     """The address in `text`: `ws://…`, `wss://…`, `host` or `host:port`.
 
+    Without a port a URL has that of its scheme, 80 or 443, and a host alone 9090.
     Raises BadAddress with a sentence of its own for each habit that leads nowhere.
     """
     typed = text.strip()
@@ -84,7 +86,7 @@ def parse(text: str) -> Address:
                 code="scheme",
                 suggestion=better,
             )
-        return _split(f"ws://{typed}")
+        return _split(f"ws://{typed}", DEFAULT_PORT)
     if scheme.lower() in ("http", "https", "rosrpc"):
         raise _wrong_scheme(scheme.lower(), rest)
     if scheme.lower() not in ("ws", "wss"):
@@ -93,10 +95,10 @@ def parse(text: str) -> Address:
             "Use ws:// or wss://, or only host and port.",
             code="scheme",
         )
-    return _split(typed)
+    return _split(typed, SCHEME_PORTS[scheme.lower()])
 
 
-def _split(typed: str) -> Address:
+def _split(typed: str, usual_port: int) -> Address:
     parts = _url_parts(typed)
     if parts.username is not None or parts.password is not None:
         raise BadAddress("An address with a user name is not supported.", "Remove the part before the @.")
@@ -109,7 +111,7 @@ def _split(typed: str) -> Address:
     path = quote(parts.path, safe="/%:@!$&'()*+,;=~") if parts.path not in ("", "/") else ""
     if parts.query:
         path = f"{path or '/'}?{quote(parts.query, safe='/%:@!$&()*+,;=~?')}"
-    return Address(host=host, port=port or DEFAULT_PORT, secure=parts.scheme.lower() == "wss", path=path)
+    return Address(host=host, port=port or usual_port, secure=parts.scheme.lower() == "wss", path=path)
 
 
 def _url_parts(typed: str) -> SplitResult:

@@ -24,7 +24,6 @@ log = logging.getLogger("catgraph.session")
 EVERY_S = 0.5
 TEXT_LETTERS = 100  # of the sentence of an alarm; a summary is bounded
 MOST_REQUESTS = 3  # for control
-NO_FIX = -1  # NavSatStatus
 _RANK = {"critical": 3, "warning": 2, "advisory": 1}
 _ASKING = ("UNACKED", "RTN_UNACKED")
 
@@ -152,7 +151,7 @@ def _speed(snapshot: Snapshot, now_s: float) -> CarSpeed:
 def place(snapshot: Snapshot, now_s: float) -> CarPlace | None:
     """Where the car is by its own GPS; None where it has no fix, however old. A heading that is old is none."""
     reading, heading = snapshot.readings.get("position"), snapshot.readings.get("heading")
-    if reading is None or reading.value.status == NO_FIX:
+    if reading is None or reading.value.status < 0:
         return None
     lat_deg, lon_deg = serialize.plain(reading.value.lat_deg, 7), serialize.plain(reading.value.lon_deg, 7)
     if lat_deg is None or lon_deg is None:

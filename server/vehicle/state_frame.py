@@ -11,6 +11,7 @@ from monitor.instruments import stopping_m, time_gap_s
 from monitor.link import Phase
 from monitor.load import AlarmLoad
 from monitor.runner import Monitor
+from monitor.scan_shape import habit_words
 from monitor.signals import SIGNALS, Signal
 from monitor.state import Reading, Snapshot
 from monitor.trends import Piece
@@ -231,7 +232,8 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "type": source.type if source else None,
         "note": (unusable.words if unusable else None)
         or (source.note if source else None)
-        or (_unknown_part(reading.value) if reading else None),
+        or (_unknown_part(reading.value) if reading else None)
+        or (habit_words(snapshot.scan_habit) if signal.name == "scan" else None),
         "unusable": unusable.words if unusable else None,
         "count": tally.received,
         "rejected": tally.rejected,

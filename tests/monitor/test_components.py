@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from monitor.components import MOST, Components
+import pytest
+
+from monitor.components import FORGOTTEN_UNKNOWN_S, MOST, ONE_INTERVAL_S, SELDOM_S, TOPIC_SILENT_S, Components
 from monitor.values import Component, Diagnostics
 
 
@@ -28,25 +30,70 @@ def test_the_newest_word_counts() -> None:
 
 def test_a_component_that_falls_silent_turns_stale_and_is_forgotten() -> None:
     known = Components()
-    known.merge(said(("laser", 0), ("gps", 0)), 0.0)
+    for at_s in (-2.0, -1.0, 0.0):
+        known.merge(said(("laser", 0), ("gps", 0)), at_s)
     assert levels(known.merge(said(("gps", 0)), 5.0)) == {"laser": 0, "gps": 0}
     assert levels(known.merge(said(("gps", 0)), 5.1)) == {"laser": 3, "gps": 0}
     assert levels(known.merge(said(("gps", 0)), 61.0)) == {"gps": 0}
 
 
-def test_a_slow_component_gets_three_of_its_periods() -> None:
+@pytest.mark.parametrize("period_s", [10.0, 30.0, 120.0])
+def test_a_slow_component_gets_three_of_its_intervals(period_s: float) -> None:
     known = Components()
-    for at_s in (0.0, 10.0):
+    for number in range(4):
+        known.merge(said(("disk", 0)), number * period_s)
+    assert levels(known.merge(said(("gps", 0)), 5.9 * period_s))["disk"] == 0
+    assert levels(known.merge(said(("gps", 0)), 6.1 * period_s))["disk"] == 3
+    assert levels(known.merge(said(("gps", 0)), 8.9 * period_s))["disk"] == 3
+
+
+def test_reports_out_of_turn_do_not_make_an_interval() -> None:
+    known = Components()
+    for at_s in (0.0, 0.1, 30.0, 32.0, 60.0, 60.5):
+        assert levels(known.merge(said(("disk", 0)), at_s)) == {"disk": 0}
+    assert levels(known.merge(said(("gps", 0)), 90.0))["disk"] == 0
+    assert levels(known.merge(said(("gps", 0)), 160.0))["disk"] == 3
+
+
+def test_what_reported_once_is_not_held_to_an_interval_and_two_reports_are_hardly_one() -> None:
+    known = Components()
+    known.merge(said(("light", 0), ("start", 0)), 0.0)
+    known.merge(said(("start", 0)), 1.0)
+    assert levels(known.merge(said(("gps", 0)), 1.0 + ONE_INTERVAL_S)) == {"light": 0, "start": 0, "gps": 0}
+    assert levels(known.merge(said(("gps", 0)), 2.0 + ONE_INTERVAL_S)) == {"light": 0, "start": 3, "gps": 0}
+    assert levels(known.merge(said(("gps", 0)), FORGOTTEN_UNKNOWN_S)) == {"light": 0, "gps": 0}
+    assert levels(known.merge(said(("gps", 0)), FORGOTTEN_UNKNOWN_S + 1.0)) == {"gps": 0}
+
+
+def test_the_silence_of_all_is_explained_by_the_one_that_reports_most_often() -> None:
+    known = Components()
+    assert known.horizon_s(0.0) == SELDOM_S
+    for at_s in (0.0, 30.0, 60.0):
         known.merge(said(("disk", 0)), at_s)
-    assert levels(known.merge(said(("gps", 0)), 39.0))["disk"] == 0
-    assert levels(known.merge(said(("gps", 0)), 41.0))["disk"] == 3
+    assert known.horizon_s(60.0) == 90.0
+    for at_s in (61.0, 62.0, 63.0):
+        known.merge(said(("ekf", 0)), at_s)
+    assert known.horizon_s(63.0) == TOPIC_SILENT_S
+    assert known.horizon_s(80.0) == 90.0  # the frequent one has fallen silent itself
+
+
+def test_a_new_component_takes_the_place_of_the_one_that_was_silent_longest() -> None:
+    known = Components()
+    for i in range(MOST):
+        known.merge(said((f"part {i}", 0)), float(i) / MOST)
+    known.merge(said(("part 0", 0)), 2.0)
+    found = levels(known.merge(said(("brake", 2)), 3.0))
+    assert found["brake"] == 2
+    assert "part 0" in found
+    assert "part 1" not in found
 
 
 def test_endless_names_do_not_fill_the_memory() -> None:
     known = Components()
-    for i in range(3 * MOST):
-        merged = known.merge(said((f"part {i}", 0)), 0.0)
+    for i in range(3):
+        merged = known.merge(said(*((f"part {i} {j}", 0) for j in range(MOST))), float(i))
     assert len(merged.components) == MOST
+    assert {component.name[:6] for component in merged.components} == {"part 2"}
 
 
 def test_a_clock_that_goes_back_harms_nothing() -> None:

@@ -13,7 +13,7 @@ from monitor.alarm_order import standing, suppressed
 from monitor.alarm_spec import Priority
 from monitor.car_clock import AHEAD_S, CONTRADICTION_S, IN_TIME_S, SAMPLES, CarClock, StampedDelay
 from monitor.catalog import AllLimits, changed
-from monitor.components import FORGOTTEN_AFTER_S, SILENT_AFTER_S, Components
+from monitor.components import FORGOTTEN_AFTER_S, ONE_INTERVAL_S, SILENT_AFTER_S, Components
 from monitor.freeze_detection import Repeats
 from monitor.inhibition import CauseTable, table_of
 from monitor.instruments import ObstacleLimits, stopping_m, time_gap_s
@@ -225,7 +225,15 @@ def test_a_component_is_stale_after_its_time_and_forgotten_in_the_end() -> None:
         return Diagnostics(components=(Component(name=name, level=0, message="fine"),))
 
     known_parts = Components()
-    for at_s, name in [(100.0, "a"), (110.0, "a"), (110.0, "a"), (200.0, "b")]:
+    for at_s, name in [
+        (100.0, "a"),
+        (101.0, "a"),
+        (101.0, "a"),
+        (102.0, "a"),
+        (198.0, "b"),
+        (199.0, "b"),
+        (200.0, "b"),
+    ]:
         found = known_parts.merge(said(name), at_s)
     assert [one.name for one in found.components] == ["b"]
     known_parts.merge(said("c"), 200.0)
@@ -247,12 +255,14 @@ def test_a_slow_component_gets_three_times_its_period_and_a_second_word_at_once_
         return {one.name: one.level for one in parts.merge(said, at_s).components}
 
     parts = Components()
-    for at_s in (100.0, 110.0):
+    for at_s in (90.0, 100.0, 110.0):
         merge(parts, at_s, "slow")
     assert merge(parts, 140.0, "other")["slow"] == 0
     assert merge(parts, 140.1, "other")["slow"] == 3
     merge(parts, 150.0, "twice", "twice")
-    assert merge(parts, 155.1, "other")["twice"] == 3
+    merge(parts, 151.0, "twice", "twice")
+    assert merge(parts, 151.0 + ONE_INTERVAL_S, "other")["twice"] == 0
+    assert merge(parts, 151.1 + ONE_INTERVAL_S, "other")["twice"] == 3
 
 
 def test_rates_that_are_set_and_rates_that_are_learned() -> None:

@@ -161,3 +161,14 @@ def test_a_flood_is_measured_and_bounded() -> None:
     measured_hz = meter.measured_hz(end_s)
     assert measured_hz is not None
     assert measured_hz == pytest.approx(10_000.0, rel=0.02)
+
+
+@pytest.mark.parametrize(("set_hz", "horizon_s"), [(None, 90.0), (2.0, 5.0)])
+def test_a_horizon_that_is_held_is_that_of_the_meter_unless_a_rate_is_set(
+    set_hz: float | None, horizon_s: float
+) -> None:
+    meter = RateMeter(1.0, set_hz)
+    meter.hold(90.0)
+    assert meter.horizon_s == horizon_s
+    feed(meter, 1.0, 30.0)
+    assert meter.horizon_s == horizon_s

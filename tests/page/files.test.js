@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import {
-  alarmWords, choiceOf, countsOf, distanceWords, factWords, lengthWords, liveOf, nameOf, originWords, pointsOf, queryOf, sizeWords, storedWords, tagsOf, warningWords, whenWords,
+  alarmWords, choiceOf, countsOf, distanceWords, factWords, lengthWords, liveOf, nameOf, originWords, pointsOf, queryOf, sizeWords, storedWords, tagsOf, warningWords, whenWords, whyNotAsItIs,
 } from '../../static/js/files/files-layout.js';
 import { listingOf, storedQueryOf } from '../../static/js/files/stored-list.js';
 
@@ -56,7 +56,14 @@ test('what a recording is called, and what stands beneath', () => {
   assert.equal(nameOf(row({ title: 'Wet lot' }), NOW), 'Wet lot');
   assert.equal(originWords(row({ title: 'Wet lot', part: 2, ended: 'recovered', is_clip: true }), NOW), 'Today 14:00 · car · clip · part 2 · recovered');
   assert.equal(originWords(row({ format: 'bag', vehicle: '', damage: ['x'] }), NOW), 'ROS 1 bag · damaged');
+  assert.equal(originWords(row({ unread: ['x'] }), NOW), 'car', 'what cannot be decoded is not damaged');
   assert.equal(originWords(row({ trashed_ms: NOW - 60_000 }), NOW), 'car · deleted Today 14:59');
+});
+
+test('a recording of several files is not offered as it is', () => {
+  assert.equal(whyNotAsItIs(row()), '');
+  assert.equal(whyNotAsItIs(row({ several_files: null })), '');
+  assert.equal(whyNotAsItIs(row({ format: 'folder', several_files: 'a folder of several files' })), 'It is a folder of several files: as it is, copy it from the server’s disk.');
 });
 
 test('the facts in one sentence, and what is unknown as unknown', () => {
@@ -66,6 +73,7 @@ test('the facts in one sentence, and what is unknown as unknown', () => {
   assert.equal(factWords(row({ state: 'unreadable', problem: 'x.mcap is empty.' })), '38.0 MB. x.mcap is empty.');
   assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'the server was killed.', damage: ['A part is lost.'] })), ['Recovered: the server was killed.', 'A part is lost.']);
   assert.deepEqual(warningWords(row({ ended: 'recovered', ended_why: 'car_1 was recovered.', left_out: ['/camera', '/points'] })), ['car_1 was recovered.', 'Not recorded: /camera, /points.']);
+  assert.deepEqual(warningWords(row({ unread: ['/points (7 messages) is left out: messages encoded as \'protobuf\' are not supported.'] })), ['/points (7 messages) is left out: messages encoded as \'protobuf\' are not supported.']);
   assert.deepEqual(warningWords(row({ not_received: ['/imu'] })), ['No messages from: /imu.']);
   assert.deepEqual(warningWords(row({ left_out: ['/camera', '/points'], left_out_count: 9 })), ['Not recorded: /camera, /points and 7 more.']);
   assert.deepEqual(warningWords(row({ ended: 'recovered' })), ['Recovered: the server stopped during the recording.']);

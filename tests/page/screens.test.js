@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { armWords, bare, foundIn, isSameCar, remembered } from '../../static/js/shell/connect-layout.js';
+import { armWords, bare, dialled, foundIn, isSameCar, remembered } from '../../static/js/shell/connect-layout.js';
 import { screenOf } from '../../static/js/shell/router.js';
 import { details, headline, kindWords } from '../../static/js/home/signals.js';
 import { tabByHash, tabByKey } from '../../static/js/shell/tabs.js';
@@ -34,9 +34,21 @@ test('addresses: each once, newest first, and not too many', () => {
   assert.equal(remembered(Array.from({ length: 20 }, (_, i) => String(i)), 'x').length, 8);
   assert.equal(bare('ws://car:9090/'), 'car:9090');
   assert.equal(bare('wss://car:9090'), 'wss://car:9090');
-  for (const written of ['car', 'car:9090', 'ws://car', ' ws://car:9090/ ']) assert.ok(isSameCar('ws://car:9090', written), written);
+  assert.equal(bare('ws://car/bridge'), 'ws://car/bridge'); // without its scheme it would have another port
+  for (const written of ['car', 'car:9090', ' ws://car:9090/ ', 'CAR']) assert.ok(isSameCar('ws://car:9090', written), written);
   assert.ok(isSameCar('ws://[::1]:9090', '[::1]'));
-  for (const other of ['', 'car:9091', 'cart', 'wss://car:9090']) assert.ok(!isSameCar('ws://car:9090', other), other);
+  for (const other of ['', 'car:9091', 'cart', 'wss://car:9090', 'ws://car']) assert.ok(!isSameCar('ws://car:9090', other), other);
+});
+
+test('what is dialled: the port of the scheme, and that of rosbridge without a scheme', () => {
+  const rows = {
+    'car': 'ws://car:9090', ' Car.Local ': 'ws://car.local:9090', 'car:9091': 'ws://car:9091', 'car:': 'ws://car:9090',
+    'ws://car': 'ws://car:80', 'ws://car/bridge': 'ws://car:80/bridge', 'wss://car': 'wss://car:443', 'WSS://car/b?x=1': 'wss://car:443/b?x=1',
+    'wss://car:9090/': 'wss://car:9090', 'car/bridge': 'ws://car:9090/bridge', 'car?x=1': 'ws://car:9090/?x=1', 'car/ü%20': 'ws://car:9090/%C3%BC%20',
+    'fd00::1': 'ws://[fd00::1]:9090', '[fd00::1]': 'ws://[fd00::1]:9090', 'wss://[fd00::1]/x': 'wss://[fd00::1]:443/x',
+  };
+  for (const [typed, url] of Object.entries(rows)) assert.equal(dialled(typed), url, typed);
+  for (const typed of ['', '  ', 'my car', 'http://car', 'ftp://car', 'ws:/car', 'ws:car', 'ws://', 'car:0', 'car:70000', 'car:abc', 'a:1:2', 'car:11311', 'ros@car', '<b>']) assert.equal(dialled(typed), '', typed);
 });
 
 test('found vehicles are listed once, and an answer of another shape is none', () => {

@@ -13,6 +13,9 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import expect
 
+from server.rosbridge.address import parse
+from tests.page.canned import Canned
+from tests.page.canned import idle as no_car
 from tests.page.conftest import Phone
 from tests.page.processes import Process, free_port, running, server, simulate
 
@@ -165,3 +168,19 @@ async def test_without_a_server_the_page_says_so_and_comes_by_itself(phone: Phon
     await expect(phone.f("says", "#connect")).to_have_text("Not sent: the server does not answer.")
     async with running(*server(tmp_path, port=port)):
         await expect(phone.f("says", "#connect")).to_be_hidden()
+
+
+DIALS = ("192.168.4.1", "car.local:9091", "ws://car/bridge", "wss://car/bridge?x=1", "wss://car:9090", "fd00::1")
+
+
+@pytest.mark.gate
+async def test_the_box_shows_what_will_be_dialled_before_it_is(phone: Phone, canned: Canned) -> None:
+    canned.state = no_car()
+    await phone.open(canned.address)
+    dials = phone.f("dials", "#connect")
+    for typed in DIALS:
+        await phone.page.fill("#address", typed)
+        await expect(dials).to_have_text(f"Dials {parse(typed).url}")
+    for refused in ("http://car:11311", "ws:/car", "my car"):
+        await phone.page.fill("#address", refused)
+        await expect(dials).to_be_hidden()

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.async_api import Page, expect
+from playwright.async_api import Page, Route, expect
 
 from tests.page.barriers import fits, no_barrier
 from tests.page.canned import Canned, Json, alarm, live
@@ -252,6 +253,37 @@ async def test_no_old_speed_stands_in_the_bar_of_a_page(phone: Phone, canned: Ca
     box = await veil.bounding_box()
     assert box is not None
     assert box["width"] == 1440
+
+
+@pytest.mark.own_phone
+@pytest.mark.parametrize(
+    ("more", "link", "words"),
+    [
+        ({"format": "folder", "several_files": "a folder of several files"}, None, "It is a folder of several files"),
+        ({"format": "zstd", "several_files": None}, "Packed MCAP or db3", "the file as it is, packed with zstd"),
+    ],
+)
+async def test_what_a_recording_can_be_downloaded_as(
+    phone: Phone, canned: Canned, more: dict[str, str | None], link: str | None, words: str
+) -> None:
+    page = phone.page
+
+    async def changed(route: Route) -> None:
+        listed = await (await route.fetch()).json()
+        listed["recordings"] = [row | more for row in listed["recordings"]]
+        await route.fulfill(json=listed)
+
+    await page.route(re.compile(r"/api/recordings\?"), changed)
+    await page.set_viewport_size({"width": 1440, "height": 900})
+    await phone.open(f"{canned.address}/#files")
+    await phone.live()
+    dock = page.locator("#panel-files .file-dock")
+    await expect(dock.get_by_role("button", name="Share")).to_have_count(1 if link else 0)
+    await dock.get_by_role("button", name="Download").click()
+    await expect(dock).to_contain_text(words)
+    await expect(dock.locator("a[download]")).to_have_count(1 if link else 0)
+    if link:
+        await expect(dock.get_by_role("link", name=link)).to_be_visible()
 
 
 async def test_files_of_a_desktop_show_the_chosen_recording_beside_the_list(phone: Phone, canned: Canned) -> None:

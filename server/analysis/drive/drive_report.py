@@ -16,6 +16,7 @@ from server.analysis.drive.sheet import sheet
 from server.analysis.recorded_log import RecordedLog, read_recorded_log
 from server.recording.catalog import annotations as annotation_store
 from server.recording.drive.facts import DriveFacts, read_facts
+from server.recording.marks.of_drive import files_of
 from server.recording.read.read import Recording
 from server.recording.verification import Verification, of_files
 
@@ -38,7 +39,8 @@ class DriveReport:
         verified: Sequence[Verification] | None = None,
     ) -> Self:
         """Reads the whole recording. `log`, `verified`: where they are known already. Raises RecordingUnreadable."""
-        files = [source.path for source in recording.files]
+        files = files_of(recording)
+        said = map(annotation_store.read, files)
         facts = read_facts(recording)
         log = log or read_recorded_log(recording)
         found = report_json(
@@ -47,7 +49,7 @@ class DriveReport:
             name=name,
             load=None if log is None else log.load,
             verified=of_files(recording) if verified is None else verified,
-            annotations=annotation_store.read(files[0]),
+            annotations=next((one for one in said if one != annotation_store.NONE), annotation_store.NONE),
         )
         return cls(facts=facts, found=found, files=files)
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from monitor.values import Level
 from server.judge.message_fields import Rejected, finite
+from server.judge.not_measured import NO_BATTERY, NO_PERCENTAGE
 from server.judge.plausible import plausible_percent
 from server.judge.topic import Topic, floats
 
@@ -15,7 +16,9 @@ def level(message: Any) -> Level:
 
 
 def battery(message: Any) -> Level:
-    """`percentage` is 0 … 1 by definition, and 0 … 100 in many a driver."""
+    """`percentage` is 0 … 1 by definition, and 0 … 100 in many a driver. Raises NotMeasured where it is not known."""
+    NO_BATTERY.demand(message)
+    NO_PERCENTAGE.demand(message)
     share = _not_below_zero(finite(message, "percentage"))
     return Level(value=share * 100 if share <= 1.0 else share, unit="%")
 

@@ -7,11 +7,13 @@ from typing import Any
 
 from monitor.values import Heading
 from server.judge.message_fields import Rejected, finite, yaw
+from server.judge.not_measured import NO_ORIENTATION
 from server.judge.topic import Topic, floats
 
 
 def heading_of_imu(message: Any) -> Heading:
-    """Compass heading from an IMU whose yaw 0 is east (REP-103)."""
+    """Compass heading from an IMU whose yaw 0 is east (REP-103). Raises NotMeasured for an IMU without orientation."""
+    NO_ORIENTATION.demand(message)
     yaw_rad = yaw(message)
     if yaw_rad is None:
         raise Rejected("orientation is not a rotation")

@@ -147,10 +147,10 @@ class Catalog:
         return drives_of(self._entries.figures(which, MOST_IN_LOGBOOK))
 
     def path(self, id: str) -> Path | None:
-        """Its file; None: it is not there. No id leads out of the folder."""
+        """Its file, of a split bag its folder; None: it is not there. No id leads out of the folder."""
         entry = self._listing.entry(id)
         path = self.folder / entry.path if entry is not None else None
-        return path if path is not None and path.is_file() else None
+        return path if path is not None and path.exists() else None
 
     def of_mark(self, vehicle: str, mark: str) -> list[Path]:
         """The files in which, or beside which, a mark may be: those that name it, and those that are yet to be read."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from pathlib import Path
 
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog.catalog_db import Entry
-from server.recording.catalog.discovery import TRASH, files_below, id_of, shape_of, started_ms_of, vehicle_of
+from server.recording.catalog.discovery import TRASH, files_below, files_of, id_of, shape_of, started_ms_of, vehicle_of
 from server.recording.catalog.entries import Entries
 from server.recording.catalog.errors import NotThere
 from server.recording.catalog.survey import VERSION
@@ -63,9 +63,14 @@ class FolderListing:
                 changed.append(entry)
         # What was moved or renamed while the folder was walked is looked at once more.
         with self._entries.lock:
-            self._entries.forget([path for path in known if path not in seen and not (self._folder / path).exists()])
+            self._entries.forget([path for path in known if path not in seen and self._is_gone(path, seen)])
             now = [self.look(self._folder / entry.path, known.get(entry.path)) for entry in changed]
             self._entries.put([entry for entry in now if entry is not None])
+
+    def _is_gone(self, path: str, seen: Container[str]) -> bool:
+        """Whether a file is there no more, or is now listed with others as one recording; or a folder is none."""
+        place = self._folder / path
+        return path.rpartition("/")[0] in seen or not place.exists() or (place.is_dir() and not files_of(place))
 
     def walk_if_changed(self) -> None:
         """Walks only where a folder or a file has changed.
@@ -81,15 +86,18 @@ class FolderListing:
     def look(self, path: Path, known: Entry | None) -> Entry | None:
         """What can be said of a file without reading it, and what is known of it if it is still the same."""
         try:
-            stat = path.stat()
+            stats = [file.stat() for file in files_of(path)]
         except OSError:
             return None
+        if not stats:
+            return None
+        size, changed_ns = sum(stat.st_size for stat in stats), max(stat.st_mtime_ns for stat in stats)
         inside = path.relative_to(self._folder).as_posix()
         trashed_ms, origin = None, inside
         if inside.startswith(f"{TRASH}/"):
             _, stamp, origin = inside.split("/", 2)
             trashed_ms = int(stamp)
-        is_same = known is not None and (known.size, known.changed_ns) == (stat.st_size, stat.st_mtime_ns)
+        is_same = known is not None and (known.size, known.changed_ns) == (size, changed_ns)
         found = known.found if is_same and known is not None else None
         if found is not None and found.get("survey") != VERSION:
             found = None
@@ -98,9 +106,9 @@ class FolderListing:
             id=id_of(origin),
             trashed_ms=trashed_ms,
             vehicle=vehicle_of(found, origin),
-            started_ms=started_ms_of(found, path.name, stat.st_mtime_ns),
-            size=stat.st_size,
-            changed_ns=stat.st_mtime_ns,
+            started_ms=started_ms_of(found, path.name, changed_ns),
+            size=size,
+            changed_ns=changed_ns,
             found=found,
             annotations=annotation_store.read(path),
         )

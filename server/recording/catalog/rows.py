@@ -14,10 +14,11 @@ from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import catalog_db
 from server.recording.catalog.annotations import LATE
 from server.recording.catalog.catalog_db import Entry, Which
+from server.recording.catalog.discovery import SEVERAL
 from server.recording.catalog.entries import Entries
 from server.recording.catalog.errors import Refused
 from server.recording.catalog.verifications import Verifications
-from server.recording.folder import DAMAGED, FINISHED
+from server.recording.folder import DAMAGED, FINISHED, FOLDER
 
 MAX_ROWS = 200  # a page
 _CURSOR = re.compile(r"(-?\d{1,16})\.([A-Za-z0-9][A-Za-z0-9_-]{0,89})")
@@ -53,6 +54,11 @@ def page_of(entries: Entries, which: Which, verifications: Verifications, *, cur
     )
 
 
+def _format(name: str) -> str:
+    """By the ending of the file; without one it is a folder."""
+    return "mcap" if name.endswith((FINISHED, DAMAGED)) else Path(name).suffix[1:] or FOLDER
+
+
 def _digest_of_late(entry: Entry) -> str:
     """Of the marks and descriptions beside the file; none: empty."""
     late = [getattr(entry.annotations, name) for name in LATE]
@@ -83,6 +89,7 @@ def row_of(entry: Entry, verified: VerificationAnswer | None = None) -> Recordin
         "state": "waiting" if entry.found is None else "unreadable" if problem else "read",
         "problem": problem,
         "damage": found.get("damage", []),
+        "unread": found.get("unread", []),
         "left_out": found.get("left_out", []),
         "left_out_count": found.get("left_out_count", 0),
         "not_received": found.get("not_received", []),
@@ -93,7 +100,8 @@ def row_of(entry: Entry, verified: VerificationAnswer | None = None) -> Recordin
         "is_clip": found.get("is_clip", False),
         "clip_of": found.get("clip_of"),
         "file": annotation_store.line(name),
-        "format": "mcap" if name.endswith((FINISHED, DAMAGED)) else Path(name).suffix[1:],
+        "format": _format(name),
+        "several_files": found.get("several_files") or (SEVERAL if _format(name) == FOLDER else None),
         "sha256": found.get("sha256"),
         "head": found.get("head"),
         "verified": verified,

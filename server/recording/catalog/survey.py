@@ -30,6 +30,7 @@ from server.judge.speed_trace import SpeedTrace
 from server.protocol.drive_trends import DriveFacts, DriveTrendsAnswer, Wanted, answer
 from server.protocol.marks import DriveMark
 from server.recording.catalog.annotations import MAX_MARKS, line
+from server.recording.catalog.discovery import files_of, why_not_one_file
 from server.recording.catalog.sketch import sketch
 from server.recording.drive.course import course_of
 from server.recording.drive.facts import facts_of, figures_of, limits_of, undescribed_of
@@ -37,9 +38,10 @@ from server.recording.drive.motion import Motion
 from server.recording.event_channels import read_recorded_events
 from server.recording.marks.of_drive import in_recording
 from server.recording.mcap.chain import read_head
+from server.recording.read.errors import NoRoom
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
 
-VERSION = 8  # of what is found: with another one, files are read again
+VERSION = 10  # of what is found: with another one, files are read again
 PRIORITIES = ("critical", "warning", "advisory")
 MAX_RAISED = 200  # alarms listed one by one; all are counted
 MAX_SENTENCES = 10
@@ -51,19 +53,22 @@ _ALARMS = "/catgraph/alarms"
 
 
 def survey(path: Path) -> dict[str, Any]:
-    """The survey of one file. `problem` is the reason why it cannot be read; then it is the only entry.
+    """The survey of one file. `problem` is the reason why it cannot be read; then it is the only entry, but for
+    `is_passing` where it can be read later.
 
     Lengths in m and s, speeds in m/s, times in ms since 1970. Unknown is None; `alarms` is None if none were recorded.
     """
     try:
         with open_recording([path]) as recording:
             found = _read(recording, path)
+    except NoRoom as why:
+        return {"problem": _sentence(str(why), path), "is_passing": True}
     except RecordingUnreadable as why:
         return {"problem": _sentence(str(why), path)}
     except MemoryError:
         return {"problem": _sentence(f"{path} has a part that is larger than this machine's memory", path)}
     found["sha256"] = _digest(path)
-    head = read_head(path, "")
+    head = None if path.is_dir() else read_head(path, "")
     found["head"] = head.digest if head is not None else None
     return found
 
@@ -104,6 +109,8 @@ def _read(recording: Recording, path: Path) -> dict[str, Any]:
         "not_received": _names(metadata.get("not_received", "")),
         "not_received_count": _count(metadata, "not_received"),
         "damage": damage[:MAX_SENTENCES],
+        "unread": [_sentence(note, path) for note in recording.notes[:MAX_SENTENCES]],
+        "several_files": why_not_one_file(path),
         "sketch": None if drawn is None else drawn.as_json(),
         "marks": _marks(recording),
         "trends": motion.sketch(recording),
@@ -222,6 +229,9 @@ def _sentence(words: str, path: Path) -> str:
 
 
 def _digest(path: Path) -> str:
+    """Of a file; of a folder, of the digests of its files."""
+    if path.is_dir():
+        return hashlib.sha256("".join(map(_digest, files_of(path))).encode()).hexdigest()
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

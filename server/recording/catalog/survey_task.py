@@ -111,7 +111,8 @@ class SurveyTask:
             figures = found.pop("figures", None)
             if figures is not None:
                 self._entries.put_figures(found["sha256"], figures)
-            found = {**found, "survey": VERSION}
+            is_passing = found.pop("is_passing", False)  # then it is read again when the folder is scanned again
+            found = {**found, "survey": None if is_passing else VERSION}
             origin = entry.path.split("/", 2)[2] if entry.trashed_ms is not None else entry.path
             new = replace(
                 now,

@@ -10,7 +10,7 @@ from server.protocol.answers import Total
 from server.recording.catalog import annotations as annotation_store
 from server.recording.catalog import atomic_move
 from server.recording.catalog.catalog_db import Entry
-from server.recording.catalog.discovery import TRASH
+from server.recording.catalog.discovery import TRASH, files_of
 from server.recording.catalog.entries import Entries
 from server.recording.catalog.errors import NotThere, Refused
 from server.recording.catalog.folder_listing import FolderListing
@@ -33,7 +33,7 @@ class Trash:
                 raise Refused("It is being recorded now: stop recording first.")
             entry = self._listing.need(id)
             now_ms = max(self._wall_ms(), 1)
-            while (self._folder / TRASH / str(now_ms) / entry.path).exists():
+            while (self._folder / TRASH / str(now_ms)).exists():  # what was deleted lies alone: see discovery
                 now_ms += 1
             moved = replace(entry, path=f"{TRASH}/{now_ms}/{entry.path}", trashed_ms=now_ms)
             self._move(entry, moved)
@@ -48,7 +48,7 @@ class Trash:
         """Exactly this one. Raises NotThere, Refused."""
         with self._entries.lock:
             back = replace(entry, path=entry.path.split("/", 2)[2], trashed_ms=None)
-            if (self._folder / back.path).exists():
+            if self._is_taken(self._folder / entry.path, self._folder / back.path):
                 raise Refused("A recording of that name exists: rename its file first.")
             self._move(entry, back)
             return back
@@ -70,9 +70,10 @@ class Trash:
             try:
                 for entry in chosen:
                     path = self._folder / entry.path
-                    path.unlink(missing_ok=True)
-                    annotation_store.beside(path).unlink(missing_ok=True)
-                    atomic_move.remove_folder(annotation_store.media_beside(path))
+                    if files_of(path):  # else its folder holds others by now, which are listed by themselves
+                        atomic_move.remove(path)
+                        annotation_store.beside(path).unlink(missing_ok=True)
+                        atomic_move.remove_folder(annotation_store.media_beside(path))
                     gone.append(entry)
             except OSError as why:
                 raise Refused(f"It cannot be deleted: {(why.strerror or str(why)).lower()}.") from None
@@ -82,13 +83,20 @@ class Trash:
                     atomic_move.tidy(self._folder / entry.path, self._folder / TRASH)
             return {"count": len(gone), "bytes": sum(entry.size for entry in gone)}
 
+    def _is_taken(self, source: Path, target: Path) -> bool:
+        """Whether something is where it would come to; of a folder, its files are put beside what is there now."""
+        files = atomic_move.moves(source, target)
+        return any(new.exists() for _, new in (files if source.is_dir() else files[:1]))
+
     def _move(self, old: Entry, new: Entry) -> None:
         source, target = self._folder / old.path, self._folder / new.path
+        if not files_of(source):
+            raise Refused("Its folder holds other recordings by now: look for its parts in the list.")
         try:
-            atomic_move.move(source, target)
+            is_moved = atomic_move.move(source, target)
         except OSError as why:
             raise Refused(f"It cannot be moved: {(why.strerror or str(why)).lower()}.") from None
-        if not target.exists():
+        if not is_moved:
             self._entries.forget([old.path])
             raise NotThere("The recording no longer exists.")
         self._entries.forget([old.path])

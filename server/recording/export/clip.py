@@ -8,8 +8,9 @@ metadata names the recording it was cut from, and what was in force: alarms, pau
 from __future__ import annotations
 
 import contextlib
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -25,10 +26,10 @@ from server.recording.marks.of_drive import described_late, marks_of, media_of
 from server.recording.marks.rows import entry
 from server.recording.mcap.write import PartFile
 from server.recording.own import own_schema
-from server.recording.read.errors import RecordingUnreadable
+from server.recording.read.errors import Undecodable
 from server.recording.read.read import Recording
 from server.recording.read.schemas import Schema, TypeBook
-from server.recording.read.source import Channel, Damage
+from server.recording.read.source import Channel, why_not_decoded
 from server.recording.standing import Stood, read_standing
 
 BEFORE_S = AFTER_S = 30.0
@@ -124,18 +125,26 @@ _LOOKING = 0.4  # of the work: the rest is copying
 
 def _copy(recording: Recording, file: PartFile, window: Window, before: _Before, progress: Progress) -> Outcome:
     outcome = Outcome()
-    channels: dict[tuple[int, int], int] = {}
+    channels: dict[tuple[int, int], int | tuple[str, str]] = {}  # or topic and reason: it cannot be in a clip
+    left_out: Counter[tuple[str, str]] = Counter()  # messages by topic and reason
     books: dict[int, TypeBook] = {}
+
+    def number_of(raw: Raw) -> int | tuple[str, str]:
+        try:
+            schema = _schema(recording, raw.channel, books)
+        except Undecodable as why:
+            return raw.channel.topic, str(why)
+        return file.channel(raw.channel.topic, schema, _LATCHED if raw.channel.is_latched else None)
 
     def add(raw: Raw, at_ns: int) -> None:
         place = (raw.file, raw.channel.number)
-        number = channels.get(place)
-        if number is None:
-            schema = _schema(recording, raw.channel, books)
-            number = channels[place] = file.channel(
-                raw.channel.topic, schema, _LATCHED if raw.channel.is_latched else None
-            )
-        file.add(number, at_ns, raw.data)
+        if place not in channels:
+            channels[place] = number_of(raw)
+        number = channels[place]
+        if isinstance(number, tuple):
+            left_out[number] += 1
+        else:
+            file.add(number, at_ns, raw.data)
 
     first_ns, last_ns = span_ns(recording)
     begin_ns, end_ns = max(window.from_ns, first_ns), min(window.to_ns, last_ns)
@@ -157,6 +166,9 @@ def _copy(recording: Recording, file: PartFile, window: Window, before: _Before,
         file.add(file.channel(_ALARMS, own_schema("alarms")), end_ns, orjson.dumps(described_event(row)))
     if not outcome.entries:
         raise NothingRecorded(f"Nothing was recorded from {_clock(window.from_ns)} to {_clock(window.to_ns)} UTC.")
+    outcome.notes += [
+        f"{topic} ({count} messages) is left out: {why}." for (topic, why), count in sorted(left_out.items())
+    ]
     return outcome
 
 
@@ -185,7 +197,7 @@ def _within(recording: Recording, window: Window, progress: Progress) -> Iterato
 
 
 def _schema(recording: Recording, channel: Channel, books: dict[int, TypeBook]) -> Schema:
-    """As the recorder declares it."""
+    """As the recorder declares it. Raises Undecodable where a recording of catgraph has no such messages."""
     if channel.topic.startswith(OWN) and channel.encoding == "json":
         with contextlib.suppress(KeyError):
             return own_schema(channel.topic.removeprefix(OWN))  # type: ignore[arg-type]
@@ -193,12 +205,14 @@ def _schema(recording: Recording, channel: Channel, books: dict[int, TypeBook]) 
     if channel.encoding == "json":
         data = channel.definition or '{"type":"object"}'
         return Schema(name=name, encoding="jsonschema", data=data.encode(), message_encoding="json", encode=None)
+    if channel.encoding not in ("ros1", "cdr"):
+        raise Undecodable(why_not_decoded(channel.encoding))
     definition = channel.definition
     if channel.format == "none":
         version = recording.ros_version
         known = books.setdefault(version, TypeBook(version)).schema(channel.type)
         if known is None:
-            raise RecordingUnreadable(f"The definition of {channel.type} is missing")
+            raise Undecodable(f"the definition of {channel.type} is missing")
         return known
     encoding = {"ros1": "ros1msg", "cdr": "ros2idl" if channel.format == "idl" else "ros2msg"}[channel.encoding]
     return Schema(
@@ -231,8 +245,9 @@ def _short(window: Window, first_ns: int, last_ns: int) -> Iterator[str]:
 
 def _damage(recording: Recording, first_ns: int) -> Iterator[str]:
     """What could not be read. That a file has no end yet is no damage to a clip: see `_short`."""
+    yield from (f"{sentence}." for sentence in recording.lacking)
     for file in recording.files:
-        lost = Damage(parts=file.damage.parts, lost=file.damage.lost, too_large=file.damage.too_large)
+        lost = replace(file.damage, is_cut=False)
         yield from (f"{sentence}." for sentence in lost.sentences(file.path.name, first_ns, file.end_ns))
 
 

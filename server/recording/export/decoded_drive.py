@@ -60,6 +60,15 @@ class DecodedDrive:
         used, topics = self._drive.topics, self.recording.topics
         return {topic: (info.type, info.count) for topic, info in sorted(topics.items()) if topic not in used}
 
+    def not_measured(self) -> list[str]:
+        """What the car declared as not measured, in sentences; complete once all was read."""
+        return [
+            f"{tally.not_measured} of {tally.received} messages for {signal}: "
+            f"{tally.why_not_measured or 'not measured'}."
+            for signal, tally in sorted(self.reception.by_signal.items())
+            if tally.not_measured
+        ]
+
     def losses(self) -> list[str]:
         """What was read and could not be used, in sentences; complete once all was read."""
         recording = self.recording

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from server.recording.read.errors import RecordingUnreadable
 from server.recording.read.read import Recording
-from server.recording.read.source import Channel, FileSource
+from server.recording.read.source import Channel
+from server.recording.read.time_order import Stream, in_time_order
 
 OWN = "/catgraph/"  # topics that catgraph itself wrote: alarms, phone, settings …
 PROGRESS_EVERY = 2000  # messages
@@ -42,16 +42,18 @@ def raw_messages(
 ) -> Iterator[Raw]:
     """Messages of the wanted channels from `start_ns` to `end_ns`, both included.
 
-    Raises RecordingUnreadable where nothing of a file is whole; what of it is damaged is left out, see
+    Raises RecordingUnreadable where nothing of any file is whole; what of them is damaged is left out, see
     `recording.damage`.
     """
     first_ns, last_ns = span_ns(recording)
     begin_ns = first_ns if start_ns is None else start_ns
     until_ns = last_ns if end_ns is None else end_ns
-    streams = [_of_file(number, file, wanted, begin_ns) for number, file in enumerate(recording.files)]
+    streams = [
+        Stream(start_ns=file.start_ns, end_ns=file.end_ns, rows=_of_file(recording, number, wanted, begin_ns))
+        for number, file in enumerate(recording.files)
+    ]
     length_ns = max(until_ns - begin_ns, 1)
-    merged = streams[0] if len(streams) == 1 else heapq.merge(*streams, key=lambda raw: raw.time_ns)
-    for count, raw in enumerate(merged):
+    for count, raw in enumerate(in_time_order(streams, lambda raw: raw.time_ns)):
         if raw.time_ns > until_ns:
             return
         if count % PROGRESS_EVERY == 0:
@@ -59,7 +61,8 @@ def raw_messages(
         yield raw
 
 
-def _of_file(number: int, file: FileSource, wanted: Callable[[Channel], bool], start_ns: int) -> Iterator[Raw]:
+def _of_file(recording: Recording, number: int, wanted: Callable[[Channel], bool], start_ns: int) -> Iterator[Raw]:
+    file = recording.files[number]
     channels = {channel.number: channel for channel in file.channels if channel.count and wanted(channel)}
     if not channels:
         return
@@ -71,4 +74,4 @@ def _of_file(number: int, file: FileSource, wanted: Callable[[Channel], bool], s
     except Exception as error:  # a damaged file makes the readers fail in every way there is
         raise RecordingUnreadable(f"{file.path} is damaged or not complete: {error}") from None
     if file.damage.is_total:
-        raise RecordingUnreadable(file.damage.why_nothing(file.path))
+        recording.assert_some(file)

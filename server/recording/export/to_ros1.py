@@ -21,7 +21,7 @@ from server.recording.export.ros1_definition import md5sum
 from server.recording.read.definition_bounds import bounded
 from server.recording.read.definitions import definitions_of, times
 from server.recording.read.errors import Undecodable
-from server.recording.read.source import Channel, FileSource
+from server.recording.read.source import Channel, FileSource, why_not_decoded
 
 _PLACEHOLDER = "structure_needs_at_least_one_member"  # how ROS 2 writes a message without fields
 _WITHOUT_COUNTERPART = ("wstring", "float128")
@@ -51,7 +51,7 @@ def ros1_form(channel: Channel, source: FileSource) -> Ros1Form:
                 "it was recorded as JSON: its type's definition was unknown, or it did not match its type"
             )
         case other:
-            raise Undecodable(f"messages encoded as {other!r} are not supported")
+            raise Undecodable(why_not_decoded(other))
 
 
 def _as_it_is(channel: Channel) -> Ros1Form:

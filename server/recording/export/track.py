@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from array import array
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
-from monitor.values import GpsFix
+from monitor.geo import is_at_zero
+from monitor.values import STATUS_UNSET, GpsFix
 from server.recording.export.decoded_drive import DecodedDrive
 from server.recording.export.outcome import ExportRefused, Progress, nothing
 from server.recording.marks.of_drive import marks_of, title_of
@@ -18,6 +20,8 @@ from server.recording.marks.of_drive import marks_of, title_of
 GAP_S = 5.0  # after this time without a position a new track starts, as on the map
 NEAR_S = 5.0  # an alarm is active where the car was, if it was known within so long
 MOST_PHONES = 50  # a track each
+UNKNOWN, NO_FIX = "without a known status", "without a fix"
+AT_ZERO, NO_PLACE = "with coordinates 0, 0", "without valid coordinates"
 _RAISED = ("raised", "recaused")
 
 
@@ -103,20 +107,47 @@ def tracks_of(drive: DecodedDrive, progress: Progress = nothing) -> Tracks:
     recording = drive.recording
     tracks = Tracks(name=f"{recording.metadata.get('vehicle') or 'car'} {when(recording.start_s)}")
 
+    left_out: Counter[str] = Counter()
+
     def add(signal: str, fix: GpsFix, at_s: float, stamp_s: float | None) -> None:
-        if fix.status >= 0 and _is_place(fix.lat_deg, fix.lon_deg):
+        why_not = _why_not(fix)
+        if why_not is None:
             tracks.car.add(at_s, fix.lat_deg, fix.lon_deg, fix.alt_m)
+        else:
+            left_out[why_not] += 1
 
     drive.read(add, signals={"position"}, progress=progress)
     _phones(drive, tracks)
+    rejected = sum(tally.rejected for tally in drive.reception.by_signal.values())
+    if not tracks.points and (left_out or rejected):
+        raise ExportRefused(" ".join(["There is no track to export.", *_left_out(left_out), *drive.losses()]))
     if not tracks.points:
         raise ExportRefused("No position was recorded in this drive: there is no track to export.")
     if not tracks.car.at_s:
-        tracks.notices.append("The car published no position: only that of the phone is in the file.")
+        what = "has no usable position" if left_out or rejected else "published no position"
+        tracks.notices.append(f"The car {what}: only that of the phone is in the file.")
+    # What has no fix is no position; what does not say so may be one.
+    tracks.notes += _left_out({UNKNOWN: left_out.pop(UNKNOWN, 0)})
+    tracks.notices += _left_out(left_out)
     _alarms(drive, tracks)
     _marks(drive, tracks)
     tracks.notes += drive.losses()
     return tracks
+
+
+def _why_not(fix: GpsFix) -> str | None:
+    """Why a position is not a point of a track; None: it is one."""
+    if fix.is_unset:
+        return AT_ZERO
+    if fix.status == STATUS_UNSET:
+        return UNKNOWN
+    if fix.status < 0:
+        return NO_FIX
+    return None if _is_place(fix.lat_deg, fix.lon_deg) else NO_PLACE
+
+
+def _left_out(counts: Mapping[str, int]) -> list[str]:
+    return [f"Left out: {count} position{'' if count == 1 else 's'} {why}." for why, count in counts.items() if count]
 
 
 def when(at_s: float) -> str:
@@ -135,7 +166,7 @@ def _phones(drive: DecodedDrive, tracks: Tracks) -> None:
         if not isinstance(fix, Mapping):
             continue
         lat_deg, lon_deg = _number(fix.get("lat_deg")), _number(fix.get("lon_deg"))
-        if lat_deg is None or lon_deg is None or not _is_place(lat_deg, lon_deg):
+        if lat_deg is None or lon_deg is None or not _is_place(lat_deg, lon_deg) or is_at_zero(lat_deg, lon_deg):
             unfit += 1
             continue
         name = str(entry.get("phone") or "phone")[:80]

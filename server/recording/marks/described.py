@@ -12,11 +12,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, cast, get_args
 
-import orjson
-from mcap.reader import make_reader
-
 from monitor.interventions import By
 from server.protocol.driving_state import InterventionDescription
+from server.recording.mcap.mcap_file import McapFile
+from server.recording.mcap.own_entries import finished, own_entries
 from server.recording.own import PREFIX
 from server.system.clean_text import clean
 
@@ -74,9 +73,11 @@ def late_of(path: Path, logged: Mapping[str, InterventionDescription]) -> list[I
 
     `logged`: what the log has of interventions of the vehicle.
     """
+    if path.is_dir():  # a bag of others
+        return None
     try:
-        with path.open("rb") as file:
-            interventions, said = _in_file(_entries(make_reader(file)))
+        with contextlib.closing(finished(path)) as source:
+            interventions, said = _in_file(_entries(source))
     except OSError:
         raise
     except Exception:  # damage makes the readers fail in every way there is
@@ -87,11 +88,13 @@ def late_of(path: Path, logged: Mapping[str, InterventionDescription]) -> list[I
 
 def holds(path: Path, intervention: str) -> bool:
     """Whether a file has this intervention; of one that cannot be read it is not known. Raises OSError."""
+    if path.is_dir():
+        return False
     try:
-        with path.open("rb") as file:
-            entries = _entries(make_reader(file))
+        with contextlib.closing(finished(path)) as source:
             return any(
-                one.get("change") == "intervention" and one.get("intervention") == intervention for one in entries
+                one.get("change") == "intervention" and one.get("intervention") == intervention
+                for one in _entries(source)
             )
     except OSError:
         raise
@@ -111,9 +114,5 @@ def _in_file(entries: Iterable[Mapping[str, Any]]) -> tuple[set[str], dict[str, 
     return {id for id in ids if isinstance(id, str)}, newest(events)
 
 
-def _entries(reader: Any) -> Iterator[Mapping[str, Any]]:
-    for _, _, message in islice(reader.iter_messages(topics=[f"{PREFIX}alarms"]), MOST_EVENTS):
-        with contextlib.suppress(orjson.JSONDecodeError):
-            entry = orjson.loads(message.data)
-            if isinstance(entry, dict):
-                yield entry
+def _entries(source: McapFile) -> Iterator[Mapping[str, Any]]:
+    return islice(own_entries(source, f"{PREFIX}alarms"), MOST_EVENTS)

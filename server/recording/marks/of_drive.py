@@ -45,8 +45,9 @@ def described_late(recording: Recording) -> list[InterventionDescription]:
 
 
 def files_of(recording: Recording) -> Sequence[Path]:
-    """Those of which it is."""
-    return [file.path for file in recording.files]
+    """Those of which it is, and before them the folder of a split bag: marks and words can be beside each."""
+    folders = [folder for path in recording.paths if path.is_dir() and (folder := path.absolute()).name]
+    return [*folders, *(file.path for file in recording.files)]
 
 
 def title_of(mark: DriveMark) -> str:

@@ -7,13 +7,12 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
-import orjson
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.reader import make_reader
 from mcap.records import Attachment, AttachmentIndex
 
 from server.protocol.marks import DriveMark
@@ -21,6 +20,7 @@ from server.recording.catalog import annotations as annotation_store
 from server.recording.marks import media
 from server.recording.marks.media import Kind, MediaName
 from server.recording.marks.rows import folded, merged
+from server.recording.mcap.own_entries import attachments_of, finished, own_entries
 from server.recording.own import PREFIX
 
 TOPIC = f"{PREFIX}marks"
@@ -45,41 +45,24 @@ NOTHING = InFile(start_ms=0.0, end_ms=0.0, marks={}, removed=frozenset(), media=
 
 
 def in_file(path: Path) -> InFile:
-    """Of one file; nothing where it has no index, or is none of ours. Raises OSError."""
-    with path.open("rb") as file:
-        try:
-            return _in_file(file)
-        except OSError:
-            raise
-        except Exception:  # damage makes the readers fail in every way there is
-            return NOTHING
-
-
-def _in_file(file: IO[bytes]) -> InFile:
-    reader = make_reader(file)
-    summary = reader.get_summary()
-    if summary is None or summary.statistics is None:
+    """Of one file; nothing where it was never closed, or is none of ours. Raises OSError."""
+    if path.is_dir():
         return NOTHING
-    has_marks = any(channel.topic == TOPIC for channel in summary.channels.values())
-    marks, removed = folded(_entries(reader) if has_marks else ())
-    named = ((media.name_of(index.name), index.data_size) for index in summary.attachment_indexes)
-    return InFile(
-        start_ms=summary.statistics.message_start_time / 1e6,
-        end_ms=summary.statistics.message_end_time / 1e6,
-        marks=marks,
-        removed=frozenset(removed),
-        media={name: size for name, size in named if name is not None},
-    )
-
-
-def _entries(reader: Any) -> Iterator[Mapping[str, Any]]:
-    for number, (_, _, message) in enumerate(reader.iter_messages(topics=[TOPIC])):
-        if number >= MOST:
-            return
-        with contextlib.suppress(orjson.JSONDecodeError):
-            entry = orjson.loads(message.data)
-            if isinstance(entry, dict):
-                yield entry
+    try:
+        with contextlib.closing(finished(path)) as source, path.open("rb") as file:
+            marks, removed = folded(islice(own_entries(source, TOPIC), MOST))
+            named = ((media.name_of(index.name), index.data_size) for index in attachments_of(file))
+            return InFile(
+                start_ms=source.start_ns / 1e6,
+                end_ms=source.end_ns / 1e6,
+                marks=marks,
+                removed=frozenset(removed),
+                media={name: size for name, size in named if name is not None},
+            )
+    except OSError:
+        raise
+    except Exception:  # damage makes the readers fail in every way there is
+        return NOTHING
 
 
 def read_marks(path: Path, within: InFile | None = None) -> list[DriveMark]:
@@ -112,10 +95,11 @@ def read_media(path: Path, mark: str, kind: Kind) -> tuple[MediaName, bytes] | N
 
 def attached(path: Path) -> Iterator[tuple[MediaName, bytes]]:
     """The voice notes and photos in a file, the newest first, without damaged ones. Raises OSError."""
+    if path.is_dir():
+        return
     with path.open("rb") as file:
         try:
-            summary = make_reader(file).get_summary()
-            indexes = [] if summary is None else summary.attachment_indexes
+            indexes = attachments_of(file)
         except OSError:
             raise
         except Exception:  # damage makes the readers fail in every way there is

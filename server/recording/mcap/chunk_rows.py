@@ -72,7 +72,19 @@ def chunk_rows(
 
     Raises PartTooLarge and MemoryError; damage makes the reader fail in every other way there is.
     """
-    data = verified(read_chunk(file, at))
+    return _rows(verified(read_chunk(file, at)), channels, from_ns, to_ns)
+
+
+def run_rows(file: IO[bytes], at: int, size: int, channels: Container[int], from_ns: int) -> list[ChunkRow]:
+    """As `chunk_rows`, of `size` bytes of messages outside of a chunk."""
+    file.seek(at)
+    data = file.read(size)
+    if len(data) < size:
+        raise ValueError("it is longer than its file")
+    return _rows(data, channels, from_ns, 2**64)
+
+
+def _rows(data: bytes, channels: Container[int], from_ns: int, to_ns: int) -> list[ChunkRow]:
     size = len(data)
     rows: list[ChunkRow] = []
     place = 0
@@ -81,8 +93,10 @@ def chunk_rows(
             _, length, channel, _, time_ns, _ = _MESSAGE_HEAD.unpack_from(data, place)
             if channel in channels and from_ns <= time_ns < to_ns:
                 rows.append((time_ns, channel, data[place + _MESSAGE_HEAD.size : place + HEAD_BYTES + length]))
-        else:
+        elif data[place]:
             length = int.from_bytes(data[place + 1 : place + HEAD_BYTES], "little")
+        else:
+            raise ValueError("it holds what is no record")
         place += HEAD_BYTES + length
     if place != size:
         raise ValueError("its records do not fill it")

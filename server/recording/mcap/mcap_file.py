@@ -1,152 +1,253 @@
-"""Reads MCAP files that are no ROS 2 bags: our own, ROS 1 messages in MCAP, and messages written as JSON."""
+"""Reads MCAP files of every profile and writer, by their index where it is complete and else by their records."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO, Any, Literal, cast
+from typing import IO, Any
 
 from mcap.reader import McapReader, make_reader
-from mcap.records import ChunkIndex, Metadata
+from mcap.records import ChunkIndex, Statistics
 
 from server.judge.message import RosVersion
-from server.recording.mcap.chunk_rows import ChunkRow, chunk_rows, in_order
-from server.recording.own import LIBRARY, METADATA
+from server.recording.mcap.chunk_rows import ChunkRow, chunk_rows, in_order, run_rows
+from server.recording.mcap.chunks import MAGIC
+from server.recording.mcap.scan import Index, Part, by_name, scan
+from server.recording.own import METADATA
+from server.recording.read.compressed_messages import PACKED, unpacked_rows
 from server.recording.read.errors import RecordingUnreadable
-from server.recording.read.source import Channel, Damage, DefinitionFormat
+from server.recording.read.qos import is_latched
+from server.recording.read.source import UNDECLARED, Channel, Damage, DefinitionFormat
+from server.recording.read.temporary_copy import TemporaryCopy
+from server.recording.read.unpack import PartTooLarge
 
 _FORMATS: dict[str, DefinitionFormat] = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
-
-
-def is_bag2(path: Path) -> bool:
-    """Whether a ROS 2 recorder wrote the file, which rosbags reads with its metadata."""
-    with path.open("rb") as file:
-        header = make_reader(cast("IO[bytes]", file)).get_header()
-        return header.profile == "ros2" and not header.library.startswith(LIBRARY)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Index:
-    """What a file holds and where."""
-
-    schemas: Mapping[int, Any]
-    channels: Mapping[int, Any]
-    counts: Mapping[int, int]  # of messages by channel
-    parts: Sequence[ChunkIndex]
-    span_ns: tuple[int, int] | None = None  # first and last message; None: that of the parts
-    metadata: Mapping[str, str] = field(default_factory=dict)  # metadata of catgraph's own recording
-    profile: str = ""
+_INDEX_HEAD = 9 + 2 + 4  # bytes of a message index's record besides its entries
+_INDEX_ENTRY = 16
 
 
 class McapFile:
-    """An MCAP file of any profile."""
+    """An MCAP file."""
 
-    distro: str | None = None
+    def __init__(
+        self,
+        path: Path,
+        *,
+        content: Path | None = None,
+        copy: TemporaryCopy | None = None,
+    ) -> None:
+        """`path`: how it is named; `content`: where it is, which is in `copy` where that is given.
 
-    is_cut = False
-
-    def __init__(self, path: Path) -> None:
+        Raises RecordingUnreadable where no message is whole, PartTooLarge, OSError and MemoryError.
+        """
         self.path = path
-        self.damage = Damage()
-        self._file = path.open("rb")
+        self.distro: str | None = None
+        self._copy = copy
+        self._file = (content or path).open("rb")
+        if copy is not None:
+            copy.release()
         try:
-            self._reader: McapReader = make_reader(self._file)
-            index = self._read_index()
+            self.is_cut = is_cut(self._file)
+            index = self._index()
         except BaseException:
             self._file.close()
             raise
-        _share_channels(index.parts)
+        self._pieces = index.pieces
+        self.damage = self._new_damage()
         self._parts = sorted(index.parts, key=lambda part: (part.message_start_time, part.message_end_time))
-        if index.span_ns is not None:
-            self.start_ns, self.end_ns = index.span_ns
-        else:
-            self.start_ns = min(part.message_start_time for part in index.parts)
-            self.end_ns = max(part.message_end_time for part in index.parts)
-        self.channels: Sequence[Channel] = [
-            _channel(channel, index.schemas.get(channel.schema_id), index.counts.get(channel.id, 0))
-            for channel in index.channels.values()
-        ]
-        self.metadata = dict(index.metadata)
-        is_ros2 = index.profile == "ros2" or any(
-            c.encoding == "cdr" or "/msg/" in c.type for c in self.channels if c.encoding != "ros1"
-        )
-        self.ros_version: RosVersion = 2 if is_ros2 else 1
+        self.start_ns, self.end_ns = index.span_ns
+        self.channels: Sequence[Channel] = _channels(index)
+        self._cdr = frozenset(channel.number for channel in self.channels if channel.encoding == "cdr")
+        self.metadata = dict(by_name(index.metadata, METADATA))
+        self.ros_version = _ros_version(index.profile, self.channels)
 
-    def _read_index(self) -> Index:
-        summary = self._reader.get_summary()
-        if summary is None or summary.statistics is None:
-            raise RecordingUnreadable(f"{self.path.name} ends too early: it has no index")
-        statistics = summary.statistics
-        return Index(
-            schemas=summary.schemas,
-            channels=summary.channels,
-            counts=statistics.channel_message_counts,
-            parts=summary.chunk_indexes,
-            span_ns=(statistics.message_start_time, statistics.message_end_time),
-            metadata=latest(self._reader.iter_metadata()),
-            profile=self._reader.get_header().profile,
+    def _index(self) -> Index:
+        if not self.is_cut and (index := _summary(self._file)) is not None:
+            return index
+        index = scan(self._file)
+        if not index.counts and (self.is_cut or index.parts):
+            raise self._unreadable(index)
+        if not self.is_cut and not index.is_ended:
+            index.pieces += 1
+        return index
+
+    def _unreadable(self, index: Index) -> Exception:
+        """Why none of its messages can be read."""
+        which = f"none of its {len(index.parts)} parts"
+        if not index.parts:
+            return RecordingUnreadable(f"{self.path} is not complete: it ends too early")
+        if self.is_cut:
+            return RecordingUnreadable(f"{self.path} is not complete, and {which} can be read")
+        return (
+            index.why
+            if isinstance(index.why, PartTooLarge)
+            else RecordingUnreadable(f"{self.path} is damaged: {which} is whole")
         )
 
-    def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
-        self.damage = Damage(is_cut=self.is_cut)
-        if not self._parts:  # nothing but messages, without an index
-            for _, channel, message in self._reader.iter_messages(starting_at=start_ns):
-                if channel.id in numbers:
-                    yield message.log_time, channel.id, message.data
-            return
+    def messages(
+        self, numbers: set[int], start_ns: int, damage: Damage | None = None
+    ) -> Iterator[tuple[int, int, bytes]]:
+        noted = damage
+        if noted is None:
+            noted = self.damage = self._new_damage()
         parts = [part for part in self._parts if _matters(part, numbers, start_ns)]
-        self.damage.parts = len(parts)
-        yield from in_order(parts, lambda part: self._whole(part, numbers, start_ns))
+        noted.parts = len(parts)
+        yield from in_order(parts, lambda part: self._whole(part, numbers, start_ns, noted))
 
-    def _whole(self, part: ChunkIndex, numbers: set[int], start_ns: int) -> list[ChunkRow]:
+    def _whole(self, part: Part, numbers: set[int], start_ns: int, damage: Damage) -> list[ChunkRow]:
         """The messages of a part that are wanted; none where it is damaged."""
         try:
-            return chunk_rows(self._file, part.chunk_start_offset, numbers, start_ns)
+            if part.run_bytes:
+                rows = run_rows(self._file, part.at, part.run_bytes, numbers, start_ns)
+            else:
+                rows = chunk_rows(self._file, part.at, numbers, start_ns)
         except MemoryError:
             raise
         except Exception as why:  # damage makes the readers fail in every way there is
-            self.damage.leave_out(part.message_start_time, part.message_end_time, why)
+            damage.leave_out(part.message_start_time, part.message_end_time, why)
             return []
+        if any(raw[:4] == PACKED for _, _, raw in rows):
+            rows, lost = unpacked_rows(rows, self._cdr)
+            damage.pieces += lost
+        return rows
+
+    def _new_damage(self) -> Damage:
+        return Damage(is_cut=self.is_cut, pieces=self._pieces)
 
     def close(self) -> None:
         self._file.close()
+        if self._copy is not None:
+            self._copy.close()
 
 
-def _share_channels(parts: Sequence[ChunkIndex]) -> None:
-    """An hour has ten thousand parts, each with a table of where its channels' indexes lie: 20 MB of which only the
-    channels are asked for, and most parts have the same."""
-    known: dict[frozenset[int], dict[int, int]] = {}
-    for part in parts:
-        part.message_index_offsets = known.setdefault(frozenset(part.message_index_offsets), part.message_index_offsets)
+def is_cut(file: IO[bytes]) -> bool:
+    """Whether a file was never closed, or lost its end."""
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(0, size - len(MAGIC)))
+    return size < 2 * len(MAGIC) or file.read() != MAGIC
 
 
-def _matters(part: ChunkIndex, numbers: set[int], start_ns: int) -> bool:
-    """Whether a part may contain a wanted message; without its channels in the index it may."""
-    return part.message_end_time >= start_ns and (
-        not part.message_index_offsets or not numbers.isdisjoint(part.message_index_offsets)
+def _summary(file: IO[bytes]) -> Index | None:
+    """The file's own index; None where it has none, or not all that its messages need. Raises MemoryError."""
+    try:
+        file.seek(0)
+        reader = make_reader(file)
+        profile = reader.get_header().profile
+        summary = reader.get_summary()
+        if summary is None or summary.statistics is None:
+            return None
+        statistics = summary.statistics
+        if not _is_complete(summary, statistics):
+            return None
+        index = Index(profile=profile, schemas=dict(summary.schemas), channels=dict(summary.channels), is_ended=True)
+        index.counts = Counter(statistics.channel_message_counts)
+        index.parts = _parts(summary.chunk_indexes)
+        index.metadata = _metadata(file, reader, len(summary.metadata_indexes), statistics.metadata_count)
+    except MemoryError:
+        raise
+    except Exception:  # damage makes the library fail in every way there is
+        return None
+    return index
+
+
+def _is_complete(summary: Any, statistics: Statistics) -> bool:
+    """Whether the index declares all channels with messages, and leads to each message.
+
+    The length of a chunk's message indexes is the only place from which a summary shows how many messages a chunk
+    has; a file may have others outside of its chunks.
+    """
+    counts: dict[int, int] = statistics.channel_message_counts
+    channels = [summary.channels.get(number) for number, count in counts.items() if count]
+    if any(one is None or (one.schema_id and one.schema_id not in summary.schemas) for one in channels):
+        return False
+    indexed = sum(
+        (part.message_index_length - _INDEX_HEAD * len(part.message_index_offsets)) // _INDEX_ENTRY
+        for part in summary.chunk_indexes
+        if part.message_index_offsets
+    )
+    return (
+        statistics.chunk_count == len(summary.chunk_indexes)
+        and statistics.message_count == sum(counts.values()) == indexed
     )
 
 
-def latest(records: Iterable[Metadata]) -> dict[str, str]:
-    """Our last metadata record: one is written at the start, one more when the file is closed."""
-    found: dict[str, str] = {}
-    for record in records:
-        if record.name == METADATA:
-            found = dict(record.metadata)
+def _parts(indexes: Sequence[ChunkIndex]) -> list[Part]:
+    """An hour has ten thousand chunks, of which most have the same channels: these are kept once."""
+    known: dict[frozenset[int], frozenset[int]] = {}
+    parts = []
+    for index in indexes:
+        if not index.message_index_offsets:  # without messages, as it is complete
+            continue
+        channels = frozenset(index.message_index_offsets)
+        parts.append(
+            Part(
+                message_start_time=index.message_start_time,
+                message_end_time=index.message_end_time,
+                at=index.chunk_start_offset,
+                channels=known.setdefault(channels, channels),
+            )
+        )
+    return parts
+
+
+def _metadata(file: IO[bytes], reader: McapReader, indexed: int, count: int) -> list[Any]:
+    """The metadata records; those that the index does not name are looked for."""
+    return list(reader.iter_metadata()) if indexed == count else scan(file, with_messages=False).metadata
+
+
+def _matters(part: Part, numbers: set[int], start_ns: int) -> bool:
+    """Whether a part may contain a wanted message."""
+    return part.message_end_time >= start_ns and (not part.channels or not numbers.isdisjoint(part.channels))
+
+
+def _channels(index: Index) -> list[Channel]:
+    """Those declared, and those that only have messages."""
+    found = [
+        _channel(channel, index.schemas.get(channel.schema_id), index.counts[channel.id])
+        for channel in index.channels.values()
+    ]
+    found += [
+        Channel(
+            number=number,
+            topic=f"channel {number}",
+            type="",
+            definition="",
+            format="none",
+            encoding=UNDECLARED,
+            count=count,
+            is_latched=False,
+        )
+        for number, count in index.counts.items()
+        if number not in index.channels
+    ]
     return found
 
 
 def _channel(channel: Any, schema: Any, count: int) -> Channel:
     name = schema.name if schema else ""
     parts = name.split("/")
+    is_ros = channel.message_encoding in ("ros1", "cdr")
     return Channel(
         number=channel.id,
         topic=channel.topic,
-        type=f"{parts[0]}/msg/{parts[1]}" if channel.message_encoding == "ros1" and len(parts) == 2 else name,
+        type=f"{parts[0]}/msg/{parts[1]}" if is_ros and len(parts) == 2 else name,
         definition=schema.data.decode("utf-8", "replace") if schema else "",
-        format=_FORMATS.get(schema.encoding, "none") if schema else "none",
-        encoding=cast('Literal["ros1", "cdr", "json"]', channel.message_encoding),
+        format=_FORMATS.get(schema.encoding, "none") if schema and schema.data.strip() else "none",
+        encoding=channel.message_encoding,
         count=count,
-        is_latched="durability: transient_local" in channel.metadata.get("offered_qos_profiles", "").lower(),
+        is_latched=is_latched(channel.metadata.get("offered_qos_profiles", "")),
     )
+
+
+def _ros_version(profile: str, channels: Sequence[Channel]) -> RosVersion:
+    """By what is encoded as ROS 1 or ROS 2; where that is both or nothing, by the profile, else by names of types."""
+    encodings = {channel.encoding for channel in channels if channel.count}
+    if ("cdr" in encodings) != ("ros1" in encodings):
+        return 2 if "cdr" in encodings else 1
+    if profile in ("ros1", "ros2"):
+        return 2 if profile == "ros2" else 1
+    encodings = {channel.encoding for channel in channels}
+    is_ros2 = "cdr" in encodings or any("/msg/" in one.type for one in channels if one.encoding == "json")
+    return 2 if is_ros2 and "ros1" not in encodings else 1

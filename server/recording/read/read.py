@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import heapq
 import operator
+import re
+from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,17 +14,15 @@ from typing import Any, Self
 import orjson
 
 from server.judge.message import Json, Message, RosVersion
-from server.recording.mcap import truncated
-from server.recording.mcap.mcap_file import McapFile, is_bag2
+from server.recording.mcap.mcap_file import McapFile
 from server.recording.own import PREFIX
-from server.recording.read import rosbag1_truncated
 from server.recording.read.decode import Decode, compile_decoder
 from server.recording.read.definitions import definitions_of
-from server.recording.read.errors import RecordingUnreadable, Undecodable
-from server.recording.read.recognise import Kind, recognise
-from server.recording.read.rosbag1 import Bag1
-from server.recording.read.rosbag2 import Bag2
-from server.recording.read.source import Channel, FileSource
+from server.recording.read.errors import NoRoom, RecordingUnreadable, Undecodable
+from server.recording.read.open_file import open_file
+from server.recording.read.recognise import Found, FoundRecording, by_name, recognise
+from server.recording.read.source import Channel, Damage, FileSource, why_not_decoded
+from server.recording.read.time_order import Stream, in_time_order
 from server.recording.read.unpack import PartTooLarge
 
 __all__ = ["Recording", "RecordingUnreadable", "TopicInfo", "open_recording"]
@@ -48,6 +47,7 @@ class _ChannelReader:
     decode: Decode
 
 
+_ROS_TYPE = re.compile(r"[A-Za-z]\w*(/msg)?/[A-Za-z]\w*")
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, content
 
 
@@ -60,13 +60,13 @@ def open_recording(paths: Sequence[Path]) -> Recording:
     if not paths:
         raise RecordingUnreadable("no recording was given")
     sources: list[FileSource] = []
+    lacking: list[str] = []
     try:
         for path in paths:
-            for file, kind in recognise(Path(path)):
-                sources.append(_open(file, kind))
-        if len({source.ros_version for source in sources}) > 1:
+            _open_parts(recognise(Path(path)), sources, lacking)
+        if len({source.ros_version for source in sources if source.channels}) > 1:
             raise RecordingUnreadable("recordings of ROS 1 and ROS 2 cannot be read as one")
-        return Recording(sources)
+        return Recording(sources, lacking, list(map(Path, paths)))
     except BaseException:
         for source in sources:
             source.close()
@@ -76,11 +76,13 @@ def open_recording(paths: Sequence[Path]) -> Recording:
 class Recording:
     """A drive on disk. Use it as a context manager, or close it."""
 
-    def __init__(self, sources: Sequence[FileSource]) -> None:
+    def __init__(self, sources: Sequence[FileSource], lacking: Sequence[str], paths: Sequence[Path]) -> None:
+        """`lacking`: parts that are missing or cannot be read at all, a sentence each; `paths`: files and folders."""
         self._sources = sources
-        self.ros_version: RosVersion = sources[0].ros_version
+        self.lacking = lacking
+        self.paths = paths
+        self.ros_version: RosVersion = next((s for s in sources if s.channels), sources[0]).ros_version
         self.topics: dict[str, TopicInfo] = {}
-        self.notes: list[str] = []  # topics left out, each with the reason, for a person
         self.metadata: dict[str, str] = next(
             (s.metadata for s in sources if isinstance(s, McapFile) and s.metadata), {}
         )
@@ -88,8 +90,12 @@ class Recording:
         self.why_rejected: dict[str, str] = {}
         self._readers: list[dict[int, _ChannelReader]] = []
         decoders: dict[tuple[str, str, str], Decode] = {}
+        left_out: Counter[tuple[str, str]] = Counter()  # messages by topic and reason
         for source in sources:
-            self._readers.append(self._readers_of(source, decoders))
+            self._readers.append(self._readers_of(source, decoders, left_out))
+        self.notes = [  # topics left out, each with the reason, for a person
+            f"{topic} ({count} messages) is left out: {why}" for (topic, why), count in left_out.items()
+        ]
         filled = [source for source in sources if any(channel.count for channel in source.channels)]
         self._start_ns = min((source.start_ns for source in filled), default=0)
         end_ns = max((source.end_ns for source in filled), default=self._start_ns)
@@ -99,7 +105,7 @@ class Recording:
     @property
     def damage(self) -> list[str]:
         """What the newest reading had to leave out because it is damaged or was never written, in sentences."""
-        return [
+        return [*self.lacking] + [
             sentence
             for source in self._sources
             for sentence in source.damage.sentences(source.path.name, self._start_ns, source.end_ns)
@@ -109,6 +115,12 @@ class Recording:
     def files(self) -> Sequence[FileSource]:
         """The source files, for copying messages unchanged."""
         return self._sources
+
+    def assert_some(self, source: FileSource) -> None:
+        """Check, when a file was read, that it or another one is not damaged everywhere. Raises RecordingUnreadable."""
+        filled = [one for one in self._sources if any(channel.count for channel in one.channels)]
+        if all(one.damage.is_total for one in filled):
+            raise RecordingUnreadable(source.damage.why_nothing(source.path))
 
     @property
     def count(self) -> int:
@@ -131,23 +143,30 @@ class Recording:
         """
         start_ns = self._start_ns + round(start_s * 1e9)
         streams = [
-            self._read(source, readers, start_ns, topics)
+            Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._read(source, readers, start_ns, topics))
             for source, readers in zip(self._sources, self._readers, strict=True)
             if readers
         ]
-        return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=operator.itemgetter(0))
+        return in_time_order(streams, operator.itemgetter(0))
 
     def own(self, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
         """What catgraph itself wrote on one of its channels ("/catgraph/alarms"), in time order: seconds since 1970,
-        and what it says. None of it is among `topics` and `messages()`."""
-        for source in self._sources:
-            numbers = {channel.number for channel in source.channels if channel.topic == topic}
-            if numbers and topic.startswith(PREFIX):
-                for time_ns, _, raw in source.messages(numbers, 0):
-                    try:
-                        yield time_ns / 1e9, _decode_json(raw)
-                    except Undecodable:
-                        self.rejected[topic] = self.rejected.get(topic, 0) + 1
+        and what it says. None of it is among `topics` and `messages()`, and `damage` stays that of the newest reading
+        of those."""
+        streams = [
+            Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._own(source, topic))
+            for source in self._sources
+            if topic.startswith(PREFIX)
+        ]
+        return in_time_order(streams, operator.itemgetter(0))
+
+    def _own(self, source: FileSource, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
+        numbers = {channel.number for channel in source.channels if channel.topic == topic}
+        for time_ns, _, raw in source.messages(numbers, 0, Damage()) if numbers else ():
+            try:
+                yield time_ns / 1e9, _decode_json(raw)
+            except Undecodable:
+                self.rejected[topic] = self.rejected.get(topic, 0) + 1
 
     def close(self) -> None:
         for source in self._sources:
@@ -162,7 +181,10 @@ class Recording:
         self.close()
 
     def _readers_of(
-        self, source: FileSource, decoders: dict[tuple[str, str, str], Decode]
+        self,
+        source: FileSource,
+        decoders: dict[tuple[str, str, str], Decode],
+        left_out: Counter[tuple[str, str]],
     ) -> dict[int, _ChannelReader]:
         readers: dict[int, _ChannelReader] = {}
         for channel in source.channels:
@@ -178,7 +200,7 @@ class Recording:
                     decoders[key] = _decoder(channel, source)
             except Undecodable as why:
                 if channel.count:
-                    self.notes.append(f"{channel.topic} ({channel.count} messages) is left out: {why}")
+                    left_out[channel.topic, str(why)] += channel.count
                 continue
             readers[channel.number] = _ChannelReader(topic=channel.topic, type=type, decode=decoders[key])
             self.topics[channel.topic] = TopicInfo(
@@ -207,7 +229,7 @@ class Recording:
                     continue
                 yield time_ns / 1e9, topic, type, message
             if source.damage.is_total:
-                raise RecordingUnreadable(source.damage.why_nothing(source.path))
+                self.assert_some(source)
         except (RecordingUnreadable, MemoryError):
             raise
         except Exception as error:  # a damaged file makes the readers fail in every way there is
@@ -223,19 +245,33 @@ def _nothing(raw: bytes) -> dict[str, Any]:
     return {}
 
 
-def _open(path: Path, kind: Kind) -> FileSource:
+def _open_parts(found: FoundRecording, sources: list[FileSource], lacking: list[str]) -> None:
+    """Adds the files that can be opened, and sentences on the others. Raises RecordingUnreadable where none can."""
+    opened: list[FileSource] = []
+    why_not: list[str] = []
+    for file in found.files:
+        try:
+            opened.append(_open(file))
+            sources.append(opened[-1])
+        except NoRoom:  # nothing is known of the file
+            raise
+        except RecordingUnreadable as why:
+            if len(found.files) == 1 and not found.lacking:
+                raise
+            why_not.append(by_name(why, file.path))
+    lacking += [*why_not, *found.lacking]
+    if not opened:
+        folder = found.files[0].path.parent
+        raise RecordingUnreadable(f"{folder} has no file that can be read: {why_not[0]}")
+
+
+def _open(found: Found) -> FileSource:
     try:
-        if kind == "bag":
-            return rosbag1_truncated.CutBag1(path) if rosbag1_truncated.is_cut(path) else Bag1(path)
-        if kind == "mcap" and truncated.is_cut(path):
-            return truncated.CutMcapFile(path)
-        if kind == "mcap" and not is_bag2(path):
-            return McapFile(path)
-        return Bag2(path, kind)
+        return open_file(found)
     except (RecordingUnreadable, MemoryError):  # what is too large is not damaged
         raise
     except Exception as error:  # as above
-        raise RecordingUnreadable(_what_is_wrong(path, error)) from None
+        raise RecordingUnreadable(_what_is_wrong(found.path, error)) from None
 
 
 # Messages of other readers for a missing end of a file, and thus a missing index.
@@ -268,14 +304,23 @@ def _decoder(channel: Channel, source: FileSource) -> Decode:
     version = source.ros_version
     match channel.encoding:
         case "json":
+            if not _is_own(source) and not _ROS_TYPE.fullmatch(channel.type):
+                raise Undecodable("its messages are JSON, and of no ROS type")
             return _decode_json
         case "ros1" if version == 1:
             pass
         case "cdr" if version == 2:
             pass
         case other:
-            raise Undecodable(f"messages encoded as {other!r} are not supported")
+            raise Undecodable(why_not_decoded(other))
     return compile_decoder(channel.type, definitions_of(channel, version, source.distro), version)
+
+
+def _is_own(source: FileSource) -> bool:
+    """Whether it is a recording of catgraph, whoever copied it: there messages of unknown types are JSON."""
+    return isinstance(source, McapFile) and (
+        bool(source.metadata) or any(channel.topic.startswith(PREFIX) for channel in source.channels)
+    )
 
 
 def _decode_json(raw: bytes) -> dict[str, Any]:

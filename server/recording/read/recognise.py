@@ -1,13 +1,24 @@
-"""Recognizes a file by its first bytes, and describes it if it is not a recording."""
+"""Finds the files of a recording, recognizes each by its first bytes, and describes it if it is not a recording."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Literal
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePath
+from typing import IO, Literal
 
+import zstandard
+
+from server.recording.read.bag2_metadata import NAME as METADATA
+from server.recording.read.bag2_metadata import BagMetadata, read_metadata
+from server.recording.read.compressed_messages import PACKED as _ZSTD
 from server.recording.read.errors import RecordingUnreadable
 
-Kind = Literal["bag", "mcap", "db3", "directory"]
+Kind = Literal["bag", "mcap", "db3"]
+PACKED_SUFFIX = ".zstd"  # behind the ending of a file that is packed as a whole
+_SUFFIXES = (".mcap", ".db3", ".bag")
+_PART = re.compile(r"_\d+$")  # ends the name of each file of a split bag
 
 _RECORDINGS: dict[bytes, Kind] = {b"#ROSBAG V2.": "bag", b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "db3"}
 _OTHERS = {
@@ -30,8 +41,26 @@ _OTHERS = {
 }
 
 
-def recognise(path: Path) -> list[tuple[Path, Kind]]:
-    """The recordings of a path: itself, or the content of a directory without metadata.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """One file of a recording."""
+
+    path: Path
+    kind: Kind
+    is_packed: bool = False  # as a whole, with zstd, as rosbag2 does it once it is complete
+    bag: BagMetadata | None = None  # of the bag in whose folder it is
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundRecording:
+    """The files of one recording."""
+
+    files: list[Found]
+    lacking: list[str] = field(default_factory=list)  # parts that are missing or not readable, in sentences
+
+
+def recognise(path: Path) -> FoundRecording:
+    """The files of a path: itself, or those of a directory, which is one recording.
 
     Raises RecordingUnreadable where there are none.
     """
@@ -39,39 +68,114 @@ def recognise(path: Path) -> list[tuple[Path, Kind]]:
         if not path.exists():
             raise RecordingUnreadable(f"{path} does not exist")
         if not path.is_dir():
-            return [(path, _kind(path))]
-        if (path / "metadata.yaml").exists():
-            return [(path, "directory")]
-        inside = sorted(file for file in path.iterdir() if file.suffix in (".mcap", ".db3", ".bag"))
+            return FoundRecording(files=[_found(path)])
+        if (path / METADATA).exists():
+            return _of_bag(path)
+        inside = _files_in(path)
     except PermissionError:
         raise RecordingUnreadable(f"{path} may not be read by this user: permission denied") from None
     except OSError as error:
         raise RecordingUnreadable(f"{path} cannot be read: {error.strerror or error}") from None
     if not inside:
         raise RecordingUnreadable(f"{path} is a directory without a recording in it")
-    found = [(file, _kind(file)) for file in inside]
-    if len({file.suffix for file in inside}) > 1 or (len(inside) > 1 and inside[0].suffix == ".bag"):
+    kinds = {_plain(file.name).suffix for file in inside}
+    if len(kinds) > 1 or (len(inside) > 1 and kinds == {".bag"}):
         names = ", ".join(file.name for file in inside[:4])
         raise RecordingUnreadable(f"{path} holds several recordings ({names}): name the one to read")
-    return found
+    return _parts(inside)
 
 
-def _kind(path: Path) -> Kind:
+def _of_bag(folder: Path) -> FoundRecording:
+    """The files that a bag's metadata name, and the parts that a recorder wrote after them without naming them."""
+    bag = read_metadata(folder)
+    there = {_plain(file.name): file for file in _files_in(folder)}
+    named = {_plain(name) for name in bag.files}
+    series = {_PART.sub("", plain.stem) for plain in named if _PART.search(plain.stem)}
+    files = {plain: file for plain, file in there.items() if plain in named or _PART.sub("", plain.stem) in series}
+    files.update({_plain(name): folder / name for name in bag.files if name and (folder / name).is_file()})
+    missing = tuple(name for name in bag.files if _plain(name) not in files)
+    if not files:
+        raise RecordingUnreadable(
+            f"{folder} is not complete: {', '.join(missing[:4]) or 'every file'} of its {METADATA} is missing"
+        )
+    found = _parts([file for _, file in sorted(files.items())])
+    lacking = [_missing(missing, found.files[0].path.name)] if missing else []
+    return FoundRecording(files=[replace(one, bag=bag) for one in found.files], lacking=[*found.lacking, *lacking])
+
+
+def _parts(files: Sequence[Path]) -> FoundRecording:
+    """Those that are recordings: a recorder that was killed can leave an empty one. Raises RecordingUnreadable where
+    none is one."""
+    found: list[Found] = []
+    lacking: list[str] = []
+    for file in files:
+        try:
+            found.append(_found(file))
+        except RecordingUnreadable as why:
+            if len(files) == 1:
+                raise
+            lacking.append(by_name(why, file))
+    if not found:
+        raise RecordingUnreadable(f"{files[0].parent} has no file that can be read: {lacking[0]}")
+    return FoundRecording(files=found, lacking=lacking)
+
+
+def by_name(why: Exception, file: Path) -> str:
+    """A sentence on a file with its name in place of its path."""
+    return str(why).replace(str(file), file.name)
+
+
+def _missing(names: Sequence[str], beside: str) -> str:
+    which = "is" if len(names) == 1 else "are" if len(names) <= 4 else f"and {len(names) - 4} more are"
+    them = "it" if len(names) == 1 else "them"
+    return f"{', '.join(names[:4])} {which} missing beside {beside}: {METADATA} names {them}"
+
+
+def _files_in(folder: Path) -> list[Path]:
+    """The recorded files in a folder; of one that stands there packed and unpacked, the unpacked one."""
+    inside = sorted(file for file in folder.iterdir() if _plain(file.name).suffix in _SUFFIXES)
+    names = {file.name for file in inside}
+    return [file for file in inside if not (file.suffix == PACKED_SUFFIX and file.stem in names)]
+
+
+def _plain(name: str) -> PurePath:
+    """A file's name without the ending of a packed one."""
+    return PurePath(name.removesuffix(PACKED_SUFFIX))
+
+
+def _found(path: Path) -> Found:
     if not path.is_file():  # a pipe would make us wait for ever
         raise RecordingUnreadable(f"{path} is not a regular file")
     try:
         with path.open("rb") as file:
             start = file.read(512)
+            if start.startswith(_ZSTD):
+                file.seek(0)
+                kind = _kind(_first_unpacked(file))
+                if kind in ("mcap", "db3"):  # rosbag packs no whole files
+                    return Found(path=path, kind=kind, is_packed=True)
     except PermissionError:
         raise RecordingUnreadable(f"{path} may not be read by this user: permission denied") from None
     except OSError as error:
         raise RecordingUnreadable(f"{path} cannot be read: {error.strerror or error}") from None
     if not start:
         raise RecordingUnreadable(f"{path} is empty: it has 0 bytes")
-    for magic, kind in _RECORDINGS.items():
-        if start.startswith(magic):
-            return kind
-    raise RecordingUnreadable(f"{path} is not a recording: it is {_in_words(start)}")
+    kind = _kind(start)
+    if kind is None:
+        raise RecordingUnreadable(f"{path} is not a recording: it is {_in_words(start)}")
+    return Found(path=path, kind=kind)
+
+
+def _kind(start: bytes) -> Kind | None:
+    return next((kind for magic, kind in _RECORDINGS.items() if start.startswith(magic)), None)
+
+
+def _first_unpacked(file: IO[bytes]) -> bytes:
+    """The first bytes of what is packed; none where it is damaged."""
+    try:
+        return bytes(zstandard.ZstdDecompressor().stream_reader(file).read(16))
+    except zstandard.ZstdError:
+        return b""
 
 
 def _in_words(start: bytes) -> str:

@@ -156,7 +156,9 @@ class Bag1:
         self.start_ns = self._reader.start_time
         self.end_ns = self._reader.end_time - 1
 
-    def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
+    def messages(
+        self, numbers: set[int], start_ns: int, damage: Damage | None = None
+    ) -> Iterator[tuple[int, int, bytes]]:
         entries: list[Entry] = []
         for number in numbers:
             entries += _since(start_ns, self._reader.indexes.get(number, ()))

@@ -11,6 +11,14 @@ from server.judge.message import RosVersion
 from server.recording.read.unpack import PartTooLarge
 
 DefinitionFormat = Literal["none", "msg", "idl"]
+UNDECLARED = ""  # the encoding of messages whose channel the file does not declare
+
+
+def why_not_decoded(encoding: str) -> str:
+    """Why messages of an encoding that is none of ours are left out."""
+    if encoding == UNDECLARED:
+        return "the file does not declare what they are"
+    return f"messages encoded as {encoding[:40]!r} are not supported"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +30,7 @@ class Channel:
     type: str  # as rosbags spells it, "pkg/msg/Type" in both versions
     definition: str
     format: DefinitionFormat
-    encoding: Literal["ros1", "cdr", "json"]
+    encoding: str  # "ros1", "cdr", "json"; others are named and not read
     count: int
     is_latched: bool
 
@@ -77,7 +85,7 @@ class Damage:
 
 
 class FileSource(Protocol):
-    """One open recording: a file, or a directory that is one ROS 2 bag."""
+    """One open file of a recording."""
 
     path: Path
     ros_version: RosVersion
@@ -88,13 +96,16 @@ class FileSource(Protocol):
 
     @property
     def damage(self) -> Damage:
-        """Of the newest reading."""
+        """Of the newest reading that has no other place for it."""
         ...
 
-    def messages(self, numbers: set[int], start_ns: int) -> Iterator[tuple[int, int, bytes]]:
+    def messages(
+        self, numbers: set[int], start_ns: int, damage: Damage | None = None
+    ) -> Iterator[tuple[int, int, bytes]]:
         """(time in ns, number of the channel, raw message) in time order, from `start_ns` on.
 
-        Where the file has checksums of its parts, damaged ones are left out and noted in `damage`."""
+        Where the file has checksums of its parts, damaged ones are left out and noted: in `damage` where that is given,
+        else in that of the file."""
         ...
 
     def close(self) -> None: ...

@@ -15,6 +15,7 @@ from pathlib import Path
 from server.protocol.answers import Recording
 from server.recording.catalog.annotations import NONE, Annotations
 from server.recording.catalog.catalog import Catalog
+from server.recording.catalog.discovery import why_not_one_file
 from server.recording.catalog.errors import NotThere, Refused
 from server.recording.store import names, row, said
 from server.recording.store.clips import ClipMaker
@@ -102,6 +103,7 @@ class Copying:
         """The parts of the file that are not there yet, then the proof. Raises FileChanged, NotTheSame, Refused,
         OSError."""
         recording, path = self._need(id)
+        _need_one_file(path)
         self._need_same(id, path)
         with path.open("rb") as file:
             size, changed_ns = _shape(file.fileno())
@@ -173,6 +175,7 @@ class Copying:
         the store. Raises NotTheSame, FileChanged, Refused, OSError, and what the pace raises; then nothing was deleted.
         """
         _, path = self._need(id)
+        _need_one_file(path)
         self._need_same(id, path)
         proof = self.uploads.get(id).verified
         if proof is None:
@@ -193,6 +196,7 @@ class Copying:
         moved = self.catalog.put_in_trash(recording["id"])
         try:
             pace.check()
+            _need_one_file(self.catalog.folder / moved.path)
             now = said.said_of(self.catalog.folder / moved.path)
             is_as_sent = now == sent and _annotation_fields(now.annotations) == _annotations(recording)
             if is_as_sent:
@@ -231,6 +235,12 @@ class Copying:
             for found in list(self.store.list(folder)):
                 if found.key.startswith(f"{folder}{id}.{recording['format']}") and found.key not in known:
                     self.store.delete(found.key)
+
+
+def _need_one_file(path: Path) -> None:
+    """What belongs to a recording and is in no copy must not be deleted with it. Raises Refused."""
+    if (what := why_not_one_file(path)) is not None:
+        raise Refused(f"{what.capitalize()} is not uploaded.")
 
 
 def _begin(upload: Upload, size: int, changed_ns: int) -> None:

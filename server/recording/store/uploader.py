@@ -14,7 +14,9 @@ from typing import Literal
 
 from server.protocol.answers import Recording, StoredCopy, StoreFacts
 from server.recording.catalog.catalog import Catalog
+from server.recording.catalog.discovery import why_not_one_file
 from server.recording.catalog.errors import NotThere, Refused
+from server.recording.folder import FOLDER
 from server.recording.store.clips import ClipMaker
 from server.recording.store.copying import ANOTHER, Copying, FileChanged, NotTheSame
 from server.recording.store.object_store import ObjectStore
@@ -179,6 +181,9 @@ class Uploader:
 
     def _why_not(self, row: Recording, upload: Upload) -> str | None:
         """Why its file is not sent now. A clip is a recording that a person cut out, and is sent as such."""
+        if row["format"] in (FOLDER, "db3") and (path := self._catalog.path(row["id"])) is not None:
+            if (what := why_not_one_file(path)) is not None:
+                return f"{what.capitalize()} is not uploaded."
         is_asked = upload.is_asked or row["is_clip"]
         is_up = is_interface_up(self._interface)
         return why_not_whole(self._situation(row), is_asked=is_asked, is_on_depot_network=is_up)

@@ -16,6 +16,7 @@ from server.recording.catalog import sketch
 from server.recording.catalog.annotations import BadAnnotation
 from server.recording.catalog.catalog import Catalog
 from server.recording.catalog.catalog_db import Which
+from server.recording.catalog.discovery import why_not_one_file
 from server.recording.catalog.errors import NotThere, Refused
 from server.recording.catalog.rows import MAX_ROWS
 from server.recording.export.formats import FORMATS
@@ -167,6 +168,8 @@ def file(request: Request, id: Id) -> Response:
     row, path = recordings.row(id), recordings.path(id)
     if row is None or path is None:
         raise HTTPException(404, "There is no such recording.")
+    if (what := why_not_one_file(path)) is not None:
+        raise HTTPException(409, f"This recording is {what}: export it, or copy it from the disk.")
     name = f"{id} {row['title']}".strip() + f".{row['format']}"
     return file_answer(request, path, name=name, media_type=_TYPES.get(row["format"], "application/octet-stream"))
 
@@ -178,7 +181,11 @@ def track(request: Request, id: Id) -> Response:
         raise HTTPException(404, "There is no such recording.")
     drawn = sketch.from_json(row["sketch"])
     marks = 0 if drawn is None else len(drawn.marks)
-    words = "No position was recorded" if drawn is None else f"The track, with {marks} alarm{'s' * (marks != 1)} on it"
+    words = (
+        "No usable position was recorded"
+        if drawn is None
+        else f"The track, with {marks} alarm{'s' * (marks != 1)} on it"
+    )
     return Response(
         sketch.svg(drawn, words), media_type="image/svg+xml", headers={"Cache-Control": "private, max-age=60"}
     )

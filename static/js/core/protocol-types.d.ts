@@ -1695,6 +1695,8 @@ export interface Recording {
   problem: string | null;
   /** what of it cannot be read, a sentence each */
   damage: Array<string>;
+  /** topics whose messages are of no use here, a sentence each; at most 10 */
+  unread: Array<string>;
   /** topics that were not recorded; at most 10 */
   left_out: Array<string>;
   left_out_count: number;
@@ -1710,8 +1712,10 @@ export interface Recording {
   clip_of: string | null;
   /** its name in the folder */
   file: string;
-  /** mcap · bag · db3 */
+  /** mcap · bag · db3 · zstd · folder */
   format: string;
+  /** why no single file is a copy of it, as words behind “it is”; null: its file is all of it */
+  several_files: string | null;
   sha256: string | null;
   /** SHA-256 of the last record of its hash chain [hex], not verified; null: none */
   head: string | null;

@@ -1,7 +1,7 @@
 // What the server makes of a recording: other formats to download, and the time around an alarm as a recording of its own.
 
 import { FileJob, save } from './files-job.js';
-import { nameOf, sizeWords } from './files-layout.js';
+import { nameOf, sizeWords, whyNotAsItIs } from './files-layout.js';
 import { keptAt } from '../core/kept-at.js';
 import { request, sentenceOf } from '../control/request.js';
 import { addressOf } from './files-model.js';
@@ -10,7 +10,7 @@ import { timeOfDay } from '../core/format.js';
 
 /** @typedef {import('./files-layout.js').Recording} Recording */
 
-export const KINDS = /** @type {Record<string, [string, string]>} */ ({ mcap: ['MCAP', 'all of it, for Foxglove and Lichtblick'], bag: ['ROS 1 bag', 'the file as it is'], db3: ['ROS 2 db3', 'the file as it is'] });
+export const KINDS = /** @type {Record<string, [string, string]>} */ ({ mcap: ['MCAP', 'all of it, for Foxglove and Lichtblick'], bag: ['ROS 1 bag', 'the file as it is'], db3: ['ROS 2 db3', 'the file as it is'], zstd: ['Packed MCAP or db3', 'the file as it is, packed with zstd'] });
 const CLIP_S = 30; // before and after an alarm
 export const PRIORITY_ICONS = { critical: 'crit', warning: 'warn', advisory: 'info' };
 
@@ -44,8 +44,9 @@ export class FileMaker {
   download(row, back) {
     const name = nameOf(row, Date.now());
     const kind = KINDS[row.format] ?? ['File', 'as it is'];
-    const asItIs = html('a', { href: keptAt(addressOf(row.id, '/file.mcap')), download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, kind[0]), html('small', {}, kind[1])), html('span', { class: 'end' }, ...words(sizeWords(row.size_bytes))));
-    listen(asItIs, 'click', () => setTimeout(() => this.#dialog.close()));
+    const why = whyNotAsItIs(row);
+    const asItIs = why ? html('span', { class: 'sub why' }, ...words(why)) : html('a', { href: keptAt(addressOf(row.id, '/file.mcap')), download: '' }, icon('download'), html('span', { class: 'tx' }, html('b', {}, kind[0]), html('small', {}, kind[1])), html('span', { class: 'end' }, ...words(sizeWords(row.size_bytes))));
+    if (!why) listen(asItIs, 'click', () => setTimeout(() => this.#dialog.close()));
     const made = row.state === 'read' ? (this.#model.listing.formats ?? []).filter(({ name, ros_version }) => name !== row.format && (ros_version === null || ros_version === row.ros_version)) : [];
     this.#dialog.show(`Download ${name}`, [html('p', { class: 'sub' }, 'Other formats are made on request.')], [html('ul', { class: 'menu-list' }, html('li', {}, asItIs),
       ...made.map(({ name: format, label, use }) => {

@@ -70,7 +70,7 @@ export function originWords(row, now_ms) {
     row.vehicle,
     row.is_clip ? 'clip' : '',
     (row.part ?? 1) > 1 ? `part ${row.part}` : '',
-    row.format === 'bag' ? 'ROS 1 bag' : row.format === 'db3' ? 'ROS 2 db3' : '',
+    row.format === 'bag' ? 'ROS 1 bag' : row.format === 'db3' ? 'ROS 2 db3' : row.format === 'folder' ? 'split ROS 2 bag' : '',
     row.ended === 'recovered' ? 'recovered' : '',
     row.damage.length ? 'damaged' : '',
     row.trashed_ms === null ? '' : `deleted ${whenWords(row.trashed_ms, now_ms)}`,
@@ -120,13 +120,18 @@ function clockOf(at_ms) {
   return `${two(at.getHours())}:${two(at.getMinutes())}`;
 }
 
+/** Why its file cannot be had as it is; empty: it can. @param {Recording} row */
+export function whyNotAsItIs(row) {
+  return row.several_files ? `It is ${row.several_files}: as it is, copy it from the server’s disk.` : '';
+}
+
 /** What else there is to say of it, in sentences. @param {Recording} row */
 export function warningWords(row) {
   const why = row.ended_why ?? 'the server stopped during the recording.';
   const recovered = row.ended === 'recovered' ? [/recover/i.test(why) ? why : `Recovered: ${why}`] : [];
   const leftOut = row.left_out?.length ? [`Not recorded: ${namesWords(row.left_out, row.left_out_count)}.`] : [];
   const silent = row.not_received?.length ? [`No messages from: ${namesWords(row.not_received, row.not_received_count)}.`] : [];
-  return [...recovered, ...row.damage, ...leftOut, ...silent];
+  return [...recovered, ...row.damage, ...(row.unread ?? []), ...leftOut, ...silent];
 }
 
 /** @typedef {{kind: 'all' | 'vehicle' | 'tag' | 'days', value: string}} Choice */

@@ -113,16 +113,16 @@ export class FileSheet {
   #actions() {
     const { row } = this;
     const isRead = row.state === 'read';
-    const kind = KINDS[row.format] ?? ['file', ''];
+    const kind = row.several_files ? [] : (KINDS[row.format] ?? ['file', '']).slice(0, 1);
     const back = () => this.#actions();
     const { isDocked } = this.#dialog;
     const seen = isDocked && isRead ? [html('div', { class: 'file-way' }, thumbnail(row)), this.#raised(row)] : [];
     this.#dialog.show(this.name, this.#about(), [...seen, ...(isRead && row.marks ? [this.#marks(row)] : []), html('ul', { class: 'menu-list', 'data-f': 'file-actions' },
       ...(isRead ? [this.#dialog.item('replay', 'Open replay', () => this.#replay()), ...this.#beside()] : []),
       ...(isRead ? [this.#report(), this.#dialog.item('fit', 'Compare along the way', () => this.#compare())] : []),
-      this.#dialog.item('share', 'Share', () => this.#share()),
+      ...(row.several_files ? [] : [this.#dialog.item('share', 'Share', () => this.#share())]),
       ...(isRead ? [this.#dialog.item('mail', 'E-mail', () => this.#mail())] : []),
-      this.#dialog.item('download', 'Download', () => this.#maker.download(row, back), isRead ? `${kind[0]} · bag · CSV …` : kind[0]),
+      this.#dialog.item('download', 'Download', () => this.#maker.download(row, back), [...kind, ...(isRead ? ['bag', 'CSV …'] : [])].join(' · ')),
       ...(isRead && row.alarms ? [this.#dialog.item('crit', 'Cut out an incident', () => this.#maker.incidents(row, back))] : []),
       ...(row.head ? [this.#dialog.item('ok', 'Verify', () => verify(this.#dialog, this.model, row, back))] : []),
       ...storeItem(this.#dialog, this.model, row, this.name, back),

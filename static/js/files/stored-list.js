@@ -33,8 +33,8 @@ export function listingOf(stored, why) {
 function rowOf(of) {
   return {
     of, id: of.id, vehicle: of.vehicle, session: null, part: null, started_ms: of.started_ms, length_s: of.length_s, size_bytes: of.size_bytes ?? NaN, distance_m: of.distance_m, top_speed_mps: of.top_speed_mps,
-    alarms: of.alarms, marks: 0, late: '', title: of.title, note: '', weather: '', tags: [], state: 'read', problem: null, damage: [], left_out: [], left_out_count: 0, not_received: [], not_received_count: 0, ros_version: null, ended: null, ended_why: null,
-    is_clip: false, clip_of: null, file: of.file ?? '', format: 'mcap', sha256: of.sha256, head: null, verified: null, thumbnail: '', sketch: of.sketch, trashed_ms: null,
+    alarms: of.alarms, marks: 0, late: '', title: of.title, note: '', weather: '', tags: [], state: 'read', problem: null, damage: [], unread: [], left_out: [], left_out_count: 0, not_received: [], not_received_count: 0, ros_version: null, ended: null, ended_why: null,
+    is_clip: false, clip_of: null, file: of.file ?? '', format: 'mcap', several_files: null, sha256: of.sha256, head: null, verified: null, thumbnail: '', sketch: of.sketch, trashed_ms: null,
     stored: { state: of.file === null ? 'none' : 'stored', share: null, checked_ms: of.checked_ms, sentence: '', clips: of.clips.length, is_asked: false, is_deletion_asked: false },
   };
 }

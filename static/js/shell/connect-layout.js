@@ -59,14 +59,48 @@ export function heldWords(held) {
   return `The server was restarted while it monitored ${bare(held.address)}: ${what}. Connect to it to continue.`;
 }
 
-/** An address as an operator writes it: without the scheme. @param {string} address */
+/**
+ * An address as an operator writes it: without the scheme, where it names a port.
+ * @param {string} address
+ */
 export function bare(address) {
-  return address.replace(/^ws:\/\//, '').replace(/\/$/, '');
+  const plain = address.replace(/\/$/, '');
+  return /^ws:\/\/(\[[^\]]*\]|[^:/?#]+):\d/.test(plain) ? plain.slice('ws://'.length) : plain;
+}
+
+const PORTS = { ws: 80, wss: 443 }; // of a URL without a port (RFC 6455); a host alone has rosbridge's own
+const PORT = 9090;
+const MASTER_PORT = 11311; // of a ROS master, which is refused
+
+/**
+ * What the server dials for an address, as in `server/rosbridge/address.py`; empty for one that it refuses.
+ * @param {string} typed
+ */
+export function dialled(typed) {
+  const text = typed.trim();
+  const [, scheme = '', after = text] = /^(wss?):\/\/(.*)$/i.exec(text) ?? [];
+  const isIpv6 = scheme === '' && /^[\da-f:.]+$/i.test(text) && (text.includes('::') || text.split(':').length === 8);
+  const parts = /^(\[[\da-f:.]+\]|[\w.-]+)(?::(\d*))?([/?][^#\s]*)?(?:#.*)?$/i.exec(isIpv6 ? `[${text}]` : after);
+  if (!parts || (scheme === '' && /:\/\/|^wss?:\/?(?=[^/\d]|\d+\.)/i.test(text))) return '';
+  const [, host = '', written = '', path = ''] = parts;
+  const secure = scheme.toLowerCase() === 'wss';
+  const port = written === '' ? (scheme === '' ? PORT : PORTS[secure ? 'wss' : 'ws']) : Number(written);
+  if (port < 1 || port > 65535 || port === MASTER_PORT) return '';
+  return `${secure ? 'wss' : 'ws'}://${host.toLowerCase()}:${port}${path === '/' ? '' : encoded(path.replace(/^\?/, '/?'))}`;
+}
+
+/** A path as it is sent. @param {string} path */
+function encoded(path) {
+  try {
+    return encodeURI(path).replaceAll('%25', '%');
+  } catch { // half a letter
+    return path;
+  }
 }
 
 /** Whether both are addresses of one rosbridge; the usual port may be left out. @param {string} one @param {string} other */
 export function isSameCar(one, other) {
-  const [a, b] = [one, other].map((address) => bare(address.trim()).replace(/^(\[[^\]]*\]|[^:/]+)$/, '$1:9090'));
+  const [a, b] = [one, other].map((address) => dialled(address) || address.trim());
   return a === b;
 }
 

@@ -2,7 +2,7 @@
 
 import { openPreferences } from './preferences.js';
 import { FoundVehicles } from './found-vehicles.js';
-import { addresses, armWords, bare, heldWords, isSameCar, keep } from './connect-layout.js';
+import { addresses, armWords, bare, dialled, heldWords, isSameCar, keep } from './connect-layout.js';
 import { closeSheet, openSheet } from './sheet.js';
 import { field, html, icon, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { connectRow } from '../slowdown/slow-layout.js';
@@ -70,6 +70,7 @@ class ConnectScreen {
   typed() {
     this.#isTyped = true;
     this.#complain('');
+    this.#drawDialled();
     this.found.draw();
   }
 
@@ -145,11 +146,19 @@ class ConnectScreen {
     const address = session?.address ?? session?.configured ?? '';
     if (!this.#isTyped && document.activeElement !== input && address && address !== this.#offered && !isSameCar(address, input.value)) input.value = bare(address);
     this.#offered = address;
+    this.#drawDialled();
     this.#drawKey();
     if (store.isSilent !== this.#wasSilent) this.#complain(store.isSilent ? 'The server does not answer; this page keeps trying.' : '');
     this.#wasSilent = store.isSilent;
     this.#drawComplaint();
     this.#drawArming();
+  }
+
+  #drawDialled() {
+    const url = dialled(this.input.value);
+    const at = field(this.root, 'dials');
+    setWords(at, url && `Dials ${url}`);
+    show(at, url !== '');
   }
 
   #drawKey() {

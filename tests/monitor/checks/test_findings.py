@@ -22,6 +22,7 @@ from monitor.reach import ReachFacts
 from monitor.slow_proof import SlowProof
 from monitor.snapshot import Snapshot
 from monitor.stamps import ClockJump
+from monitor.unusable import Unusable
 from monitor.values import Bearing, Effort, Level, Twist
 from tests.monitor.checks.known import ask, known
 from tests.monitor.checks.test_obstacle import before, estimated
@@ -48,6 +49,16 @@ from tests.monitor.checks.test_three_answers import (
 )
 
 KEPT = Path(__file__).with_name("findings.json")
+
+
+NOT_MEASURED = Unusable(
+    reason="not measured (why)", at_s=NOW_S, since_s=NOW_S - 9.0, count=200, horizon_s=1.0, is_declared=True
+)
+
+
+def one_fewer() -> Snapshot:
+    return known(scan=replace(seen(20.0), ranges_m=seen(20.0).ranges_m[:-1]))
+
 
 PROOFS = {
     "stands as ordered": SlowProof(ordered_s=NOW_S - 2.0, shown="stopped", shown_s=NOW_S),
@@ -104,6 +115,10 @@ MORE: dict[str, dict[str, Snapshot]] = {
         "error too large": known(position=replace(FIX, sigma_m=30.0)),
         "no error told": known(position=replace(FIX, sigma_m=None)),
         "no place": known(position=replace(FIX, lat_deg=math.nan)),
+        "not set": known(position=replace(FIX, lat_deg=math.nan, lon_deg=math.nan, status=-1, is_unset=True)),
+    },
+    "signal_unusable.acceleration": {
+        "not measured": replace(known(), unusable={"acceleration": NOT_MEASURED}),
     },
     "gps_jump": {
         "just": ran(3.1),
@@ -140,7 +155,10 @@ MORE: dict[str, dict[str, Snapshot]] = {
         for minutes in (4, 5, 10, 14, 15, 30, 60, 120)
     },
     "scan_shape": {
-        "one beam fewer": known(scan=replace(seen(20.0), ranges_m=seen(20.0).ranges_m[:-1])),
+        "one beam fewer": replace(one_fewer(), scan_habit=frozenset({0})),
+        "one beam fewer, as always": replace(one_fewer(), scan_habit=frozenset({-1})),
+        "one beam fewer, or as many": replace(one_fewer(), scan_habit=frozenset({-1, 0})),
+        "one beam fewer, at first": one_fewer(),
         "two fewer": known(scan=replace(seen(20.0), ranges_m=seen(20.0).ranges_m[:-2])),
         "step not a number": known(scan=replace(seen(20.0), angle_increment_rad=math.nan)),
     },

@@ -22,8 +22,11 @@ import pytest
 from websockets import ConnectionClosed
 
 from server.cli.replay import add_arguments, run
+from server.cli.replay_report import Report
 from server.recording.read.read import open_recording
+from server.rosbridge_server.server import RosBridge
 from tests.server.recording.bags import Drive, write_ros1, write_ros2
+from tests.server.recording.read.test_bag2 import split
 from tests.server.rosbridge_server.probe import Probe, probing
 
 PROJECT = Path(__file__).resolve().parents[3]
@@ -316,6 +319,14 @@ async def test_damage_in_the_middle_is_said_after_what_was_good(tmp_path: Path) 
     assert code == 2
     assert err == "catgraph replay: hurt.bag is damaged: a part of it cannot be unpacked\n"
     assert json.loads(re.sub(" ", "", re.search(r"Played ([\d ]+) messages", out)[1])) > 100  # type: ignore[index]
+
+
+def test_what_is_damaged_is_said_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = split(tmp_path, "mcap")
+    (folder / "drive_1.mcap").unlink()
+    with open_recording([folder]) as recording:
+        Report(recording, RosBridge(ros_version=2)).close()
+    assert capsys.readouterr().out.count("drive_1.mcap is missing") == 1
 
 
 async def test_topics_that_no_bridge_could_carry_are_noted(tmp_path: Path) -> None:

@@ -499,7 +499,7 @@ PLACES: dict[str, tuple[Any, Any, int, tuple[float, float] | str]] = {
     "no fix, a place": (32.2, -110.9, -1, (32.2, -110.9)),
     "no fix, no place": (None, None, -1, (NAN, NAN)),
     "no fix, half a place": (1e300, None, -1, (NAN, NAN)),
-    "no fix, no place on Earth": (1e300, 0.0, -1, "latitude or longitude out of range"),
+    "no fix, no place on Earth": (1e300, 0.0, -1, (NAN, NAN)),
 }
 
 

@@ -295,6 +295,21 @@ async def test_formats(
         assert list((tmp_path / "mail" / "work").iterdir()) == [], "nothing is left lying about"
 
 
+async def test_a_database_is_not_sent_without_its_log(
+    tmp_path: Path, shelf: Shelf, post: Post, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "drive_0.db3"
+    path.write_bytes(b"a database")
+    path.with_name("drive_0.db3-wal").write_bytes(b"most of the drive")
+    monkeypatch.setattr(shelf, "path_of", lambda recording: path)
+    async with mailing(tmp_path / "mail", shelf) as mailer:
+        await mailer.change(settings(post.port))
+        letter = await over(mailer, (await mailer.order("key-0001", order())).n)
+        assert (letter.state, post.mails()) == ("failed", [])
+        assert letter.said == "drive is a database with a log that holds a part of it: send it in another format."
+        assert (await over(mailer, (await mailer.order("key-0002", order(format="csv"))).n)).state == "sent"
+
+
 async def test_mails_of_reports_quote_the_head_of_the_chain(tmp_path: Path, shelf: Shelf, post: Post) -> None:
     head = read_head(record(shelf.folder / "chained.mcap", seconds=1.0), "chained")
     assert head is not None

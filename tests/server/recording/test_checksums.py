@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
@@ -10,7 +11,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from server.cli.main import main
+from server.recording.catalog.survey import survey
 from server.recording.read.read import RecordingUnreadable, open_recording
+from tests.server.recording.made import BEGAN_MS, record
 
 MESSAGES = 400
 EVERY_NS = 10_000_000
@@ -161,6 +165,40 @@ def test_each_reading_tells_of_itself(tmp_path: Path, profile: str) -> None:
         assert recording.damage == []  # what is damaged lies before it
 
 
+def hurt_last_part(path: Path) -> None:
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    part = summary.chunk_indexes[-1]
+    content = bytearray(path.read_bytes())
+    content[part.chunk_start_offset + part.chunk_length - 20] ^= 1
+    path.write_bytes(content)
+
+
+def test_reading_the_alarms_leaves_what_else_is_damaged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = record(tmp_path / "car" / "a.mcap", seconds=60.0, alarms=[(2.0, "critical")])
+    hurt_last_part(path)
+    with open_recording([path]) as recording:
+        list(recording.messages())
+        (said,) = recording.damage
+        assert len(list(recording.own("/catgraph/alarms"))) == 2
+        assert recording.damage == [said]
+    found = survey(path)
+    assert found["damage"] == [f"{said}."]
+    assert found["alarms"]["critical"] == 1
+    assert main(["export", str(path), "--format", "bag", "--out", str(tmp_path / "a.bag")]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_what_catgraph_wrote_into_several_files_comes_in_the_order_of_time(tmp_path: Path) -> None:
+    for part in (2, 10):
+        record(tmp_path / f"a_{part}.mcap", alarms=[(1.0, "critical")], began_ms=BEGAN_MS + part * 60_000)
+    with open_recording([tmp_path]) as recording:
+        times = [at_s for at_s, _ in recording.own("/catgraph/alarms")]
+    assert len(times) == 4
+    assert times == sorted(times)
+
+
 # -- files that were never closed --------------------------------------------------------------------------------------
 
 
@@ -185,6 +223,26 @@ def test_a_file_that_was_never_closed_is_read_to_its_last_whole_part(
     with open_recording([path]) as recording:
         assert recording.topics["/text"].count == len(came)
         assert recording.duration_s == pytest.approx(last_ns / 1e9)
+
+
+@PROFILES
+@pytest.mark.parametrize("number", [0, 2, -1])
+def test_the_times_of_a_damaged_part_are_not_those_of_the_drive(tmp_path: Path, profile: str, number: int) -> None:
+    path = written(tmp_path / "a.mcap", profile=profile, times=lambda n: 10**18 + n * EVERY_NS)
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    content, at = bytearray(path.read_bytes()), summary.chunk_indexes[number].chunk_start_offset
+    content[at + 9 : at + 25] = struct.pack("<QQ", 5, 2**63)  # behind opcode and length
+    content[at + summary.chunk_indexes[number].chunk_length - 20] ^= 1
+    path.write_bytes(content[:-8])
+    with open_recording([path]) as recording:
+        times = [message.at_s for message in recording.messages()]
+        assert recording.start_s == times[0]
+        assert recording.duration_s == pytest.approx(times[-1] - times[0])
+        assert times[0] >= 1e9
+        assert len(times) > 300
+        assert "is damaged: 1 part of" in recording.damage[0]
 
 
 @PROFILES

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import zstandard
 
 from server.recording.read.read import RecordingUnreadable, open_recording
 from tests.server.recording.bags import BEGIN_S, Drive, write_ros1, write_ros2
@@ -43,6 +44,7 @@ def why_unreadable(*paths: Path) -> str:
         (b"\xff\xd8\xff\xe0" + bytes(50), "is a JPEG picture"),
         (b"PK\x03\x04" + bytes(50), "is a ZIP archive: unpack it first"),
         (b"\x1f\x8b\x08" + bytes(50), "is packed with gzip: unpack it first"),
+        (zstandard.ZstdCompressor().compress(b"#ROSBAG V2.0\n" + bytes(50)), "is packed with zstd: unpack it first"),
         (b"%PDF-1.7", "is a PDF document"),
         (b"hello,world\n1,2\n", "is a text file"),
         ("Größe\n".encode() * 100, "is a text file"),

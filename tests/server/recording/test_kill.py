@@ -13,7 +13,8 @@ import pytest
 from mcap.reader import make_reader
 
 from server.recording.folder import RecordingsFolder
-from server.recording.mcap.mcap_file import latest
+from server.recording.mcap.scan import by_name
+from server.recording.own import METADATA
 from server.recording.recover import recover_all
 from tests.server.recording.recording_child import BEGAN_NS, MISSING, record_until_killed
 
@@ -63,7 +64,7 @@ def kill_once(root: Path, after_s: float, part_s: float = 3600.0) -> Killed:
         with path.open("rb") as file:
             reader = make_reader(file, validate_crcs=True)
             rows = [m.log_time for _, _, m in reader.iter_messages()]
-            metadata = latest(reader.iter_metadata())
+            metadata = dict(by_name(list(reader.iter_metadata()), METADATA))
         found += [at_ns - BEGAN_NS for at_ns in rows]
     assert found == list(range(len(found))), "each once, in order, none missing in between"
     old = max((handed for at_ns, handed in reports if at_ns <= killed_ns - OLD_S * 1e9), default=0)

@@ -19,12 +19,19 @@ DIALLED = {
     "underscores, as docker names have": ("my_car", "ws://my_car:9090"),
     "ip": ("192.168.4.1", "ws://192.168.4.1:9090"),
     "ip and port": ("192.168.4.1:8080", "ws://192.168.4.1:8080"),
-    "ws": ("ws://car", "ws://car:9090"),
+    "ws": ("ws://car", "ws://car:80"),
+    "ws with a slash": ("ws://car/", "ws://car:80"),
     "ws in capitals": ("WS://car:9090", "ws://car:9090"),
     "wss": ("wss://car:443", "wss://car:443"),
-    "wss without port": ("wss://car", "wss://car:9090"),
+    "wss without port": ("wss://car", "wss://car:443"),
+    "wss in capitals": ("WSS://car", "wss://car:443"),
+    "wss with a path": ("wss://car/bridge?x=1", "wss://car:443/bridge?x=1"),
+    "wss and port": ("wss://car:9090/bridge", "wss://car:9090/bridge"),
+    "wss with a colon": ("wss://car:/bridge", "wss://car:443/bridge"),
+    "wss on IPv6": ("wss://[fd00::1]/x", "wss://[fd00::1]:443/x"),
     "slash at the end": ("ws://car:9090/", "ws://car:9090"),
-    "path": ("ws://car/bridge/1", "ws://car:9090/bridge/1"),
+    "path": ("ws://car/bridge/1", "ws://car:80/bridge/1"),
+    "path without a scheme": ("car/bridge/1", "ws://car:9090/bridge/1"),
     "path and query": ("car:9090/b?token=a%20b&x=1", "ws://car:9090/b?token=a%20b&x=1"),
     "query only": ("car?x=1", "ws://car:9090/?x=1"),
     "fragment": ("car#top", "ws://car:9090"),
@@ -52,7 +59,7 @@ def test_is_dialled(typed: str, url: str) -> None:
 
 
 def test_shown_is_host_and_port() -> None:
-    assert parse("wss://car/x").shown == "car:9090"
+    assert parse("wss://car/x").shown == "car:443"
     assert parse("fd00::1").shown == "[fd00::1]:9090"
 
 

@@ -9,11 +9,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import zstandard
 
 from server.cli.main import main
+from server.recording import space
 from server.recording.catalog.survey import survey
 from server.recording.folder import RecordingsFolder
-from server.recording.read import rosbags_bounds, unpack
+from server.recording.mcap.chunks import MAGIC
+from server.recording.read import bag2_metadata, qos, temporary_copy, unpack
 from server.recording.read.read import RecordingUnreadable, open_recording
 from server.recording.read.unpack import MOST_BYTES
 from server.recording.recover import recover
@@ -122,7 +125,7 @@ def test_only_what_has_the_size_that_it_says_is_unpacked(kind: packed.Kind, off:
     if is_right:
         assert unpack.unpack(kind, zeros, size) == bytes(size)
         return
-    with pytest.raises((ValueError, EOFError, unpack.zstandard.ZstdError)):
+    with pytest.raises((ValueError, EOFError, zstandard.ZstdError)):
         unpack.unpack(kind, zeros, size + off)
 
 
@@ -135,17 +138,17 @@ def metadata_of(to: Path) -> Path:
     return write_ros2(to / "drive", drive) / "metadata.yaml"
 
 
-NESTED = "[" * (rosbags_bounds.DEEPEST + 1) + "]" * (rosbags_bounds.DEEPEST + 1)
+NESTED = "[" * (bag2_metadata.DEEPEST + 1) + "]" * (bag2_metadata.DEEPEST + 1)
 
 
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
         (lambda text: f"x: {NESTED}\n{text}", "nested too deeply"),
-        (lambda text: "- " * (rosbags_bounds.DEEPEST + 1) + "x\n", "nested too deeply"),
+        (lambda text: "- " * (bag2_metadata.DEEPEST + 1) + "x\n", "nested too deeply"),
         (lambda text: f"x: &one y\nz: *one\n{text}", "refers to parts"),
         (lambda text: "x: [" + "1," * 1000 + f"1]\n{text}", "more than 900 entries"),
-        (lambda text: "x: " + "y" * rosbags_bounds.MOST_METADATA + f"\n{text}", "larger than 2 MB"),
+        (lambda text: "x: " + "y" * bag2_metadata.MOST_METADATA + f"\n{text}", "larger than 2 MB"),
     ],
     ids=["deep", "dashes", "reference", "entries", "long line"],
 )
@@ -156,7 +159,7 @@ def test_metadata_beyond_the_bounds_are_refused(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(rosbags_bounds, "MOST_ENTRIES", 900)
+    monkeypatch.setattr(bag2_metadata, "MOST_ENTRIES", 900)
     metadata = metadata_of(tmp_path)
     metadata.write_text(change(metadata.read_text()))
     assert main(["check", str(metadata.parent)]) == 2
@@ -170,7 +173,8 @@ def test_a_bag_of_files_packed_one_by_one_does_not_fill_the_disk(
     """A disk with 3 MB free, of which half is left free, and a file of 4 MB."""
     metadata = metadata_of(tmp_path)
     plain = next(metadata.parent.glob("*.mcap"))
-    plain.with_name(plain.name + ".zstd").write_bytes(packed.zeros("zstd", 4 * MB))
+    content = MAGIC + bytes(4 * MB)
+    plain.with_name(plain.name + ".zstd").write_bytes(zstandard.ZstdCompressor().compress(content))
     plain.unlink()
     text = re.sub(r"compression_mode:.*", "compression_mode: file", metadata.read_text())
     text = re.sub(r"compression_format:.*", "compression_format: zstd", text)
@@ -178,8 +182,8 @@ def test_a_bag_of_files_packed_one_by_one_does_not_fill_the_disk(
     beside = tmp_path / "temporary"
     beside.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(beside))
-    monkeypatch.setattr(rosbags_bounds, "LEAVE_FREE", MB)
-    monkeypatch.setattr(rosbags_bounds, "LOOK_EVERY", MB // 4)
+    monkeypatch.setattr(temporary_copy, "LEAVE_FREE", MB)
+    monkeypatch.setattr(temporary_copy, "LOOK_EVERY", MB // 4)
 
     def free(_: Path) -> int:
         return 3 * MB - sum(file.stat().st_size for file in beside.rglob("*") if file.is_file())
@@ -191,7 +195,7 @@ def test_a_bag_of_files_packed_one_by_one_does_not_fill_the_disk(
         most = max(most, 3 * MB - free(path))
         return free(path)
 
-    monkeypatch.setattr(rosbags_bounds.space, "free_at", watched)
+    monkeypatch.setattr(space, "free_at", watched)
     with pytest.raises(RecordingUnreadable, match="does not fit on the disk"):
         open_recording([metadata.parent])
     assert 0 < most < 2.5 * MB
@@ -212,6 +216,8 @@ def test_a_message_beyond_the_bound_is_refused(tmp_path: Path, capsys: pytest.Ca
 
 
 def test_quality_of_service_beyond_the_bounds_is_not_known() -> None:
-    assert rosbags_bounds._bounded_qos("- &one 1\n- *one\n") == []
     one = "- history: 1\n  depth: 5\n  reliability: 1\n  durability: 1\n"
-    assert rosbags_bounds._bounded_qos(one * (rosbags_bounds.MOST_QOS // len(one) + 1)) == []
+    assert qos.is_latched(one)
+    assert not qos.is_latched("- &one {durability: 1}\n- *one\n")
+    assert not qos.is_latched(one * (qos.MOST_QOS // len(one) + 1))
+    assert not qos.is_latched("[" * 40 + "]" * 40)

@@ -17,6 +17,7 @@ from typing import IO, Any
 
 import orjson
 
+from monitor.values import GpsFix
 from server.bus.event_table import COLUMNS as ALARM_COLUMNS
 from server.bus.event_table import event_row, safe_cell
 from server.recording.export.columns import OWN_TABLES, TABLES, TIMES, OwnTable
@@ -50,8 +51,11 @@ def write_csv_zip(recording: Recording, path: Path, *, progress: Progress = noth
     with tempfile.TemporaryDirectory(prefix=".tables-", dir=path.parent) as folder:
         tables = _Tables(Path(folder), recording.start_s)
         with contextlib.closing(tables):
+            unset = 0
 
             def add(signal: str, value: Any, at_s: float, stamp_s: float | None) -> None:
+                nonlocal unset
+                unset += isinstance(value, GpsFix) and value.is_unset
                 table = TABLES[signal]
                 for row in table.rows(value):
                     tables.add(f"{signal}.csv", table.columns, at_s, stamp_s, row)
@@ -63,8 +67,10 @@ def write_csv_zip(recording: Recording, path: Path, *, progress: Progress = noth
         if not tables.rows and not texts:
             raise ExportRefused("Nothing in this recording fits a table.")
         outcome.entries = sum(tables.rows.values())
-        outcome.notes = [*_without_table(drive), *unfit, *drive.losses()]
-        outcome.notices = [f"{note}." for note in recording.notes]
+        outcome.notes = [*(f"{note}." for note in recording.notes), *_without_table(drive), *unfit, *drive.losses()]
+        outcome.notices = drive.not_measured()
+        if unset:
+            outcome.notices.append(f"{unset} positions with coordinates 0, 0 have empty cells and status -1.")
         notes = [*outcome.notices, *outcome.notes]
         about = readme(drive, [Written(name=name, rows=rows) for name, rows in tables.rows.items()], notes)
         _pack(path, Path(folder), list(tables.rows), {"README.txt": about, **texts}, recording, progress)
@@ -86,7 +92,7 @@ class _Tables:
                 when(at_s),
                 f"{at_s - self._start_s:.6f}",
                 "" if stamp_s is None else f"{stamp_s:.6f}",
-                *(safe_cell(value) for value in values),
+                *("" if value != value else safe_cell(value) for value in values),  # NaN: not known
             )
         )
         self.rows[name] += 1

@@ -26,7 +26,7 @@ from server.recording.export.raw import OWN, Raw, raw_messages
 from server.recording.read.definitions import definitions_of, distribution, times
 from server.recording.read.errors import Undecodable
 from server.recording.read.read import Recording
-from server.recording.read.source import Channel, FileSource
+from server.recording.read.source import Channel, FileSource, why_not_decoded
 
 FORMAT = ExportFormat(
     name="ros2",
@@ -114,14 +114,16 @@ def _copy(recording: Recording, messages: Iterable[Raw], writer: Writer, outcome
             continue
         if place not in connections:
             try:
-                if not is_own and channel.encoding != "cdr":
+                if not is_own and channel.encoding not in ("cdr", "json"):
+                    raise Undecodable(why_not_decoded(channel.encoding))
+                if not is_own and channel.encoding == "json":
                     raise Undecodable(
                         "it was recorded as JSON: its type's definition was unknown, or it did not match it"
                     )
                 connections[place] = connection_of(channel, recording.files[raw.file])
             except Undecodable as why:
                 connections[place] = None
-                left_out[channel.topic, str(why)] = channel.count
+                left_out[channel.topic, str(why)] += channel.count
         connection = connections[place]
         if connection is not None:
             writer.write(connection, raw.time_ns, _text(raw.data) if is_own else raw.data)

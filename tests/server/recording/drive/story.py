@@ -20,7 +20,7 @@ METRE_DEG = 1 / 111_319.49  # of longitude at the equator
 
 
 def rows(length_s: float = LENGTH_S, speed_mps: float = SPEED_MPS) -> list[Row]:
-    """Speed at 20 Hz, positions at 5 Hz due east along the equator."""
+    """Speed at 20 Hz, positions at 5 Hz due east along the equator, but for 0.1 m: 0, 0 is no place."""
     found: list[Row] = []
     for n in range(round(length_s * 20) + 1):
         at_s = n / 20
@@ -28,7 +28,7 @@ def rows(length_s: float = LENGTH_S, speed_mps: float = SPEED_MPS) -> list[Row]:
             continue
         found.append((at_s, "/catvehicle/vel", "geometry_msgs/msg/Twist", {"linear": {"x": speed_mps}}))
         if n % 4 == 0:
-            fix = {"status": {"status": 0}, "latitude": 0.0, "longitude": at_s * speed_mps * METRE_DEG}
+            fix = {"status": {"status": 0}, "latitude": 1e-6, "longitude": at_s * speed_mps * METRE_DEG}
             fix["position_covariance_type"], fix["position_covariance"] = 2, [0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01]
             found.append((at_s, "/fix", "sensor_msgs/msg/NavSatFix", fix))
     return found

@@ -55,7 +55,9 @@ def test_a_longer_drive_takes_no_more(tmp_path: Path) -> None:
 @pytest.mark.timeout(3600)
 def test_an_hour_exports_to_everything_with_little_memory(tmp_path: Path) -> None:
     hour = drive(tmp_path / "hour.mcap", 3600.0)
-    peaks = {name: peak_mb(hour, name, tmp_path) for name in FORMATS if name != "ros2"}
+    peaks = {
+        name: peak_mb(hour, name, tmp_path) for name in FORMATS if name not in ("ros2", "forms")
+    }  # forms of this drive are empty
     peaks |= {f"bag, {packed}": peak_mb(hour, "bag", tmp_path, "--compression", packed) for packed in ("bz2", "lz4")}
     peaks["clip"] = peak_mb(hour, "mcap", tmp_path, "--at", "3000")
     print(f"peak MB of an hour of driving ({hour.stat().st_size / 1e6:.0f} MB): {peaks}")

@@ -149,14 +149,51 @@ def test_lines_are_cut_at_the_antimeridian(tmp_path: Path, lons: list[float], ex
     assert all(-180.0 <= float(p.attrib["lon"]) < 180.0 for p in root.iter(f"{{{GPX['g']}}}trkpt"))
 
 
-@pytest.mark.parametrize(
-    "rows", [[], [fix(0.0, 32.0, -110.0, status=-1)], [fix(0.0, 91.0, 0.0)], [fix(0.0, math.nan, 0.0)]]
-)
-def test_no_position_is_said(tmp_path: Path, rows: list[Row]) -> None:
-    drive: list[Row] = [(0.0, "/catvehicle/vel", TWIST, {"linear": {"x": 1.0}}), *rows]
-    for write in (gpx, geojson):
-        with pytest.raises(ExportRefused, match="No position was recorded in this drive"):
-            write(made(tmp_path, drive) if write is gpx else tmp_path / "ours.mcap", tmp_path)
+SPEED: Row = (0.0, "/catvehicle/vel", TWIST, {"linear": {"x": 1.0}})
+NO_TRACK: dict[str, tuple[list[Row], str]] = {
+    "nothing": ([], "No position was recorded in this drive: there is no track to export."),
+    "no fix": (
+        [fix(0.0, 32.0, -110.0, status=-1), fix(1.0, 32.0, -110.0, status=-1)],
+        "There is no track to export. Left out: 2 positions without a fix.",
+    ),
+    "no status": (
+        [fix(0.0, 32.0, -110.0, status=-2)],
+        "There is no track to export. Left out: 1 position without a known status.",
+    ),
+    "zeros": (
+        [fix(0.0, 0.0, 0.0), fix(1.0, 0.0, -0.0, status=2), fix(2.0, 1e-12, 0.0)],
+        "There is no track to export. Left out: 3 positions with coordinates 0, 0.",
+    ),
+    "beyond the pole": (
+        [fix(0.0, 91.0, 0.0)],
+        "There is no track to export. 1 of 1 messages for position were invalid: latitude or longitude out of range.",
+    ),
+    "no numbers": (
+        [fix(0.0, math.nan, 0.0)],
+        "There is no track to export. 1 of 1 messages for position were invalid: "
+        "latitude or longitude is not a number.",
+    ),
+}
+
+
+@pytest.mark.parametrize(("rows", "sentence"), NO_TRACK.values(), ids=NO_TRACK)
+@pytest.mark.parametrize("write", [gpx, geojson])
+def test_why_there_is_no_track_is_said(tmp_path: Path, rows: list[Row], sentence: str, write: Any) -> None:
+    with pytest.raises(ExportRefused) as refusal:
+        write(made(tmp_path, [SPEED, *rows]), tmp_path)
+    assert str(refusal.value) == sentence
+
+
+def test_what_a_track_leaves_out_is_counted_by_its_reason(tmp_path: Path) -> None:
+    rows = [fix(0.0, 0.0, 0.0), fix(1.0, 0.0, 0.0), fix(2.0, 32.0, -110.0), fix(3.0, 5.0, 5.0, status=-1)]
+    root, outcome = gpx(made(tmp_path, [*rows, fix(4.0, 6.0, 6.0, status=-2)]), tmp_path)
+    points = [(float(p.attrib["lat"]), float(p.attrib["lon"])) for p in root.iter(f"{{{GPX['g']}}}trkpt")]
+    assert points == [(32.0, -110.0)]
+    assert outcome.notices == [
+        "Left out: 2 positions with coordinates 0, 0.",
+        "Left out: 1 position without a fix.",
+    ]
+    assert outcome.notes == ["Left out: 1 position without a known status."]
 
 
 def test_a_phone_alone_is_a_track_and_alarms_without_a_place_are_counted(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from server.recording.store.rules import StoreRule, WholeFiles
 from server.recording.store.stored_list import StoredRecordings
 from server.recording.store.trouble import Kind, StoreTrouble
 from tests.server.recording.made import BEGAN_MS, record
+from tests.server.recording.read.test_bag2 import left_open
 from tests.server.recording.store.running import FAST, ID, Car, Running, whole
 from tests.server.recording.store.s3 import S3
 
@@ -74,6 +75,27 @@ async def test_a_name_that_is_used_again_overwrites_nothing_in_the_store(car: Ca
         assert s3.keys() == kept
         await deleted_here(now, path)
     assert whole(s3) == content
+
+
+async def test_a_database_is_not_deleted_with_a_log_that_was_not_uploaded(car: Car, s3: S3, tmp_path: Path) -> None:
+    killed = left_open(tmp_path / "made")
+    path, log = car.folder / "drive_0.db3", car.folder / "drive_0.db3-wal"
+    shutil.copy(killed, path)
+    async with car.running() as now:
+        id = next(row["id"] for row in now.catalog.rows().rows if row["format"] == "db3")
+        now.uploader.ask(id, deletes=False)
+        await now.stored(id)
+        shutil.copy(f"{killed}-wal", log)
+        copying = now.uploader._copying
+        with pytest.raises(Refused, match="A database with a log that holds a part of it is not uploaded"):
+            copying.delete_here(id, None)  # type: ignore[arg-type]
+        with pytest.raises(Refused, match="A database with a log that holds a part of it is not uploaded"):
+            copying.send_file(id, None, print)  # type: ignore[arg-type]
+        now.uploader.ask(id, deletes=True)
+        now.catalog.walk()
+        now.catalog._survey.rouse()
+        await now.until(lambda: now.copy(id)["sentence"].startswith("A database with a log"))
+    assert (path.read_bytes(), log.stat().st_size) == (killed.read_bytes(), Path(f"{killed}-wal").stat().st_size)
 
 
 async def test_only_what_was_uploaded_is_destroyed_in_the_trash(car: Car, s3: S3) -> None:

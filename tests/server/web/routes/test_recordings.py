@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import shutil
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from server.vehicle.vehicle import Vehicle
 from tests.http import http_client
 from tests.server.conftest import serving
 from tests.server.recording.made import BEGAN_MS, record
+from tests.server.recording.read.test_bag2 import left_open
 
 FIRST, SECOND = "car_20260921T141320Z", "car_20260921T151320Z"
 
@@ -93,7 +95,7 @@ async def test_a_recording_and_its_picture(client: httpx.AsyncClient) -> None:
     assert picture.headers["content-type"].startswith("image/svg+xml")
     assert picture.headers["content-security-policy"].startswith("default-src 'none'")
     assert "The track, with 1 alarm on it" in picture.text
-    assert "No position was recorded" in (await client.get(f"/api/recordings/{SECOND}/track.svg")).text
+    assert "No usable position was recorded" in (await client.get(f"/api/recordings/{SECOND}/track.svg")).text
     assert problem(await client.get("/api/recordings/none/track.svg"), 404)
 
 
@@ -108,6 +110,23 @@ async def test_the_file_whole_and_in_parts(client: httpx.AsyncClient, data: Path
     assert (await client.head(f"/api/recordings/{FIRST}/file.mcap")).headers["content-length"] == str(len(content))
     assert problem(await client.get(f"/api/recordings/{FIRST}/file.mcap", headers={"range": "bytes=0-1,4-5"}), 416)
     assert problem(await client.get("/api/recordings/none/file.mcap"), 404)
+
+
+async def test_a_database_is_not_downloaded_without_its_log(
+    client: httpx.AsyncClient, data: Path, tmp_path: Path
+) -> None:
+    killed = left_open(tmp_path)
+    there = data / "recordings" / "killed"
+    shutil.copytree(killed.parent, there)
+    try:
+        await client.post("/api/recordings/rescan")
+        rows = (await client.get("/api/recordings")).json()["recordings"]
+        address = f"/api/recordings/{next(row['id'] for row in rows if row['format'] == 'db3')}/file.mcap"
+        assert "a database with a log that holds a part of it: export it" in problem(await client.get(address), 409)
+        (there / "drive_0.db3-wal").write_bytes(b"")  # of a database that was closed nothing is in it
+        assert (await client.get(address)).content == killed.read_bytes()
+    finally:
+        shutil.rmtree(there)
 
 
 async def test_a_title_names_the_file_and_does_no_harm(client: httpx.AsyncClient) -> None:
