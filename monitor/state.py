@@ -161,11 +161,14 @@ class State:
     def link(self, facts: LinkFacts) -> None:
         """Set the facts of the link. A link that opens restarts the measurement of rates."""
         before, self.link_facts = self.link_facts, facts
+        if before.opened_s is not None and facts.opened_s is None:
+            self._components.closed(facts.since_s)
         if facts.opened_s is not None and facts.opened_s != before.opened_s:
             for stats in self._stats.values():
                 stats.restart()
             self._clock_jump = None
             self._scan_habit = ScanHabit()
+            self._components.opened(facts.opened_s)
             self._unusable = MappingProxyType({})
 
     def recorder(self, facts: RecorderFacts) -> None:
@@ -183,6 +186,8 @@ class State:
 
     def set_paused(self, paused: bool, since_s: float | None = None) -> None:
         """Pause or resume monitoring. `since_s`: an earlier start of the pause."""
+        if self._paused_since_s is not None and not paused:
+            self._components.miss(self._paused_since_s, self._latest_s)
         self.paused = paused
         self._paused_since_s = since_s if paused else None
 
@@ -193,6 +198,10 @@ class State:
 
     def snapshot(self, now_s: float) -> Snapshot:
         """What is known at `now_s`, which later messages do not change."""
+        self._components.watch(now_s)
+        return self._known(now_s)
+
+    def _known(self, now_s: float) -> Snapshot:
         self._follow_clock(now_s)
         if self.paused and self._paused_since_s is None:
             self._paused_since_s = now_s
@@ -229,7 +238,7 @@ class State:
         """Like `snapshot`, for display only: it does not affect later evaluations."""
         kept = self._rates_at_s, self._rates, self._latest_s
         try:
-            return self.snapshot(now_s)
+            return self._known(now_s)
         finally:
             self._rates_at_s, self._rates, self._latest_s = kept
 
