@@ -25,7 +25,7 @@ from monitor.inhibition import GRACE_S
 from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
 from monitor.signals import SIGNALS, Signal
 from monitor.snapshot import Snapshot
-from monitor.staleness import FALTERS_AT, silence
+from monitor.staleness import FALTERS_AT, is_heard, silence
 
 NEVER_AFTER_S = 5.0  # as long as the whole car is given for its first message
 
@@ -73,14 +73,16 @@ def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Findi
     if not is_wanted:
         return absent(f"{signal.label}: nothing received yet", brief="nothing received")
     opened_s = snapshot.link.opened_s
-    after_s = SELDOM_S if signal.by_parts and set_hz(limits, signal.name) == 0.0 else NEVER_AFTER_S
-    if opened_s is None or snapshot.now_s - opened_s < after_s:
+    if opened_s is None or snapshot.now_s - opened_s < NEVER_AFTER_S:
         return unknown(f"{signal.label}: waiting for its first message", short="waiting")
     if _car_is_quiet(snapshot):
         return unknown(f"{signal.label}: the whole car is silent", short="silent")
     waited_s = snapshot.now_s - opened_s
+    text = f"{signal.label}: nothing received in {waited_s:.0f} s since connecting"
+    if signal.by_parts and set_hz(limits, signal.name) == 0.0 and waited_s < SELDOM_S:
+        return unknown(f"{text}; its interval is not known", short="no data")
     return fault(
-        f"{signal.label}: nothing received in {waited_s:.0f} s since connecting",
+        text,
         brief=signal.label,
         causes=(signal.name,),
     )
@@ -88,7 +90,7 @@ def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Findi
 
 def _car_is_quiet(snapshot: Snapshot) -> bool:
     found = silence(snapshot)
-    return found is None or found.is_quiet
+    return not is_heard(snapshot) if found is None else found.is_quiet
 
 
 def _is_event_like(signal: Signal, limits: SlowLimits) -> bool:
