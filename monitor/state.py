@@ -128,10 +128,10 @@ class State:
 
     def refuse(self, signal: str, reason: str, received_s: float, *, is_declared: bool = False) -> None:
         """A message without a usable value of this signal, and the reason. `is_declared`: it declares the value as not
-        measured; an earlier value is then no longer known, and what is derived may take its place."""
+        measured; an earlier value that is not fresh is then no longer known, and a derived one may take its place."""
         self._follow_clock(received_s)
         if is_declared:
-            self._derived.not_measured(signal)
+            self._derived.not_measured(signal, received_s)
         meter = self._stats[signal].meter
         meter.receive(received_s)
         self._heard_s = received_s
