@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 
 from monitor.values import Component, Diagnostics
 
@@ -26,7 +27,7 @@ class _Reports:
     __slots__ = ("_intervals", "allowed_s", "at_s", "missed_s", "newest")
 
     def __init__(self, newest: Component, at_s: float) -> None:
-        self.newest, self.at_s = newest, at_s
+        self.newest, self.at_s = replace(newest, once_s=at_s), at_s
         self.missed_s = 0.0  # since then, the time in which no report could be received
         self.allowed_s = math.inf  # the silence that its own interval explains; infinite after a single report
         self._intervals: deque[float] = deque(maxlen=INTERVALS)
@@ -36,7 +37,8 @@ class _Reports:
             self._intervals.append(at_s - self.at_s)
             least_s = SILENT_AFTER_S if len(self._intervals) > 1 else ONE_INTERVAL_S
             self.allowed_s = max(least_s, SILENT_PERIODS * max(self._intervals))
-        self.newest, self.at_s, self.missed_s = newest, at_s, 0.0
+        self.newest = replace(newest, once_s=at_s) if math.isinf(self.allowed_s) else newest
+        self.at_s, self.missed_s = at_s, 0.0
 
     def miss(self, from_s: float, until_s: float) -> None:
         self.missed_s += max(0.0, until_s - max(from_s, self.at_s))

@@ -152,6 +152,7 @@ class Component:
     name: str
     level: int  # 0 OK, 1 WARN, 2 ERROR, 3 STALE
     message: str
+    once_s: float | None = None  # when it reported, on the receiver's clock, where its interval is not known
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

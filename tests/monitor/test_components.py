@@ -65,6 +65,15 @@ def test_what_reported_once_is_not_held_to_an_interval_and_two_reports_are_hardl
     assert levels(known.merge(said(("gps", 0)), FORGOTTEN_UNKNOWN_S + 1.0)) == {"gps": 0}
 
 
+def test_a_component_whose_interval_is_not_known_says_when_it_reported() -> None:
+    known = Components()
+    known.merge(said(("light", 0), ("gps", 0)), 3.0)
+    found = {one.name: one.once_s for one in known.merge(said(("gps", 0)), 4.0).components}
+    assert found == {"light": 3.0, "gps": None}
+    found = {one.name: one.once_s for one in known.merge(said(("light", 1)), 1200.0).components}
+    assert found == {"light": None}
+
+
 def test_the_silence_of_all_is_explained_by_the_one_that_reports_most_often() -> None:
     known = Components()
     assert known.horizon_s(0.0) == SELDOM_S
