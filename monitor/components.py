@@ -40,6 +40,11 @@ class _Reports:
         self.newest = replace(newest, once_s=at_s) if math.isinf(self.allowed_s) else newest
         self.at_s, self.missed_s = at_s, 0.0
 
+    @property
+    def interval_s(self) -> float | None:
+        """Its own; None while it is not known."""
+        return max(self._intervals) if len(self._intervals) > 1 else None
+
     def miss(self, from_s: float, until_s: float) -> None:
         self.missed_s += max(0.0, until_s - max(from_s, self.at_s))
 
@@ -111,3 +116,8 @@ class Components:
         """The silence of all together that the intervals of those that still report explain [s]."""
         allowed_s = min((one.allowed_s for one in self._heard.values() if not one.is_due(now_s)), default=math.inf)
         return SELDOM_S if math.isinf(allowed_s) else max(TOPIC_SILENT_S, allowed_s)
+
+    def period_s(self, now_s: float) -> float | None:
+        """The interval of the one that reports most often, of those that still report [s]; None: not known."""
+        found = [one.interval_s for one in self._heard.values() if not one.is_due(now_s)]
+        return min((interval_s for interval_s in found if interval_s is not None), default=None)

@@ -101,7 +101,8 @@ class State:
             self._slow_proof.add(received_s, value.speed_mps)  # type: ignore[union-attr, arg-type]
         elif kind is Diagnostics:
             value = self._components.merge(value, received_s)  # type: ignore[arg-type]
-            self._stats[signal].meter.hold(self._components.horizon_s(received_s))
+            components = self._components
+            self._stats[signal].meter.hold(components.horizon_s(received_s), components.period_s(received_s))
         elif kind is LaserScan:
             self._scan_habit.add(value)  # type: ignore[arg-type]
         elif kind is DriveMode:
