@@ -6,6 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from monitor.catalog import AllLimits, changed
+from monitor.runner import Monitor
+from monitor.signals import SIGNALS
 from monitor.state import State
 from monitor.values import Acceleration, Heading, Level, Odometry, Twist, Value
 from tests.monitor.drive import REAL_HZ, Drive
@@ -69,6 +72,32 @@ def test_wrong_messages_between_declared_ones_are_counted_on() -> None:
         car.state.refuse("brake", NOT_MEASURED, car.now_s, is_declared=True)
         car.to(car.now_s + 0.05)
     assert car.monitor.findings["signal_unusable.brake"].verdict == "ok"  # the wrong ones have ended
+
+
+@pytest.mark.parametrize(
+    ("signal", "hz", "is_declared", "verdict"),
+    [
+        ("brake", 0.0, True, "fault"),
+        ("brake", 0.0, False, "fault"),
+        ("heading", 0.0, True, "unknown"),
+        ("heading", 5.0, True, "fault"),
+        ("fuel", 0.0, True, "unknown"),
+    ],
+)
+def test_what_came_without_a_value_and_then_no_more_is_not_called_never_received(
+    signal: str, hz: float, is_declared: bool, verdict: str
+) -> None:
+    car = Drive(monitor=Monitor(limits=changed(AllLimits(), {f"signals.{signal}_hz": hz})))
+    car.link = replace(car.link, published=frozenset({*REAL_HZ, signal}))
+    car.silent = {signal, "odometry"}
+    car.open()
+    for number in range(60):
+        car.state.refuse(signal, NOT_MEASURED, number / 20, is_declared=is_declared)
+        car.to((number + 1) / 20)
+    car.to(23.0)
+    finding = car.monitor.findings[f"signal_stale.{signal}"]
+    label = SIGNALS[signal].label
+    assert (finding.verdict, finding.text) == (verdict, f"{label}: {NOT_MEASURED}, then no message for 20 s")
 
 
 def test_a_single_wrong_message_between_declared_ones_is_no_fault() -> None:

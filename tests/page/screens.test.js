@@ -78,6 +78,8 @@ test('the details of a signal tell what was rejected and why', () => {
   assert.equal(kindWords(signal), 'Twist');
   assert.equal(kindWords({ ...signal, type: null, topic: null, value: { source: 'speed' } }), 'from speed');
   assert.equal(kindWords({ ...signal, type: null, topic: null, value: null }), 'no such topic');
+  assert.equal(kindWords({ ...signal, value: { source: 'odometry' } }), 'from odometry', 'its own topic holds no value');
+  assert.equal(kindWords({ ...signal, value: { source: 'topic' } }), 'Twist');
 });
 
 test('recording and last values', () => {
