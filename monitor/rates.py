@@ -99,7 +99,7 @@ class RateMeter:
     def hold(self, horizon_s: float, period_s: float | None) -> None:
         """The horizon and the period [s] from now on, unless the operator set a rate: of a signal that comes in parts.
 
-        `period_s` None: it is not known.
+        `period_s` None: it is not known, and what is observed counts.
         """
         if (horizon_s, period_s) != (self._held_s, self._held_period_s):
             self._held_s, self._held_period_s = horizon_s, period_s
@@ -211,7 +211,8 @@ class RateMeter:
             floor_s = STARTING_S if self._declared_hz is not None else UNDECLARED_S
             self.horizon_s = max(STALE_PERIODS * (self.period_s or 0.0), floor_s)
         if self._held_s is not None and not self._set_hz:
-            self.horizon_s, self.period_s = self._held_s, self._held_period_s
+            self.horizon_s = self._held_s
+            self.period_s = self._held_period_s or self.period_s
 
     def _observed_s(self, expected_hz: float | None) -> float | None:
         if self._heard < 2 or self._last_s is None:

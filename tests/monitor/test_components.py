@@ -115,12 +115,22 @@ def test_a_clock_that_goes_back_harms_nothing() -> None:
 @pytest.mark.parametrize("period_s", [1.0, 30.0, 120.0])
 def test_between_two_reports_the_value_does_not_age(period_s: float) -> None:
     state = State()
-    for number in range(41):  # by then the rate of the topic is settled, and held against the default of 1 Hz
+    for number in range(40):  # two components, so that the topic as a whole has no steady rate
         state.receive("diagnostics", said(("disk", 0)), number * period_s)
+        state.receive("diagnostics", said(("fan", 0)), (number + 0.2) * period_s)
     reading = state.get("diagnostics")
     assert reading is not None
-    assert reading.freshness(40.9 * period_s) == "fresh"
-    assert reading.freshness(40 * period_s + max(10.1, 3.1 * period_s)) == "stale"
+    assert reading.freshness(39.95 * period_s) == "fresh"
+    assert reading.freshness(39.2 * period_s + max(10.1, 3.1 * period_s)) == "stale"
+
+
+def test_a_first_report_whose_interval_is_not_known_ages_soon() -> None:
+    state = State()
+    state.receive("diagnostics", said(("disk", 0)), 0.0)
+    reading = state.get("diagnostics")
+    assert reading is not None
+    assert reading.freshness(3.1) == reading.freshness(SELDOM_S - 1.0) == "ageing"
+    assert reading.freshness(SELDOM_S + 1.0) == "stale"
 
 
 def test_diagnostics_that_came_each_second_age_after_three() -> None:
