@@ -1,4 +1,5 @@
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { armWords, bare, dialled, foundIn, isSameCar, remembered } from '../../static/js/shell/connect-layout.js';
 import { screenOf } from '../../static/js/shell/router.js';
@@ -49,6 +50,14 @@ test('what is dialled: the port of the scheme, and that of rosbridge without a s
   };
   for (const [typed, url] of Object.entries(rows)) assert.equal(dialled(typed), url, typed);
   for (const typed of ['', '  ', 'my car', 'http://car', 'ftp://car', 'ws:/car', 'ws:car', 'ws://', 'car:0', 'car:70000', 'car:abc', 'a:1:2', 'car:11311', 'ros@car', '<b>']) assert.equal(dialled(typed), '', typed);
+});
+
+test('what is shown is what the server dials, for each spelling of a table that the tests of the server read too', () => {
+  const rows = JSON.parse(readFileSync(new URL('../server/rosbridge/spellings.json', import.meta.url), 'utf8'));
+  assert.ok(rows.length > 200);
+  for (const [typed, url] of rows) assert.equal(dialled(typed), url ?? '', JSON.stringify(typed));
+  const longest = `ws://car/${'x'.repeat(291)}`;
+  assert.deepEqual([dialled(longest) !== '', dialled(`${longest}x`)], [true, '']);
 });
 
 test('found vehicles are listed once, and an answer of another shape is none', () => {
