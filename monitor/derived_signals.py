@@ -57,10 +57,13 @@ class DerivedSignals:
             derived_from=signal,
         )
 
-    def not_measured(self, signal: str) -> None:
-        """The car declares that it does not measure `signal`: its reading goes, and a derived one may come."""
+    def not_measured(self, signal: str, at_s: float) -> None:
+        """A message declares that `signal` is not measured: a reading that is not fresh goes, and a derived one may
+        come. A fresh one stays, because another sensor on the same topic may measure it."""
         known = self._table.newest.get(signal)
         if known is not None and known.derived_from is None:
+            if known.is_fresh(at_s):
+                return
             self._table.drop(signal)
         if signal == "heading":
             self._headings.is_published = False

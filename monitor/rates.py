@@ -50,6 +50,7 @@ class RateMeter:
         "_declared_hz",
         "_first_s",
         "_heard",
+        "_held_period_s",
         "_held_s",
         "_is_settled",
         "_last_block_hz",
@@ -77,6 +78,7 @@ class RateMeter:
         self._arrivals: deque[float] = deque(maxlen=20_000)
         self._is_settled = False
         self._held_s: float | None = None
+        self._held_period_s: float | None = None
         self.restart()
 
     def restart(self) -> None:
@@ -94,10 +96,13 @@ class RateMeter:
         self._set_hz = set_hz or None
         self._settle()
 
-    def hold(self, horizon_s: float) -> None:
-        """The horizon [s] from now on, unless the operator set a rate: of a signal that comes in parts."""
-        if horizon_s != self._held_s:
-            self._held_s = horizon_s
+    def hold(self, horizon_s: float, period_s: float | None) -> None:
+        """The horizon and the period [s] from now on, unless the operator set a rate: of a signal that comes in parts.
+
+        `period_s` None: it is not known, and what is observed counts.
+        """
+        if (horizon_s, period_s) != (self._held_s, self._held_period_s):
+            self._held_s, self._held_period_s = horizon_s, period_s
             self._settle()
 
     def receive(self, at_s: float) -> None:
@@ -207,6 +212,7 @@ class RateMeter:
             self.horizon_s = max(STALE_PERIODS * (self.period_s or 0.0), floor_s)
         if self._held_s is not None and not self._set_hz:
             self.horizon_s = self._held_s
+            self.period_s = self._held_period_s or self.period_s
 
     def _observed_s(self, expected_hz: float | None) -> float | None:
         if self._heard < 2 or self._last_s is None:

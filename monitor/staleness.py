@@ -55,15 +55,25 @@ def silence(snapshot: Snapshot) -> Silence | None:
     )
 
 
+def is_heard(snapshot: Snapshot) -> bool:
+    """Whether anything came on this connection, regular or not."""
+    opened_s = snapshot.link.opened_s
+    return snapshot.heard_s is not None and (opened_s is None or snapshot.heard_s >= opened_s)
+
+
 def _arrivals(snapshot: Snapshot) -> Iterator[_Arrival]:
     """Of each signal that ought to come regularly, whether what came can be used or not."""
     unusable = snapshot.unusable
     for name, reading in snapshot.readings.items():
-        if reading.derived_from is None and not SIGNALS[name].event_like and name not in unusable:
+        if reading.derived_from is None and _is_regular(name) and name not in unusable:
             yield _Arrival(reading.received_s, reading.horizon_s, reading.period_s)
     for name, one in unusable.items():
-        if not SIGNALS[name].event_like:
+        if _is_regular(name):
             yield _Arrival(one.at_s, one.horizon_s, one.period_s)
+
+
+def _is_regular(name: str) -> bool:
+    return not (SIGNALS[name].event_like or SIGNALS[name].by_parts)
 
 
 class _Arrival(NamedTuple):

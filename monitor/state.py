@@ -101,7 +101,8 @@ class State:
             self._slow_proof.add(received_s, value.speed_mps)  # type: ignore[union-attr, arg-type]
         elif kind is Diagnostics:
             value = self._components.merge(value, received_s)  # type: ignore[arg-type]
-            self._stats[signal].meter.hold(self._components.horizon_s(received_s))
+            components = self._components
+            self._stats[signal].meter.hold(components.horizon_s(received_s), components.period_s(received_s))
         elif kind is LaserScan:
             self._scan_habit.add(value)  # type: ignore[arg-type]
         elif kind is DriveMode:
@@ -128,10 +129,10 @@ class State:
 
     def refuse(self, signal: str, reason: str, received_s: float, *, is_declared: bool = False) -> None:
         """A message without a usable value of this signal, and the reason. `is_declared`: it declares the value as not
-        measured; an earlier value is then no longer known, and what is derived may take its place."""
+        measured; an earlier value that is not fresh is then no longer known, and a derived one may take its place."""
         self._follow_clock(received_s)
         if is_declared:
-            self._derived.not_measured(signal)
+            self._derived.not_measured(signal, received_s)
         meter = self._stats[signal].meter
         meter.receive(received_s)
         self._heard_s = received_s
@@ -161,11 +162,14 @@ class State:
     def link(self, facts: LinkFacts) -> None:
         """Set the facts of the link. A link that opens restarts the measurement of rates."""
         before, self.link_facts = self.link_facts, facts
+        if before.opened_s is not None and facts.opened_s is None:
+            self._components.closed(facts.since_s)
         if facts.opened_s is not None and facts.opened_s != before.opened_s:
             for stats in self._stats.values():
                 stats.restart()
             self._clock_jump = None
             self._scan_habit = ScanHabit()
+            self._components.opened(facts.opened_s)
             self._unusable = MappingProxyType({})
 
     def recorder(self, facts: RecorderFacts) -> None:
@@ -183,6 +187,8 @@ class State:
 
     def set_paused(self, paused: bool, since_s: float | None = None) -> None:
         """Pause or resume monitoring. `since_s`: an earlier start of the pause."""
+        if self._paused_since_s is not None and not paused:
+            self._components.miss(self._paused_since_s, self._latest_s)
         self.paused = paused
         self._paused_since_s = since_s if paused else None
 
@@ -193,6 +199,10 @@ class State:
 
     def snapshot(self, now_s: float) -> Snapshot:
         """What is known at `now_s`, which later messages do not change."""
+        self._components.watch(now_s)
+        return self._known(now_s)
+
+    def _known(self, now_s: float) -> Snapshot:
         self._follow_clock(now_s)
         if self.paused and self._paused_since_s is None:
             self._paused_since_s = now_s
@@ -229,7 +239,7 @@ class State:
         """Like `snapshot`, for display only: it does not affect later evaluations."""
         kept = self._rates_at_s, self._rates, self._latest_s
         try:
-            return self.snapshot(now_s)
+            return self._known(now_s)
         finally:
             self._rates_at_s, self._rates, self._latest_s = kept
 

@@ -4,7 +4,7 @@ measured. That is no silence."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 NOT_A_NUMBER = " is not a number"
@@ -14,13 +14,14 @@ NOT_A_NUMBER = " is not a number"
 class Unusable:
     """The newest messages of a signal, none of which could be used."""
 
-    reason: str  # of the newest one
-    at_s: float  # when the newest one came
+    reason: str  # of the newest one; of the newest wrong one, as long as such come
+    at_s: float  # when the newest one came, wrong or declared
     since_s: float  # when the first one in a row came
-    count: int  # in a row
+    count: int  # in a row; of the wrong ones alone, as long as such come
     horizon_s: float  # a silence of this signal longer than that is one
     period_s: float | None = None
-    is_declared: bool = False  # the newest one declares the value as not measured: no fault of the sensor
+    is_declared: bool = False  # they declare the value as not measured, none of late is wrong: no fault of the sensor
+    wrong_s: float | None = None  # when the newest wrong one came, where declared ones came after it
 
     @property
     def words(self) -> str:
@@ -45,6 +46,10 @@ def refused(
     """The unusable signals after one more message of `signal` without a value."""
     known = before.get(signal)
     if known is not None and known.is_declared != is_declared:
+        wrong_s = known.at_s if known.wrong_s is None else known.wrong_s
+        if is_declared and at_s - wrong_s <= horizon_s:
+            now = replace(known, at_s=at_s, horizon_s=horizon_s, period_s=period_s, wrong_s=wrong_s)
+            return MappingProxyType({**before, signal: now})
         known = None
     now = Unusable(
         reason=reason,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -152,6 +152,8 @@ class Component:
     name: str
     level: int  # 0 OK, 1 WARN, 2 ERROR, 3 STALE
     message: str
+    # When it reported, on the receiver's clock, where its interval is not known; no part of what it said.
+    once_s: float | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

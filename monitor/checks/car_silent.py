@@ -18,13 +18,14 @@ from monitor.check import (
 )
 from monitor.inhibition import GRACE_S
 from monitor.snapshot import Snapshot
-from monitor.staleness import BRIDGE_WITHIN_S, silence
+from monitor.staleness import BRIDGE_WITHIN_S, is_heard, silence
 
 
 def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     found = silence(snapshot)
     if found is None:
-        return unknown("Nothing received since connecting", short="no data")
+        what = "No regular signal" if is_heard(snapshot) else "Nothing"
+        return unknown(f"{what} received since connecting", short="no data")
     if not found.is_silent and not (was_active and found.falters):
         return ok(f"{found.fresh} of {found.heard} signals come")
     if not (found.is_bridge_proved or was_active or found.silent_s > BRIDGE_WITHIN_S):

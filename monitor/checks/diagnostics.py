@@ -6,7 +6,7 @@ Components that no other check uses are included, so that everything the car rep
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from functools import partial
 
 from monitor.check import (
@@ -37,7 +37,7 @@ def find(levels: Collection[int], snapshot: Snapshot, limits: Limits, was_active
     components = snapshot.need("diagnostics").components
     bad = [component for component in components if component.level in levels]
     if not bad:
-        return ok(f"{len(components)} components report")
+        return ok(f"{len(components)} components report{_once(components, snapshot.now_s)}")
     bad.sort(key=lambda component: (component.level != ERROR, component.name))
     brief = bad[0].name if len(bad) == 1 else f"{len(bad)} parts"
     return fault(
@@ -45,6 +45,14 @@ def find(levels: Collection[int], snapshot: Snapshot, limits: Limits, was_active
         brief=brief if len(f"FAULT {brief}") <= BRIEF_LETTERS else f"{len(bad)} part",
         causes=tuple(sorted({component.name for component in bad})),
     )
+
+
+def _once(components: Sequence[Component], now_s: float) -> str:
+    """Which of them are not missed when they fall silent: a level that was reported once may be old."""
+    ages_s = [now_s - component.once_s for component in components if component.once_s is not None]
+    if not ages_s:
+        return ""
+    return f", {len(ages_s)} of them once, {'up to ' if len(ages_s) > 1 else ''}{max(0.0, *ages_s):.0f} s ago"
 
 
 def _text(bad: list[Component]) -> str:

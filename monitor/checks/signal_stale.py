@@ -25,7 +25,8 @@ from monitor.inhibition import GRACE_S
 from monitor.signal_limits import GROUP, SignalLimits, SlowLimits, set_hz
 from monitor.signals import SIGNALS, Signal
 from monitor.snapshot import Snapshot
-from monitor.staleness import FALTERS_AT, silence
+from monitor.staleness import FALTERS_AT, is_heard, silence
+from monitor.unusable import Unusable
 
 NEVER_AFTER_S = 5.0  # as long as the whole car is given for its first message
 
@@ -36,7 +37,7 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
         return ok(f"{signal.label}: messages arrive, {unusable.words}")
     reading = snapshot.get(signal.name)
     if reading is None or reading.derived_from is not None:
-        return _never_came(signal, snapshot, limits)
+        return _never_came(signal, snapshot, limits) if unusable is None else _ended(signal, unusable, snapshot, limits)
     age_s = reading.silent_s(snapshot.now_s)
     if unusable is not None:
         age_s = min(age_s, snapshot.now_s - unusable.at_s)
@@ -65,7 +66,7 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
 
 
 def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Finding:
-    is_wanted = not signal.optional or set_hz(limits, signal.name) > 0.0
+    is_wanted = _is_wanted(signal, limits)
     if signal.name not in snapshot.link.published:
         if is_wanted:
             return unknown(f"{signal.label} is not published", short="no data")
@@ -73,22 +74,45 @@ def _never_came(signal: Signal, snapshot: Snapshot, limits: SlowLimits) -> Findi
     if not is_wanted:
         return absent(f"{signal.label}: nothing received yet", brief="nothing received")
     opened_s = snapshot.link.opened_s
-    after_s = SELDOM_S if signal.by_parts and set_hz(limits, signal.name) == 0.0 else NEVER_AFTER_S
-    if opened_s is None or snapshot.now_s - opened_s < after_s:
+    if opened_s is None or snapshot.now_s - opened_s < NEVER_AFTER_S:
         return unknown(f"{signal.label}: waiting for its first message", short="waiting")
     if _car_is_quiet(snapshot):
         return unknown(f"{signal.label}: the whole car is silent", short="silent")
     waited_s = snapshot.now_s - opened_s
+    text = f"{signal.label}: nothing received in {waited_s:.0f} s since connecting"
+    if signal.by_parts and set_hz(limits, signal.name) == 0.0 and waited_s < SELDOM_S:
+        return unknown(f"{text}; its interval is not known", short="no data")
     return fault(
-        f"{signal.label}: nothing received in {waited_s:.0f} s since connecting",
+        text,
         brief=signal.label,
         causes=(signal.name,),
     )
 
 
+def _ended(signal: Signal, unusable: Unusable, snapshot: Snapshot, limits: SlowLimits) -> Finding:
+    """Messages came, all of them without a value, and come no more."""
+    age_s = snapshot.now_s - unusable.at_s
+    text = f"{signal.label}: {unusable.words}, then no message for {age_s:.0f} s"
+    if not _is_wanted(signal, limits):
+        return absent(text, brief="silent")
+    if _car_is_quiet(snapshot):
+        return unknown(f"{signal.label}: the whole car is silent", short="silent")
+    return fault(
+        text,
+        brief=_brief(signal, age_s),
+        measured=Quantity(label="Silent for", value=age_s, unit="s"),
+        limit=Quantity(label="Allowed", value=unusable.horizon_s, unit="s"),
+        causes=(signal.name,),
+    )
+
+
+def _is_wanted(signal: Signal, limits: SlowLimits) -> bool:
+    return not signal.optional or set_hz(limits, signal.name) > 0.0
+
+
 def _car_is_quiet(snapshot: Snapshot) -> bool:
     found = silence(snapshot)
-    return found is None or found.is_quiet
+    return not is_heard(snapshot) if found is None else found.is_quiet
 
 
 def _is_event_like(signal: Signal, limits: SlowLimits) -> bool:

@@ -92,7 +92,14 @@ def _has_no_variance(message: Any) -> bool:
 
 
 def _is_absent(message: Any) -> bool:
-    return isinstance(message, Mapping) and message.get("present") is False
+    """`present` is false by default: a driver that fills in the percentage alone has a battery."""
+    if not isinstance(message, Mapping) or message.get("present") is not False:
+        return False
+    try:
+        share = number(message, "percentage")
+    except Rejected:
+        return False
+    return share == 0 or math.isnan(share)
 
 
 def _is_outside(message: Any) -> bool:
@@ -189,9 +196,9 @@ NO_VARIANCE = Rule(
 NO_BATTERY = Rule(
     type=BATTERY,
     field="present",
-    value="false",
-    effect="fuel is not measured, whatever the percentage is",
-    source="sensor_msgs/BatteryState: true where the battery is present",
+    value="false, where percentage is 0 or NaN",
+    effect="fuel is not measured",
+    source="sensor_msgs/BatteryState: true where the battery is present; false is the default too",
     holds=_is_absent,
     reason="not measured (present is false)",
 )

@@ -122,7 +122,9 @@ SignalValue = (
     | NumberValue
 )
 Value = TypeVar("Value")
-SignalFreshness = TypeAliasType("SignalFreshness", Freshness | Literal["never", "not_published"])
+SignalFreshness = TypeAliasType(
+    "SignalFreshness", Freshness | Literal["not_measured", "no_value", "never", "not_published"]
+)
 
 
 class SignalState(TypedDict, Generic[Value]):
@@ -132,7 +134,10 @@ class SignalState(TypedDict, Generic[Value]):
     unit: Annotated[str, doc("of the headline number")]
     freshness: Annotated[
         SignalFreshness,
-        doc("ageing: > 3 periods; stale: > max(10 periods, 1 s); never: subscribed to, and nothing came"),
+        doc(
+            "ageing: > 3 periods; stale: > max(10 periods, 1 s); not_measured: messages came, which declare that; "
+            "no_value: messages came, none of which could be used; never: subscribed to, and nothing came"
+        ),
     ]
     age_s: Annotated[float | None, doc("since it came")]
     delay_s: Annotated[float | None, doc("how old it was when it came, at most")]

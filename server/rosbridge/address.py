@@ -30,6 +30,7 @@ _NETLOC = re.compile(r"(\[[^\[\]]*\]|[^\[\]:]*)(:[^:]*)?\Z")
 _RUN_ON = re.compile(r"^\[[^\]/?#]*\][^:/?#]")  # a bracket and then no colon
 _FEW_SLASHES = re.compile(r"(?i)(wss?):/?(?=[^/\d]|\d+\.)")
 _LOGIN = re.compile(r"(^\s*|//)[^/?#]*@")
+_QUERY = "/%:@!$&'()*+,;=~?"
 _EXAMPLE = "Type a host and a port, such as 192.168.4.1:9090."
 _IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
@@ -77,7 +78,7 @@ def parse(text: str) -> Address:
     scheme, separator, rest = typed.partition("://")
     if not separator:
         if _is_bare_ipv6(typed):
-            return Address(host=_host_of(typed), port=DEFAULT_PORT)
+            return Address(host=_host_of(typed.lower()), port=DEFAULT_PORT)
         if slip := _FEW_SLASHES.match(typed):
             better = f"{slip[1].lower()}://{typed[slip.end() :]}"
             raise BadAddress(
@@ -103,6 +104,9 @@ def _split(typed: str, usual_port: int) -> Address:
     if parts.username is not None or parts.password is not None:
         raise BadAddress("An address with a user name is not supported.", "Remove the part before the @.")
     port = _port(parts)
+    written = _written_host(parts)
+    if not written.isascii() or (written.startswith("[") and not _is_bare_ipv6(parts.hostname or "")):
+        raise _no_host(written)  # `hostname` is in small letters, and some letters have a small one in ASCII
     host = _host_of(parts.hostname or "")
     if port == 0:
         raise BadAddress("Port 0 cannot be dialled.", "rosbridge usually listens on 9090.")
@@ -110,7 +114,7 @@ def _split(typed: str, usual_port: int) -> Address:
         raise _master(host, f"Port {MASTER_PORT} is the ROS master; catgraph connects to rosbridge.")
     path = quote(parts.path, safe="/%:@!$&'()*+,;=~") if parts.path not in ("", "/") else ""
     if parts.query:
-        path = f"{path or '/'}?{quote(parts.query, safe='/%:@!$&()*+,;=~?')}"
+        path = f"{path or '/'}?{quote(parts.query, safe=_QUERY)}"
     return Address(host=host, port=port or usual_port, secure=parts.scheme.lower() == "wss", path=path)
 
 
@@ -122,6 +126,12 @@ def _url_parts(typed: str) -> SplitResult:
         return urlsplit(typed)
     except ValueError:  # brackets that hold no IPv6 address, letters that turn into / or @ when made plain
         raise _no_host(rest) from None
+
+
+def _written_host(parts: SplitResult) -> str:
+    """With its brackets and capital letters."""
+    found = _NETLOC.match(parts.netloc)
+    return "" if found is None else found[1]
 
 
 def _port(parts: SplitResult) -> int | None:

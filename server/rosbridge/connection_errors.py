@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from server.protocol.state import ConnectionProblem
-from server.rosbridge.address import Address, BadAddress
+from server.rosbridge.address import SCHEME_PORTS, Address, BadAddress
 
 LOGIN_WANTED = "login_wanted"
 BRIDGE_SILENT = "bridge_silent"
@@ -49,7 +49,8 @@ def of_dial_error(error: BaseException, address: Address) -> Problem:
         return Problem(
             code="refused",
             title=f"{host} is there, but nothing listens on port {port}.",
-            hint="Start rosbridge on the car, or check the port.",
+            hint="Start rosbridge on the car, or check the port."
+            + (" rosbridge usually listens on 9090." if port in SCHEME_PORTS.values() else ""),
             mark="refused",
         )
     if isinstance(error, ssl.SSLError) or (address.secure and isinstance(error, ConnectionError)):

@@ -214,6 +214,8 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
     freshness: SignalFreshness
     if reading is not None:
         freshness = reading.freshness(facts.now_s)
+    elif unusable is not None:
+        freshness = "not_measured" if unusable.is_declared else "no_value"
     elif source is not None and source.decode is not None:
         freshness = "never"
     else:

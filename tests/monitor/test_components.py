@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from monitor.components import FORGOTTEN_UNKNOWN_S, MOST, ONE_INTERVAL_S, SELDOM_S, TOPIC_SILENT_S, Components
+from monitor.state import State
 from monitor.values import Component, Diagnostics
 
 
@@ -65,6 +66,15 @@ def test_what_reported_once_is_not_held_to_an_interval_and_two_reports_are_hardl
     assert levels(known.merge(said(("gps", 0)), FORGOTTEN_UNKNOWN_S + 1.0)) == {"gps": 0}
 
 
+def test_a_component_whose_interval_is_not_known_says_when_it_reported() -> None:
+    known = Components()
+    known.merge(said(("light", 0), ("gps", 0)), 3.0)
+    found = {one.name: one.once_s for one in known.merge(said(("gps", 0)), 4.0).components}
+    assert found == {"light": 3.0, "gps": None}
+    found = {one.name: one.once_s for one in known.merge(said(("light", 1)), 1200.0).components}
+    assert found == {"light": None}
+
+
 def test_the_silence_of_all_is_explained_by_the_one_that_reports_most_often() -> None:
     known = Components()
     assert known.horizon_s(0.0) == SELDOM_S
@@ -100,3 +110,42 @@ def test_a_clock_that_goes_back_harms_nothing() -> None:
     known = Components()
     known.merge(said(("laser", 2)), 100.0)
     assert levels(known.merge(said(("gps", 0)), 50.0)) == {"gps": 0}
+
+
+@pytest.mark.parametrize("period_s", [1.0, 30.0, 120.0])
+def test_between_two_reports_the_value_does_not_age(period_s: float) -> None:
+    state = State()
+    for number in range(40):  # two components, so that the topic as a whole has no steady rate
+        state.receive("diagnostics", said(("disk", 0)), number * period_s)
+        state.receive("diagnostics", said(("fan", 0)), (number + 0.2) * period_s)
+    reading = state.get("diagnostics")
+    assert reading is not None
+    assert reading.freshness(39.95 * period_s) == "fresh"
+    assert reading.freshness(39.2 * period_s + max(10.1, 3.1 * period_s)) == "stale"
+
+
+def test_a_first_report_whose_interval_is_not_known_ages_soon() -> None:
+    state = State()
+    state.receive("diagnostics", said(("disk", 0)), 0.0)
+    reading = state.get("diagnostics")
+    assert reading is not None
+    assert reading.freshness(3.1) == reading.freshness(SELDOM_S - 1.0) == "ageing"
+    assert reading.freshness(SELDOM_S + 1.0) == "stale"
+
+
+def test_diagnostics_that_came_each_second_age_after_three() -> None:
+    state = State()
+    for number in range(6):
+        state.receive("diagnostics", said(("ekf", 0), *([("disk", 0)] if number % 5 == 0 else [])), float(number))
+    reading = state.get("diagnostics")
+    assert reading is not None
+    assert [reading.freshness(5.0 + age_s) for age_s in (2.9, 3.1, 9.9, 10.1)] == ["fresh", "ageing", "ageing", "stale"]
+
+
+def test_the_operators_rate_counts_for_diagnostics_too() -> None:
+    state = State({"diagnostics": 2.0})
+    for number in range(6):
+        state.receive("diagnostics", said(("disk", 0)), number * 30.0)
+    reading = state.get("diagnostics")
+    assert reading is not None
+    assert (reading.horizon_s, reading.period_s) == (5.0, 0.5)

@@ -168,7 +168,7 @@ def test_a_horizon_that_is_held_is_that_of_the_meter_unless_a_rate_is_set(
     set_hz: float | None, horizon_s: float
 ) -> None:
     meter = RateMeter(1.0, set_hz)
-    meter.hold(90.0)
+    meter.hold(90.0, 30.0)
     assert meter.horizon_s == horizon_s
     feed(meter, 1.0, 30.0)
-    assert meter.horizon_s == horizon_s
+    assert (meter.horizon_s, meter.period_s) == (horizon_s, 0.5 if set_hz else 30.0)

@@ -24,5 +24,6 @@ test('the page never believes more than the server does', () => {
 test('what never came stays what it is', () => {
   assert.equal(freshnessStyle(signal({ freshness: 'never', age_s: null }), 9).ink, 'never');
   assert.equal(freshnessStyle(signal({ freshness: 'not_published', age_s: null }), 9).ink, 'not_published');
+  assert.equal(freshnessStyle(signal({ freshness: 'not_measured', age_s: null }), 9).ink, 'not_measured');
   assert.deepEqual(freshnessStyle(undefined, 0), { ink: 'not_published', age_s: null });
 });

@@ -208,6 +208,7 @@ test('a car that is not known to be there is never shown as live, and why is sai
   for (const [value, ink, words] of /** @type {[any, string, RegExp][]} */ ([
     [FIX, 'stale', /^The car’s position is 3\.4 s old: the car may be elsewhere\.$/],
     [null, 'never', /^No position received/],
+    [null, 'no_value', /^The car’s messages hold no usable position\.$/],
     [null, 'not_published', /^The car publishes no position/],
     [{ ...FIX, status: -1 }, 'fresh', /^The car’s receiver has no fix/],
     [{ ...FIX, lat_deg: null, status: -1 }, 'fresh', /^The car’s receiver has no fix/],

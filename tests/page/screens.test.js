@@ -1,4 +1,5 @@
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { test } from 'node:test';
 import { armWords, bare, dialled, foundIn, isSameCar, remembered } from '../../static/js/shell/connect-layout.js';
 import { screenOf } from '../../static/js/shell/router.js';
@@ -51,6 +52,14 @@ test('what is dialled: the port of the scheme, and that of rosbridge without a s
   for (const typed of ['', '  ', 'my car', 'http://car', 'ftp://car', 'ws:/car', 'ws:car', 'ws://', 'car:0', 'car:70000', 'car:abc', 'a:1:2', 'car:11311', 'ros@car', '<b>']) assert.equal(dialled(typed), '', typed);
 });
 
+test('what is shown is what the server dials, for each spelling of a table that the tests of the server read too', () => {
+  const rows = JSON.parse(readFileSync(new URL('../server/rosbridge/spellings.json', import.meta.url), 'utf8'));
+  assert.ok(rows.length > 200);
+  for (const [typed, url] of rows) assert.equal(dialled(typed), url ?? '', JSON.stringify(typed));
+  const longest = `ws://car/${'x'.repeat(291)}`;
+  assert.deepEqual([dialled(longest) !== '', dialled(`${longest}x`)], [true, '']);
+});
+
 test('found vehicles are listed once, and an answer of another shape is none', () => {
   assert.deepEqual(foundIn({ found: [{ name: 'Sim', address: 'ws://127.0.0.1:9091' }], vehicles: [{ name: 'car', address: '127.0.0.1:9091', phase: 'idle' }, { name: 'b', address: null }] }),
     [{ name: 'Sim', address: 'ws://127.0.0.1:9091', phase: undefined }]);
@@ -78,6 +87,8 @@ test('the details of a signal tell what was rejected and why', () => {
   assert.equal(kindWords(signal), 'Twist');
   assert.equal(kindWords({ ...signal, type: null, topic: null, value: { source: 'speed' } }), 'from speed');
   assert.equal(kindWords({ ...signal, type: null, topic: null, value: null }), 'no such topic');
+  assert.equal(kindWords({ ...signal, value: { source: 'odometry' } }), 'from odometry', 'its own topic holds no value');
+  assert.equal(kindWords({ ...signal, value: { source: 'topic' } }), 'Twist');
 });
 
 test('recording and last values', () => {

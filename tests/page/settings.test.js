@@ -146,6 +146,8 @@ test('a topic says what it carries, how fast, and what is wrong with it', () => 
   assert.match(topicWords(signal({ rejected: 3, rejected_why: 'x is NaN' }), undefined, true).says, /3 rejected: x is NaN/);
   assert.match(topicWords(signal({ freshness: 'stale', age_s: 7.4 }), undefined, true).says, /silent for 7.4 s/);
   assert.match(topicWords(signal({ freshness: 'never' }), undefined, true).says, /no message yet/);
+  const empty = topicWords(signal({ freshness: 'not_measured', value: null, note: 'not measured (present is false)' }), undefined, true);
+  assert.deepEqual([empty.says, empty.icon], ['speed · Twist\nnot measured (present is false)', 'unknown']);
   const ghost = { freshness: /** @type {const} */ ('not_published'), note: 'no node publishes it', value: null };
   assert.deepEqual(topicWords(signal(ghost), undefined, true), { topic: '/vel', says: 'speed · no node publishes it', icon: 'unknown', rate: '–' });
   assert.deepEqual(topicWords(signal(ghost), '/vel', true), { topic: '/vel', says: 'speed · chosen by you, no node publishes it', icon: 'warn', rate: '–' });

@@ -11,9 +11,9 @@ const person = (/** @type {string} */ page, /** @type {string} */ name, more = {
 test('signals that are not fresh are listed first; those nobody publishes are not', () => {
   const lines = signalLines(/** @type {any} */ ({
     speed: signal('Speed', 'fresh'), fuel: signal('Fuel', 'not_published'), scan: signal('Laser', 'stale', { rate_hz: 0, age_s: 7.35 }),
-    command: signal('Command', 'never', { rate_hz: null, age_s: null }),
+    command: signal('Command', 'never', { rate_hz: null, age_s: null }), heading: signal('Heading', 'not_measured', { age_s: null }),
   }));
-  assert.deepEqual(lines.map(({ cells }) => cells), [['Laser', '0.0 Hz', 'STALE 7.3 s'], ['Command', 'no message yet', '–'], ['Speed', '20.0 Hz', '0.04 s']]);
+  assert.deepEqual(lines.map(({ cells }) => cells), [['Laser', '0.0 Hz', 'STALE 7.3 s'], ['Command', 'no message yet', '–'], ['Heading', 'not measured', '–'], ['Speed', '20.0 Hz', '0.04 s']]);
 });
 
 test('who is in control stands first, then this page; why one cannot hear an alarm is said', () => {

@@ -17,9 +17,7 @@ export const LAG_GRACE_S = 0.6;
 export function freshnessStyle(signal, lag_s) {
   if (!signal) return { ink: 'not_published', age_s: null };
   const age_s = signal.age_s === null ? null : signal.age_s + lag_s;
-  if (signal.freshness === 'never' || signal.freshness === 'not_published' || age_s === null) {
-    return { ink: signal.freshness, age_s };
-  }
+  if (age_s === null) return { ink: signal.freshness, age_s };
   if (signal.freshness === 'stale') return { ink: 'stale', age_s };
   if (lag_s <= LAG_GRACE_S) return { ink: signal.freshness, age_s };
   return { ink: age_s > (signal.horizon_s ?? 1) ? 'stale' : 'ageing', age_s };

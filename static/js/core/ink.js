@@ -5,8 +5,15 @@ import { age } from './format.js';
 
 /** @typedef {import('./protocol-types.js').SignalFreshness} Freshness */
 
+/** @typedef {'not_measured' | 'no_value' | 'never' | 'not_published'} Absent */
+
 /** What stands in the place of a value that never came. */
-export const ABSENT = /** @type {Record<'never' | 'not_published', string>} */ ({ never: 'no message yet', not_published: 'not published' });
+export const ABSENT = /** @type {Record<Absent, string>} */ ({
+  not_measured: 'not measured', no_value: 'no value', never: 'no message yet', not_published: 'not published',
+});
+
+/** @param {Freshness} ink @returns {ink is Absent} */
+export const isAbsent = (ink) => ink in ABSENT;
 
 /**
  * Write `text` as a value of this freshness; where there is none, say so in words and never write 0.
@@ -17,10 +24,9 @@ export const ABSENT = /** @type {Record<'never' | 'not_published', string>} */ (
  * @param {string} [unitText]
  */
 export function write(element, ink, text, unit, unitText = '') {
-  const isAbsent = ink === 'never' || ink === 'not_published';
   setAttribute(element, 'data-ink', ink);
-  setText(element, isAbsent ? ABSENT[ink] : text);
-  if (unit) setText(unit, isAbsent ? '' : unitText);
+  setText(element, isAbsent(ink) ? ABSENT[ink] : text);
+  if (unit) setText(unit, isAbsent(ink) ? '' : unitText);
 }
 
 /**
@@ -30,6 +36,6 @@ export function write(element, ink, text, unit, unitText = '') {
  */
 export function writeAge(element, { ink, age_s }) {
   setAttribute(element, 'data-ink', ink);
-  if (ink === 'never' || ink === 'not_published') return setText(element, ABSENT[ink]);
+  if (isAbsent(ink)) return setText(element, ABSENT[ink]);
   return setText(element, `${ink === 'stale' ? 'STALE ' : ''}${age(age_s, 2)} s`);
 }

@@ -2120,14 +2120,14 @@ export interface SignDepartureCommand {
   check: string;
 }
 
-export type SignalFreshness = "fresh" | "ageing" | "stale" | "never" | "not_published";
+export type SignalFreshness = "fresh" | "ageing" | "stale" | "not_measured" | "no_value" | "never" | "not_published";
 
 /** One signal. */
 export interface SignalState<Value> {
   label: string;
   /** of the headline number */
   unit: string;
-  /** ageing: > 3 periods; stale: > max(10 periods, 1 s); never: subscribed to, and nothing came */
+  /** ageing: > 3 periods; stale: > max(10 periods, 1 s); not_measured: messages came, which declare that; no_value: messages came, none of which could be used; never: subscribed to, and nothing came */
   freshness: SignalFreshness;
   /** since it came */
   age_s: number | null;

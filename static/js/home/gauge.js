@@ -2,7 +2,7 @@
 
 import { html, setAttribute, setText, show, svg } from '../core/dom.js';
 import { accelerationAngle, band, digitsBox, faceOf, orderMark, speedAngle } from './gauge-layout.js';
-import { ABSENT } from '../core/ink.js';
+import { ABSENT, isAbsent } from '../core/ink.js';
 import { orderOf } from '../slowdown/slow-layout.js';
 import { speedIn, speedUnit, speedWords, spokenSpeedUnit } from '../core/units.js';
 import { age, signed } from '../core/format.js';
@@ -84,7 +84,7 @@ class Gauge {
     const scale = this.#scale();
     const speedInk = store.ink('speed');
     const speed_mps = number(store.signal('speed')?.value?.speed_mps);
-    const isSpeedKnown = speed_mps !== null && isValue(speedInk.ink);
+    const isSpeedKnown = speed_mps !== null && !isAbsent(speedInk.ink);
     setAttribute(root, 'data-speed', isSpeedKnown ? speedInk.ink : 'never');
     const [digits, unitWord] = isSpeedKnown ? speedWords(speed_mps) : ['–', speedUnit()];
     const block = digitsBox(digits);
@@ -112,10 +112,11 @@ class Gauge {
     const { acceleration, accelerationUnit, accelerationMeter } = this.parts;
     const pushInk = store.ink('acceleration');
     const push = number(store.signal('acceleration')?.value?.acceleration_mps2);
-    const isPushKnown = push !== null && isValue(pushInk.ink);
+    const isPushKnown = push !== null && !isAbsent(pushInk.ink);
     setAttribute(root, 'data-push', isPushKnown ? pushInk.ink : 'never');
-    setText(acceleration, isPushKnown ? signed(push) : pushInk.ink === 'not_published' ? 'not published' : '–');
-    setText(accelerationUnit, isPushKnown || pushInk.ink !== 'not_published' ? 'm/s²' : '');
+    const why = !isPushKnown && isAbsent(pushInk.ink) && pushInk.ink !== 'never' ? ABSENT[pushInk.ink] : '';
+    setText(acceleration, why || (isPushKnown ? signed(push) : '–'));
+    setText(accelerationUnit, why ? '' : 'm/s²');
     setAttribute(accelerationMeter, 'aria-valuemin', -scale.acceleration_max_mps2);
     meter(accelerationMeter, isPushKnown && pushInk.ink !== 'stale' ? push : null, scale.acceleration_max_mps2, `${signed(push)} metres per second squared`);
   }
@@ -188,15 +189,12 @@ function showFace({ face, bug }, scale) {
   ] : []));
 }
 
-/** @param {import('../core/protocol-types.js').SignalFreshness} ink */
-const isValue = (ink) => ink !== 'never' && ink !== 'not_published';
-
 /**
  * @param {{ink: import('../core/protocol-types.js').SignalFreshness, age_s: number | null}} state
  * @param {boolean} isKnown
  */
 function noteOf({ ink, age_s }, isKnown) {
-  if (ink === 'never' || ink === 'not_published') return ABSENT[ink];
+  if (isAbsent(ink)) return ABSENT[ink];
   if (ink === 'stale') return `STALE ${age(age_s)} s`;
   if (!isKnown) return 'unknown';
   return ink === 'ageing' ? `${age(age_s)} s old` : '';

@@ -1,7 +1,7 @@
 // The nearest object ahead: in digits, and on a tape from the bumper to 20 m.
 
 import { field, setAttribute, setText, setWords, show } from '../core/dom.js';
-import { ABSENT, write, writeAge } from '../core/ink.js';
+import { ABSENT, isAbsent, write, writeAge } from '../core/ink.js';
 import { bearing, fixed } from '../core/format.js';
 
 const TAPE = { from: 26, to: 380, metres: 20 };
@@ -40,13 +40,12 @@ export function mount(root, store) {
   function draw() {
     const state = store.ink('distance');
     const value = store.signal('distance')?.value;
-    const isThere = state.ink !== 'never' && state.ink !== 'not_published';
-    const distance_m = isThere && typeof value?.distance_m === 'number' ? value.distance_m : null;
+    const distance_m = !isAbsent(state.ink) && typeof value?.distance_m === 'number' ? value.distance_m : null;
     const isLive = state.ink === 'fresh' || state.ink === 'ageing';
     writeAge(age, state);
     show(parts.distance, distance_m !== null);
     show(none, distance_m === null);
-    setText(none, !isThere ? ABSENT[/** @type {'never'} */ (state.ink)] : value?.none_in_range ? 'none in range' : 'distance unknown');
+    setText(none, isAbsent(state.ink) ? ABSENT[state.ink] : value?.none_in_range ? 'none in range' : 'distance unknown');
     if (distance_m !== null) write(distance, state.ink, fixed(distance_m));
 
     const bearingState = store.ink('bearing');

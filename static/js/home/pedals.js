@@ -1,7 +1,7 @@
 // Brake, accelerator and steering: percent in digits and as bars.
 
 import { field, setAttribute } from '../core/dom.js';
-import { write } from '../core/ink.js';
+import { isAbsent, write } from '../core/ink.js';
 import { fixed } from '../core/format.js';
 
 const HEIGHT = 72, FOOT = 2.5, HALF = 86;
@@ -45,7 +45,7 @@ export function mount(root, store) {
     for (const { name, value, unit, fill, bar } of parts) {
       const { ink } = store.ink(name);
       const percent = store.signal(name)?.value?.percent;
-      const isKnown = typeof percent === 'number' && ink !== 'never' && ink !== 'not_published';
+      const isKnown = typeof percent === 'number' && !isAbsent(ink);
       const isLive = isKnown && ink !== 'stale';
       const words = name === 'steering' && isKnown ? steeringWords(percent) : { digits: isKnown ? fixed(percent, 0) : '–', side: '%' };
       write(value, ink, words.digits, unit, words.side);

@@ -1,7 +1,7 @@
 // Signals: every signal with its value, rate and age; one press shows where it comes from and what was wrong with it.
 
 import { html, icon, setAttribute, setText, setWords, show } from '../core/dom.js';
-import { ABSENT, write } from '../core/ink.js';
+import { isAbsent, write } from '../core/ink.js';
 import { shownIn, speedWords } from '../core/units.js';
 import { age, counted, fixed, NOTHING } from '../core/format.js';
 
@@ -73,9 +73,10 @@ function rangeWords({ lowest, highest, unit = '' }) {
 
 /** Where a signal comes from, in a word. @param {Signal} signal */
 export function kindWords({ type, topic, value }) {
+  const source = value?.['source'];
+  if (typeof source === 'string' && source !== 'topic') return `from ${source}`; // also where the topic's messages hold no value
   if (type) return type.split('/').at(-1) ?? type;
-  if (topic) return 'type unknown';
-  return typeof value?.['source'] === 'string' ? `from ${value['source']}` : 'no such topic';
+  return topic ? 'type unknown' : 'no such topic';
 }
 
 /** @param {any} components */
@@ -155,14 +156,13 @@ function row(choose) {
  * @param {{ink: import('../core/protocol-types.js').SignalFreshness, age_s: number | null}} state
  */
 function fill(at, name, signal, { ink, age_s }) {
-  const isAbsent = ink === 'never' || ink === 'not_published';
   const [text, unit] = headline(name, signal.value, signal.unit);
   setText(at.name, signal.label);
   setText(at.kind, kindWords(signal));
   setAttribute(at.element, 'data-faulty', signal.rejected > 0);
-  write(at.value, ink, isAbsent ? ABSENT[ink] : text, at.unit, unit);
-  setText(at.rate, isAbsent ? NOTHING : fixed(signal.rate_hz));
-  setText(at.old, isAbsent ? NOTHING : age(age_s, 2));
+  write(at.value, ink, text, at.unit, unit);
+  setText(at.rate, ink === 'never' || ink === 'not_published' ? NOTHING : fixed(signal.rate_hz));
+  setText(at.old, isAbsent(ink) ? NOTHING : age(age_s, 2));
   setAttribute(at.old, 'data-age', ink);
   show(at.clock, ink === 'ageing');
   if (at.more.hasAttribute('hidden')) return;

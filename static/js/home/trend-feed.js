@@ -1,6 +1,6 @@
 // The last minute of the signals on Home: kept from the frames, with what this page missed fetched from the server.
 
-import { ABSENT } from '../core/ink.js';
+import { ABSENT, isAbsent } from '../core/ink.js';
 import { Minute, STEP_S } from './trends-layout.js';
 import { shownIn } from '../core/units.js';
 import { fixed, signed } from '../core/format.js';
@@ -85,7 +85,7 @@ export function trendsOf(store) {
  */
 export function nowOf(spec, store) {
   const { ink } = store.ink(spec.name);
-  if (ink === 'never' || ink === 'not_published') return { ink, text: ABSENT[ink], value: null };
+  if (isAbsent(ink)) return { ink, text: ABSENT[ink], value: null };
   const now = /** @type {Record<string, any> | null | undefined} */ (store.signal(spec.name)?.value);
   const number = now?.['speed_mps'] ?? now?.['acceleration_mps2'] ?? now?.['distance_m'] ?? now?.['percent'] ?? now?.['value'];
   const { value } = shownIn(typeof number === 'number' ? number : null, spec.unit);

@@ -1,7 +1,7 @@
 // The texts of the scan's tab: age of the scan, the nearest return in the corridor, the marked return, the plot for screen readers.
 
 import { field, setAttribute, setText, setWords, show } from '../core/dom.js';
-import { ABSENT, write } from '../core/ink.js';
+import { ABSENT, isAbsent, write } from '../core/ink.js';
 import { bearingOf } from './scan-frame.js';
 import { beamWords, sectorSentences, sectorsOf, unseenOf } from './scan-layout.js';
 import { age, bearing, fixed } from '../core/format.js';
@@ -26,7 +26,7 @@ export class ScanReadout {
     const { at, mark, store } = this;
     const { ink, age_s } = state;
     const scan = store.scans.newest;
-    const isThere = scan !== null && ink !== 'never' && ink !== 'not_published';
+    const isThere = scan !== null && !isAbsent(ink);
     const isNow = isThere && ink !== 'stale';
     show(at('none'), !isNow);
     show(at('none-help'), ink === 'not_published');
@@ -34,7 +34,7 @@ export class ScanReadout {
     show(at('aim'), isThere);
     show(at('late'), isNow && ink === 'ageing');
     if (isNow && ink === 'ageing') setText(at('late'), `${age(age_s, 2)} s`);
-    const missing = isThere ? `STALE ${age(age_s)} s` : ink === 'fresh' || ink === 'ageing' ? 'waiting for a scan' : ABSENT[/** @type {'never'} */ (ink)] ?? 'no scan';
+    const missing = isThere ? `STALE ${age(age_s)} s` : isAbsent(ink) ? ABSENT[ink] : ink === 'stale' ? 'no scan' : 'waiting for a scan';
     if (!isNow) setText(at('none-words'), missing);
     this.#drawNearest(isNow ? scan : null, isNow ? ink : 'fresh');
     setWords(at('beams'), isThere && scan ? beamWords(scan) : '');
@@ -104,7 +104,7 @@ export class ScanReadout {
  */
 export function scanInk(store, shown) {
   const state = store.ink('scan');
-  if (!store.scans.newest || state.ink === 'never' || state.ink === 'not_published') return state;
+  if (!store.scans.newest || isAbsent(state.ink)) return state;
   const { age_s: then_s, at_ms } = shown ?? { age_s: store.scans.newest.age_s, at_ms: store.scans.at_ms };
   const age_s = then_s + (store.now() - at_ms) / 1000;
   // The server has no limit while it does not know the rate of the laser; a picture of a moving world gets ten periods.

@@ -39,7 +39,7 @@ export function topicWords(signal, picked, isLive) {
   ];
   const isWell = !signal.note && !signal.rejected && (signal.freshness === 'fresh' || signal.freshness === 'ageing');
   return {
-    topic: signal.topic, says: facts.filter(Boolean).join('\n'), icon: !isLive ? 'unknown' : isWell ? 'ok' : 'warn',
+    topic: signal.topic, says: facts.filter(Boolean).join('\n'), icon: !isLive || signal.freshness === 'not_measured' ? 'unknown' : isWell ? 'ok' : 'warn',
     rate: isLive ? fixed(signal.rate_hz) : NOTHING,
   };
 }

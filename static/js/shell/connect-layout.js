@@ -71,6 +71,8 @@ export function bare(address) {
 const PORTS = { ws: 80, wss: 443 }; // of a URL without a port (RFC 6455); a host alone has rosbridge's own
 const PORT = 9090;
 const MASTER_PORT = 11311; // of a ROS master, which is refused
+const LONGEST = 300; // letters
+const HOST = /^(?=.{1,253}$)[a-z\d_]([\w-]{0,61}[a-z\d_])?(\.[a-z\d_]([\w-]{0,61}[a-z\d_])?)*\.?$/i;
 
 /**
  * What the server dials for an address, as in `server/rosbridge/address.py`; empty for one that it refuses.
@@ -78,23 +80,33 @@ const MASTER_PORT = 11311; // of a ROS master, which is refused
  */
 export function dialled(typed) {
   const text = typed.trim();
+  if ([...text].length > LONGEST || /[\p{C}\p{Z}]/u.test(text)) return '';
   const [, scheme = '', after = text] = /^(wss?):\/\/(.*)$/i.exec(text) ?? [];
-  const isIpv6 = scheme === '' && /^[\da-f:.]+$/i.test(text) && (text.includes('::') || text.split(':').length === 8);
-  const parts = /^(\[[\da-f:.]+\]|[\w.-]+)(?::(\d*))?([/?][^#\s]*)?(?:#.*)?$/i.exec(isIpv6 ? `[${text}]` : after);
+  const isIpv6 = scheme === '' && isHost(`[${text}]`);
+  const parts = /^(\[[\da-f:.]+\]|[\w.-]+)(?::(\d*))?([/?][^#]*)?(?:#.*)?$/i.exec(isIpv6 ? `[${text}]` : after);
   if (!parts || (scheme === '' && /:\/\/|^wss?:\/?(?=[^/\d]|\d+\.)/i.test(text))) return '';
   const [, host = '', written = '', path = ''] = parts;
+  if (!isHost(host)) return '';
   const secure = scheme.toLowerCase() === 'wss';
   const port = written === '' ? (scheme === '' ? PORT : PORTS[secure ? 'wss' : 'ws']) : Number(written);
   if (port < 1 || port > 65535 || port === MASTER_PORT) return '';
-  return `${secure ? 'wss' : 'ws'}://${host.toLowerCase()}:${port}${path === '/' ? '' : encoded(path.replace(/^\?/, '/?'))}`;
+  return `${secure ? 'wss' : 'ws'}://${host.toLowerCase()}:${port}${sent(path)}`;
 }
 
-/** A path as it is sent. @param {string} path */
-function encoded(path) {
+/** A path as it is sent. @param {string} path with its query */
+function sent(path) {
+  const whole = path.replace(/^([^?]*)\?$/, '$1').replace(/^\?/, '/?');
+  return whole === '/' ? '' : encodeURI(whole).replaceAll('%25', '%');
+}
+
+/** Whether this is a host name, an IPv4 address, or an IPv6 address in brackets. @param {string} text */
+function isHost(text) {
+  if (!text.startsWith('[')) return HOST.test(text);
+  if (!/^\[[\da-f:.]+\]$/i.test(text)) return false;
   try {
-    return encodeURI(path).replaceAll('%25', '%');
-  } catch { // half a letter
-    return path;
+    return Boolean(new URL(`ws://${text}`));
+  } catch {
+    return false;
   }
 }
 

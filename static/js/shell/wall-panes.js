@@ -2,6 +2,7 @@
 
 import { html, setAttribute, setWords } from '../core/dom.js';
 import { age, counted, fixed, NOTHING } from '../core/format.js';
+import { ABSENT, isAbsent } from '../core/ink.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').State} State
@@ -23,7 +24,7 @@ export function signalLines(signals) {
   const isLate = (/** @type {string} */ freshness) => Number(freshness === 'fresh');
   return published.sort(([, a], [, b]) => isLate(a.freshness) - isLate(b.freshness)).map(([name, { label, rate_hz, age_s, freshness }]) => ({
     key: name, ink: freshness,
-    cells: [label, freshness === 'never' ? 'no message yet' : `${rate_hz === null || rate_hz === undefined ? NOTHING : fixed(rate_hz)} Hz`, age_s === null ? NOTHING : `${freshness === 'stale' ? 'STALE ' : ''}${age(age_s, 2)} s`],
+    cells: [label, isAbsent(freshness) ? ABSENT[freshness] : `${rate_hz === null || rate_hz === undefined ? NOTHING : fixed(rate_hz)} Hz`, age_s === null ? NOTHING : `${freshness === 'stale' ? 'STALE ' : ''}${age(age_s, 2)} s`],
   }));
 }
 

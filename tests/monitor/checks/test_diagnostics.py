@@ -49,6 +49,23 @@ def test_a_long_name_does_not_break_the_tile() -> None:
     assert len(finding.text) < 200
 
 
+@pytest.mark.parametrize(
+    ("reported", "text"),
+    [
+        ((None, None), "2 components report"),
+        ((None, -600.0), "2 components report, 1 of them once, 600 s ago"),
+        ((-600.0, -20.0, None), "3 components report, 2 of them once, up to 600 s ago"),
+    ],
+)
+def test_a_level_that_was_reported_once_says_how_old_it_is(reported: tuple[float | None, ...], text: str) -> None:
+    components = tuple(
+        Component(name=str(i), level=0, message="", once_s=None if since_s is None else 100.0 + since_s)
+        for i, since_s in enumerate(reported)
+    )
+    finding = ask("diagnostics_error", known(100.0, diagnostics=Diagnostics(components=components)))
+    assert (finding.verdict, finding.text) == ("ok", text)
+
+
 def test_not_published_and_silent() -> None:
     assert not ask("diagnostics_error", known()).applies
     assert ask("diagnostics_error", known(age_s=2.0, diagnostics=said(("gps", 2)))).verdict == "unknown"

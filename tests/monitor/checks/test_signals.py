@@ -56,6 +56,24 @@ def test_silent(age_s: float, horizon_s: float, verdict: Verdict) -> None:
     assert stale("brake", snapshot(brake=heard(age_s, horizon_s=horizon_s))).verdict is verdict
 
 
+@pytest.mark.parametrize(
+    ("waited_s", "hz", "verdict", "text"),
+    [
+        (4.9, 0.0, UNKNOWN, "waiting for its first message"),
+        (5.1, 0.0, UNKNOWN, "nothing received in 5 s since connecting; its interval is not known"),
+        (149.0, 0.0, UNKNOWN, "nothing received in 149 s since connecting; its interval is not known"),
+        (151.0, 0.0, FAULT, "nothing received in 151 s since connecting"),
+        (5.1, 1.0, FAULT, "nothing received in 5 s since connecting"),
+    ],
+)
+def test_diagnostics_of_which_nothing_came_are_never_called_fine(
+    waited_s: float, hz: float, verdict: Verdict, text: str
+) -> None:
+    opened_s = NOW_S - waited_s
+    found = stale("diagnostics", snapshot(replace(OPEN, since_s=opened_s, connected_s=opened_s)), diagnostics_hz=hz)
+    assert (found.verdict, found.text) == (verdict, f"Diagnostics: {text}")
+
+
 def test_what_is_said_of_a_silent_signal() -> None:
     found = stale("brake", snapshot(brake=heard(3.4)))
     assert (found.text, found.brief, found.causes) == ("Brake: no message for 3.4 s", "FAULT Brake 3 s", ("brake",))

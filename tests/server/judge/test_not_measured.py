@@ -105,7 +105,10 @@ HELD: dict[str, tuple[Rule, Any, bool]] = {
     "variance NaN": (table.NO_VARIANCE, fix(position_covariance=covariance(NAN)), True),
     "variance of north 0": (table.NO_VARIANCE, fix(position_covariance=covariance(1.0, north=0.0)), True),
     "variance 1": (table.NO_VARIANCE, fix(position_covariance=covariance(1.0)), False),
-    "no battery": (table.NO_BATTERY, battery(present=False), True),
+    "no battery, 0": (table.NO_BATTERY, battery(present=False, percentage=0.0), True),
+    "no battery, NaN": (table.NO_BATTERY, battery(present=False, percentage=NAN), True),
+    "no battery, null": (table.NO_BATTERY, battery(present=False, percentage=None), True),
+    "only the percentage": (table.NO_BATTERY, battery(present=False, percentage=0.03), False),
     "a battery": (table.NO_BATTERY, battery(present=True), False),
     "nothing said of a battery": (table.NO_BATTERY, without(battery(), "present"), False),
     "percentage NaN": (table.NO_PERCENTAGE, battery(percentage=NAN), True),
@@ -194,7 +197,7 @@ def test_without_a_fix_any_number_is_no_place(status: int, lat: Any, lon: Any) -
     assert math.isnan(found.lon_deg)
 
 
-@pytest.mark.parametrize(("present", "percentage"), [(False, 0.0), (False, 0.72), (False, NAN), (True, NAN)])
+@pytest.mark.parametrize(("present", "percentage"), [(False, 0.0), (False, NAN), (True, NAN)])
 def test_a_battery_that_is_not_measured_is_not_empty(present: bool, percentage: float) -> None:
     with pytest.raises(NotMeasured, match=r"^not measured \((present is false|percentage is NaN)\)$"):
         signals.fuel.battery(battery(present=present, percentage=percentage))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import socket
+from pathlib import Path
 
 import pytest
 from autobahn.websocket.util import parse_url
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.rosbridge.address import Address, BadAddress, parse, refuse_forbidden, without_login
+from server.rosbridge.address import Address, BadAddress, parse, refuse_forbidden, url_of, without_login
 
 DIALLED = {
     "bare host": ("car", "ws://car:9090"),
@@ -130,6 +132,21 @@ def test_is_refused(typed: str, code: str, words: str, suggestion: str | None) -
     if suggestion is not None:
         assert suggestion in refusal.value.hint
         parse(suggestion)
+
+
+SPELLINGS = json.loads(Path(__file__).with_name("spellings.json").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(("typed", "url"), SPELLINGS, ids=[ascii(typed) for typed, _ in SPELLINGS])
+def test_the_page_shows_what_is_dialled(typed: str, url: str | None) -> None:
+    """tests/page/screens.test.js reads the same table: what the page shows is what the server dials."""
+    assert url_of(typed) == url
+
+
+@pytest.mark.parametrize("rows", [DIALLED, REFUSED], ids=["dialled", "refused"])
+def test_the_page_is_tried_with_each_spelling_of_this_file(rows: dict[str, tuple[str, ...]]) -> None:
+    """Except for the longest ones, which screens.test.js makes itself."""
+    assert {row[0] for row in rows.values() if len(row[0]) < 130} <= {typed for typed, _ in SPELLINGS}
 
 
 FORBIDDEN = [

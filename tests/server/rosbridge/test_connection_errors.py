@@ -141,3 +141,12 @@ OTHERS = {
 @pytest.mark.parametrize("problem", OTHERS.values(), ids=OTHERS)
 def test_the_other_problems_are_well_told(problem: Problem) -> None:
     is_well_worded(problem)
+
+
+@pytest.mark.parametrize(
+    ("typed", "is_named"), [("ws://car", True), ("wss://car/x", True), ("car", False), ("ws://car:8080", False)]
+)
+def test_a_refused_port_that_was_not_typed_names_the_usual_one(typed: str, is_named: bool) -> None:
+    problem = of_dial_error(system_error(errno.ECONNREFUSED), parse(typed))
+    assert problem.code == "refused"
+    assert problem.hint.endswith("rosbridge usually listens on 9090.") is is_named

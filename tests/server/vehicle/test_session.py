@@ -187,6 +187,22 @@ async def test_bad_messages_are_counted_with_their_reason(bridge: RosBridge, ser
 
 
 @pytest.mark.virtual_time
+async def test_messages_without_a_value_are_not_called_no_message(bridge: RosBridge, server: str) -> None:
+    bridge.advertise("/battery_state", "sensor_msgs/BatteryState")
+    async with viewer(server) as one, driving(bridge):
+        await one.state(lambda s: is_live(s) and s["signals"]["fuel"]["freshness"] == "never")
+        bridge.publish("/battery_state", {"present": False, "percentage": float("nan")})
+        bridge.publish("/scan", {"ranges": "none"})
+        state = await one.state(lambda s: s["signals"]["scan"]["unusable"] and s["signals"]["fuel"]["unusable"])
+        fuel, laser = state["signals"]["fuel"], state["signals"]["scan"]
+        assert (fuel["freshness"], fuel["unusable"]) == ("not_measured", "not measured (present is false)")
+        assert (laser["freshness"], laser["value"]) == ("no_value", None)
+        bridge.publish("/battery_state", {"present": False, "percentage": 0.5})
+        state = await one.state(lambda s: s["signals"]["fuel"]["freshness"] == "fresh")
+        assert state["signals"]["fuel"]["value"]["value"] == 50.0
+
+
+@pytest.mark.virtual_time
 async def test_beams_below_range_min_are_no_returns(bridge: RosBridge, server: str) -> None:
     ranges = np.array([0.02, 5.0, np.nan, np.inf, 90.0, 10.0, -np.inf], dtype=np.float32)
     async with viewer(server) as one, driving(bridge):
