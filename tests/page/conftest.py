@@ -84,14 +84,14 @@ async def press(keys: Locator) -> None:
 
 DRAWN = """(states) => new Promise((done) => {
     const root = document.documentElement;
-    const until = Number(root.dataset.state ?? 0) + states;
+    const until = Number(root.dataset.states ?? 0) + states;
     const look = () => {
-        if (Number(root.dataset.state ?? 0) < until) return;
+        if (Number(root.dataset.states ?? 0) < until) return;
         seen.disconnect();
         done();
     };
     const seen = new MutationObserver(look);
-    seen.observe(root, { attributeFilter: ['data-state'] });
+    seen.observe(root, { attributeFilter: ['data-states'] });
 })"""
 
 

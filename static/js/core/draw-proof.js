@@ -28,7 +28,7 @@ function textOf(node) {
 
 /**
  * To be called after each complete drawing: restarts the delay of 2 s after which CSS covers the page, where a fresh frame was drawn.
- * `data-state` at the root is the number of fresh frames that were drawn: by it others see that a frame has reached the glass.
+ * `data-states` at the root is the number of fresh frames that were drawn: by it others see that a frame has reached the glass.
  * Throws where nothing was written.
  * @param {{painter: import('./painter.js').Painter, deadMan: import('./dead-man.js').DeadMan}} page
  * @param {() => object | null} newest the frame that was drawn
@@ -52,7 +52,7 @@ export function rewinder({ painter, deadMan }, newest) {
     if (deadMan.covered || frame === seen) return;
     seen = frame;
     states += 1;
-    dataset['state'] = String(states);
+    dataset['states'] = String(states);
     dataset['beat'] = String(states % 2); // of its own: where every second drawing has a fresh frame, the one above would not turn over
   };
 }
