@@ -17,6 +17,8 @@ from server.app.config import Config
 from server.rosbridge_server.server import RosBridge
 from server.vehicle.vehicle import Vehicle
 from server.web.middleware import http_protocol
+from tests.event_loops import pytest_asyncio_loop_factories as pytest_asyncio_loop_factories
+from tests.event_loops import virtual_clock as virtual_clock
 from tests.virtual_time import real_time
 
 
