@@ -15,7 +15,7 @@ from server.judge.settings import AUTO, BadSetting, Settings, change
 from server.judge.settings_override import SettingsOverride
 from server.storage import bounded_toml
 
-_SECTIONS = ("version", "profile", "topics", "limits")
+_SECTIONS = ("version", "profile", "topics", "units", "limits")
 
 
 class BadSettingsFile(Exception):
@@ -35,13 +35,14 @@ def read_override(path: Path) -> SettingsOverride:
     wrong: list[str] = []
     values = _values(path, _tables(path, body, wrong), wrong)
     topics = _topics(path, body.get("topics", {}), wrong)
+    units = _units(path, body.get("units", {}), wrong)
     profile = body.get("profile", AUTO)
     known = (AUTO, *profiles.load())
     if profile not in known:
         wrong.append(f"{path}: profile: known are {_listed(known)}, not {_shown(profile)}.")
     if wrong:
         raise BadSettingsFile(*wrong)
-    return SettingsOverride(name=path.name, values=values, topics=topics, profile=str(profile))
+    return SettingsOverride(name=path.name, values=values, topics=topics, units=units, profile=str(profile))
 
 
 def _body(path: Path) -> dict[str, Any]:
@@ -103,6 +104,19 @@ def _topics(path: Path, given: Any, wrong: list[str]) -> dict[str, str]:
         else:
             topics[signal] = topic
     return topics
+
+
+def _units(path: Path, given: Any, wrong: list[str]) -> dict[str, str]:
+    if not isinstance(given, dict):
+        wrong.append(f"{path}: units: this is a table of signals and their units.")
+        return {}
+    units: dict[str, str] = {}
+    for signal, unit in given.items():
+        try:
+            units |= change(Settings(), GENERIC, units={signal: str(unit)}).units
+        except BadSetting as why:
+            wrong.append(f"{path}: units.{_shown(signal)}: {why}")
+    return units
 
 
 def _guess(name: str, known: Any) -> str:

@@ -12,6 +12,7 @@ from monitor.catalog import AllLimits
 from server.judge import profiles
 from server.judge.profiles import GENERIC, Profile
 from server.judge.settings import AUTO, Conflict, Settings, SettingsFile, change, differences, from_toml, to_toml
+from server.judge.units import UNITS
 from server.protocol.answers import SettingField, SettingsAnswer
 
 PERCENT_A_RAD = -1 / 0.00536  # the CATVehicle's steering: measured on its recordings, negative percent = left
@@ -57,11 +58,12 @@ class ActiveSettings:
         *,
         values: Mapping[str, float | None],
         topics: Mapping[str, str | None],
+        units: Mapping[str, str | None] | None = None,
         profile: str | None,
         version: int | None,
     ) -> list[str]:
         """Stores changes and puts them in force; what changed, a line each. Raises BadSetting, Conflict, OSError."""
-        new = self.prepare(values=values, topics=topics, profile=profile, version=version)
+        new = self.prepare(values=values, topics=topics, units=units, profile=profile, version=version)
         self.store(new)
         return self.adopt(new)
 
@@ -70,6 +72,7 @@ class ActiveSettings:
         *,
         values: Mapping[str, float | None],
         topics: Mapping[str, str | None],
+        units: Mapping[str, str | None] | None = None,
         profile: str | None,
         version: int | None,
     ) -> Settings:
@@ -80,6 +83,7 @@ class ActiveSettings:
             self._profile_named(profile or self.settings.profile),  # a default of the new kind of car is not kept
             values=values,
             topics=topics,
+            units=units,
             profile_name=profile,
             known_profiles=self._profiles,
         )
@@ -101,11 +105,13 @@ class ActiveSettings:
         return True
 
     def in_force(self) -> dict[str, Any]:
-        """Everything that is judged by: the kind of car, each threshold in SI, each topic that was picked."""
-        return {"profile": self.profile.name, "topics": dict(self.settings.topics)} | catalog.flat(self.limits)
+        """Everything that is judged by: the kind of car, each threshold in SI, each topic and unit that was picked."""
+        chosen = {"topics": dict(self.settings.topics), "units": dict(self.settings.units)}
+        return {"profile": self.profile.name} | chosen | catalog.flat(self.limits)
 
     def changes(self) -> dict[str, list[Any]]:
-        """Changes of the active settings since the last call: name → [from, to]; topics are "topics.speed"."""
+        """Changes of the active settings since the last call: name → [from, to]; a topic is "topics.speed", a unit
+        "units.brake"."""
         before, after = _flat(self._reported), _flat(now := self.in_force())
         self._reported = now
         names = sorted({*before, *after})
@@ -129,6 +135,10 @@ class ActiveSettings:
             "defaults": catalog.flat(catalog.changed(catalog.AllLimits(), self.profile.limits)),
             "changed": sorted(self.settings.values),
             "topics": dict(self.settings.topics),
+            "units": dict(self.settings.units),
+            "unit_choices": {
+                signal: [{"name": unit.name, "label": unit.label} for unit in units] for signal, units in UNITS.items()
+            },
             "schema": cast(dict[str, SettingField], catalog.schema()),
         }
 
@@ -156,5 +166,5 @@ class ActiveSettings:
 
 
 def _flat(in_force: Mapping[str, Any]) -> dict[str, Any]:
-    topics = {f"topics.{signal}": topic for signal, topic in in_force["topics"].items()}
-    return {name: value for name, value in in_force.items() if name != "topics"} | topics
+    chosen = {f"{part}.{signal}": name for part in ("topics", "units") for signal, name in in_force[part].items()}
+    return {name: value for name, value in in_force.items() if name not in ("topics", "units")} | chosen

@@ -57,6 +57,7 @@ def receive(
     """
     reception.received += 1
     stamp = stamp_s(message)
+    reception.note_frame(sources[0].topic, message)
     delay_s = 0.0 if transport is None else transport.receive(sources[0].topic, at_s, stamp)
     changed: tuple[str, ...] = ()
     is_proper = True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -43,12 +44,24 @@ class Reception:
     received: int = 0
     rejected: int = 0
     unasked: int = 0  # messages on topics without a subscription
+    frame_ids: dict[str, str] = field(default_factory=dict)  # topic → frame that its newest message names
 
     def tally(self, signal: str) -> Tally:
         found = self.by_signal.get(signal)
         if found is None:
             found = self.by_signal[signal] = Tally()
         return found
+
+    def note_frame(self, topic: str, message: Any) -> None:
+        """Keep the frame that the header of a message names, at most its first 100 characters."""
+        header = message.get("header") if isinstance(message, Mapping) else None
+        frame_id = header.get("frame_id") if isinstance(header, Mapping) else None
+        if isinstance(frame_id, str) and self.frame_ids.get(topic) != frame_id[:100]:
+            self.frame_ids[topic] = frame_id[:100]
+
+    def frame_of(self, topic: str) -> str | None:
+        """The frame that the newest message of a topic names; None: none, or not known."""
+        return self.frame_ids.get(topic) or None
 
     def read(self, source: Source, message: Any, note: str | None) -> Any | None:
         """The decoded value, or None where it was rejected or is not measured; all are counted."""

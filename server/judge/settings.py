@@ -20,6 +20,7 @@ from monitor.catalog import AllLimits
 from monitor.signals import SIGNALS
 from server.judge import profiles
 from server.judge.profiles import GENERIC, Profile
+from server.judge.units import UNITS
 from server.storage import bounded_toml, durable_file
 from server.storage.set_aside import set_aside
 
@@ -29,7 +30,7 @@ AUTO = "auto"  # the profile follows from what the car offers
 MAX_TOML_BYTES = bounded_toml.MAX_BYTES
 _MAX_VERSION = 2**53  # a larger one is not exact in JSON on a page
 _HUGE = 1e12
-_SECTIONS = {"version", "profile", "topics", "limits"}
+_SECTIONS = {"version", "profile", "topics", "units", "limits"}
 _MOST_NAMED = 5  # things left out that a complaint names
 
 
@@ -53,6 +54,7 @@ class Settings:
     profile: str = AUTO
     values: Mapping[str, float] = field(default_factory=dict)  # "speed_limit.max_mps": 9.0; only what was changed
     topics: Mapping[str, str] = field(default_factory=dict)  # signal → topic the operator picked
+    units: Mapping[str, str] = field(default_factory=dict)  # signal → name of the unit the operator picked
 
     def limits(self, profile: Profile) -> AllLimits:
         """The thresholds in force for a car of that kind."""
@@ -65,10 +67,11 @@ def change(
     *,
     values: Mapping[str, float | None] | None = None,
     topics: Mapping[str, str | None] | None = None,
+    units: Mapping[str, str | None] | None = None,
     profile_name: str | None = None,
     known_profiles: Mapping[str, Profile] | None = None,
 ) -> Settings:
-    """The next version. A value or topic of None is reset to its default. Raises BadSetting with the field."""
+    """The next version. A value, topic or unit of None is reset to its default. Raises BadSetting with the field."""
     new_values = {**settings.values}
     for name, value in (values or {}).items():
         if value is None:
@@ -88,10 +91,19 @@ def change(
             raise BadSetting(f"topics.{signal}", "A topic name has 1 to 300 printable characters.")
         else:
             new_topics[signal] = topic
+    new_units = {**settings.units}
+    for signal, unit in (units or {}).items():
+        known = [row.name for row in UNITS.get(signal, ())]
+        if unit is None:
+            new_units.pop(signal, None)
+        elif unit in known:
+            new_units[signal] = unit
+        else:
+            raise BadSetting(_seen(f"units.{signal}"), f"The unit of {_seen(signal)} cannot be {_seen(unit)}.")
     chosen = settings.profile if profile_name is None else profile_name
     if chosen != AUTO and known_profiles is not None and chosen not in known_profiles:
         raise BadSetting("profile", f"There is no profile named {_seen(chosen)}.")
-    return Settings(version=settings.version + 1, profile=chosen, values=kept, topics=new_topics)
+    return Settings(version=settings.version + 1, profile=chosen, values=kept, topics=new_topics, units=new_units)
 
 
 def _validate(flat: Mapping[str, Any], *, named: Mapping[str, Any]) -> None:
@@ -139,9 +151,16 @@ def differences(old: Settings, new: Settings, profile: Profile, new_profile: Pro
     for signal in sorted({*old.topics, *new.topics}):
         if old.topics.get(signal) != new.topics.get(signal):
             lines.append(f"Topic of {SIGNALS[signal].label}: {new.topics.get(signal, 'as found')}")
+    for signal in sorted({*old.units, *new.units}):
+        if old.units.get(signal) != new.units.get(signal):
+            lines.append(f"Unit of {SIGNALS[signal].label}: {_unit_label(signal, new.units.get(signal))}")
     if old.profile != new.profile:
         lines.append(f"Profile: {new.profile}")
     return lines
+
+
+def _unit_label(signal: str, name: str | None) -> str:
+    return next((unit.label for unit in UNITS.get(signal, ()) if unit.name == name), "as found")
 
 
 def to_toml(settings: Settings) -> str:
@@ -155,6 +174,7 @@ def to_toml(settings: Settings) -> str:
             "version": settings.version,
             "profile": settings.profile,
             "topics": dict(sorted(settings.topics.items())),
+            **({"units": dict(sorted(settings.units.items()))} if settings.units else {}),
             "limits": limits,
         }
     )
@@ -173,6 +193,9 @@ def from_toml(text: str, profile: Profile = GENERIC, known_profiles: Mapping[str
     topics = _table(body, "topics")
     if not all(isinstance(topic, str) for topic in topics.values()):
         raise BadSetting("topics", "A topic must be text.")
+    units = _table(body, "units")
+    if not all(isinstance(unit, str) for unit in units.values()):
+        raise BadSetting("units", "A unit must be text.")
     name = body.get("profile", AUTO)
     if not isinstance(name, str):
         raise BadSetting("profile", "The profile must be a name.")
@@ -180,7 +203,15 @@ def from_toml(text: str, profile: Profile = GENERIC, known_profiles: Mapping[str
     if unknown:
         raise BadSetting(_seen(unknown[0]), f"There is no section named {_seen(unknown[0])}.")
     profile = (known_profiles or {}).get(name, profile)
-    fresh = change(Settings(), profile, values=values, topics=topics, profile_name=name, known_profiles=known_profiles)
+    fresh = change(
+        Settings(),
+        profile,
+        values=values,
+        topics=topics,
+        units=units,
+        profile_name=name,
+        known_profiles=known_profiles,
+    )
     return replace(fresh, version=version)
 
 
@@ -207,6 +238,7 @@ def salvage(text: str, known_profiles: Mapping[str, Profile]) -> tuple[Settings,
             profile=found.profile,
             values={**settings.values, **found.values},
             topics={**settings.topics, **found.topics},
+            units={**settings.units, **found.units},
         )
 
     version = body.pop("version", 0)
@@ -221,9 +253,9 @@ def salvage(text: str, known_profiles: Mapping[str, Profile]) -> tuple[Settings,
                     continue
                 for threshold, value in thresholds.items():
                     take({name: {group: {threshold: value}}})
-        elif name == "topics" and isinstance(rows, dict):
-            for signal, topic in rows.items():
-                take({name: {signal: topic}})
+        elif name in ("topics", "units") and isinstance(rows, dict):
+            for signal, chosen in rows.items():
+                take({name: {signal: chosen}})
         else:
             take({name: rows})
     return settings, left_out

@@ -20,6 +20,7 @@ class SettingsOverride:
     name: str = ""  # of the file
     values: Mapping[str, float] = field(default_factory=dict)  # "speed_limit.max_mps": 9.0
     topics: Mapping[str, str] = field(default_factory=dict)  # signal → topic
+    units: Mapping[str, str] = field(default_factory=dict)  # signal → name of its unit
     profile: str = AUTO
 
 
@@ -31,7 +32,9 @@ def recorded_override(toml: str) -> tuple[SettingsOverride, list[str]]:
     except BadSetting:
         read, found = salvage(toml, profiles.load())
         left_out = [f"The settings cannot be used as they are: {why}" for why in found[:MOST_LEFT_OUT]]
-    override = SettingsOverride(name="as recorded", values=read.values, topics=read.topics, profile=read.profile)
+    override = SettingsOverride(
+        name="as recorded", values=read.values, topics=read.topics, units=read.units, profile=read.profile
+    )
     return override, left_out
 
 
@@ -39,8 +42,9 @@ def tuning_for(override: SettingsOverride, topics: Mapping[str, str], ros: RosVe
     """How a car with these topics is judged: its profile as live recognises it, then the override."""
     tuning = ActiveSettings(SettingsFile(None))
     tuning.recognise(topics, ros)
-    if override.topics or override.profile != AUTO:
-        tuning.change(values={}, topics=dict(override.topics), profile=override.profile, version=None)
+    if override.topics or override.units or override.profile != AUTO:
+        topics, units = dict(override.topics), dict(override.units)
+        tuning.change(values={}, topics=topics, units=units, profile=override.profile, version=None)
     if override.values:  # after the profile: what is kept of them is what differs from its defaults
         tuning.change(values=dict(override.values), topics={}, profile=None, version=None)
     return tuning

@@ -35,6 +35,8 @@ class Source:
     type: str | None  # as the bridge spells it; None: not known
     decode: Decode | None  # None: known by name, but of a type that cannot be read
     note: str | None = None  # what the operator should know of the choice
+    why: str | None = None  # what decided for this topic
+    carries: bool = True  # False: a further candidate, watched to compare it with the source of the signal
 
 
 def candidates(found: Mapping[str, str]) -> dict[str, list[TopicOffer]]:

@@ -48,6 +48,11 @@ class SettingField(TypedDict):
     type: NotRequired[str]
 
 
+class UnitChoice(TypedDict):
+    name: str
+    label: str
+
+
 class SettingsAnswer(TypedDict):
     """`GET /api/settings`."""
 
@@ -58,12 +63,16 @@ class SettingsAnswer(TypedDict):
     defaults: dict[str, float]
     changed: Annotated[list[str], doc("what differs from its default")]
     topics: Annotated[dict[str, str], doc("signal → topic, of those that were chosen")]
+    units: Annotated[dict[str, str], doc("signal → name of its unit, of those that were chosen")]
+    unit_choices: Annotated[dict[str, list[UnitChoice]], doc("signal → the units it may be published in")]
     schema: Annotated[dict[str, SettingField], doc("in the order of Settings")]
 
 
 class TopicOffer(TypedDict):
     topic: str
     type: str
+    frame: NotRequired[Annotated[str | None, doc("that its messages name; null: none, or not known")]]
+    why: NotRequired[Annotated[str, doc("what speaks for it and against it, in few words")]]
 
 
 class SignalsAnswer(TypedDict):

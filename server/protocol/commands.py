@@ -127,6 +127,9 @@ class Set(BaseCommand):
     topics: dict[Name, str | None] = Field(
         default_factory=dict, max_length=50, description="signal → topic; null: as found"
     )
+    units: dict[Name, Name | None] = Field(
+        default_factory=dict, max_length=50, description="signal → name of its unit; null: as found"
+    )
     profile: Annotated[Name | None, doc("a profile's name, or auto")] = None
     version: Annotated[Number | None, doc("refused where the settings are no longer at this version")] = None
 

@@ -147,6 +147,8 @@ class SignalState(TypedDict, Generic[Value]):
     rate_hz: float | None
     topic: str | None
     type: str | None
+    why: Annotated[str | None, doc("why this topic carries the signal; null: none does")]
+    frame: Annotated[str | None, doc("the frame that its messages name; null: none, or not known")]
     note: Annotated[str | None, doc('"Float64, expected Float32: reading it as Float64"')]
     unusable: Annotated[str | None, doc('why the newest messages cannot be used: "not a number (linear.x)"')]
     count: int

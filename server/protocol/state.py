@@ -12,6 +12,7 @@ from server.protocol.departure import DepartureState
 from server.protocol.doc import doc
 from server.protocol.driving_state import ModeState
 from server.protocol.operator_state import ControlState, PhoneCompared, PhoneListed, ReachState
+from server.protocol.questions import Question
 from server.protocol.recording_state import RecordingState
 from server.protocol.signal_state import Signals
 from server.protocol.slow_down_state import SlowDownState
@@ -181,6 +182,9 @@ class RecordedState(TypedDict):
     phone: Annotated[PhoneCompared | None, doc("the phone that is compared with the car; null: none")]
     phones: Annotated[list[PhoneListed], doc("all that share a position, at most 12, the one compared first")]
     marks: Annotated[int, doc("how many marks this drive has, or a recording up to the moment shown")]
+    questions: Annotated[
+        list[Question], doc("what the operator in control is asked of this car, the most urgent first")
+    ]
 
 
 class ReplayEnvelope(TypedDict):

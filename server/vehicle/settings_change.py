@@ -41,6 +41,7 @@ class SettingsChange:
                 parts.settings.prepare,
                 values=command.values,
                 topics=command.topics,
+                units=command.units,
                 profile=command.profile,
                 version=command.version,
             )

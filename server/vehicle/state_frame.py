@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from server.judge.topics import Source
 from server.protocol import serialize
 from server.protocol.driving_state import ModeState
 from server.protocol.operator_state import OperatorsState
+from server.protocol.questions import Question
 from server.protocol.recording_state import RecordingState
 from server.protocol.signal_state import SignalFreshness, SignalState, SignalValue
 from server.protocol.slow_down_state import SlowDownState
@@ -81,6 +82,7 @@ class Facts:
     mode: ModeState
     operators: OperatorsState
     marks: int = 0  # of this drive
+    questions: Sequence[Question] = ()
 
 
 def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> RecordedState:
@@ -109,6 +111,7 @@ def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> RecordedS
         "phone": phone.as_json(snapshot.phone, facts.now_s),
         "phones": phone.all_as_json(snapshot.phones, snapshot.phone, facts.now_s),
         "marks": facts.marks,
+        "questions": list(facts.questions),
     }
 
 
@@ -232,6 +235,8 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "rate_hz": serialize.plain(rate.measured_hz, 1) if rate else None,
         "topic": source.topic if source else None,
         "type": source.type if source else None,
+        "why": source.why if source else None,
+        "frame": facts.reception.frame_of(source.topic) if source else None,
         "note": (unusable.words if unusable else None)
         or (source.note if source else None)
         or (_unknown_part(reading.value) if reading else None)

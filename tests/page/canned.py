@@ -50,6 +50,7 @@ def signal(label: str, kind: str | None, value: Json | None, **more: Any) -> Jso
         "age_s": 0.02 if known else None, "delay_s": 0.0 if known else None, "unusable": None,
         "horizon_s": max(1.0, 10 / hz), "period_s": 1 / hz, "expected_hz": hz, "rate_hz": hz,
         "topic": f"/catvehicle/{label.lower()}" if known else None, "type": kind, "note": None,
+        "why": "by its name" if known else None, "frame": None,
         "count": 1118 if known else 0, "rejected": 0, "rejected_why": None, "repaired": 0,
         "repaired_why": None, "value": value,
         "lowest": None, "highest": None, **more,
@@ -127,6 +128,7 @@ def live() -> Json:
         "control": {"holder": "You"},
         "reach": None,
         "marks": 0,
+        "questions": [],
         "phones": [],
         "phone": {
             "id": "9c0f", "label": "Pixel 7", "count": 1, "handheld": True, "chosen": False, "choice": "only",

@@ -1329,6 +1329,16 @@ export interface OpenReplay {
   at_s?: number;
 }
 
+/** One answer to a question. */
+export interface Option {
+  /** what the command `set` takes for it: a topic, or the name of a unit */
+  value: string;
+  /** as the page shows it */
+  label: string;
+  /** what is known of it; empty: nothing */
+  why: string;
+}
+
 /** When; null: not (yet). */
 export interface OrderSteps {
   pressed_ms: number | null;
@@ -1587,6 +1597,18 @@ export interface Quantity {
   unit: string;
 }
 
+/** Asked until it is answered by the command `set`: `topics` of a source, `units` of a unit. */
+export interface Question {
+  signal: string;
+  kind: "source" | "unit";
+  /** *Two lasers: which looks ahead?* */
+  words: string;
+  /** the most probable first, at most 12 */
+  options: Array<Option>;
+  /** how many there are, those left out included */
+  options_count: number;
+}
+
 export interface RaisedAlarm {
   at_ms: number;
   priority: Priority;
@@ -1660,6 +1682,8 @@ export interface RecordedState {
   phones: Array<PhoneListed>;
   /** how many marks this drive has, or a recording up to the moment shown */
   marks: number;
+  /** what the operator in control is asked of this car, the most urgent first */
+  questions: Array<Question>;
 }
 
 /** A row of `GET /api/recordings`. */
@@ -2033,6 +2057,8 @@ export interface SetCommand {
   values?: Record<string, number | null>;
   /** signal → topic; null: as found */
   topics?: Record<string, string | null>;
+  /** signal → name of its unit; null: as found */
+  units?: Record<string, string | null>;
   /** a profile's name, or auto */
   profile?: string | null;
   /** refused where the settings are no longer at this version */
@@ -2097,6 +2123,10 @@ export interface SettingsAnswer {
   changed: Array<string>;
   /** signal → topic, of those that were chosen */
   topics: Record<string, string>;
+  /** signal → name of its unit, of those that were chosen */
+  units: Record<string, string>;
+  /** signal → the units it may be published in */
+  unit_choices: Record<string, Array<UnitChoice>>;
   /** in the order of Settings */
   schema: Record<string, SettingField>;
 }
@@ -2140,6 +2170,10 @@ export interface SignalState<Value> {
   rate_hz: number | null;
   topic: string | null;
   type: string | null;
+  /** why this topic carries the signal; null: none does */
+  why: string | null;
+  /** the frame that its messages name; null: none, or not known */
+  frame: string | null;
   /** "Float64, expected Float32: reading it as Float64" */
   note: string | null;
   /** why the newest messages cannot be used: "not a number (linear.x)" */
@@ -2324,6 +2358,8 @@ export interface State {
   phones: Array<PhoneListed>;
   /** how many marks this drive has, or a recording up to the moment shown */
   marks: number;
+  /** what the operator in control is asked of this car, the most urgent first */
+  questions: Array<Question>;
   server: ServerState;
   /** the departure check; left out of a recording's state */
   departure?: DepartureState;
@@ -2493,6 +2529,10 @@ export interface TooLarge {
 export interface TopicOffer {
   topic: string;
   type: string;
+  /** that its messages name; null: none, or not known */
+  frame?: string | null;
+  /** what speaks for it and against it, in few words */
+  why?: string;
 }
 
 export interface Total {
@@ -2542,6 +2582,11 @@ export interface Trends {
   now: number;
   lowest: Record<string, Array<Step>>;
   highest: Record<string, Array<Step>>;
+}
+
+export interface UnitChoice {
+  name: string;
+  label: string;
 }
 
 /** Of web nodes, twice a second while nothing comes from the vehicle's session; over with the next state. */
