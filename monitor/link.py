@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 Phase = Literal["idle", "connecting", "failed", "monitoring", "lost"]
@@ -26,11 +27,18 @@ class LinkFacts:
     connected_s: float | None = None  # when the open connection was made
     last_message_s: float | None = None  # when the car last said anything
     published: frozenset[str] = frozenset()  # the signals that discovery found on the car
+    undecided: Mapping[str, str] = field(
+        default_factory=dict
+    )  # signals that no topic carries yet, and why, in few words
     log_trouble: str | None = None  # why the alarm log is not kept on the disk, as a sentence; None: it is
     late_s: float | None = None  # how late the messages are that come now; None: not known
     throttled: frozenset[str] = frozenset()  # the signals that are throttled because the link is too slow
     reduced: str | None = None  # the throttling, as a sentence; None: none
     wall_zero_s: float | None = None  # the time of day [s since 1970] when `received_s` was 0; None: not known
+
+    def offers(self, signal: str) -> bool:
+        """Whether the car has a signal, or topics for it of which none is chosen."""
+        return signal in self.published or signal in self.undecided
 
     @property
     def opened_s(self) -> float | None:

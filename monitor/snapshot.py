@@ -143,6 +143,9 @@ class Snapshot:
         """The value while it is fresh; raises `NotFresh`, which the runner turns into UNKNOWN, otherwise."""
         reading = self.readings.get(signal)
         label = SIGNALS[signal].label
+        undecided = self.link.undecided.get(signal) if self.link.undecided else None
+        if undecided is not None and (reading is None or not reading.is_fresh(self.now_s)):
+            raise NotFresh(f"{label}: {undecided}", "not set")
         unusable = self.unusable.get(signal)
         if unusable is not None and (reading is None or not reading.is_fresh(self.now_s)):
             raise NotFresh(f"{label}: {unusable.words}", "unusable")

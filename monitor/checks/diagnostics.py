@@ -32,7 +32,7 @@ NAMED = 3  # components in the text; the rest are counted
 
 
 def find(levels: Collection[int], snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
-    if snapshot.get("diagnostics") is None and "diagnostics" not in snapshot.link.published:
+    if snapshot.get("diagnostics") is None and not snapshot.link.offers("diagnostics"):
         return absent("Diagnostics are not published")
     components = snapshot.need("diagnostics").components
     bad = [component for component in components if component.level in levels]

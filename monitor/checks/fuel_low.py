@@ -46,7 +46,7 @@ def ends(limits: FuelLimits) -> End:
 
 def find(snapshot: Snapshot, limits: FuelLimits, was_active: bool) -> Finding:
     reading = snapshot.get("fuel")
-    if reading is None and "fuel" not in snapshot.link.published:
+    if reading is None and not snapshot.link.offers("fuel"):
         return absent("Fuel is not published")
     level = snapshot.need("fuel")
     if level.unit != "%":

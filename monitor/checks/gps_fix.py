@@ -49,7 +49,7 @@ def ends(limits: FixLimits) -> End:
 
 
 def has_fix(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
-    if snapshot.get("position") is None and "position" not in snapshot.link.published:
+    if snapshot.get("position") is None and not snapshot.link.offers("position"):
         return absent("Position is not published")
     fix = snapshot.need("position")
     if fix.status == STATUS_UNSET:
@@ -70,7 +70,7 @@ def has_fix(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
 
 
 def knows_its_quality(snapshot: Snapshot, limits: FixLimits, was_active: bool) -> Finding:
-    if snapshot.get("position") is None and "position" not in snapshot.link.published:
+    if snapshot.get("position") is None and not snapshot.link.offers("position"):
         return absent("Position is not published")
     fix = snapshot.need("position")
     if fix.status >= 0 and fix.sigma_m is None:

@@ -52,7 +52,7 @@ class JumpLimits(Limits):
 
 def _why_not(snapshot: Snapshot) -> Finding | None:
     """Why positions cannot be judged against the wheels, None where they can."""
-    if snapshot.get("position") is None and "position" not in snapshot.link.published:
+    if snapshot.get("position") is None and not snapshot.link.offers("position"):
         return absent("Position is not published")
     status = snapshot.need("position").status
     if status < 0:

@@ -47,7 +47,7 @@ class BlindLimits(Limits):
 
 
 def _laser_is_absent(snapshot: Snapshot) -> bool:
-    return snapshot.get("scan") is None and "scan" not in snapshot.link.published
+    return snapshot.get("scan") is None and not snapshot.link.offers("scan")
 
 
 def ends(limits: BlindLimits) -> End:

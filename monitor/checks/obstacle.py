@@ -33,7 +33,7 @@ STEADY_WITHIN_M = 3.0  # a gap that shrank more than the car can drive in betwee
 
 
 def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Finding:
-    if snapshot.get("scan") is None and "scan" not in snapshot.link.published:
+    if snapshot.get("scan") is None and not snapshot.link.offers("scan"):
         return absent("The laser is not published")
     scan = snapshot.need("scan")
     speed_mps = _speed(snapshot)
@@ -54,7 +54,7 @@ def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Fi
 
 
 def by_estimator(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Finding:
-    if snapshot.get("distance") is None and "distance" not in snapshot.link.published:
+    if snapshot.get("distance") is None and not snapshot.link.offers("distance"):
         return absent("The nearest object is not published")
     distance = snapshot.need("distance")
     speed_mps = _speed(snapshot)

@@ -60,7 +60,7 @@ class AgreementLimits(Limits):
 
 def _why_not(snapshot: Snapshot, was_active: bool) -> Finding | None:
     """Why the phone cannot be compared with the car, None where it can."""
-    if snapshot.get("position") is None and "position" not in snapshot.link.published:
+    if snapshot.get("position") is None and not snapshot.link.offers("position"):
         return absent("Position is not published")
     view, now_s = snapshot.phone, snapshot.now_s
     if not view.is_there(now_s):

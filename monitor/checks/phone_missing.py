@@ -37,7 +37,7 @@ def find(snapshot: Snapshot, limits: MissingLimits, was_active: bool) -> Finding
     view, now_s = snapshot.phone, snapshot.now_s
     if not view.is_there(now_s):
         return _none("No phone is sharing its position", was_active)
-    if snapshot.get("position") is None and "position" not in snapshot.link.published:
+    if snapshot.get("position") is None and not snapshot.link.offers("position"):
         return _none("The car publishes no position to compare with", was_active)
     why = view.why_not(now_s)
     if why is None:

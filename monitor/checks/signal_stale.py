@@ -32,6 +32,8 @@ NEVER_AFTER_S = 5.0  # as long as the whole car is given for its first message
 
 
 def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
+    if signal.name in snapshot.link.undecided:
+        return unknown(f"{signal.label}: {snapshot.link.undecided[signal.name]}", short="not set")
     unusable = snapshot.unusable.get(signal.name)
     if unusable is not None and unusable.is_coming(snapshot.now_s):
         return ok(f"{signal.label}: messages arrive, {unusable.words}")

@@ -16,7 +16,8 @@ from server.analysis import summary
 from server.analysis.as_json import as_json
 from server.analysis.faults import CannotInject
 from server.analysis.rehearse import Extract, Rehearsed, rehearse
-from server.analysis.report import Report
+from server.analysis.report import Report, to_choose
+from server.analysis.report_text import printable
 from server.judge.settings import BadSetting
 from server.judge.settings_override import SettingsOverride
 from server.recording.read.read import Recording, RecordingUnreadable, open_recording
@@ -71,6 +72,7 @@ def check_recording(
                 f"{count} messages on {topic} are left out: {recording.why_rejected.get(topic, 'not JSON')}."
                 for topic, count in sorted(recording.rejected.items())
             ]
+            unread += [printable(sentence, 2000) for sentence in to_choose(report.run)]
             text, json, page = summary.text(report), None, None
             if options.with_json:
                 json = orjson.dumps(as_json(report), option=orjson.OPT_INDENT_2)

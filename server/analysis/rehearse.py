@@ -25,6 +25,7 @@ from server.judge.pipeline import TICK_S
 from server.judge.reception_stats import Reception
 from server.judge.settings_override import SettingsOverride
 from server.judge.topics import Source
+from server.protocol.questions import Question
 from server.recording.delay import recorded_delay
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, RecordingUnreadable
@@ -69,6 +70,9 @@ class Rehearsed:
     notes: Sequence[str] = field(default_factory=list)
     broke_off: str | None = None  # why the recording could not be read to its end
     damage: Sequence[str] = ()  # what within it could not be read
+    undecided: Mapping[str, str] = field(default_factory=dict)  # signal → why none of its topics is taken
+    refused: frozenset[str] = frozenset()  # those of them where there is nothing to choose from
+    questions: Sequence[Question] = ()  # which topics to choose from
 
     @property
     def judged_s(self) -> float:
@@ -195,6 +199,9 @@ class _Rehearsal(Observer):
             notes=self.notes,
             broke_off=self._broke_off,
             damage=self._recording.damage,
+            undecided=run.epoch.choice.undecided,
+            refused=run.epoch.choice.refused,
+            questions=run.epoch.choice.questions,
         )
 
     # -- the observer of the run -------------------------------------------------------------------------------------

@@ -13,7 +13,9 @@ from monitor.signals import SIGNALS
 from server.analysis.compare import Change, compare
 from server.analysis.recorded_log import RecordedLog
 from server.analysis.rehearse import Rehearsed
+from server.analysis.report_text import printable
 from server.judge.settings_override import SettingsOverride
+from server.protocol.questions import Question
 from server.recording.read.read import Recording
 from server.recording.verification import Verification
 
@@ -26,6 +28,7 @@ class SignalRow:
     label: str
     topic: str | None
     type: str | None
+    why: str | None  # why this topic; of a signal without one, why none is taken
     note: str | None
     count: int
     rate_hz: float | None  # over all that was judged
@@ -102,6 +105,8 @@ def why_nothing(run: Rehearsed, recording: Recording) -> str | None:
         return None
     if not recording.count:
         return "Nothing could be evaluated: the recording has no message."
+    if not run.sources and run.undecided:
+        return f"Nothing could be evaluated: {next(iter(run.undecided.values()))}."
     if not run.sources:
         none_is = f"none of its {len(recording.topics)} topics is" if len(recording.topics) > 1 else "its topic is not"
         return (
@@ -145,6 +150,29 @@ def not_checked(run: Rehearsed) -> list[tuple[str, list[str]]]:
     return list(by_reason.items())
 
 
+def to_choose(run: Rehearsed) -> list[str]:
+    """What could not be judged because no topic carries it, and how to choose one, in sentences."""
+    asked = [f"{_shown(question)} {_answer(question)}" for question in run.questions]
+    picked = run.tuning.settings.topics  # what was picked and is not there is noted already
+    return asked + [
+        f"{SIGNALS[signal].label}: {run.undecided[signal]}." for signal in sorted(run.refused) if signal not in picked
+    ]
+
+
+def _shown(question: Question) -> str:
+    left = question["options_count"] - len(question["options"])
+    options = [
+        printable(one["value"], 60) + (f" ({printable(one['why'], 80)})" if one["why"] else "")
+        for one in question["options"]
+    ]
+    return f"{printable(question['words'])} {', '.join(options)}{f' and {left} more' if left else ''}."
+
+
+def _answer(question: Question) -> str:
+    example = printable(question["options"][0]["value"], 80)
+    return f'Choose in a file for --settings: [topics] {question["signal"]} = "{example}".'
+
+
 def name_of(override: SettingsOverride) -> str:
     return override.name or "the defaults"
 
@@ -158,6 +186,7 @@ def _row(run: Rehearsed, name: str) -> SignalRow:
         label=signal.label,
         topic=None if source is None else source.topic,
         type=None if source is None else source.type,
+        why=run.undecided.get(name) if source is None else source.why,
         note=_note(run, name),
         count=0 if tally is None else tally.received,
         rate_hz=proper / run.judged_s if proper > 1 and run.judged_s > 0 else None,

@@ -8,7 +8,7 @@ from monitor.alarm_spec import Priority
 from monitor.load import BEARABLE_IN_10_MIN, FLOOD_IN_10_MIN
 from server.analysis.compare import Change
 from server.analysis.episodes import Episode
-from server.analysis.report import Report, SignalRow, differences, name_of, not_checked
+from server.analysis.report import Report, SignalRow, differences, name_of, not_checked, to_choose
 from server.analysis.report_text import clock, counted, grouped, length, printable
 
 _MARKS = {Priority.CRITICAL: "CRITICAL", Priority.WARNING: "warning ", Priority.ADVISORY: "advisory"}
@@ -52,9 +52,9 @@ def _touched(count: int) -> str:
 
 
 def _signals(report: Report) -> Iterator[str]:
-    rows = [row for row in report.signals() if row.topic is not None or not row.optional]
+    rows = [row for row in report.signals() if row.topic is not None or row.why or not row.optional]
     yield "Signals"
-    if report.recording.count and not report.run.sources:
+    if report.recording.count and not report.run.sources and not report.run.undecided:
         yield "  None of the topics in this recording is one that catgraph knows."
     widths = (
         max(len(row.label) for row in rows),
@@ -70,7 +70,7 @@ def _signals(report: Report) -> Iterator[str]:
 
 def _signal(row: SignalRow, width: int) -> str:
     if row.topic is None:
-        return "not published"
+        return "not published" if row.why is None else f"not chosen: {printable(row.why, 100)}"
     said = [f"{printable(row.topic, 48):{width}}  {grouped(row.count):>9}"]
     said.append(f"{row.rate_hz:7.1f} Hz" if row.rate_hz is not None else " " * 10)
     if row.lowest is not None and row.highest is not None:
@@ -118,6 +118,11 @@ def _slowed(report: Report) -> Iterator[str]:
 
 
 def _not_checked(report: Report) -> Iterator[str]:
+    sentences = to_choose(report.run)
+    if sentences:
+        yield "To choose: which topic carries a signal"
+        yield from (f"  {printable(sentence, 2000)}" for sentence in sentences)
+        yield ""
     rows = not_checked(report.run)
     if rows:
         yield "Never checked, state unknown"

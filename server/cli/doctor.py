@@ -7,11 +7,15 @@ import asyncio
 import contextlib
 import sys
 import time
+from collections.abc import Mapping
 from typing import Any
 
 from server.judge.reception_stats import Reception
 from server.judge.signals import TOPICS
-from server.judge.topics import BY_SIGNAL, Source, map_signals
+from server.judge.sources.candidates import to_compare
+from server.judge.sources.choice import Choice, choose
+from server.judge.sources.evidence import Evidence
+from server.judge.topics import BY_SIGNAL, Source
 from server.rosbridge.address import Address, BadAddress, parse
 from server.rosbridge.connection_errors import LOGIN_WANTED, ROSAPI_ENDED, ROSAPI_MISSING, Problem, not_proved
 from server.rosbridge.diagnosis import SILENT_S, Diagnosis
@@ -23,6 +27,7 @@ from server.vehicle import discovery
 from server.vehicle.undelivered import BLOCKED_AFTER_S, CLIENT_COUNT, Passing
 
 CONNECT_WITHIN_S = 5.0
+MOST_CANDIDATES = 8  # of one signal beside the one that is taken
 ROS_SILENT = "DOES NOT ANSWER (get_time); after a restart of roscore restart rosbridge"
 
 
@@ -53,6 +58,7 @@ class _Listener:
         self.spoke = asyncio.Event()
         self.problem: Problem | None = None
         self.reception = Reception()
+        self.evidence = Evidence()
         self.by_topic: dict[str, tuple[Source, ...]] = {}
         self.counts: dict[str, int] = {}
         self.values: dict[str, Any] = {}
@@ -75,8 +81,9 @@ class _Listener:
         if topic == CLIENT_COUNT:
             self.client_count = message
         self.counts[topic] = self.counts.get(topic, 0) + 1
+        self.evidence.receive(topic, message, time.monotonic())
         for source in self.by_topic.get(topic, ()):
-            value = self.reception.read(source, message, note)
+            value = self.reception.read(source, message, note) if source.carries else None
             if value is not None:
                 self.values[source.signal] = value
 
@@ -156,10 +163,11 @@ async def _discover_and_report(
         problem = behind or ROSAPI_MISSING
         print(f"{problem.title} {problem.hint}")
         return 1
-    sources = await _map(asks, offer)
+    choice, unpublished = await _map(asks, offer)
     ear.by_topic = {}
-    for source in sources.values():
+    for source in (*choice.sources.values(), *(one for found in choice.watched.values() for one in found)):
         ear.by_topic[source.topic] = (*ear.by_topic.get(source.topic, ()), source)
+    ear.evidence.follow(to_compare(offer.topics, {}))
     for topic, kind in offer.topics.items():
         mapped = [source for source in ear.by_topic.get(topic, ()) if source.decode is not None]
         cbor = any(BY_SIGNAL[source.signal].compression == "cbor" for source in mapped)
@@ -169,28 +177,31 @@ async def _discover_and_report(
             )
     print(f"Listening for {seconds:g} s …", flush=True)
     await asyncio.sleep(seconds)
-    not_passed = await _not_passed(offer, sources, ear, asks)
+    shown = choose(offer.topics, unpublished=unpublished, evidence=ear.evidence)
+    not_passed = await _not_passed(offer, choice.sources, ear, asks)
     if not_passed is not None:
         print(f"{not_passed.title} {not_passed.hint}")
-    return _print(offer, sources, ear, seconds)
+    return _print(offer, shown, ear, seconds)
 
 
-async def _map(asks: Questions, offer: discovery.Offer) -> dict[str, Source]:
-    """The topic of each signal, of those that a node publishes."""
+async def _map(asks: Questions, offer: discovery.Offer) -> tuple[Choice, set[str]]:
+    """The topic of each signal, of those that a node publishes; and the topics that none does."""
     published: set[str] = set()
     unpublished: set[str] = set()
     while True:
-        sources = map_signals(offer.topics, unpublished=unpublished)
-        unknown = {source.topic for source in sources.values()} - published - unpublished
+        choice = choose(offer.topics, unpublished=unpublished)
+        watched = {one.topic for found in choice.watched.values() for one in found}
+        unknown = {source.topic for source in choice.sources.values()} | watched
+        unknown -= published | unpublished
         if not unknown:
-            return sources
+            return choice, unpublished
         for topic in sorted(unknown):
             nodes = await discovery.fetch_publishers(asks, topic, and_bridge=True)
             (unpublished if nodes == () else published).add(topic)
 
 
 async def _not_passed(
-    offer: discovery.Offer, sources: dict[str, Source], ear: _Listener, asks: Questions
+    offer: discovery.Offer, sources: Mapping[str, Source], ear: _Listener, asks: Questions
 ) -> Problem | None:
     """Why topics of signals that have a publisher do not come through the bridge; None: they do, or it is not known."""
     silent = [topic for topic in {source.topic for source in sources.values()} if not ear.counts.get(topic)]
@@ -204,11 +215,16 @@ async def _not_passed(
     return passing.problem(BLOCKED_AFTER_S)
 
 
-def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Listener, seconds: float) -> int:
-    missing = []
+def _print(offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: float) -> int:
+    missing, sources = [], choice.sources
     print(f"\n{'signal':<14}{'topic':<46}{'type':<34}{'rate':>9}")
     for row in TOPICS:
         source = sources.get(row.signal)
+        if row.signal in choice.undecided:
+            print(f"{row.signal:<14}{'not chosen: ' + choice.undecided[row.signal]}")
+            _print_candidates(choice, row.signal, None)
+            missing.append(row.signal)
+            continue
         if source is None:
             print(f"{row.signal:<14}{'not published':<46}{row.expected_type + ' looked for':<34}")
             missing.append(row.signal)
@@ -217,8 +233,11 @@ def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Listener, s
         rate = f"{count / seconds:.1f} Hz" if count else "silent"
         print(f"{row.signal:<14}{source.topic:<46}{source.type or 'unknown':<34}{rate:>9}")
         tally = ear.reception.by_signal.get(row.signal)
+        if source.why:
+            print(f"{'':<14}why: {source.why}")
         if source.note:
             print(f"{'':<14}{source.note}")
+        _print_candidates(choice, row.signal, source.topic)
         if tally is not None and tally.rejected:
             print(f"{'':<14}{tally.rejected} of {tally.received} rejected: {tally.last_reason}")
         if tally is not None and tally.not_measured:
@@ -237,6 +256,8 @@ def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Listener, s
         print(
             f"{ear.reception.frames.rejected} frames were no rosbridge operations: {ear.reception.frames.last_reason}"
         )
+    for question in choice.questions:
+        print(f"To choose, in Settings or on Signals: {question['words']}")
     needed = [signal for signal in missing if signal in REPORT_SIGNALS]
     optional = [signal for signal in missing if signal not in REPORT_SIGNALS]
     print(f"\n{'Missing or silent: ' + ', '.join(needed) if needed else 'All required signals are present.'}")
@@ -247,6 +268,15 @@ def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Listener, s
         "docs/safety.md explains how to restrict it."
     )
     return 1 if needed else 0
+
+
+def _print_candidates(choice: Choice, signal: str, taken: str | None) -> None:
+    """The other topics that may carry a signal, and what is known of each."""
+    others = [(topic, why) for topic, why in choice.reasons.get(signal, {}).items() if topic != taken]
+    for topic, why in others[:MOST_CANDIDATES]:
+        print(f"{'':<14}or: {topic}{f' ({why})' if why else ''}")
+    if len(others) > MOST_CANDIDATES:
+        print(f"{'':<14}and {len(others) - MOST_CANDIDATES} more")
 
 
 REPORT_SIGNALS = ("speed", "brake", "accelerator", "steering", "distance", "bearing", "position", "scan", "diagnostics")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -13,7 +13,12 @@ from server.judge.recorded_events import NewSettings, RecordedEvents
 from server.judge.ros_names import BadName, canonical_name
 from server.judge.settings import BadSetting
 from server.judge.settings_override import SettingsOverride, recorded_override, tuning_for
-from server.judge.topics import Source, map_signals
+from server.judge.sources.candidates import to_compare
+from server.judge.sources.choice import Choice, choose
+from server.judge.sources.evidence import Evidence
+from server.judge.sources.survey import survey
+from server.judge.topics import Source
+from server.protocol.questions import Question
 
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, message
 
@@ -63,8 +68,24 @@ class SettingsEpoch:
     """How a recording is judged under one version of the settings."""
 
     tuning: ActiveSettings
-    sources: Mapping[str, Source]  # by signal
+    choice: Choice
     listeners: Mapping[str, tuple[Source, ...]]  # by topic as the recording spells it
+    competing: frozenset[str] = frozenset()  # topics as the recording spells them, of signals that none carries yet
+
+    @property
+    def sources(self) -> Mapping[str, Source]:
+        """By signal."""
+        return self.choice.sources
+
+    @property
+    def undecided(self) -> Mapping[str, str]:
+        """Why no topic carries a signal though there are some, by signal."""
+        return self.choice.undecided
+
+    @property
+    def questions(self) -> Sequence[Question]:
+        """What the operator would be asked."""
+        return self.choice.questions
 
     @property
     def published(self) -> frozenset[str]:
@@ -88,8 +109,12 @@ class Drive:
         override: SettingsOverride | None = None,
         fallback: str = "",
         signals: Collection[str] | None = None,
+        evidence: Evidence | None = None,
     ) -> None:
+        """`evidence`: of the same recording, where it was gathered already."""
         self._signals = signals
+        self._source = source
+        self.evidence = evidence  # None: no topics compete, or not gathered yet
         self.start_s = source.start_s
         self.length_s = source.duration_s
         self.ros_version = source.ros_version
@@ -127,11 +152,25 @@ class Drive:
     def _epoch(self, override: SettingsOverride) -> SettingsEpoch:
         """Raises BadSetting."""
         tuning = tuning_for(override, self.offered, self.ros_version)
-        sources = map_signals(self.offered, tuning.settings.topics)
-        wanted = self._signals
+        choice = choose(self.offered, tuning.settings.topics, evidence=self._evidence_for(tuning.settings.topics))
+        sources, wanted = choice.sources, self._signals
         by_topic = pipeline.by_topic(one for one in sources.values() if wanted is None or one.signal in wanted)
         found = {topic: by_topic.get(name, ()) for topic, name in self._names.items()}
         listeners = {
             topic: sources for topic, sources in found.items() if any(source.decode is not None for source in sources)
         }
-        return SettingsEpoch(tuning=tuning, sources=sources, listeners=listeners)
+        return SettingsEpoch(
+            tuning=tuning,
+            choice=choice,
+            listeners=listeners,
+            competing=frozenset(topic for topic, name in self._names.items() if name in choice.competing),
+        )
+
+    def _evidence_for(self, picked: Mapping[str, str]) -> Evidence | None:
+        """What the recording shows of the topics that compete for a signal; read once, and only where some do."""
+        if self.evidence is None and to_compare(self.offered, picked):
+            # Of all that could compete: with the next settings others may.
+            topics, found = to_compare(self.offered, {}) | to_compare(self.offered, picked), self._source.topics
+            silent = [name for topic, name in self._names.items() if getattr(found[topic], "count", 1) == 0]
+            self.evidence = survey(self._source, self._names, topics, silent)
+        return self.evidence

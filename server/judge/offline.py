@@ -188,6 +188,8 @@ class OfflineRun:
         self._observer.message_received(topic, now_s)
         sources = self._epoch.listeners.get(topic)
         if sources is None:
+            if topic in self._epoch.competing:
+                run_state.last_message_s = now_s  # the car sends, though nothing of it can be judged
             return
         run_state.topics_received.add(topic)
         run_state.last_message_s = now_s
@@ -290,6 +292,7 @@ class OfflineRun:
             connected_s=run_state.opened_s,
             last_message_s=run_state.last_message_s,
             published=self._epoch.published,
+            undecided=self._epoch.undecided,
             wall_zero_s=self.drive.start_s,
         )
 

@@ -59,6 +59,7 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
         mode=mode_shown(
             run_state.state.get("mode"), epoch.sources.get("mode"), run_state.monitor.limits.driving, now_s
         ),
+        questions=epoch.choice.questions,
         operators={"control": {"holder": None}, "reach": None},  # not applicable to a recording
     )
     shown = state_frame(facts, run_state.state.glance(now_s), run_state.monitor)

@@ -140,7 +140,7 @@ class CommandHandler:
                 return {"ok": True}
             case "signals":
                 topics = parts.connection.subscriptions
-                return queries.signals(topics.signals.unmapped, judgement.reception, topics.offered)
+                return queries.signals(topics.signals, judgement.reception, topics.offered)
             case "settings":
                 return {**parts.settings.as_json(), "toml": parts.settings.as_toml()}
             case "check":

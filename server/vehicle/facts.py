@@ -42,6 +42,7 @@ def link_facts(parts: SessionParts, now_s: float, *, wall_ms: int, log_trouble: 
         connected_s=connection.connected_s,
         last_message_s=judgement.last_message_s,
         published=topics.published(),
+        undecided=topics.signals.undecided,
         log_trouble=log_trouble,
         late_s=judgement.transport.late_s(now_s) if connection.phase == "monitoring" else None,
         throttled=topics.table.load.throttled(now_s),
@@ -107,4 +108,5 @@ def frame_facts(
         decelerate=parts.slow_down.frame(),
         mode=parts.driving.frame(now_s, wall_ms),
         marks=parts.marks.count,
+        questions=topics.signals.questions if connection.phase == "monitoring" else (),
     )

@@ -11,7 +11,6 @@ from monitor.state import Snapshot, TrackPoint
 from server.control.lease import NotInControl
 from server.judge.reception_stats import Reception
 from server.judge.settings import BadSetting, Conflict
-from server.judge.topics import candidates
 from server.protocol import commands, serialize
 from server.protocol import drive_trends as drive
 from server.protocol.answers import SignalsAnswer, TrackPoints
@@ -19,6 +18,7 @@ from server.protocol.messages import Answer
 from server.rosbridge import connection_errors
 from server.rosbridge.address import BadAddress
 from server.vehicle.judgement import Judgement
+from server.vehicle.signal_map import SignalMap
 
 REFUSALS = (commands.NotUnderstood, BadAddress, Refused, BadSetting, Conflict, OSError)  # what `refusal` has words for
 
@@ -95,14 +95,12 @@ def _joins(point: TrackPoint) -> int:
     return 2 if point.is_jump else 1 if point.is_after_gap else 0
 
 
-def signals(
-    unmapped: Mapping[str, str], reception: Reception, offered: Mapping[str, str] | None = None
-) -> SignalsAnswer:
+def signals(signal_map: SignalMap, reception: Reception, offered: Mapping[str, str] | None = None) -> SignalsAnswer:
     """Topics beyond the signals, unreadable frames, and the possible topics of each signal; `offered` None: the topics
     are unknown."""
     return {
-        "candidates": None if offered is None else candidates(offered),
-        "topics": [{"topic": name, "type": kind} for name, kind in sorted(unmapped.items())],
+        "candidates": None if offered is None else signal_map.candidates(offered),
+        "topics": [{"topic": name, "type": kind} for name, kind in sorted(signal_map.unmapped.items())],
         "rejected": {
             SIGNALS[name].label: dict(tally.reasons) for name, tally in reception.by_signal.items() if tally.rejected
         },

@@ -1,10 +1,31 @@
-"""Which topic of a car carries which signal. Pure."""
+"""Which topic of a car carries which signal, and which further topics are compared meanwhile. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, Protocol
 
-from server.judge.topics import COMMAND, Source, map_signals
+from monitor.signals import SIGNALS
+from server.judge.sources.candidates import to_compare
+from server.judge.sources.choice import Choice, choose
+from server.judge.sources.evidence import Evidence
+from server.judge.topics import COMMAND, Source, candidates
+from server.protocol.answers import TopicOffer
+from server.protocol.questions import Question
+
+SETTLED_S = 2.0  # candidates have so long for their first messages before the operator is asked
+
+
+class Delivers(Protocol):
+    """What is known of the delivery of topics."""
+
+    @property
+    def unpublished(self) -> Collection[str]:
+        """Topics without a publisher."""
+
+    @property
+    def delivered(self) -> Collection[str]:
+        """Topics of which anything ever came."""
 
 
 class SignalMap:
@@ -14,18 +35,104 @@ class SignalMap:
         self.sources: Mapping[str, Source] = {}  # by signal
         self.unmapped: Mapping[str, str] = {}  # topic → type of what carries no signal
         self.offers_nothing = False  # no topic of the car can be read
+        self.undecided: Mapping[str, str] = {}  # signal → why none of its topics carries it
+        self.questions: Sequence[Question] = ()
+        self.watched: Mapping[str, Source] = {}  # topic → what it may carry; compared, and not judged
+        self._evidence = Evidence()
+        self._choice: Choice | None = None
+        self._compared_since_s: float | None = None
 
-    def update(self, offered: Mapping[str, str], picked: Mapping[str, str], unpublished: Collection[str]) -> None:
-        """Chooses the topic of each signal. `offered`: topic → type; `picked`: signal → topic, by an operator."""
-        sources = map_signals(offered, picked, unpublished)
-        gone = {s: source for s, source in self.sources.items() if s not in sources and source.topic not in offered}
-        self.sources = gone | sources  # a topic that vanished stays subscribed: it may come back
+    def update(
+        self,
+        offered: Mapping[str, str],
+        picked: Mapping[str, str],
+        delivery: Delivers,
+        now_s: float = 0.0,
+    ) -> None:
+        """Chooses the topic of each signal. `offered`: topic → type; `picked`: signal → topic, by an operator;
+        `now_s` on a monotonic clock."""
+        evidence, before, unpublished, delivered = (
+            self._evidence, self.sources, delivery.unpublished, delivery.delivered,
+        )  # fmt: skip
+        evidence.follow(to_compare(offered, picked))
+        in_use = {signal: source.topic for signal, source in before.items() if source.topic in delivered}
+        choice = self._choice = choose(offered, picked, unpublished, evidence, in_use)
+        self.watched = {one.topic: one for found in choice.watched.values() for one in found}
+        if self._settle(now_s):
+            choice = self._choice = choose(offered, picked, unpublished, evidence, in_use)
+        # A topic that vanished stays subscribed: it may come back, and another is not taken in its place unasked.
+        gone = {
+            signal: source
+            for signal, source in before.items()
+            if source.topic not in offered
+            and (signal not in choice.sources or (signal in in_use and signal not in picked))
+            and picked.get(signal) in (None, source.topic)
+        }
+        self.sources = {**choice.sources, **gone}
+        self.undecided = {signal: why for signal, why in choice.undecided.items() if signal not in gone}
+        self.questions = [
+            *(_instead(gone[signal], choice.sources[signal]) for signal in gone if signal in choice.sources),
+            *choice.questions,
+        ]
         mapped = {source.topic for source in self.sources.values()}
         self.unmapped = {name: kind for name, kind in offered.items() if name not in mapped}
-        self.offers_nothing = not any(source.decode for source in self.sources.values())
+        self.offers_nothing = not self.undecided and not any(source.decode for source in self.sources.values())
+
+    def _settle(self, now_s: float) -> bool:
+        """Whether the candidates have shown themselves only now, as far as they will before the operator is asked."""
+        was_settled = self._evidence.is_settled
+        if not self.watched:
+            self._compared_since_s = None
+            self._evidence.is_settled = True
+        else:
+            if self._compared_since_s is None:
+                self._compared_since_s = now_s
+            is_seen = all(self._evidence.of(topic).count for topic in self.watched)
+            self._evidence.is_settled = is_seen or now_s - self._compared_since_s >= SETTLED_S
+        return self._evidence.is_settled is not was_settled
+
+    def is_due(self, now_s: float) -> bool:
+        """Whether candidates had their time, so that `update` may decide otherwise."""
+        since_s = self._compared_since_s
+        return not self._evidence.is_settled and since_s is not None and now_s - since_s >= SETTLED_S
+
+    def compare(self, topic: str, message: Any, now_s: float) -> bool:
+        """Takes a message of any topic as evidence; whether `update` may decide otherwise by it."""
+        return self._evidence.receive(topic, message, now_s)
+
+    def candidates(self, offered: Mapping[str, str]) -> dict[str, list[TopicOffer]]:
+        """Signal → the topics that can carry it, with what is known of each."""
+        found = candidates(offered)
+        reasons = {} if self._choice is None else self._choice.reasons
+        for signal, rows in found.items():
+            for row in rows:
+                known, why = self._evidence.of(row["topic"]), reasons.get(signal, {}).get(row["topic"])
+                if why:
+                    row["why"] = why
+                if known.count:
+                    row["frame"] = known.frame
+                if signal == "scan" and known.picture is not None:
+                    row["ranges_m"] = list(known.picture.ranges_m)
+                    row["angle_min_rad"] = known.picture.angle_min_rad
+                    row["angle_increment_rad"] = known.picture.angle_increment_rad
+        return found
 
     @property
     def command_topic(self) -> str | None:
         """Where others command the car."""
         source = self.sources.get(COMMAND)
         return source.topic if source is not None else None
+
+
+def _instead(gone: Source, other: Source) -> Question:
+    """A topic that carried a signal vanished, and another could carry it."""
+    return {
+        "signal": gone.signal,
+        "kind": "source",
+        "words": f"{SIGNALS[gone.signal].label}: {gone.topic} is gone. Is it {other.topic} now?",
+        "options": [
+            {"value": other.topic, "label": other.topic, "why": other.why or ""},
+            {"value": gone.topic, "label": gone.topic, "why": "it is waited for"},
+        ],
+        "options_count": 2,
+    }

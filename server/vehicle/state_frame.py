@@ -238,7 +238,7 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "why": source.why if source else None,
         "frame": facts.reception.frame_of(source.topic) if source else None,
         "note": (unusable.words if unusable else None)
-        or (source.note if source else None)
+        or (source.note if source else snapshot.link.undecided.get(signal.name))
         or (_unknown_part(reading.value) if reading else None)
         or (habit_words(snapshot.scan_habit) if signal.name == "scan" else None),
         "unusable": unusable.words if unusable else None,

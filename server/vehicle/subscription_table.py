@@ -67,12 +67,20 @@ class SubscriptionTable:
         offered: Mapping[str, str] | None,
         *,
         needs_client_count: bool,
+        watched: Mapping[str, Source],
     ) -> None:
-        """Update the link's subscriptions to the wanted ones. `offered` None: the topics are unknown."""
+        """Update the link's subscriptions to the wanted ones. `offered` None: the topics are unknown.
+
+        `watched`: further topics that are compared and not judged.
+        """
         known, too_large, compression = self._definitions, self.large.left, self.cbor.compression
         wanted = wanted_topics.judged(
             by_topic, self.load, without=too_large, asked=known.asked, fit=known.fit, compression=compression
         )
+        wanted |= wanted_topics.compared(
+            watched, self.load, without={*wanted, *too_large}, is_recorded=self.also != "none", asked=known.asked,
+            fit=known.fit, compression=compression,
+        )  # fmt: skip
         self.judged = len(wanted)
         if offered is not None:
             has_button = car_marks.is_button(car_marks.TOPIC, offered.get(car_marks.TOPIC))
@@ -89,7 +97,9 @@ class SubscriptionTable:
                 wanted.setdefault(CLIENT_COUNT, Subscription(topic=CLIENT_COUNT, type=kind, queue_length=1))
         if self.guard is not None:
             wanted.setdefault(self.guard, Subscription(topic=self.guard, type="std_msgs/String", queue_length=1))
-        self._apply(wanted, [topic for topic in wanted if topic in by_topic], [*self.recorded.topics])
+        self._apply(
+            wanted, [topic for topic in wanted if topic in by_topic or topic in watched], [*self.recorded.topics]
+        )
 
     def subscribe_by_name(self, picked: Mapping[str, str]) -> Mapping[str, tuple[Source, ...]]:
         """Without rosapi, by the names that are known; the signals that each topic would fill."""

@@ -77,6 +77,7 @@ class Subscriptions:
         self.table.opened()
         while link is not None and asks is not None and link is self._link and link.is_open:
             try:
+                self._look_soon |= self.signals.is_due(self._now())
                 if self._look_soon or self._now() - looked_s >= (LOOK_AGAIN_S if self.signals.sources else 1.0):
                     looked_s, self._look_soon = self._now(), False
                     await self._look(link, asks)
@@ -135,8 +136,7 @@ class Subscriptions:
 
     def type_of(self, topic: str) -> str | None:
         """The type of a topic that is subscribed to, as the bridge spells it; None: not known."""
-        sources = self.by_topic.get(topic)
-        offered = self._offer.topics.get(topic) if self._offer is not None else None
+        sources, offered = self.by_topic.get(topic), (self.offered or {}).get(topic)
         return self.others.get(topic) or (sources[0].type if sources else offered or None)
 
     def problem(self, now_s: float, *, flows: bool) -> Problem | None:
@@ -169,7 +169,7 @@ class Subscriptions:
                 self._subscribe()
 
     def map_again(self) -> None:
-        """After a change of settings, of what is published, or of what the link bears."""
+        """After a change of settings, of what is published or shown, or of what the link bears."""
         if self._offer is not None:
             self._map(self._offer)
         elif self._link is not None and self.by_topic:
@@ -185,10 +185,9 @@ class Subscriptions:
 
     def took(self, topic: str, message: object) -> bool:
         """A message about the bridge itself; whether it was one."""
-        if topic != CLIENT_COUNT:
-            return False
-        self._missing.client_count(message)
-        return topic not in self.others and topic not in self.by_topic
+        if topic == CLIENT_COUNT:
+            self._missing.client_count(message)
+        return topic == CLIENT_COUNT and topic not in self.others and topic not in self.by_topic
 
     def skipped(self, topic: str | None, size: int) -> None:
         """A message that was too large to be read. A topic that the message does not name is found where only one can
@@ -257,7 +256,7 @@ class Subscriptions:
 
     def _map(self, offer: discovery.Offer) -> None:
         """Chooses the topic of each signal and subscribes to them."""
-        self.signals.update(offer.topics, self._tuning.settings.topics, self._missing.delivery.unpublished)
+        self.signals.update(offer.topics, self._tuning.settings.topics, self._missing.delivery, self._now())
         self._subscribe()
         before, self._unfit = self._unfit, car_marks.unfit(offer.topics.get(car_marks.TOPIC))
         if self._unfit not in (None, before):
@@ -266,7 +265,8 @@ class Subscriptions:
     def _subscribe(self) -> None:
         if self._link is not None:
             self.by_topic = pipeline.by_topic(self.signals.sources.values())
-            self.table.subscribe(self.by_topic, self.offered, needs_client_count=self._missing.needs_client_count)
+            needs, watched = self._missing.needs_client_count, self.signals.watched
+            self.table.subscribe(self.by_topic, self.offered, needs_client_count=needs, watched=watched)
 
     def _subscribe_anew(self, topic: str) -> None:
         if self.table.renew(topic):

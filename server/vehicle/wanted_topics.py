@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from server.judge.signals import TOPICS
 from server.judge.topics import BY_SIGNAL, Source
@@ -12,6 +12,7 @@ from server.recording.recorded_topics import Also
 from server.rosbridge.subscription import Subscription
 from server.vehicle.link_load import LinkLoad
 
+LASER_THROTTLE_MS = 500  # of a laser that is only compared
 Compression = Callable[[str, bool], str]  # topic and whether its type is fit for CBOR → "cbor" or "none"
 
 
@@ -47,6 +48,36 @@ def judged(
                 queue_length=1 if load.step else min(row.queue_length for row in rows),
             )
     return wanted
+
+
+def compared(
+    watched: Mapping[str, Source],
+    load: LinkLoad,
+    *,
+    without: Collection[str],
+    is_recorded: bool,
+    asked: Collection[str],
+    fit: Collection[str],
+    compression: Compression,
+) -> dict[str, Subscription]:
+    """The subscriptions of topics that may carry a signal and are compared. `is_recorded`: all topics are recorded, so
+    that none is thinned out for it."""
+    found = judged(
+        {topic: (source,) for topic, source in watched.items()},
+        load,
+        without=without,
+        asked=asked,
+        fit=fit,
+        compression=compression,
+    )
+    if is_recorded:
+        return found
+    return {
+        topic: replace(row, throttle_ms=max(row.throttle_ms, LASER_THROTTLE_MS))
+        if watched[topic].signal == "scan"
+        else row
+        for topic, row in found.items()
+    }
 
 
 def recorded(

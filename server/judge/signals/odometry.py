@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from monitor.values import Odometry
@@ -23,6 +24,11 @@ def odometry(message: Any) -> Odometry:
         speed_mps=known(speed),
         frame_id=text(message, "header", "frame_id"),
     )
+
+
+def pose_only(message: Any) -> Odometry:
+    """As `odometry`, of a topic whose twist is never filled: its speed is not known."""
+    return replace(odometry(message), speed_mps=None)
 
 
 TOPICS = (

@@ -7,20 +7,47 @@ from collections.abc import Mapping
 from typing import Any
 
 from monitor.values import Twist
-from server.judge.message_fields import finite, inner, known, number
+from server.judge.frame_words import is_earth_fixed
+from server.judge.message_fields import finite, inner, known, number, text
 from server.judge.plausible import plausible_speed
 from server.judge.topic import Topic, floats
 
 SIDEWAYS = 0.25  # of the way made: a car rolls forwards or backwards, and slips a little
+MOVES_MPS = 1.0  # below it what is measured sideways may be noise
 
 
 def twist(message: Any) -> Twist:
+    """Speed of a geometry_msgs/Twist in the frame of the car. What goes sideways as no car can is east and north: then
+    the way made is the speed."""
     yaw_rate = number(message, "angular", "z") if isinstance(message, Mapping) and "angular" in message else math.nan
-    return Twist(speed_mps=plausible_speed(finite(message, "linear", "x")), yaw_rate_radps=known(yaw_rate))
+    x, y = finite(message, "linear", "x"), _sideways(message)
+    way = math.hypot(x, y)
+    speed = way if way > MOVES_MPS and abs(y) > SIDEWAYS * way else x
+    return Twist(speed_mps=plausible_speed(speed), yaw_rate_radps=known(yaw_rate))
 
 
 def twist_stamped(message: Any) -> Twist:
+    """As `twist`; in a frame of the earth or of a GPS receiver it is east and north, and the way made is the speed."""
+    if is_earth_fixed(text(message, "header", "frame_id")):
+        return way_made_stamped(message)
     return twist(inner(message, "twist"))
+
+
+def way_made(message: Any) -> Twist:
+    """Speed of a velocity in east and north: never negative, for it does not say where the nose of the car points."""
+    way = math.hypot(finite(message, "linear", "x"), finite(message, "linear", "y"))
+    return Twist(speed_mps=plausible_speed(way), yaw_rate_radps=None)
+
+
+def way_made_stamped(message: Any) -> Twist:
+    """As `way_made`, of a geometry_msgs/TwistStamped."""
+    return way_made(inner(message, "twist"))
+
+
+def _sideways(message: Any) -> float:
+    linear = message["linear"]
+    y = number(message, "linear", "y") if isinstance(linear, Mapping) and "y" in linear else 0.0
+    return 0.0 if math.isnan(y) else y
 
 
 def twist_of_odometry(message: Any) -> Twist:

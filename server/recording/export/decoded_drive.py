@@ -50,10 +50,13 @@ class DecodedDrive:
         `on_value` receives signal, value, seconds since 1970 and the stamp by the car. Raises RecordingUnreadable.
         """
         recording = self.recording
-        drive = self._drive if signals is None else Drive(recording, self._recorded, signals=signals)
+        drive = self._drive if signals is None else self._of(signals)
         run = OfflineRun(recording, drive, observer=_Values(drive, on_value, progress), with_checks=False)
         self.reception = run.run_state.reception
         run.advance(math.inf, to_last_message=True)
+
+    def _of(self, signals: Collection[str]) -> Drive:
+        return Drive(self.recording, self._recorded, signals=signals, evidence=self._drive.evidence)
 
     def other_topics(self) -> dict[str, tuple[str, int]]:
         """Topic → type and count, of what fills no signal."""

@@ -2533,6 +2533,12 @@ export interface TopicOffer {
   frame?: string | null;
   /** what speaks for it and against it, in few words */
   why?: string;
+  /** of a laser that is compared: the nearest range in each of at most 72 parts of its newest scan */
+  ranges_m?: Array<number | null>;
+  /** of the middle of the first part, in the laser's own frame */
+  angle_min_rad?: number;
+  /** from one part to the next */
+  angle_increment_rad?: number;
 }
 
 export interface Total {

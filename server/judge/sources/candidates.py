@@ -1,0 +1,157 @@
+"""The topics of a car that may carry each signal, by their names and types, and which of them need to be compared."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from server.judge.frame_words import looks
+from server.judge.signals import TOPICS
+from server.judge.sources import namespaces
+from server.judge.sources.evidence import Evidence
+from server.judge.sources.source import BY_SIGNAL, COMMAND, Source, plain_type, source_of
+from server.judge.topic import Topic
+
+MOST_COMPARED = 12  # topics of one signal
+OWN_NAMES = {"speed": "/catvehicle/vel", "scan": "/catvehicle/front_laser_points"}  # names that say enough
+OTHER_CAR = "of another car"
+NO_PUBLISHER = "no node publishes it"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """A topic that may carry a signal."""
+
+    topic: str
+    type: str
+    rank: int | None  # of its name among those of the signal; None: found by its type alone
+    is_readable: bool
+    is_published: bool
+
+    @property
+    def is_named(self) -> bool:
+        return self.rank is not None
+
+    @property
+    def plain_type(self) -> str:
+        """Its type in the spelling of ROS 1."""
+        return plain_type(self.type)
+
+    def source(self, signal: str, *, why: str) -> Source:
+        """It as the source of a signal."""
+        return source_of(BY_SIGNAL[signal], self.topic, self.type, why=why, is_by_type=self.rank is None)
+
+
+Pools = Mapping[str, list[Candidate]]
+
+
+def pools_of(offered: Mapping[str, str], unpublished: Collection[str] = ()) -> Pools:
+    """Signal → its candidates (offered: topic → type), the likeliest first: readable, published, by name."""
+    by_lower: dict[str, list[str]] = {}
+    by_kind: dict[str, list[str]] = {}
+    for topic, kind in offered.items():
+        by_lower.setdefault(topic.lower(), []).append(topic)
+        by_kind.setdefault(plain_type(kind), []).append(topic)
+    return {row.signal: _pool(row, offered, by_lower, by_kind, unpublished) for row in TOPICS}
+
+
+def _pool(
+    row: Topic,
+    offered: Mapping[str, str],
+    by_lower: Mapping[str, list[str]],
+    by_kind: Mapping[str, list[str]],
+    unpublished: Collection[str],
+) -> list[Candidate]:
+    ranks: dict[str, int | None] = {}
+    for rank, name in enumerate(row.names):
+        for topic in sorted(by_lower.get(name.lower(), ())):
+            ranks.setdefault(topic, rank)
+    for kind in row.by_type:
+        for topic in by_kind.get(kind, ()):
+            ranks.setdefault(topic, None)
+    found = [
+        Candidate(
+            topic=topic,
+            type=offered[topic],
+            rank=rank,
+            is_readable=plain_type(offered[topic]) in row.types,
+            is_published=topic not in unpublished,
+        )
+        for topic, rank in ranks.items()
+    ]
+    return sorted(found, key=_likeliest)
+
+
+def _likeliest(one: Candidate) -> tuple[bool, bool, bool, int, int, str]:
+    rank = 0 if one.rank is None else one.rank
+    return (not one.is_readable, not one.is_published, one.rank is None, looks(one.topic), rank, one.topic)
+
+
+def to_compare(offered: Mapping[str, str], picked: Mapping[str, str]) -> dict[str, str]:
+    """The topics (topic → type) whose messages may decide which of them carries a signal; empty: names and types do."""
+    pools = pools_of(offered)
+    wanted: dict[str, str] = {}
+
+    def add(found: Collection[Candidate]) -> None:
+        wanted.update({one.topic: one.type for one in [c for c in found if c.is_readable][:MOST_COMPARED]})
+
+    for signal in ("scan", "odometry", "position"):
+        readable = [one for one in pools[signal] if one.is_readable]
+        is_clear = signal != "scan" and any(one.is_named for one in readable)
+        if len(readable) > 1 and signal not in picked and not is_clear and not _has_own_name(signal, readable):
+            add(readable)
+    speeds = [one for one in pools["speed"] if one.is_readable]
+    pick = picked.get("speed")
+    if pick is not None:
+        speeds = [one for one in speeds if one.topic == pick]
+    if pick is not None or not _has_own_name("speed", speeds):
+        add(speeds)
+        if any("Twist" in one.type for one in speeds):
+            add([one for one in pools["position"] if one.is_readable][:2])
+    return wanted
+
+
+def _has_own_name(signal: str, found: Collection[Candidate]) -> bool:
+    return any(one.topic.lower() == OWN_NAMES[signal] for one in found) if signal in OWN_NAMES else False
+
+
+def cars_of(pools: Pools) -> tuple[str, ...]:
+    """The namespaces of several cars on one bridge; empty: there is one car."""
+    return namespaces.competing({signal: [one.topic for one in pool] for signal, pool in pools.items()})
+
+
+def named_first(found: Collection[Candidate]) -> Candidate | None:
+    """The candidate of the best name; None: none has a name of the signal."""
+    named = [one for one in found if one.rank is not None]
+    return min(named, key=lambda one: (one.rank or 0, one.topic)) if named else None
+
+
+def what_is_known(one: Candidate, signal: str, evidence: Evidence) -> str:
+    """What speaks for a candidate and against it, in few words."""
+    known, words = evidence.of(one.topic), list[str]()
+    if not one.is_readable:
+        words.append("of a type that cannot be read")
+    if not one.is_published:
+        words.append(NO_PUBLISHER)
+    if one.topic in evidence.silent:
+        words.append("no message")
+    if signal == "scan":
+        ahead = evidence.is_ahead(one.topic)
+        if ahead is not None:
+            words.append("looks ahead by TF" if ahead else "looks elsewhere by TF")
+        elif looks(f"{one.topic} {known.frame or ''}"):
+            words.append(
+                "its name says ahead" if looks(f"{one.topic} {known.frame or ''}") < 0 else "its name says not ahead"
+            )
+    if signal in ("speed", "odometry") and known.is_twist_empty:
+        words.append("its twist is never filled")
+    if signal == "speed" and known.is_earth_fixed:
+        words.append("its velocity is east and north")
+    if one.is_named:
+        words.append("a usual name")
+    if known.frame:
+        words.append(f"frame {known.frame}")
+    return ", ".join(words)
+
+
+__all__ = ["COMMAND", "Candidate", "Pools", "cars_of", "named_first", "pools_of", "to_compare", "what_is_known"]

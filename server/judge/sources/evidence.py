@@ -1,0 +1,258 @@
+"""What the messages of candidate topics show of them: frames, velocities, poses, and whether they agree. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from server.judge.frame_words import is_earth_fixed
+from server.judge.message_fields import Rejected, inner, number, stamp_s, text
+from server.judge.signals.speed import SIDEWAYS
+from server.judge.sources.pictures import Picture, picture_of, see_the_same
+from server.judge.sources.source import plain_type
+from server.judge.sources.ways import Way, course_rad, is_same, metres_between, turned
+
+MOST_TOPICS = 64
+SAME_TIME_S = 0.3  # two messages so near in time are compared
+FIXES_S = 1.2  # the same for positions, of which many receivers send one a second
+PICTURE_EVERY_S = 0.4
+ENOUGH = 5  # messages that show the same
+AGREE_ENOUGH = 10
+MOVES_MPS = 1.0
+NO_REVERSE_MPS = 4.0  # faster than a car is reversed for long
+COURSE_WITHIN_RAD = math.radians(20)
+COURSE_CLEAR_RAD = math.radians(40)  # so far from east a velocity along the car differs from one in east and north
+SAME_PLACE_M = 5.0
+
+
+@dataclass(slots=True)
+class TopicEvidence:
+    """What is known of one topic. A velocity is along and across the car, or in east and north."""
+
+    kind: str
+    frame: str | None = None  # that its messages name; None: none, or no message yet
+    count: int = 0
+    has_twist: bool = False  # a component of its twist was not zero
+    way: Way = field(default_factory=Way)  # of its pose
+    earth_votes: int = 0
+    body_votes: int = 0
+    velocity: tuple[float, float, float] | None = None  # when, x and y [m/s] of the newest message
+    place: tuple[float, float, float] | None = None  # when, latitude and longitude [degrees]
+    course: tuple[float, float] | None = None  # when, direction of the way made [rad from east]
+    picture: Picture | None = None  # of its newest scan, at most every PICTURE_EVERY_S
+
+    @property
+    def is_twist_empty(self) -> bool:
+        """Whether its twist is exactly zero though its pose moves."""
+        return not self.has_twist and self.way.has_moved
+
+    @property
+    def is_body_fixed(self) -> bool:
+        """Whether its values follow the car and not the compass."""
+        return self.body_votes >= ENOUGH and self.body_votes > 2 * self.earth_votes
+
+    @property
+    def is_earth_fixed(self) -> bool:
+        """Whether its values are in east and north."""
+        return self.earth_votes >= ENOUGH and self.earth_votes > 2 * self.body_votes
+
+    @property
+    def shown(self) -> tuple[object, ...]:
+        """What a choice may depend on."""
+        return (
+            self.frame,
+            self.count > 0,
+            self.has_twist,
+            self.is_twist_empty,
+            self.is_earth_fixed,
+            self.is_body_fixed,
+        )
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether more messages would hardly show more."""
+        match self.kind:
+            case "nav_msgs/Odometry":
+                return self.has_twist or self.is_twist_empty
+            case "geometry_msgs/TwistStamped" | "geometry_msgs/Twist":
+                named = self.frame is not None and is_earth_fixed(self.frame)
+                return named or self.is_earth_fixed or self.is_body_fixed
+            case "sensor_msgs/LaserScan":
+                return self.count > 0
+        return True
+
+
+NOTHING = TopicEvidence(kind="")
+
+
+class Evidence:
+    """Of the candidate topics of one car, or of one recording. Times are of one clock that does not go back, in s.
+
+    `looks_ahead`: frame of a laser → whether the middle of its view is ahead of the car; None or absent: not known.
+    """
+
+    def __init__(self) -> None:
+        self._topics: dict[str, TopicEvidence] = {}
+        self._same: dict[tuple[str, str], list[int]] = {}  # pair of topics → how often alike, how often not
+        self.looks_ahead: Mapping[str, bool | None] = {}
+        self.silent: frozenset[str] = frozenset()  # topics without a message in the whole recording
+        self.is_settled = True  # False: candidates have only just been subscribed to
+
+    def follow(self, topics: Mapping[str, str]) -> None:
+        """Further topics (topic → type) whose messages count; what is known of the others is kept."""
+        for topic, kind in topics.items():
+            if topic not in self._topics and len(self._topics) < MOST_TOPICS:
+                self._topics[topic] = TopicEvidence(kind=plain_type(kind))
+
+    def of(self, topic: str) -> TopicEvidence:
+        """What is known of a topic."""
+        return self._topics.get(topic, NOTHING)
+
+    def agree(self, one: str, other: str) -> bool | None:
+        """Whether the values of two topics are alike; None: not known."""
+        alike, unlike = self._same.get((min(one, other), max(one, other)), (0, 0))
+        if alike >= AGREE_ENOUGH and alike >= 5 * unlike:
+            return True
+        return False if unlike >= AGREE_ENOUGH and unlike > alike else None
+
+    def is_ahead(self, topic: str) -> bool | None:
+        """Whether the laser of a topic looks ahead, by its frame; None: not known."""
+        frame = self.of(topic).frame
+        return None if frame is None else self.looks_ahead.get(frame.strip("/"), self.looks_ahead.get(frame))
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether more messages would hardly show more."""
+        return all(known.is_enough for known in self._topics.values()) and self._is_compared()
+
+    def _is_compared(self) -> bool:
+        """Whether topics of one kind, where there are several, are known to be alike or not."""
+        for kind in ("nav_msgs/Odometry", "sensor_msgs/NavSatFix", "sensor_msgs/LaserScan"):
+            names = [name for name, known in self._topics.items() if known.kind == kind and not known.is_twist_empty]
+            for other in names[1:]:
+                is_other_laser = kind == "sensor_msgs/LaserScan" and self.of(names[0]).frame != self.of(other).frame
+                if not is_other_laser and self.agree(names[0], other) is None:
+                    return False
+        return True
+
+    def receive(self, topic: str, message: Any, at_s: float) -> bool:
+        """Takes a message of any topic; whether it changed what a choice may depend on."""
+        known = self._topics.get(topic)
+        if known is None:
+            return False
+        before = known.shown
+        known.count += 1
+        if known.frame is None and isinstance(message, Mapping):
+            known.frame = text(message, "header", "frame_id")[:100] or None
+        try:
+            agreed = self._take(topic, known, message, at_s)
+        except (Rejected, AttributeError, KeyError, TypeError, ValueError, OverflowError):
+            agreed = False  # a message that is not proper shows nothing
+        return agreed or known.shown != before
+
+    def _take(self, topic: str, known: TopicEvidence, message: Any, at_s: float) -> bool:
+        match known.kind:
+            case "nav_msgs/Odometry":
+                pose = inner(inner(message, "pose"), "pose")
+                x, y = self._twist(known, inner(inner(message, "twist"), "twist"), at_s)
+                known.way.add(number(pose, "position", "x"), number(pose, "position", "y"), at_s)
+                return self._compare_speeds(topic, math.hypot(x, y), at_s)
+            case "geometry_msgs/TwistStamped" | "geometry_msgs/Twist":
+                body = inner(message, "twist") if known.kind.endswith("Stamped") else message
+                self._vote(known, *self._twist(known, body, at_s), at_s)
+            case "sensor_msgs/NavSatFix":
+                return self._fix(topic, known, message, at_s)
+            case "sensor_msgs/LaserScan":
+                return self._scan(topic, known, message, at_s)
+        return False
+
+    def _twist(self, known: TopicEvidence, twist: Any, at_s: float) -> tuple[float, float]:
+        parts = [number(twist, part, axis) for part in ("linear", "angular") for axis in "xyz" if axis in twist[part]]
+        known.has_twist |= any(part != 0.0 for part in parts)  # NaN too: it is filled, and says that it is not known
+        x, y = number(twist, "linear", "x"), number(twist, "linear", "y")
+        known.velocity = (at_s, x, 0.0 if math.isnan(y) else y)
+        return x, known.velocity[2]
+
+    def _vote(self, known: TopicEvidence, x: float, y: float, at_s: float) -> None:
+        """Whether one velocity is along the car or in east and north."""
+        way = math.hypot(x, y)
+        if not way > MOVES_MPS:
+            return
+        if abs(y) > SIDEWAYS * way:
+            known.earth_votes += 1
+            return
+        for other in self._near(at_s, SAME_TIME_S):
+            if other.kind == "nav_msgs/Odometry" and other.has_twist and other.velocity is not None:
+                body = math.hypot(*other.velocity[1:])
+                if is_same(way, body):
+                    # Reversing is beyond doubt only where the odometry reverses too, and hardly aside.
+                    reverses = other.velocity[1] < 0 and abs(other.velocity[2]) <= SIDEWAYS * body
+                    known.body_votes += (x < 0) == reverses
+                    known.earth_votes += (x < 0) != reverses
+                    return
+        course = next((t.course for t in self._topics.values() if t.course and at_s - t.course[0] <= FIXES_S), None)
+        if course is None or abs(turned(course[1], 0.0)) < COURSE_CLEAR_RAD:
+            return
+        if abs(turned(math.atan2(y, x), course[1])) < COURSE_WITHIN_RAD and (x > 0 or way > NO_REVERSE_MPS):
+            known.earth_votes += 1
+        elif x > 0:
+            known.body_votes += 1
+
+    def _compare_speeds(self, topic: str, speed_mps: float, at_s: float) -> bool:
+        changed = False
+        for name, other in self._topics.items():
+            if name != topic and other.kind == "nav_msgs/Odometry" and other.velocity is not None:
+                if at_s - other.velocity[0] <= SAME_TIME_S:
+                    beside = math.hypot(*other.velocity[1:])
+                    if max(speed_mps, beside) > MOVES_MPS:
+                        changed |= self._note(topic, name, is_alike=is_same(speed_mps, beside))
+        return changed
+
+    def _fix(self, topic: str, known: TopicEvidence, message: Any, at_s: float) -> bool:
+        if number(message, "status", "status") < 0:
+            return False
+        latitude, longitude = number(message, "latitude"), number(message, "longitude")
+        if not (abs(latitude) <= 90 and abs(longitude) <= 360) or (latitude == 0.0 and longitude == 0.0):
+            return False
+        before, known.place = known.place, (at_s, latitude, longitude)
+        if before is not None and 0.0 < at_s - before[0] <= 2 * FIXES_S:
+            way_m = metres_between(before[1:], known.place[1:])
+            is_moving = way_m > max(0.2, 2.0 * (at_s - before[0]))
+            known.course = (at_s, course_rad(before[1:], known.place[1:])) if is_moving else None
+        changed = False
+        for name, other in self._topics.items():
+            if name != topic and other.place is not None and at_s - other.place[0] <= FIXES_S:
+                is_alike = metres_between(other.place[1:], known.place[1:]) <= SAME_PLACE_M
+                changed |= self._note(topic, name, is_alike=is_alike)
+        return changed
+
+    def _scan(self, topic: str, known: TopicEvidence, message: Any, at_s: float) -> bool:
+        stamp = stamp_s(message)
+        is_of_another = stamp is not None and any(
+            other.picture is not None and other.picture.stamp_s == stamp
+            for name, other in self._topics.items()
+            if name != topic
+        )
+        if known.picture is not None and 0.0 <= at_s - known.picture.at_s < PICTURE_EVERY_S and not is_of_another:
+            return False
+        known.picture = picture_of(message, at_s)
+        changed = False
+        for name, other in self._topics.items():
+            if name != topic and other.picture is not None and known.picture is not None:
+                if other.frame == known.frame:
+                    is_alike = see_the_same(known.picture, other.picture)
+                    changed |= is_alike is not None and self._note(topic, name, is_alike=is_alike)
+        return changed
+
+    def _note(self, one: str, other: str, *, is_alike: bool) -> bool:
+        """Counts a comparison; whether the answer of `agree` is another now."""
+        before = self.agree(one, other)
+        counts = self._same.setdefault((min(one, other), max(one, other)), [0, 0])
+        if before is None or counts[not is_alike] < 10 * AGREE_ENOUGH:
+            counts[not is_alike] += 1
+        return self.agree(one, other) is not before
+
+    def _near(self, at_s: float, within_s: float) -> Iterable[TopicEvidence]:
+        return (t for t in self._topics.values() if t.velocity is not None and at_s - t.velocity[0] <= within_s)
