@@ -209,7 +209,8 @@ def _shortest_period_s(snapshot: Snapshot) -> float:
 
 def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[SignalValue]:
     source = facts.sources.get(signal.name)
-    reading: Reading[Any] | None = snapshot.readings.get(signal.name)
+    undecided = snapshot.link.undecided.get(signal.name)  # then what came before is not trusted either
+    reading: Reading[Any] | None = None if undecided else snapshot.readings.get(signal.name)
     tally = facts.reception.by_signal.get(signal.name) or Tally()
     rate = snapshot.rates.get(signal.name)
     extent = snapshot.extents.get(signal.name)
@@ -238,7 +239,7 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "why": source.why if source else None,
         "frame": facts.reception.frame_of(source.topic) if source else None,
         "note": (unusable.words if unusable else None)
-        or (source.note if source else snapshot.link.undecided.get(signal.name))
+        or (source.note if source else undecided)
         or (_unknown_part(reading.value) if reading else None)
         or (habit_words(snapshot.scan_habit) if signal.name == "scan" else None),
         "unusable": unusable.words if unusable else None,

@@ -1,0 +1,173 @@
+"""Topics that compete for a signal on a live car: compared, asked for, answered, and not swapped unasked."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncIterator, Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from server.app.config import Config
+from server.rosbridge_server.server import RosBridge
+from server.vehicle.vehicle import Vehicle
+from tests.http import http_client
+from tests.server.cars import ZERO, scan, twist
+from tests.server.conftest import serving
+from tests.server.viewer import viewer
+
+FRONT, REAR = "/front_lidar/scan", "/rear_lidar/scan"
+ODOM, STAMPED = "nav_msgs/Odometry", "geometry_msgs/TwistStamped"
+Publish = Callable[[RosBridge, float], None]
+
+
+@contextlib.asynccontextmanager
+async def car(topics: dict[str, str], publish: Publish, hz: float = 20.0) -> AsyncIterator[tuple[RosBridge, str]]:
+    """A car that publishes on these topics until the block ends, and a server that watches it."""
+    bridge = RosBridge(ros_version=1, now=time.time)
+    port = await bridge.start("127.0.0.1", 0)
+    for topic, kind in topics.items():
+        bridge.advertise(topic, kind)
+
+    async def drive() -> None:
+        began_s = time.monotonic()
+        while True:
+            publish(bridge, time.monotonic() - began_s)
+            await asyncio.sleep(1 / hz)
+
+    task = asyncio.create_task(drive())
+    try:
+        async with serving(Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{port}"),))) as base:
+            yield bridge, base
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+        await bridge.stop()
+
+
+def odometry(way_m: float, mps: float) -> dict[str, Any]:
+    pose = {"position": {"x": way_m, "y": 0.0, "z": 0.0}, "orientation": {**ZERO, "w": 1.0}}
+    return {
+        "header": {"seq": 1, "stamp": {"secs": 0, "nsecs": 0}, "frame_id": "odom"},
+        "child_frame_id": "base_link",
+        "pose": {"pose": pose, "covariance": [0.0] * 36},
+        "twist": {"twist": twist(mps), "covariance": [0.0] * 36},
+    }
+
+
+def of_laser(frame: str, range_m: float) -> dict[str, Any]:
+    found = scan(np.full(181, range_m))
+    return found | {"header": found["header"] | {"frame_id": frame}}
+
+
+def two_lasers(bridge: RosBridge, at_s: float) -> None:
+    bridge.publish("/odom", odometry(2.0 * at_s, 2.0))
+    bridge.publish(FRONT, of_laser("front", 3.0))
+    bridge.publish(REAR, of_laser("rear", 20.0))
+
+
+@pytest.mark.virtual_time
+async def test_two_lasers_are_asked_for_and_the_answer_makes_the_obstacle_alarm() -> None:
+    topics = {"/odom": ODOM, FRONT: "sensor_msgs/LaserScan", REAR: "sensor_msgs/LaserScan"}
+    async with car(topics, two_lasers) as (_, base), viewer(base) as one, http_client() as http:
+        state = await one.state(lambda s: bool(s["questions"]))
+        (question,) = state["questions"]
+        assert question["words"] == "Two lasers: which looks ahead?"
+        assert [option["value"] for option in question["options"]] == [FRONT, REAR]
+        laser = state["signals"]["scan"]
+        assert (laser["topic"], laser["value"], laser["note"]) == (None, None, "two lasers, none chosen")
+        found = (await http.get(f"{base}/api/checks/obstacle")).json()
+        assert (found["verdict"], found["text"]) == ("unknown", "Laser: two lasers, none chosen")
+        assert not any(alarm["id"] in ("obstacle", "no_message") for alarm in state["alarms"])
+        offers = (await http.get(f"{base}/api/signals")).json()["candidates"]["scan"]
+        assert {offer["topic"]: offer["frame"] for offer in offers} == {FRONT: "front", REAR: "rear"}
+        assert [len(offer["ranges_m"]) for offer in offers] == [72, 72]
+        assert {offer["topic"]: offer["ranges_m"][36] for offer in offers} == {FRONT: 3.0, REAR: 20.0}
+
+        await one.ask(kind="set", topics={"scan": FRONT})
+        state = await one.state(lambda s: any(alarm["id"] == "obstacle" for alarm in s["alarms"]))
+        assert state["questions"] == []
+        laser = state["signals"]["scan"]
+        assert (laser["topic"], laser["why"], laser["frame"]) == (FRONT, "chosen by the operator", "front")
+
+
+@pytest.mark.virtual_time
+async def test_an_odometry_that_moves_without_a_twist_loses_its_speed() -> None:
+    def publish(bridge: RosBridge, at_s: float) -> None:
+        bridge.publish("/lio/odom", odometry(max(0.0, at_s - 4.0), 0.0))
+
+    async with car({"/lio/odom": ODOM}, publish) as (_, base), viewer(base) as one, http_client() as http:
+        state = await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
+        assert state["signals"]["speed"]["topic"] == "/lio/odom"
+        state = await one.state(
+            lambda s: s["signals"]["speed"]["topic"] is None and s["session"]["phase"] == "monitoring"
+        )
+        assert state["signals"]["speed"]["note"] == "/lio/odom has no speed: its twist is zero while its pose moves"
+        assert state["questions"] == []
+        assert (state["signals"]["speed"]["value"], state["signals"]["speed"]["freshness"]) == (None, "not_published")
+        found = (await http.get(f"{base}/api/checks/speed_limit")).json()
+        assert (found["verdict"], found["text"]) == (
+            "unknown",
+            "Speed: /lio/odom has no speed: its twist is zero while its pose moves",
+        )
+
+
+@pytest.mark.virtual_time
+async def test_a_velocity_in_east_and_north_gives_way_to_the_wheels() -> None:
+    def publish(bridge: RosBridge, at_s: float) -> None:
+        bridge.publish("/odom", odometry(5.0 * at_s, 5.0))
+        header = {"seq": 1, "stamp": {"secs": 0, "nsecs": 0}, "frame_id": "gps"}
+        bridge.publish("/vel", {"header": header, "twist": twist(-5.0)})
+
+    async with car({"/odom": ODOM, "/vel": STAMPED}, publish) as (_, base), viewer(base) as one:
+        values = []
+
+        def is_by_the_wheels(state: dict[str, Any]) -> bool:
+            speed = state["signals"]["speed"]
+            if speed["value"]:
+                values.append(speed["value"]["speed_mps"])
+            return speed["topic"] == "/odom" and len(values) > 5
+
+        state = await one.state(is_by_the_wheels)
+        assert state["signals"]["speed"]["why"] == "the only speed along the car"
+        assert set(values) == {5.0}
+
+
+@pytest.mark.virtual_time
+async def test_two_cars_on_one_bridge_are_not_mixed() -> None:
+    topics = {"/agv1/odom": ODOM, "/agv2/odom": ODOM, "/agv2/scan": "sensor_msgs/LaserScan"}
+
+    def publish(bridge: RosBridge, at_s: float) -> None:
+        bridge.publish("/agv1/odom", odometry(0.0, 0.0))
+        bridge.publish("/agv2/odom", odometry(at_s, 1.0))
+        bridge.publish("/agv2/scan", of_laser("laser", 9.0))
+
+    async with car(topics, publish) as (_, base), viewer(base) as one:
+        state = await one.state(lambda s: bool(s["questions"]))
+        assert [asked["words"] for asked in state["questions"]] == ["Two cars: /agv1 and /agv2: which is this?"]
+        assert {signal["topic"] for signal in state["signals"].values()} == {None}
+        await one.ask(kind="set", topics={"speed": "/agv1/odom"})
+        state = await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
+        assert state["signals"]["scan"]["topic"] is None
+        assert state["questions"] == []
+
+
+@pytest.mark.virtual_time
+async def test_a_source_that_dies_is_not_swapped_for_another_that_lives() -> None:
+    def publish(bridge: RosBridge, at_s: float) -> None:
+        if at_s < 4.0:
+            bridge.publish("/odom", odometry(2.0 * at_s, 2.0))
+        bridge.publish("/visual/odom", odometry(2.0 * at_s, 2.0))
+        bridge.publish("/scan", of_laser("laser", 20.0))  # the car is not silent
+
+    topics = {"/odom": ODOM, "/visual/odom": ODOM, "/scan": "sensor_msgs/LaserScan"}
+    async with car(topics, publish) as (_, base), viewer(base) as one:
+        state = await one.state(lambda s: s["signals"]["speed"]["freshness"] == "fresh")
+        assert state["signals"]["speed"]["topic"] == "/odom"
+        state = await one.state(lambda s: any(alarm["id"] == "signal_stale.speed" for alarm in s["alarms"]))
+        assert state["signals"]["speed"]["topic"] == "/odom"
+        assert state["signals"]["speed"]["freshness"] != "fresh"
