@@ -136,7 +136,7 @@ def what_is_known(one: Candidate, signal: str, evidence: Evidence) -> str:
     if one.topic in evidence.silent:
         words.append("no message")
     if signal == "scan":
-        ahead = evidence.is_ahead(one.topic)
+        ahead = known.looks_ahead
         if ahead is not None:
             words.append("looks ahead by TF" if ahead else "looks elsewhere by TF")
         elif looks(f"{one.topic} {known.frame or ''}"):

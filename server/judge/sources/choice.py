@@ -213,7 +213,7 @@ class _Chooser:
         if len(found) == 1:
             return found[0].source("scan", why=BY_NAME if found[0].is_named else ONLY_ONE)
         evidence = self._evidence
-        ahead = [one for one in found if evidence.is_ahead(one.topic)]
+        ahead = [one for one in found if evidence.of(one.topic).looks_ahead]
         if len(ahead) == 1:
             return ahead[0].source("scan", why="looks ahead by TF")
         first = named_first(ahead or found) or min(ahead or found, key=lambda one: (len(one.topic), one.topic))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from monitor.values import LaserScan
 from server.judge.frame_words import is_earth_fixed
 from server.judge.message_fields import Rejected, inner, number, stamp_s, text
+from server.judge.signals.scan import laser_scan
 from server.judge.signals.speed import SIDEWAYS
 from server.judge.sources.pictures import Picture, picture_of, see_the_same
 from server.judge.sources.source import plain_type
@@ -41,6 +43,7 @@ class TopicEvidence:
     velocity: tuple[float, float, float] | None = None  # when, x and y [m/s] of the newest message
     place: tuple[float, float, float] | None = None  # when, latitude and longitude [degrees]
     course: tuple[float, float] | None = None  # when, direction of the way made [rad from east]
+    looks_ahead: bool | None = None  # of a laser, by the transforms of the car; None: they do not say
     picture: Picture | None = None  # of its newest scan, at most every PICTURE_EVERY_S
 
     @property
@@ -68,6 +71,7 @@ class TopicEvidence:
             self.is_twist_empty,
             self.is_earth_fixed,
             self.is_body_fixed,
+            self.looks_ahead,
         )
 
     @property
@@ -90,13 +94,13 @@ NOTHING = TopicEvidence(kind="")
 class Evidence:
     """Of the candidate topics of one car, or of one recording. Times are of one clock that does not go back, in s.
 
-    `looks_ahead`: frame of a laser → whether the middle of its view is ahead of the car; None or absent: not known.
+    `place`: whether the laser of a topic, by one of its scans, looks ahead of the car; None: not known.
     """
 
     def __init__(self) -> None:
         self._topics: dict[str, TopicEvidence] = {}
         self._same: dict[tuple[str, str], list[int]] = {}  # pair of topics → how often alike, how often not
-        self.looks_ahead: Mapping[str, bool | None] = {}
+        self.place: Callable[[str, LaserScan], bool | None] = lambda *_: None
         self.silent: frozenset[str] = frozenset()  # topics without a message in the whole recording
         self.is_settled = True  # False: candidates have only just been subscribed to
 
@@ -116,11 +120,6 @@ class Evidence:
         if alike >= AGREE_ENOUGH and alike >= 5 * unlike:
             return True
         return False if unlike >= AGREE_ENOUGH and unlike > alike else None
-
-    def is_ahead(self, topic: str) -> bool | None:
-        """Whether the laser of a topic looks ahead, by its frame; None: not known."""
-        frame = self.of(topic).frame
-        return None if frame is None else self.looks_ahead.get(frame.strip("/"), self.looks_ahead.get(frame))
 
     @property
     def is_enough(self) -> bool:
@@ -237,7 +236,8 @@ class Evidence:
         )
         if known.picture is not None and 0.0 <= at_s - known.picture.at_s < PICTURE_EVERY_S and not is_of_another:
             return False
-        known.picture = picture_of(message, at_s)
+        scan = laser_scan(message)
+        known.picture, known.looks_ahead = picture_of(scan, stamp, at_s), self.place(topic, scan)
         changed = False
         for name, other in self._topics.items():
             if name != topic and other.picture is not None and known.picture is not None:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from server.judge.message_fields import stamp_s
-from server.judge.signals.scan import laser_scan
+from monitor.values import LaserScan
 
 BINS = 72
 SAME_M = 0.005  # a filter leaves a range as it is; another laser has noise of its own
@@ -29,9 +27,8 @@ class Picture:
     angle_increment_rad: float
 
 
-def picture_of(message: Any, at_s: float) -> Picture | None:
-    """The picture of a sensor_msgs/LaserScan; None: it has no beams. Raises Rejected."""
-    scan = laser_scan(message)
+def picture_of(scan: LaserScan, stamp: float | None, at_s: float) -> Picture | None:
+    """The picture of a scan; None: it has no beams."""
     beams = scan.beams
     if beams == 0:
         return None
@@ -46,7 +43,7 @@ def picture_of(message: Any, at_s: float) -> Picture | None:
     step_rad = scan.angle_increment_rad * beams / bins
     return Picture(
         at_s=at_s,
-        stamp_s=stamp_s(message),
+        stamp_s=stamp,
         ranges_m=tuple(round(float(found), 3) if math.isfinite(found) else None for found in nearest),
         angle_min_rad=scan.angle_min_rad + (step_rad - scan.angle_increment_rad) / 2,
         angle_increment_rad=step_rad,

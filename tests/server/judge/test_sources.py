@@ -58,8 +58,13 @@ def shown(topics: Mapping[str, str], *messages: tuple[str, Any, float]) -> Evide
     return evidence
 
 
-def frames(**by_topic: str) -> Evidence:
-    return shown(LASERS, *((f"/{name}/scan", scan(frame), 1.0) for name, frame in by_topic.items()))
+def frames(ahead: Mapping[str, bool | None] = {}, **by_topic: str) -> Evidence:
+    """`ahead`: frame → whether a laser there looks ahead."""
+    evidence = shown(LASERS)
+    evidence.place = lambda _, seen: ahead.get(seen.frame_id)
+    for name, frame in by_topic.items():
+        evidence.receive(f"/{name}/scan", scan(frame), 1.0)
+    return evidence
 
 
 # -- lasers ------------------------------------------------------------------------------------------------------------
@@ -79,16 +84,14 @@ def test_two_lasers_are_asked_for_whatever_their_names_say(evidence: Evidence) -
 
 
 def test_tf_decides_which_laser_looks_ahead() -> None:
-    evidence = frames(front="one", rear="/two")
-    evidence.looks_ahead = {"one": False, "two": True}
+    evidence = frames({"one": False, "two": True}, front="one", rear="two")
     source = choose(LASERS, evidence=evidence).sources["scan"]
     assert (source.topic, source.why) == ("/rear/scan", "looks ahead by TF")
 
 
 @pytest.mark.parametrize("ahead", [{}, {"one": None}, {"one": False, "two": False}, {"one": True, "two": True}])
 def test_tf_that_names_none_or_both_does_not_decide(ahead: dict[str, bool | None]) -> None:
-    evidence = frames(front="one", rear="two")
-    evidence.looks_ahead = ahead
+    evidence = frames(ahead, front="one", rear="two")
     assert "scan" not in choose(LASERS, evidence=evidence).sources
 
 
