@@ -8,12 +8,12 @@ from typing import Any, Protocol
 from monitor.signals import SIGNALS
 from server.judge.sources.candidates import to_compare
 from server.judge.sources.choice import Choice, choose
-from server.judge.sources.evidence import Evidence
+from server.judge.sources.evidence import Evidence, Place
 from server.judge.topics import COMMAND, Source, candidates
 from server.protocol.answers import TopicOffer
 from server.protocol.questions import Question
 
-SETTLED_S = 2.0  # candidates have so long for their first messages before the operator is asked
+SEEN_S, SETTLED_S = 1.0, 2.0  # with messages of all candidates, or without, the operator is not asked before
 
 
 class Delivers(Protocol):
@@ -31,14 +31,15 @@ class Delivers(Protocol):
 class SignalMap:
     """Of one car, over all openings of its link."""
 
-    def __init__(self) -> None:
+    def __init__(self, place: Place | None = None) -> None:
+        """`place`: see `Evidence`."""
         self.sources: Mapping[str, Source] = {}  # by signal
         self.unmapped: Mapping[str, str] = {}  # topic → type of what carries no signal
         self.offers_nothing = False  # no topic of the car can be read
         self.undecided: Mapping[str, str] = {}  # signal → why none of its topics carries it
         self.questions: Sequence[Question] = ()
         self.watched: Mapping[str, Source] = {}  # topic → what it may carry; compared, and not judged
-        self._evidence = Evidence()
+        self._evidence = Evidence(place)
         self._choice: Choice | None = None
         self._compared_since_s: float | None = None
 
@@ -87,14 +88,17 @@ class SignalMap:
         else:
             if self._compared_since_s is None:
                 self._compared_since_s = now_s
-            is_seen = all(self._evidence.of(topic).count for topic in self.watched)
-            self._evidence.is_settled = is_seen or now_s - self._compared_since_s >= SETTLED_S
+            self._evidence.is_settled = self._had_their_time(now_s)
         return self._evidence.is_settled is not was_settled
 
     def is_due(self, now_s: float) -> bool:
         """Whether candidates had their time, so that `update` may decide otherwise."""
+        return not self._evidence.is_settled and self._had_their_time(now_s)
+
+    def _had_their_time(self, now_s: float) -> bool:
+        is_seen = all(self._evidence.of(topic).count for topic in self.watched)
         since_s = self._compared_since_s
-        return not self._evidence.is_settled and since_s is not None and now_s - since_s >= SETTLED_S
+        return since_s is not None and now_s - since_s >= (SEEN_S if is_seen else SETTLED_S)
 
     def compare(self, topic: str, message: Any, now_s: float) -> bool:
         """Takes a message of any topic as evidence; whether `update` may decide otherwise by it."""

@@ -60,8 +60,8 @@ def shown(topics: Mapping[str, str], *messages: tuple[str, Any, float]) -> Evide
 
 def frames(ahead: Mapping[str, bool | None] = {}, **by_topic: str) -> Evidence:
     """`ahead`: frame → whether a laser there looks ahead."""
-    evidence = shown(LASERS)
-    evidence.place = lambda _, seen: ahead.get(seen.frame_id)
+    evidence = Evidence(lambda _, seen: ahead.get(seen.frame_id))
+    evidence.follow(LASERS)
     for name, frame in by_topic.items():
         evidence.receive(f"/{name}/scan", scan(frame), 1.0)
     return evidence
