@@ -16,6 +16,7 @@ from server.protocol.driving_state import DrivingAnswer, InterventionAnswer
 from server.protocol.logbook import LogbookAnswer
 from server.protocol.marks import DriveMark, MarkList
 from server.protocol.people import PeopleList
+from server.protocol.topic_offer import TopicOffer
 
 ExportState = Literal["waiting", "working", "done", "failed", "cancelled"]
 
@@ -66,21 +67,6 @@ class SettingsAnswer(TypedDict):
     units: Annotated[dict[str, str], doc("signal → name of its unit, of those that were chosen")]
     unit_choices: Annotated[dict[str, list[UnitChoice]], doc("signal → the units it may be published in")]
     schema: Annotated[dict[str, SettingField], doc("in the order of Settings")]
-
-
-class TopicOffer(TypedDict):
-    topic: str
-    type: str
-    frame: NotRequired[Annotated[str | None, doc("that its messages name; null: none, or not known")]]
-    why: NotRequired[Annotated[str, doc("what speaks for it and against it, in few words")]]
-    ranges_m: NotRequired[
-        Annotated[
-            list[float | None],
-            doc("of a laser that is compared: the nearest range in each of at most 72 parts of its newest scan"),
-        ]
-    ]
-    angle_min_rad: NotRequired[Annotated[float, doc("of the middle of the first part, in the laser's own frame")]]
-    angle_increment_rad: NotRequired[Annotated[float, doc("from one part to the next")]]
 
 
 class SignalsAnswer(TypedDict):

@@ -10,8 +10,8 @@ from server.judge.sources.candidates import to_compare
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence, Place
 from server.judge.topics import COMMAND, Source, candidates
-from server.protocol.answers import TopicOffer
 from server.protocol.questions import Question
+from server.protocol.topic_offer import TopicOffer
 
 SEEN_S, SETTLED_S = 1.0, 2.0  # with messages of all candidates, or without, the operator is not asked before
 

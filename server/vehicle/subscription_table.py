@@ -67,12 +67,13 @@ class SubscriptionTable:
         offered: Mapping[str, str] | None,
         *,
         needs_client_count: bool,
-        watched: Mapping[str, Source],
+        watched: Mapping[str, Source] | None = None,
     ) -> None:
         """Update the link's subscriptions to the wanted ones. `offered` None: the topics are unknown.
 
         `watched`: further topics that are compared and not judged.
         """
+        watched = watched or {}
         known, too_large, compression = self._definitions, self.large.left, self.cbor.compression
         wanted = wanted_topics.judged(
             by_topic, self.load, without=too_large, asked=known.asked, fit=known.fit, compression=compression

@@ -202,7 +202,9 @@ async def test_the_doctor_looks_for_topics_with_a_publisher() -> None:
             return {"publishers": [] if arguments["topic"] in ("/catvehicle/vel", "/fuel") else ["/car"]}
 
     link: Any = Link()
-    sources = await doctor._map(link, Offer(topics=FOUND, ros=1))
+    choice, unpublished = await doctor._map(link, Offer(topics=FOUND, ros=1))
+    sources = choice.sources
+    assert unpublished == {"/catvehicle/vel", "/fuel"}
     assert (sources["speed"].topic, sources["speed"].decode is not None) == ("/vel", True)
     assert sources["fuel"].decode is None
     assert len(asked) == len(set(asked)) == len(FOUND) - 1, "each topic once, and none that carries no signal"
