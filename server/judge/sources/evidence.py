@@ -101,7 +101,7 @@ class Evidence:
     def __init__(self, place: Place | None = None) -> None:
         self._topics: dict[str, TopicEvidence] = {}
         self._same: dict[tuple[str, str], list[int]] = {}  # pair of topics → how often alike, how often not
-        self._place: Place = place or (lambda *_: None)
+        self.place: Place = place or (lambda *_: None)
         self.silent: frozenset[str] = frozenset()  # topics without a message in the whole recording
         self.is_settled = True  # False: candidates have only just been subscribed to
 
@@ -238,7 +238,7 @@ class Evidence:
         if known.picture is not None and 0.0 <= at_s - known.picture.at_s < PICTURE_EVERY_S and not is_of_another:
             return False
         scan = laser_scan(message)
-        known.picture, known.looks_ahead = picture_of(scan, stamp, at_s), self._place(topic, scan)
+        known.picture, known.looks_ahead = picture_of(scan, stamp, at_s), self.place(topic, scan)
         changed = False
         for name, other in self._topics.items():
             if name != topic and other.picture is not None and known.picture is not None:
