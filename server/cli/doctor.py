@@ -9,9 +9,12 @@ import sys
 import time
 from typing import Any
 
+from server.judge import profiles
 from server.judge.reception_stats import Reception
+from server.judge.settings import Settings
 from server.judge.signals import TOPICS
 from server.judge.topics import BY_SIGNAL, Source, map_signals
+from server.judge.unit_watch import UnitBasis
 from server.rosbridge.address import Address, BadAddress, parse
 from server.rosbridge.connection_errors import LOGIN_WANTED, ROSAPI_ENDED, ROSAPI_MISSING, Problem, not_proved
 from server.rosbridge.diagnosis import SILENT_S, Diagnosis
@@ -54,6 +57,7 @@ class _Listener:
         self.problem: Problem | None = None
         self.reception = Reception()
         self.by_topic: dict[str, tuple[Source, ...]] = {}
+        self.basis = UnitBasis(profile=profiles.GENERIC, chosen={})
         self.counts: dict[str, int] = {}
         self.values: dict[str, Any] = {}
         self.client_count: Any = None  # of the bridge, as it last published it
@@ -78,6 +82,9 @@ class _Listener:
         for source in self.by_topic.get(topic, ()):
             value = self.reception.read(source, message, note)
             if value is not None:
+                value = self.reception.in_unit(source, value, time.monotonic(), self.basis)
+            if value is not None:
+                self.reception.units.see(source.signal, value, time.monotonic())
                 self.values[source.signal] = value
 
     def status_received(self, level: str, text: str) -> None:
@@ -157,6 +164,9 @@ async def _discover_and_report(
         print(f"{problem.title} {problem.hint}")
         return 1
     sources = await _map(asks, offer)
+    profile = profiles.choose(profiles.load(), offer.topics, offer.ros)
+    ratio = Settings().limits(profile).steering.tyre_rad_per_unit
+    ear.basis = UnitBasis(profile=profile, chosen={}, tyre_rad_per_unit=ratio)
     ear.by_topic = {}
     for source in sources.values():
         ear.by_topic[source.topic] = (*ear.by_topic.get(source.topic, ()), source)
@@ -219,6 +229,8 @@ def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Listener, s
         tally = ear.reception.by_signal.get(row.signal)
         if source.note:
             print(f"{'':<14}{source.note}")
+        if (unit := _unit(ear, source)) is not None:
+            print(f"{'':<14}{unit}")
         if tally is not None and tally.rejected:
             print(f"{'':<14}{tally.rejected} of {tally.received} rejected: {tally.last_reason}")
         if tally is not None and tally.not_measured:
@@ -247,6 +259,15 @@ def _print(offer: discovery.Offer, sources: dict[str, Source], ear: _Listener, s
         "docs/safety.md explains how to restrict it."
     )
     return 1 if needed else 0
+
+
+def _unit(ear: _Listener, source: Source) -> str | None:
+    """In which unit a topic is published; None: nothing came, or there is no doubt of it, or it is unknown, which is
+    the reason why its messages are not measured."""
+    decision = ear.reception.units.decision(source.signal, source.topic)
+    if decision is None or decision.unit is None:
+        return None
+    return f"published in {decision.unit.label}, {decision.why}"
 
 
 REPORT_SIGNALS = ("speed", "brake", "accelerator", "steering", "distance", "bearing", "position", "scan", "diagnostics")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 from server.judge import pipeline
@@ -14,6 +15,9 @@ from server.judge.ros_names import BadName, canonical_name
 from server.judge.settings import BadSetting
 from server.judge.settings_override import SettingsOverride, recorded_override, tuning_for
 from server.judge.topics import Source, map_signals
+from server.judge.unit_evidence import Evidence
+from server.judge.unit_survey import Surveyed, survey
+from server.judge.unit_watch import Key, UnitBasis
 
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, message
 
@@ -32,6 +36,7 @@ class MessageSource(Protocol):
     duration_s: float
     ros_version: RosVersion
     notes: list[str]
+    rejected: dict[str, int]  # topic → messages that could not be decoded
 
     @property
     def topics(self) -> Mapping[str, HasType]: ...
@@ -90,6 +95,7 @@ class Drive:
         signals: Collection[str] | None = None,
     ) -> None:
         self._signals = signals
+        self._source = source
         self.start_s = source.start_s
         self.length_s = source.duration_s
         self.ros_version = source.ros_version
@@ -114,6 +120,23 @@ class Drive:
                 self._recorded_epoch(event.toml) for _, event in recorded.events if isinstance(event, NewSettings)
             ]
         self.topics = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
+
+    @cached_property
+    def unit_evidence(self) -> dict[Key, Evidence]:
+        """What the whole recording shows of the units of its topics. Reads them, where a unit is in doubt."""
+        return survey(self._source, [self._surveyed(epoch) for epoch in self.epochs])
+
+    def _surveyed(self, epoch: SettingsEpoch) -> Surveyed:
+        by_topic = pipeline.by_topic(epoch.sources.values())
+        return Surveyed(
+            listeners=epoch.listeners,
+            all_listeners={topic: by_topic.get(name, ()) for topic, name in self._names.items()},
+            basis=UnitBasis(
+                profile=epoch.tuning.profile,
+                chosen=epoch.tuning.settings.units,
+                tyre_rad_per_unit=epoch.tuning.limits.steering.tyre_rad_per_unit,
+            ),
+        )
 
     def _recorded_epoch(self, toml: str) -> SettingsEpoch:
         override, left_out = recorded_override(toml)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from monitor.state import LinkFacts
+from server.judge.unit_questions import unit_questions
 from server.protocol.departure import DepartureState
 from server.protocol.state import LiveState, RecordedState, ServerState
 from server.rosbridge.connection_errors import Problem
@@ -107,4 +108,5 @@ def frame_facts(
         decelerate=parts.slow_down.frame(),
         mode=parts.driving.frame(now_s, wall_ms),
         marks=parts.marks.count,
+        questions=(*unit_questions(judgement.reception.units, topics.signals.sources),),
     )

@@ -8,15 +8,17 @@ from typing import Any
 
 from monitor.values import Twist
 from server.judge.message_fields import finite, inner, known, number
-from server.judge.plausible import plausible_speed
+from server.judge.plausible import FASTEST_KMH, plausible_speed
 from server.judge.topic import Topic, floats
 
 SIDEWAYS = 0.25  # of the way made: a car rolls forwards or backwards, and slips a little
 
 
 def twist(message: Any) -> Twist:
+    """A speed in the unit of the topic, which `server.judge.units` decides."""
     yaw_rate = number(message, "angular", "z") if isinstance(message, Mapping) and "angular" in message else math.nan
-    return Twist(speed_mps=plausible_speed(finite(message, "linear", "x")), yaw_rate_radps=known(yaw_rate))
+    speed = plausible_speed(finite(message, "linear", "x"), FASTEST_KMH)
+    return Twist(speed_mps=speed, yaw_rate_radps=known(yaw_rate))
 
 
 def twist_stamped(message: Any) -> Twist:
@@ -39,7 +41,8 @@ def twist_of_odometry(message: Any) -> Twist:
 
 
 def speed_of_float(message: Any) -> Twist:
-    return Twist(speed_mps=plausible_speed(finite(message, "data")), yaw_rate_radps=None)
+    """As `twist`."""
+    return Twist(speed_mps=plausible_speed(finite(message, "data"), FASTEST_KMH), yaw_rate_radps=None)
 
 
 TOPICS = (
