@@ -19,8 +19,8 @@ from monitor.trends import Trends
 from server.judge import pipeline
 from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
 from server.judge.pipeline import TICK_S
-from server.judge.recorded_events import ChosenPhone, NewSettings, Pause
 from server.judge.reception_stats import Reception
+from server.judge.recorded_events import ChosenPhone, NewSettings, Pause
 from server.judge.recorded_slowdown import SlowDownEvent
 from server.judge.run_state import RunState
 from server.judge.unit_watch import UnitWatch

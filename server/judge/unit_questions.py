@@ -47,9 +47,7 @@ def unit_sentences(units: UnitWatch, sources: Mapping[str, Source]) -> list[str]
 
 
 def _asked(units: UnitWatch, sources: Mapping[str, Source]) -> list[tuple[str, Source]]:
-    return [
-        (name, sources[name]) for name in SIGNALS if name in sources and units.is_to_ask(name, sources[name].topic)
-    ]
+    return [(name, sources[name]) for name in SIGNALS if name in sources and units.is_to_ask(name, sources[name].topic)]
 
 
 def _why(unit: Unit, highest: float) -> str:

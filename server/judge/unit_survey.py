@@ -1,5 +1,7 @@
-"""Reads those topics of a recording whose unit the values decide, before it is judged: a decision then does not depend on
-where a replay begins."""
+"""Reads those topics of a recording whose unit the values decide, before it is judged.
+
+A decision then does not depend on where a replay begins.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +10,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from server.judge.topic import FLOATS
 from server.judge.topics import Source, plain_type
 from server.judge.unit_evidence import Evidence, new_evidence
 from server.judge.unit_watch import PLACES, Key, UnitBasis, number_of, read
-from server.judge.topic import FLOATS
 from server.judge.units import UnitRule, rule_for
 
 MOST_VALUES = 500_000  # of the surveyed topics; what comes later is taken as it comes
@@ -132,7 +134,7 @@ def _read(
         for source in there:
             place = read(source, message)
             for target in speeds:
-                if target.evidence.ways is not None and type(place) in PLACES:
+                if target.evidence.ways is not None and isinstance(place, PLACES):
                     target.evidence.ways.add_place(source.signal, place, at_s)
             if is_short and all(t.evidence.ways is not None and t.evidence.ways.compared >= compared for t in speeds):
                 return False

@@ -11,7 +11,7 @@ from server.judge.topic import Topic, floats
 
 
 def effort(message: Any) -> Effort:
-    """By force.x of a Wrench, where the CATVehicle's pedals have percent; the unit is decided by `server.judge.units`."""
+    """By force.x of a Wrench, where the CATVehicle has percent; `server.judge.units` decides."""
     return Effort(percent=plausible_percent(finite(message, "force", "x")))
 
 
