@@ -38,6 +38,9 @@ class Observer:
     def value_decoded(self, signal: str, value: Any, now_s: float, stamp_s: float | None) -> None:
         """A message holds this value; `stamp_s`: by its header, on the car's clock."""
 
+    def number_decoded(self, signal: str, number: float, now_s: float, stamp_s: float | None) -> None:
+        """A message holds a number whose unit is not known."""
+
     def signals_changed(self, changed: tuple[str, ...], state: State, now_s: float) -> None:
         """A message changed these signals; what comes of it was judged."""
 
@@ -207,6 +210,7 @@ class OfflineRun:
             units=self._epoch.tuning.settings.units,
             transport=self.drive.delay,
             on_value=self._observer.value_decoded,
+            on_number=self._observer.number_decoded,
         )
         if changed:
             if self._with_checks:

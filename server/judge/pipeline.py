@@ -12,7 +12,7 @@ from server.judge.message_fields import stamp_s
 from server.judge.profiles import Profile
 from server.judge.reception_stats import Reception
 from server.judge.topics import Source
-from server.judge.unit_watch import UnitBasis
+from server.judge.unit_watch import UnitBasis, number_of
 from server.judge.units import UNITS
 
 TICK_S = 0.05  # every check is judged this often
@@ -53,11 +53,13 @@ def receive(
     units: Mapping[str, str] = NO_UNITS,
     transport: Delays | None = None,
     on_value: Callable[[str, Any, float, float | None], None] | None = None,
+    on_number: Callable[[str, float, float, float | None], None] | None = None,
 ) -> tuple[str, ...]:
     """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock;
     `tyre_rad_per_unit` of the steering signal, 0: not known; `units` are the operator's choices, signal → name;
     `transport` None: it came without
-    delay, as far as is known. `on_value` receives each decoded value: signal, value, `at_s`, stamp.
+    delay, as far as is known. `on_value` receives each decoded value: signal, value, `at_s`, stamp; `on_number` each
+    number whose unit is not known, as it was published.
     """
     reception.received += 1
     stamp = stamp_s(message)
@@ -69,9 +71,12 @@ def receive(
         value = reception.read(source, message, note)
         if value is not None and source.signal in UNITS:
             basis = UnitBasis(profile=profile, chosen=units, tyre_rad_per_unit=tyre_rad_per_unit)
-            value = reception.in_unit(source, value, at_s, basis)
+            published = value
+            value = reception.in_unit(source, published, at_s, basis)
             if reception.units.takes_back(source):
                 state.forget(source.signal)
+                if value is None and on_number is not None and (number := number_of(published)) is not None:
+                    on_number(source.signal, number, at_s, stamp)
         if value is None:
             tally = reception.tally(source.signal)
             if tally.why_not_measured is not None:

@@ -11,12 +11,15 @@ from server.judge.units import Unit
 from server.protocol.questions import Question
 
 
-def unit_questions(units: UnitWatch, sources: Mapping[str, Source]) -> tuple[Question, ...]:
-    """One for each signal whose unit the values do not show, in the order of the signals."""
+def unit_questions(units: UnitWatch, sources: Mapping[str, Source], chosen: Mapping[str, str]) -> tuple[Question, ...]:
+    """One for each signal whose unit the values do not show, in the order of the signals. `chosen`: the operator's
+    answers, signal → name of the unit, which hold from the next value on."""
     found = []
     for signal, source in _asked(units, sources):
         decision = units.decision(signal, source.topic)
         assert decision is not None
+        if chosen.get(signal) in [unit.name for unit in decision.fits]:
+            continue
         highest = units.highest(signal, source.topic)
         fits = decision.fits
         question: Question = {

@@ -61,7 +61,7 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
             run_state.state.get("mode"), epoch.sources.get("mode"), run_state.monitor.limits.driving, now_s
         ),
         operators={"control": {"holder": None}, "reach": None},  # not applicable to a recording
-        questions=(*unit_questions(run_state.reception.units, epoch.sources),),
+        questions=(*unit_questions(run_state.reception.units, epoch.sources, epoch.tuning.settings.units),),
     )
     shown = state_frame(facts, run_state.state.glance(now_s), run_state.monitor)
     shown["session"]["name"] = name

@@ -108,5 +108,5 @@ def frame_facts(
         decelerate=parts.slow_down.frame(),
         mode=parts.driving.frame(now_s, wall_ms),
         marks=parts.marks.count,
-        questions=(*unit_questions(judgement.reception.units, topics.signals.sources),),
+        questions=(*unit_questions(judgement.reception.units, topics.signals.sources, parts.settings.settings.units),),
     )

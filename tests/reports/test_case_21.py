@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from server.judge.drive import Drive as JudgedDrive
 from server.judge.offline import OfflineRun
 from server.judge.settings_override import SettingsOverride
 from server.recording.event_channels import read_recorded_events
+from server.recording.export.formats.csv_zip import write_csv_zip
 from server.recording.read.read import open_recording
 from server.replay import replay_frames
 from tests.reports.cases import judged, made, raised
@@ -112,3 +114,29 @@ def test_pedals_that_rest_are_checked(tmp_path: Path) -> None:
     report = judged(pedals(tmp_path, [0.0] * 100))
     assert "pedals" not in never_checked(report)
     assert not [note for note in report.run.notes if "unit" in note]
+
+
+def exported(bag: Path, into: Path) -> tuple[dict[str, list[str]], list[str]]:
+    """The lines of each file of the export, and its notes."""
+    with open_recording([bag]) as recording:
+        outcome = write_csv_zip(recording, into)
+    with zipfile.ZipFile(into) as packed:
+        files = {name: packed.read(name).decode().splitlines() for name in packed.namelist()}
+    return files, [*outcome.notes, *outcome.notices]
+
+
+def test_an_export_has_the_numbers_and_says_that_their_unit_is_unknown(bag: Path, tmp_path: Path) -> None:
+    files, notes = exported(bag, tmp_path / "pedals.zip")
+    lines = files["brake-unit-unknown.csv"]
+    assert lines[0].endswith(",as published [unit unknown]")
+    assert len(lines) == 601
+    assert lines[300].endswith(",1.0")
+    assert "brake.csv" not in files
+    assert f"600 of 600 messages for brake: {UNKNOWN}." in notes
+    assert "their unit is not known" in "\n".join(files["README.txt"])
+
+
+def test_an_export_in_a_decided_unit_is_in_the_unit_of_the_signal(tmp_path: Path) -> None:
+    files, _ = exported(pedals(tmp_path, [0.5, 60.0]), tmp_path / "pedals.zip")
+    assert [line.rsplit(",", 1)[1] for line in files["brake.csv"]] == ["brake [%]", "0.5", "60.0"]
+    assert "brake-unit-unknown.csv" not in files

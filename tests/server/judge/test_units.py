@@ -95,7 +95,7 @@ class Car:
         return decision.why
 
     def questions(self) -> dict[str, list[str]]:
-        found = unit_questions(self.reception.units, self.sources)
+        found = unit_questions(self.reception.units, self.sources, self.units)
         return {one["signal"]: [option["value"] for option in one["options"]] for one in found}
 
     def drive(self, seconds: float, mps: float, factor: float, *, reference: str = "odom", hz: float = 20.0) -> None:
@@ -278,6 +278,7 @@ def test_a_question_is_asked_once_the_car_moves_and_ends_with_the_answer() -> No
         "Choose it in the file for --settings: [units] brake =" in unit_sentences(car.reception.units, car.sources)[0]
     )
     car.units = {"brake": "share"}
+    assert car.questions() == {}
     assert car.say("brake", 0.3) == [30.0]
     assert car.questions() == {}
 
