@@ -68,6 +68,14 @@ class DerivedSignals:
         if signal == "heading":
             self._headings.is_published = False
 
+    def forget_speed(self) -> None:
+        """The speeds so far are void: nothing is derived from them any more."""
+        known = self._table.newest.get("acceleration")
+        if known is not None and known.derived_from is not None:
+            self._table.drop("acceleration")
+        self._slope, self.slope_mps2 = Slope(), None
+        self.standstill = Standstill()
+
     def _heading_on_course(self, reading: Reading[GpsFix]) -> Value | None:
         fix, at_s, table = reading.value, reading.received_s, self._table
         speed_mps = table.newest["speed"].value.speed_mps if table.is_fresh("speed", at_s) else None

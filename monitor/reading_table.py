@@ -33,6 +33,14 @@ class ReadingTable:
         self.newest = {name: reading for name, reading in self.newest.items() if name != signal}
         self._readings_shared = None
 
+    def forget(self, signal: str) -> None:
+        """Forget the newest reading of a signal, and its range."""
+        if signal in self.newest:
+            self.drop(signal)
+        if signal in self._extents:
+            self._extents = {name: extent for name, extent in self._extents.items() if name != signal}
+            self._extents_shared = None
+
     def put_extent(self, signal: str, lowest: float, highest: float) -> None:
         """Replace the range of a signal's headline number."""
         if self._extents_shared is not None:

@@ -140,6 +140,15 @@ class State:
             self._unusable, signal, reason, received_s, meter.horizon_s, meter.period_s, is_declared=is_declared
         )
 
+    def forget(self, signal: str) -> None:
+        """What was received of a signal is void, and so is what was derived from it: its unit was another."""
+        stats = self._stats[signal]
+        stats.lowest, stats.highest = math.inf, -math.inf
+        self._table.forget(signal)
+        if signal == "speed":
+            self._derived.forget_speed()
+            self._wheels = Wheels()
+
     def receive_phone(self, report: PhoneReport, now_s: float) -> None:
         """Take the report of an operator's phone; judged on the next tick."""
         self._follow_clock(now_s)

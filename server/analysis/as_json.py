@@ -77,6 +77,7 @@ def _settings(report: Report) -> dict[str, Any]:
         "profile": run.tuning.profile.name,
         "changed": {name: value for name, _, value, _ in report.settings()},
         "topics": dict(run.tuning.settings.topics),
+        "units": dict(run.tuning.settings.units),
     }
 
 

@@ -25,6 +25,7 @@ from server.judge.pipeline import TICK_S
 from server.judge.reception_stats import Reception
 from server.judge.settings_override import SettingsOverride
 from server.judge.topics import Source
+from server.judge.unit_questions import unit_sentences
 from server.protocol.questions import Question
 from server.recording.delay import recorded_delay
 from server.recording.event_channels import read_recorded_events
@@ -104,6 +105,7 @@ class _Injected:
     def __init__(self, recording: Recording, faults: Faults, drive: Drive) -> None:
         self.start_s, self.duration_s = recording.start_s, recording.duration_s
         self.ros_version, self.notes, self.topics = recording.ros_version, recording.notes, recording.topics
+        self.rejected = recording.rejected
         self._recording = recording
         self._faults = faults
         self._signals = {topic: sources[0].signal for topic, sources in drive.epochs[0].listeners.items()}
@@ -168,6 +170,7 @@ class _Rehearsal(Observer):
             self._broke_off = str(error)  # it is judged up to there
         if self._messages:
             self._sample(run.run_state.monitor, self._last_s)
+        self.notes += unit_sentences(run.run_state.reception.units, run.epoch.sources)
         self._note_rejected()
         return self._found(run)
 

@@ -206,6 +206,9 @@ def _note(run: Rehearsed, name: str) -> str | None:
     notes = [] if source is None or source.note is None else [source.note]
     if tally is not None and tally.not_measured:
         notes.append(f"{tally.not_measured} of {tally.received} {tally.why_not_measured or 'not measured'}")
+    if source is not None and (unit := run.reception.units.note(name, source.topic)) is not None:
+        if tally is None or unit != tally.why_not_measured:
+            notes.append(unit)
     if name == "scan" and (habit := habit_words(run.snapshot.scan_habit)) is not None:
         notes.append(habit)
     return "; ".join(notes) or None

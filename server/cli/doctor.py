@@ -10,12 +10,15 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from server.judge import profiles
 from server.judge.reception_stats import Reception
+from server.judge.settings import Settings
 from server.judge.signals import TOPICS
 from server.judge.sources.candidates import to_compare
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence
 from server.judge.topics import BY_SIGNAL, Source
+from server.judge.unit_watch import UnitBasis
 from server.rosbridge.address import Address, BadAddress, parse
 from server.rosbridge.connection_errors import LOGIN_WANTED, ROSAPI_ENDED, ROSAPI_MISSING, Problem, not_proved
 from server.rosbridge.diagnosis import SILENT_S, Diagnosis
@@ -60,6 +63,7 @@ class _Listener:
         self.reception = Reception()
         self.evidence = Evidence()
         self.by_topic: dict[str, tuple[Source, ...]] = {}
+        self.basis = UnitBasis(profile=profiles.GENERIC, chosen={})
         self.counts: dict[str, int] = {}
         self.values: dict[str, Any] = {}
         self.client_count: Any = None  # of the bridge, as it last published it
@@ -85,6 +89,9 @@ class _Listener:
         for source in self.by_topic.get(topic, ()):
             value = self.reception.read(source, message, note) if source.carries else None
             if value is not None:
+                value = self.reception.in_unit(source, value, time.monotonic(), self.basis)
+            if value is not None:
+                self.reception.units.see(source.signal, value, time.monotonic())
                 self.values[source.signal] = value
 
     def status_received(self, level: str, text: str) -> None:
@@ -164,6 +171,9 @@ async def _discover_and_report(
         print(f"{problem.title} {problem.hint}")
         return 1
     choice, unpublished = await _map(asks, offer)
+    profile = profiles.choose(profiles.load(), offer.topics, offer.ros)
+    ratio = Settings().limits(profile).steering.tyre_rad_per_unit
+    ear.basis = UnitBasis(profile=profile, chosen={}, tyre_rad_per_unit=ratio)
     ear.by_topic = {}
     for source in (*choice.sources.values(), *(one for found in choice.watched.values() for one in found)):
         ear.by_topic[source.topic] = (*ear.by_topic.get(source.topic, ()), source)
@@ -237,6 +247,8 @@ def _print(offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: floa
             print(f"{'':<14}why: {source.why}")
         if source.note:
             print(f"{'':<14}{source.note}")
+        if (unit := _unit(ear, source)) is not None:
+            print(f"{'':<14}{unit}")
         _print_candidates(choice, row.signal, source.topic)
         if tally is not None and tally.rejected:
             print(f"{'':<14}{tally.rejected} of {tally.received} rejected: {tally.last_reason}")
@@ -277,6 +289,15 @@ def _print_candidates(choice: Choice, signal: str, taken: str | None) -> None:
         print(f"{'':<14}or: {topic}{f' ({why})' if why else ''}")
     if len(others) > MOST_CANDIDATES:
         print(f"{'':<14}and {len(others) - MOST_CANDIDATES} more")
+
+
+def _unit(ear: _Listener, source: Source) -> str | None:
+    """In which unit a topic is published; None: nothing came, or there is no doubt of it, or it is unknown, which is
+    the reason why its messages are not measured."""
+    decision = ear.reception.units.decision(source.signal, source.topic)
+    if decision is None or decision.unit is None:
+        return None
+    return f"published in {decision.unit.label}, {decision.why}"
 
 
 REPORT_SIGNALS = ("speed", "brake", "accelerator", "steering", "distance", "bearing", "position", "scan", "diagnostics")

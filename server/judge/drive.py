@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 from server.judge import pipeline
@@ -13,11 +14,14 @@ from server.judge.recorded_events import NewSettings, RecordedEvents
 from server.judge.ros_names import BadName, canonical_name
 from server.judge.settings import BadSetting
 from server.judge.settings_override import SettingsOverride, recorded_override, tuning_for
+from server.judge.sources import survey as source_survey
 from server.judge.sources.candidates import to_compare
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence
-from server.judge.sources.survey import survey
 from server.judge.topics import Source
+from server.judge.unit_evidence import Evidence as UnitEvidence
+from server.judge.unit_survey import Surveyed, survey
+from server.judge.unit_watch import Key, UnitBasis
 from server.protocol.questions import Question
 
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, message
@@ -37,6 +41,7 @@ class MessageSource(Protocol):
     duration_s: float
     ros_version: RosVersion
     notes: list[str]
+    rejected: dict[str, int]  # topic → messages that could not be decoded
 
     @property
     def topics(self) -> Mapping[str, HasType]: ...
@@ -140,6 +145,23 @@ class Drive:
             ]
         self.topics = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
 
+    @cached_property
+    def unit_evidence(self) -> dict[Key, UnitEvidence]:
+        """What the whole recording shows of the units of its topics. Reads them, where a unit is in doubt."""
+        return survey(self._source, [self._surveyed(epoch) for epoch in self.epochs])
+
+    def _surveyed(self, epoch: SettingsEpoch) -> Surveyed:
+        by_topic = pipeline.by_topic(epoch.sources.values())
+        return Surveyed(
+            listeners=epoch.listeners,
+            all_listeners={topic: by_topic.get(name, ()) for topic, name in self._names.items()},
+            basis=UnitBasis(
+                profile=epoch.tuning.profile,
+                chosen=epoch.tuning.settings.units,
+                tyre_rad_per_unit=epoch.tuning.limits.steering.tyre_rad_per_unit,
+            ),
+        )
+
     def _recorded_epoch(self, toml: str) -> SettingsEpoch:
         override, left_out = recorded_override(toml)
         self.notes += left_out
@@ -172,5 +194,5 @@ class Drive:
             # Of all that could compete: with the next settings others may.
             topics, found = to_compare(self.offered, {}) | to_compare(self.offered, picked), self._source.topics
             silent = [name for topic, name in self._names.items() if getattr(found[topic], "count", 1) == 0]
-            self.evidence = survey(self._source, self._names, topics, silent)
+            self.evidence = source_survey.survey(self._source, self._names, topics, silent)
         return self.evidence

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from copy import deepcopy
 from typing import Any
 
 from monitor.alarm import Transition
@@ -18,9 +19,11 @@ from monitor.trends import Trends
 from server.judge import pipeline
 from server.judge.drive import Drive, MessageSource, Row, SettingsEpoch
 from server.judge.pipeline import TICK_S
+from server.judge.reception_stats import Reception
 from server.judge.recorded_events import ChosenPhone, NewSettings, Pause
 from server.judge.recorded_slowdown import SlowDownEvent
 from server.judge.run_state import RunState
+from server.judge.unit_watch import UnitWatch
 
 SILENCE_S = 600.0  # after so long without a message nothing new can be said: the judge is not stepped through the rest
 STEPS_PER_CLOCK_READ = 24  # some 2 ms
@@ -34,6 +37,9 @@ class Observer:
 
     def value_decoded(self, signal: str, value: Any, now_s: float, stamp_s: float | None) -> None:
         """A message holds this value; `stamp_s`: by its header, on the car's clock."""
+
+    def number_decoded(self, signal: str, number: float, now_s: float, stamp_s: float | None) -> None:
+        """A message holds a number whose unit is not known."""
 
     def signals_changed(self, changed: tuple[str, ...], state: State, now_s: float) -> None:
         """A message changed these signals; what comes of it was judged."""
@@ -103,6 +109,7 @@ class OfflineRun:
             opened_s=from_s,
             at_s=from_s,
             recorded_alarms=Monitor(limits=limits).alarms,
+            reception=Reception(units=UnitWatch(deepcopy(self.drive.unit_evidence))),
         )
 
     @property
@@ -202,8 +209,10 @@ class OfflineRun:
             state=run_state.state,
             profile=self._epoch.tuning.profile,
             tyre_rad_per_unit=run_state.monitor.limits.steering.tyre_rad_per_unit,
+            units=self._epoch.tuning.settings.units,
             transport=self.drive.delay,
             on_value=self._observer.value_decoded,
+            on_number=self._observer.number_decoded,
         )
         if changed:
             if self._with_checks:

@@ -7,15 +7,17 @@ from typing import Any, Protocol
 
 from monitor.runner import Monitor, Transition
 from monitor.state import State
-from monitor.values import DriveMode, Steering
-from server.judge.active_settings import PERCENT_A_RAD
+from monitor.values import DriveMode
 from server.judge.message_fields import stamp_s
 from server.judge.profiles import Profile
 from server.judge.reception_stats import Reception
 from server.judge.topics import Source
+from server.judge.unit_watch import UnitBasis, number_of
+from server.judge.units import UNITS
 
 TICK_S = 0.05  # every check is judged this often
 
+NO_UNITS: Mapping[str, str] = {}
 ByTopic = Mapping[str, tuple[Source, ...]]
 
 
@@ -48,12 +50,16 @@ def receive(
     state: State,
     profile: Profile,
     tyre_rad_per_unit: float,
+    units: Mapping[str, str] = NO_UNITS,
     transport: Delays | None = None,
     on_value: Callable[[str, Any, float, float | None], None] | None = None,
+    on_number: Callable[[str, float, float, float | None], None] | None = None,
 ) -> tuple[str, ...]:
     """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock;
-    `tyre_rad_per_unit` of the steering signal, 0: not known; `transport` None: it came without
-    delay, as far as is known. `on_value` receives each decoded value: signal, value, `at_s`, stamp.
+    `tyre_rad_per_unit` of the steering signal, 0: not known; `units` are the operator's choices, signal → name;
+    `transport` None: it came without
+    delay, as far as is known. `on_value` receives each decoded value: signal, value, `at_s`, stamp; `on_number` each
+    number whose unit is not known, as it was published.
     """
     reception.received += 1
     stamp = stamp_s(message)
@@ -63,6 +69,14 @@ def receive(
     is_proper = True
     for source in sources:
         value = reception.read(source, message, note)
+        if value is not None and source.signal in UNITS:
+            basis = UnitBasis(profile=profile, chosen=units, tyre_rad_per_unit=tyre_rad_per_unit)
+            published = value
+            value = reception.in_unit(source, published, at_s, basis)
+            if reception.units.takes_back(source):
+                state.forget(source.signal)
+                if value is None and on_number is not None and (number := number_of(published)) is not None:
+                    on_number(source.signal, number, at_s, stamp)
         if value is None:
             tally = reception.tally(source.signal)
             if tally.why_not_measured is not None:
@@ -72,9 +86,9 @@ def receive(
             if source.decode is not None:
                 state.refuse(source.signal, tally.last_reason or "unreadable", at_s)
             continue
-        if type(value) is Steering:
-            value = steered(value, profile, tyre_rad_per_unit)
-        elif type(value) is DriveMode and (mode := profile.modes.get(value.said.casefold())) is not None:
+        if source.carries:
+            reception.units.see(source.signal, value, at_s)
+        if type(value) is DriveMode and (mode := profile.modes.get(value.said.casefold())) is not None:
             value = DriveMode(mode=mode, said=value.said)
         if on_value is not None:
             on_value(source.signal, value, at_s, stamp)
@@ -82,12 +96,6 @@ def receive(
     if not is_proper:
         reception.rejected += 1
     return changed
-
-
-def steered(signal: Steering, profile: Profile, tyre_rad_per_unit: float) -> Steering:
-    """The steering as the kind of car means it, from the number of its signal."""
-    percent = signal.percent * PERCENT_A_RAD if profile.steering == "tyre_angle" else signal.percent
-    return Steering(percent=percent, tyre_rad=signal.percent * tyre_rad_per_unit if tyre_rad_per_unit else None)
 
 
 def judge(

@@ -10,6 +10,8 @@ from server.judge.topic import Decode
 
 FULLEST_PERCENT = 10_000.0  # a hundred times all there is
 FASTEST_MPS = 150.0  # beyond that a wheel sensor or a unit is broken, not the car fast
+FASTEST_KMH = FASTEST_MPS * 3.6
+TOO_FAST = "a speed beyond the range of a car"
 
 
 def one_number(*path: str, minimum: float, maximum: float) -> Decode:
@@ -25,10 +27,10 @@ def one_number(*path: str, minimum: float, maximum: float) -> Decode:
     return decode
 
 
-def plausible_speed(value: float) -> float:
-    """A speed [m/s] as it is; raises Rejected where no car is as fast."""
-    if abs(value) > FASTEST_MPS:
-        raise Rejected("a speed beyond the range of a car")
+def plausible_speed(value: float, most: float = FASTEST_MPS) -> float:
+    """A speed [m/s] as it is; raises Rejected where no car is as fast. `most`: of another unit."""
+    if abs(value) > most:
+        raise Rejected(TOO_FAST)
     return value
 
 

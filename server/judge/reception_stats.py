@@ -9,6 +9,7 @@ from typing import Any
 
 from server.judge.message_fields import NotMeasured, Rejected
 from server.judge.topics import Source
+from server.judge.unit_watch import UnitBasis, UnitWatch
 
 MAX_REASONS = 20  # a hostile bridge must not fill the memory with reasons
 OTHER = "other reasons"
@@ -45,6 +46,7 @@ class Reception:
     rejected: int = 0
     unasked: int = 0  # messages on topics without a subscription
     frame_ids: dict[str, str] = field(default_factory=dict)  # topic → frame that its newest message names
+    units: UnitWatch = field(default_factory=UnitWatch)
 
     def tally(self, signal: str) -> Tally:
         found = self.by_signal.get(signal)
@@ -83,6 +85,19 @@ class Reception:
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError, IndexError) as error:
             # a decoder of ours did not foresee this shape: the message is refused all the same, and the shape is named
             tally.reject(f"unexpected shape: {type(error).__name__}")
+        return None
+
+    def in_unit(self, source: Source, value: Any, at_s: float, basis: UnitBasis) -> Any | None:
+        """A value that was read, in the unit of its signal; None where that is not known, which is counted as not
+        measured, or where its unit does not allow it."""
+        try:
+            return self.units.convert(source, value, at_s, basis)
+        except NotMeasured as why:
+            tally = self.tally(source.signal)
+            tally.not_measured += 1
+            tally.why_not_measured = str(why)
+        except Rejected as why:
+            self.tally(source.signal).reject(str(why))
         return None
 
     def junk(self, reason: str) -> None:

@@ -1,9 +1,15 @@
-"""The units that a signal may be published in, declared once."""
+"""The units that a signal may be published in, and what decides which one it is: declared once.
+
+`docs/signals.md` shows the rules.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+
+from server.judge.plausible import FASTEST_KMH, FASTEST_MPS
+from server.judge.topic import FLOATS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,13 +19,168 @@ class Unit:
     name: str  # in settings and commands
     label: str  # as the operator reads it
     factor: float | None  # to the unit of `monitor.signals`; None: follows from the kind of car
+    most: float  # a number beyond, of either sign, is not of this unit; noise is allowed for
 
 
-SHARE = Unit(name="share", label="0 to 1", factor=100.0)
-PERCENT = Unit(name="percent", label="0 to 100 %", factor=1.0)
+SHARE = Unit(name="share", label="0 to 1", factor=100.0, most=1.05)
+PERCENT = Unit(name="percent", label="0 to 100 %", factor=1.0, most=105.0)
+LITRES = Unit(name="litres", label="litres", factor=1.0, most=10_000.0)
+MPS = Unit(name="mps", label="m/s", factor=1.0, most=FASTEST_MPS)
+KMH = Unit(name="kmh", label="km/h", factor=1 / 3.6, most=FASTEST_KMH)
+STEERING_PERCENT = Unit(name="percent", label="-100 to 100 %, negative left", factor=1.0, most=105.0)
+TYRE_RAD = Unit(name="tyre_rad", label="tyre angle in rad, positive left", factor=None, most=1.2)
+TYRE_DEG = Unit(name="tyre_deg", label="tyre angle in degrees, positive left", factor=None, most=70.0)
+WHEEL_RAD = Unit(name="wheel_rad", label="steering wheel in rad", factor=None, most=25.0)
+WHEEL_DEG = Unit(name="wheel_deg", label="steering wheel in degrees", factor=None, most=1400.0)
+BY_RATIO = Unit(name="ratio", label="by the tyre angle per unit of steering", factor=None, most=10_000.0)  # a setting
+
+_PEDAL = (SHARE, PERCENT)
+_STEERING = (STEERING_PERCENT, TYRE_RAD, TYRE_DEG, WHEEL_RAD, WHEEL_DEG)
 
 UNITS: Mapping[str, tuple[Unit, ...]] = {
-    "fuel": (SHARE, PERCENT),
-    "brake": (SHARE, PERCENT),
-    "accelerator": (SHARE, PERCENT),
+    "speed": (MPS, KMH),
+    "fuel": (SHARE, PERCENT, LITRES),
+    "brake": _PEDAL,
+    "accelerator": _PEDAL,
+    "steering": _STEERING,
 }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnitRule:
+    """What decides the unit of a signal that comes in messages of some types."""
+
+    signals: tuple[str, ...]
+    types: tuple[str, ...]  # ROS 1 spelling
+    field: str
+    units: tuple[Unit, ...]  # that it may be in
+    definition: Unit | None  # by the message or by convention, unless the values contradict it; None: there is none
+    by_values: tuple[Unit, ...]  # what values alone can decide: the one of these that allows all of them
+    is_signed: bool = False  # a number below zero contradicts no unit
+    by_way: bool = False  # the way that follows from it is compared with the way of odometry and of the receiver
+    decided: str  # for readers of the table
+    source: str
+
+
+_VALUES = "all values at most 1: not known; one above 1: 0 to 100 %; one above 100, or below 0: not known"
+_WAY = (
+    "m/s; km/h where the way that follows from it is 3.6 times (±10 %) that of the odometry's pose or the receiver's "
+    "positions over 20 m faster than 2 m/s; not known where these contradict each other"
+)
+
+RULES: tuple[UnitRule, ...] = (
+    UnitRule(
+        signals=("speed",),
+        types=("geometry_msgs/Twist", "geometry_msgs/TwistStamped"),
+        field="linear.x",
+        units=(MPS, KMH),
+        definition=MPS,
+        by_values=(),
+        is_signed=True,
+        by_way=True,
+        decided=_WAY,
+        source="REP-103: SI units",
+    ),
+    UnitRule(
+        signals=("speed",),
+        types=FLOATS,
+        field="data",
+        units=(MPS, KMH),
+        definition=MPS,
+        by_values=(),
+        is_signed=True,
+        by_way=True,
+        decided=_WAY,
+        source="REP-103: SI units; the message has none",
+    ),
+    UnitRule(
+        signals=("brake", "accelerator"),
+        types=("geometry_msgs/Wrench",),
+        field="force.x",
+        units=_PEDAL,
+        definition=None,
+        by_values=_PEDAL,
+        decided=f"CATVehicle: 0 to 100 %; any other car: {_VALUES}",
+        source="profile of the CATVehicle; newton by geometry_msgs/Wrench, which no pedal has",
+    ),
+    UnitRule(
+        signals=("brake", "accelerator"),
+        types=FLOATS,
+        field="data",
+        units=_PEDAL,
+        definition=None,
+        by_values=_PEDAL,
+        decided=_VALUES,
+        source="the message has no unit",
+    ),
+    UnitRule(
+        signals=("steering",),
+        types=("geometry_msgs/Wrench",),
+        field="torque.z",
+        units=_STEERING,
+        definition=None,
+        by_values=(TYRE_RAD, STEERING_PERCENT),
+        is_signed=True,
+        decided="CATVehicle: percent; its simulator: rad; any other car: not known while all values are within ±1.2, "
+        "then percent; one beyond ±100: not known",
+        source="profiles of the CATVehicle, whose message it is",
+    ),
+    UnitRule(
+        signals=("steering",),
+        types=FLOATS,
+        field="data",
+        units=_STEERING,
+        definition=None,
+        by_values=(),
+        is_signed=True,
+        decided="not known: rad, degrees and percent have values in common; with the setting *Tyre angle per unit of "
+        "steering* the tyre angle is known all the same",
+        source="the message has no unit",
+    ),
+    UnitRule(
+        signals=("fuel",),
+        types=("sensor_msgs/BatteryState",),
+        field="percentage",
+        units=_PEDAL,
+        definition=SHARE,
+        by_values=_PEDAL,
+        decided="0 to 1; 0 to 100 % as soon as one value is above 1, also for values below 1; one above 100: not known",
+        source="sensor_msgs/BatteryState: charge percentage on 0 to 1 range",
+    ),
+    UnitRule(
+        signals=("fuel",),
+        types=FLOATS,
+        field="data",
+        units=(SHARE, PERCENT, LITRES),
+        definition=None,
+        by_values=_PEDAL,
+        decided=f"{_VALUES}; litres only by choice",
+        source="the message has no unit",
+    ),
+)
+
+
+def rule_for(signal: str, plain_type: str) -> UnitRule | None:
+    """The rule of a signal in messages of a type (ROS 1 spelling); None: its unit is not in doubt.
+
+    A type without a rule has that of a plain number; a nav_msgs/Odometry has its pose in the same message.
+    """
+    if signal not in UNITS or plain_type == "nav_msgs/Odometry":
+        return None
+    rules = [rule for rule in RULES if signal in rule.signals]
+    return next((rule for rule in rules if plain_type in rule.types), rules[-1])
+
+
+def unit_named(signal: str, name: str | None) -> Unit | None:
+    """A unit of a signal by its name; None: it has none of that name."""
+    return None if name is None else next((unit for unit in UNITS.get(signal, ()) if unit.name == name), None)
+
+
+def table() -> str:
+    """The rules as a Markdown table."""
+    head = ("| signal | type | field | unit | source |", "|---|---|---|---|---|")
+    rows = [
+        f"| {', '.join(rule.signals)} | {', '.join(rule.types)} | {rule.field} | {rule.decided} | {rule.source} |"
+        for rule in RULES
+    ]
+    return "\n".join((*head, *rows)) + "\n"

@@ -9,6 +9,7 @@ from monitor.alarm_order import standing
 from monitor.check import Verdict
 from server.judge.offline import OfflineRun
 from server.judge.run_state import RunState
+from server.judge.unit_questions import unit_questions
 from server.protocol import serialize
 from server.protocol.state import RecordedState
 from server.vehicle.mode_shown import mode_shown
@@ -59,8 +60,11 @@ def frame(run: OfflineRun, *, vehicle: str, name: str, settings_version: int, tr
         mode=mode_shown(
             run_state.state.get("mode"), epoch.sources.get("mode"), run_state.monitor.limits.driving, now_s
         ),
-        questions=epoch.choice.questions,
         operators={"control": {"holder": None}, "reach": None},  # not applicable to a recording
+        questions=(
+            *epoch.questions,
+            *unit_questions(run_state.reception.units, epoch.sources, epoch.tuning.settings.units),
+        ),
     )
     shown = state_frame(facts, run_state.state.glance(now_s), run_state.monitor)
     shown["session"]["name"] = name

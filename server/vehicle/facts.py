@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from monitor.state import LinkFacts
+from server.judge.unit_questions import unit_questions
 from server.protocol.departure import DepartureState
 from server.protocol.state import LiveState, RecordedState, ServerState
 from server.rosbridge.connection_errors import Problem
@@ -71,6 +72,7 @@ def frame_facts(
     operators = parts.authorization.as_json(now_s, wall_ms)
     operators["control"]["handover"] = parts.handover.as_json(now_s, wall_ms)
     connection, judgement, topics = parts.connection, parts.judgement, parts.connection.subscriptions
+    asked_units = unit_questions(judgement.reception.units, topics.signals.sources, parts.settings.settings.units)
     return Facts(
         vehicle=vehicle,
         now_s=now_s,
@@ -108,5 +110,5 @@ def frame_facts(
         decelerate=parts.slow_down.frame(),
         mode=parts.driving.frame(now_s, wall_ms),
         marks=parts.marks.count,
-        questions=topics.signals.questions if connection.phase == "monitoring" else (),
+        questions=(*topics.signals.questions, *asked_units) if connection.phase == "monitoring" else (),
     )

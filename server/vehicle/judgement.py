@@ -92,6 +92,7 @@ class Judgement:
             state=self.state,
             profile=self._tuning.profile,
             tyre_rad_per_unit=self.monitor.limits.steering.tyre_rad_per_unit,
+            units=self._tuning.settings.units,
             transport=self.transport,
         )
         if changed:

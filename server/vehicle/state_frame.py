@@ -226,7 +226,7 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         freshness = "not_published"
     return {
         "label": signal.label,
-        "unit": signal.unit,
+        "unit": signal.unit if source is None or _is_unit_known(facts, source) else "",
         "freshness": freshness,
         "age_s": serialize.plain(reading.age_s(facts.now_s), 3) if reading else None,
         "delay_s": serialize.plain(reading.delay_s, 3) if reading else None,
@@ -241,7 +241,8 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "note": (unusable.words if unusable else None)
         or (source.note if source else undecided)
         or (_unknown_part(reading.value) if reading else None)
-        or (habit_words(snapshot.scan_habit) if signal.name == "scan" else None),
+        or (habit_words(snapshot.scan_habit) if signal.name == "scan" else None)
+        or (facts.reception.units.note(signal.name, source.topic) if source else None),
         "unusable": unusable.words if unusable else None,
         "count": tally.received,
         "rejected": tally.rejected,
@@ -252,6 +253,11 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "lowest": serialize.plain(extent.lowest) if extent else None,
         "highest": serialize.plain(extent.highest) if extent else None,
     }
+
+
+def _is_unit_known(facts: Facts, source: Source) -> bool:
+    decision = facts.reception.units.decision(source.signal, source.topic)
+    return decision is None or decision.unit is not None or decision.is_rest
 
 
 def _unknown_part(value: Any) -> str | None:

@@ -10,6 +10,7 @@ from typing import Any, Literal, get_args
 
 from monitor import catalog
 from monitor.values import Mode
+from server.judge.units import unit_named
 
 SteeringUnit = Literal["percent", "tyre_angle", "unknown"]
 
@@ -21,6 +22,7 @@ class Profile:
     name: str
     title: str
     steering: SteeringUnit = "unknown"  # what torque.z of the steering topic means; its ratio is a threshold
+    units: Mapping[str, str] = field(default_factory=dict)  # signal → name of the unit that a car of this kind has
     modes: Mapping[str, Mode] = field(default_factory=dict)  # words and numbers of its mode topic, in lower case
     limits: Mapping[str, float] = field(default_factory=dict)  # thresholds that differ from the checks' own defaults
     has: tuple[str, ...] = ()  # topics that a car of this kind has, whatever the case of their letters
@@ -51,6 +53,10 @@ def load() -> dict[str, Profile]:
 
 def _read(name: str, body: Mapping[str, Any]) -> Profile:
     match = body.get("match", {})
+    units = body.get("units", {})
+    for signal, unit in units.items():
+        if unit_named(signal, unit) is None:
+            raise ValueError(f"{name}: {signal} has no unit {unit!r}")
     limits = {
         f"{group}.{threshold}": value
         for group, values in body.get("limits", {}).items()
@@ -61,6 +67,7 @@ def _read(name: str, body: Mapping[str, Any]) -> Profile:
         name=name,
         title=body["title"],
         steering=body.get("steering", "unknown"),
+        units=units,
         modes={word.casefold(): mode for mode in get_args(Mode) for word in body.get("mode", {}).get(mode, ())},
         limits=limits,
         has=tuple(match.get("has", ())),

@@ -12,15 +12,15 @@ from server.judge.topic import Topic, floats
 
 
 def level(message: Any) -> Level:
-    return Level(value=_not_below_zero(finite(message, "data")), unit="%")
+    """A number in the unit of the topic, which `server.judge.units` decides."""
+    return Level(value=_not_below_zero(finite(message, "data")), unit="")
 
 
 def battery(message: Any) -> Level:
-    """`percentage` is 0 … 1 by definition, and 0 … 100 in many a driver. Raises NotMeasured where it is not known."""
+    """As `level`, by `percentage`. Raises NotMeasured where it is not known."""
     NO_BATTERY.demand(message)
     NO_PERCENTAGE.demand(message)
-    share = _not_below_zero(finite(message, "percentage"))
-    return Level(value=share * 100 if share <= 1.0 else share, unit="%")
+    return Level(value=_not_below_zero(finite(message, "percentage")), unit="")
 
 
 def _not_below_zero(value: float) -> float:

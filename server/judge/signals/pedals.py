@@ -11,11 +11,12 @@ from server.judge.topic import Topic, floats
 
 
 def effort(message: Any) -> Effort:
-    """Percent in force.x of a Wrench, as the car's pedals have it."""
+    """By force.x of a Wrench, where the CATVehicle has percent; `server.judge.units` decides."""
     return Effort(percent=plausible_percent(finite(message, "force", "x")))
 
 
 def effort_of_float(message: Any) -> Effort:
+    """As `effort`."""
     return Effort(percent=plausible_percent(finite(message, "data")))
 
 

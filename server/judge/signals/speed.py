@@ -9,7 +9,7 @@ from typing import Any
 from monitor.values import Twist
 from server.judge.frame_words import is_earth_fixed
 from server.judge.message_fields import finite, inner, known, number, text
-from server.judge.plausible import plausible_speed
+from server.judge.plausible import FASTEST_KMH, plausible_speed
 from server.judge.topic import Topic, floats
 
 SIDEWAYS = 0.25  # of the way made: a car rolls forwards or backwards, and slips a little
@@ -17,13 +17,13 @@ MOVES_MPS = 1.0  # below it what is measured sideways may be noise
 
 
 def twist(message: Any) -> Twist:
-    """Speed of a geometry_msgs/Twist in the frame of the car. What goes sideways as no car can is east and north: then
-    the way made is the speed."""
+    """Speed of a geometry_msgs/Twist in the frame of the car, in the unit of the topic, which `server.judge.units`
+    decides. What goes sideways as no car can is east and north: then the way made is the speed."""
     yaw_rate = number(message, "angular", "z") if isinstance(message, Mapping) and "angular" in message else math.nan
     x, y = finite(message, "linear", "x"), _sideways(message)
     way = math.hypot(x, y)
     speed = way if way > MOVES_MPS and abs(y) > SIDEWAYS * way else x
-    return Twist(speed_mps=plausible_speed(speed), yaw_rate_radps=known(yaw_rate))
+    return Twist(speed_mps=plausible_speed(speed, FASTEST_KMH), yaw_rate_radps=known(yaw_rate))
 
 
 def twist_stamped(message: Any) -> Twist:
@@ -36,7 +36,7 @@ def twist_stamped(message: Any) -> Twist:
 def way_made(message: Any) -> Twist:
     """Speed of a velocity in east and north: never negative, for it does not say where the nose of the car points."""
     way = math.hypot(finite(message, "linear", "x"), finite(message, "linear", "y"))
-    return Twist(speed_mps=plausible_speed(way), yaw_rate_radps=None)
+    return Twist(speed_mps=plausible_speed(way, FASTEST_KMH), yaw_rate_radps=None)
 
 
 def way_made_stamped(message: Any) -> Twist:
@@ -66,7 +66,8 @@ def twist_of_odometry(message: Any) -> Twist:
 
 
 def speed_of_float(message: Any) -> Twist:
-    return Twist(speed_mps=plausible_speed(finite(message, "data")), yaw_rate_radps=None)
+    """As `twist`."""
+    return Twist(speed_mps=plausible_speed(finite(message, "data"), FASTEST_KMH), yaw_rate_radps=None)
 
 
 TOPICS = (

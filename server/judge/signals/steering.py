@@ -11,11 +11,12 @@ from server.judge.topic import Topic, floats
 
 
 def steering(message: Any) -> Steering:
-    """Percent in torque.z of a Wrench, negative = left."""
+    """By torque.z of a Wrench, where the CATVehicle has percent, negative = left; `server.judge.units` decides."""
     return Steering(percent=plausible_percent(finite(message, "torque", "z")))
 
 
 def steering_of_float(message: Any) -> Steering:
+    """As `steering`."""
     return Steering(percent=plausible_percent(finite(message, "data")))
 
 

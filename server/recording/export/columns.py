@@ -10,6 +10,7 @@ from typing import Any
 from monitor.signals import SIGNALS, Signal
 from monitor.values import Diagnostics, LaserScan
 
+WITHOUT_UNIT = "-unit-unknown.csv"  # the end of a table's name, after that of its signal
 TIMES = ("time", "since start [s]", "stamp by the car [s since 1970]")
 
 

@@ -18,6 +18,7 @@ from server.recording.read.read import Recording
 REPORT_EVERY = 1000  # messages
 
 OnValue = Callable[[str, Any, float, float | None], None]
+OnNumber = Callable[[str, float, float, float | None], None]
 
 
 class DecodedDrive:
@@ -44,14 +45,22 @@ class DecodedDrive:
         """The topic of each signal at the beginning."""
         return self._drive.epochs[0].sources
 
-    def read(self, on_value: OnValue, *, signals: Collection[str] | None = None, progress: Progress = nothing) -> None:
+    def read(
+        self,
+        on_value: OnValue,
+        *,
+        on_number: OnNumber | None = None,
+        signals: Collection[str] | None = None,
+        progress: Progress = nothing,
+    ) -> None:
         """Reads all values of the signals (None: of all) in the order of their reception.
 
-        `on_value` receives signal, value, seconds since 1970 and the stamp by the car. Raises RecordingUnreadable.
+        `on_value` receives signal, value, seconds since 1970 and the stamp by the car; `on_number` the same of numbers
+        whose unit is not known. Raises RecordingUnreadable.
         """
         recording = self.recording
         drive = self._drive if signals is None else self._of(signals)
-        run = OfflineRun(recording, drive, observer=_Values(drive, on_value, progress), with_checks=False)
+        run = OfflineRun(recording, drive, observer=_Values(drive, on_value, on_number, progress), with_checks=False)
         self.reception = run.run_state.reception
         run.advance(math.inf, to_last_message=True)
 
@@ -92,9 +101,9 @@ class DecodedDrive:
 class _Values(Observer):
     """Reports the values of a run with their time of day."""
 
-    def __init__(self, drive: Drive, on_value: OnValue, progress: Progress) -> None:
+    def __init__(self, drive: Drive, on_value: OnValue, on_number: OnNumber | None, progress: Progress) -> None:
         self._start_s, self._length_s = drive.start_s, max(drive.length_s, 1e-9)
-        self._on_value = on_value
+        self._on_value, self._on_number = on_value, on_number
         self._progress = progress
         self._messages = 0
 
@@ -107,3 +116,8 @@ class _Values(Observer):
     def value_decoded(self, signal: str, value: Any, now_s: float, stamp_s: float | None) -> None:
         """Reports the value."""
         self._on_value(signal, value, self._start_s + now_s, stamp_s)
+
+    def number_decoded(self, signal: str, number: float, now_s: float, stamp_s: float | None) -> None:
+        """Reports the number."""
+        if self._on_number is not None:
+            self._on_number(signal, number, self._start_s + now_s, stamp_s)

@@ -1,0 +1,141 @@
+"""Reads those topics of a recording whose unit the values decide, before it is judged.
+
+A decision then does not depend on where a replay begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from server.judge.topic import FLOATS
+from server.judge.topics import Source, plain_type
+from server.judge.unit_evidence import Evidence, new_evidence
+from server.judge.unit_watch import PLACES, Key, UnitBasis, number_of, read
+from server.judge.units import UnitRule, rule_for
+
+MOST_VALUES = 500_000  # of the surveyed topics; what comes later is taken as it comes
+MOST_FOR_SPEED = 4_000  # messages of a speed in m/s by its definition, and of what it is compared with
+REFERENCES = ("odometry", "position")
+
+
+class Rows(Protocol):
+    """Messages of a recording."""
+
+    @property
+    def start_s(self) -> float: ...
+    @property
+    def rejected(self) -> dict[str, int]: ...
+
+    def rows(
+        self, start_s: float = 0.0, topics: Collection[str] | None = None
+    ) -> Iterator[tuple[float, str, str, Any]]: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surveyed:
+    """What is read under one version of the settings: topic as the recording spells it → what it fills."""
+
+    listeners: Mapping[str, Sequence[Source]]  # of the signals that are wanted
+    all_listeners: Mapping[str, Sequence[Source]]
+    basis: UnitBasis
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Target:
+    source: Source
+    rule: UnitRule
+    evidence: Evidence
+
+
+def survey(recording: Rows, epochs: Sequence[Surveyed]) -> dict[Key, Evidence]:
+    """The evidence of the whole drive, by signal and topic as a bridge spells it; nothing is read where nothing is in
+    doubt. What cannot be read ends it: the run that follows reports that."""
+    targets = _targets(epochs)
+    if not targets:
+        return {}
+    speeds = [target for rows in targets.values() for target in rows if target.rule.by_way]
+    references = _references(epochs) if speeds else {}
+    is_short = all(_has_unit(target) for rows in targets.values() for target in rows)
+    if is_short and not references:
+        return {}
+    counted = dict(recording.rejected)
+    is_over = False
+    with suppress(Exception):
+        is_over = _read(recording, targets, references, speeds, MOST_FOR_SPEED if is_short else MOST_VALUES, is_short)
+    recording.rejected.clear()
+    recording.rejected.update(counted)  # they are counted when they are judged
+    found = {}
+    for rows in targets.values():
+        for target in rows:
+            target.evidence.is_whole = is_over
+            found[target.source.signal, target.source.topic] = target.evidence
+    return found
+
+
+def _targets(epochs: Sequence[Surveyed]) -> dict[str, list[_Target]]:
+    found: dict[str, list[_Target]] = {}
+    known: set[Key] = set()
+    for epoch in epochs:
+        for topic, sources in epoch.listeners.items():
+            for source in sources:
+                rule = rule_for(source.signal, plain_type(source.type or ""))
+                key = (source.signal, source.topic)
+                if rule is None or source.decode is None or key in known:
+                    continue
+                if epoch.basis.unit_of(source.signal) is None:
+                    known.add(key)
+                    target = _Target(source=source, rule=rule, evidence=new_evidence(source.signal, rule))
+                    found.setdefault(topic, []).append(target)
+    return found
+
+
+def _references(epochs: Sequence[Surveyed]) -> dict[str, list[Source]]:
+    return {
+        topic: [source for source in sources if source.signal in REFERENCES and source.decode is not None]
+        for epoch in epochs
+        for topic, sources in epoch.all_listeners.items()
+        if any(source.signal in REFERENCES and source.decode is not None for source in sources)
+    }
+
+
+def _has_unit(target: _Target) -> bool:
+    """By its definition: only its way could contradict it."""
+    return target.rule.by_way and plain_type(target.source.type or "") not in FLOATS
+
+
+def _read(
+    recording: Rows,
+    targets: Mapping[str, Sequence[_Target]],
+    references: Mapping[str, Sequence[Source]],
+    speeds: Sequence[_Target],
+    most: int,
+    is_short: bool,
+) -> bool:
+    """Whether everything was read."""
+    taken = 0
+    compared = {source.signal for sources in references.values() for source in sources}
+    for row_s, topic, _, message in recording.rows(0.0, frozenset((*targets, *references))):
+        here, there = targets.get(topic, ()), references.get(topic, ())
+        if not here and not there:
+            continue
+        taken += 1
+        if taken > most:
+            return False
+        at_s = row_s - recording.start_s
+        for target in here:
+            number = number_of(read(target.source, message))
+            if number is not None:
+                target.evidence.add(number, target.rule.units)
+                if target.evidence.ways is not None:
+                    target.evidence.ways.add_speed(number, at_s)
+        for source in there:
+            place = read(source, message)
+            for target in speeds:
+                if target.evidence.ways is not None and isinstance(place, PLACES):
+                    target.evidence.ways.add_place(source.signal, place, at_s)
+            if is_short and all(t.evidence.ways is not None and t.evidence.ways.compared >= compared for t in speeds):
+                return False
+    return True
