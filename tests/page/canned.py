@@ -352,7 +352,8 @@ class Canned:
 
         @self.app.get("/api/signals")
         async def signals() -> Json:
-            offered = {one["topic"]: one["type"] for one in self.state["signals"].values() if one["topic"] and one["type"]}
+            known = [one for one in self.state["signals"].values() if one["topic"] and one["type"]]
+            offered = {one["topic"]: one["type"] for one in known}
             found = candidates(offered) | self.candidates
             return {"candidates": found, "topics": [{"topic": "/rosout", "type": "rosgraph_msgs/Log"}]}
 

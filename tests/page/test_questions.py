@@ -215,6 +215,25 @@ async def test_a_note_on_the_mounting_stands_on_scan_and_leads_to_its_settings(p
     await expect(note).to_be_hidden()
 
 
+@pytest.mark.parametrize("size", [(820, 1180), (1440, 900)])
+async def test_on_a_wide_screen_keys_scale_and_note_cover_one_another_nowhere(
+    phone: Phone, canned: Canned, size: tuple[int, int]
+) -> None:
+    await phone.page.set_viewport_size({"width": size[0], "height": size[1]})
+    canned.state["signals"]["scan"]["note"] = "assumed to look ahead: no transforms, and no setting"
+    canned.state["signals"]["distance"] |= {"value": None, "age_s": None, "freshness": "not_measured"}
+    await home(phone, canned)
+    await expect(phone.page.locator(".mapv .sc")).to_be_attached()
+    await expect(phone.f("note", "#panel-scan")).to_be_visible()
+    await phone.drawn()
+    for one, other in ((".mapv .sc", ".fabs"), (".scan-note", '[data-panel="scan"] .zoom'), (".compass", ".mapv .sc")):
+        assert not await phone.page.evaluate(OVERLAP, [one, other]), one
+    trend = '.trends-pane[data-signal="distance"] .v' if size[0] == 1440 else '[data-trend="distance"] .row .n'
+    await expect(phone.page.locator(trend)).to_have_text("–")
+    await phone.f("note", "#panel-scan").click()
+    await expect(phone.page.locator("#tab-settings")).to_have_attribute("aria-selected", "true")
+
+
 FIELD = {
     "title": "Laser turned to the left", "heading": "Vehicle", "unit": "°", "default": 0.0, "minimum": -180.0,
     "maximum": 180.0, "step": 0.5,
