@@ -1,6 +1,6 @@
 // What stands behind one signal: its source and why, what else there is, its frame and unit, and the keys that change them.
 
-import { html, setAttribute, setWords, words } from '../core/dom.js';
+import { html, setAttribute, words } from '../core/dom.js';
 import { openTopicPicker } from '../settings/topic-picker.js';
 import { settingsOf } from '../settings/settings-model.js';
 
@@ -94,8 +94,7 @@ export class SignalMore {
 
   /** @param {string} unit '': as found @param {string} label */
   #unitKey(unit, label) {
-    const key = html('button', { type: 'button', class: 'key', 'data-unit': unit, 'data-operator': '' });
-    setWords(key, label);
+    const key = html('button', { type: 'button', class: 'key', 'data-unit': unit, 'data-operator': '' }, html('span', {}, ...words(label)));
     key.addEventListener('click', async () => {
       const outcome = await this.feed.model.set({ units: { [this.name]: unit || null } });
       if (!outcome.ok) this.say(outcome.reason ?? 'Refused.', 'Unit not changed');
