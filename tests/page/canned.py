@@ -348,12 +348,14 @@ class Canned:
 
         @self.app.get("/api/settings")
         async def settings() -> Json:
-            return ActiveSettings(SettingsFile(None)).as_json()
+            return cast(Json, ActiveSettings(SettingsFile(None)).as_json()) | self.settings
 
         @self.app.get("/api/signals")
         async def signals() -> Json:
-            offered = {one["topic"]: one["type"] for one in self.state["signals"].values() if one["topic"]}
-            return {"candidates": candidates(offered), "topics": [{"topic": "/rosout", "type": "rosgraph_msgs/Log"}]}
+            known = [one for one in self.state["signals"].values() if one["topic"] and one["type"]]
+            offered = {one["topic"]: one["type"] for one in known}
+            found = candidates(offered) | self.candidates
+            return {"candidates": found, "topics": [{"topic": "/rosout", "type": "rosgraph_msgs/Log"}]}
 
         @self.app.get("/api/checks/{name}")
         async def one_check(name: str, response: Response) -> Json:
@@ -456,6 +458,8 @@ class Canned:
         ]
         self.ground: Json = {"layers": [], "image": None}
         self.log: list[Json] = []  # newest first
+        self.candidates: dict[str, list[Json]] = {}  # of a signal, in the place of those by type
+        self.settings: Json = {}  # what differs of `GET /api/settings`
         self.checks: dict[str, Json] = {}  # the answer for each check that is requested by its id
         self.timeline: Json | None = None  # of the recording that a page asks to replay
         self.mails: list[Json] = []

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { distance_m, offsetOf, placeAt } from '../../static/js/core/geodesy.js';
 import {
-  CLOSEST, FIRST, WIDEST, between, bounded, ellipseOf, fitted, gridPaths, gridStep_m, groundMatrix, metresOf, panned, pictureMatrix, pixelOf, scaleBar_m, tileScale,
+  CLOSEST, FIRST, WIDEST, between, bounded, clearTop, ellipseOf, fitted, gridPaths, gridStep_m, groundMatrix, metresOf, overlap, panned, pictureMatrix, pixelOf, scaleBar_m, tileScale,
   upOf, zoomed,
 } from '../../static/js/map/map-layout.js';
 import { besideWay, inside } from '../../static/js/map/map-figure.js';
@@ -345,4 +345,24 @@ test('the number stands beside its way and never on it', () => {
     }
   }
   assert.ok(besideWay([[252, 312], [206, 250]], SIZE)[0] < 206); // as the pictures of the design have it: at the left
+});
+
+test('words stand where nothing is taken, as near to their place as can be, or nowhere', () => {
+  const keys = { left: 218, top: 80, width: 188, height: 44 };
+  const head = { left: 64, top: 0, width: 412, height: 28 };
+  const words = { left: 210, top: 90, width: 90, height: 19 };
+  assert.equal(clearTop(words, [], 130), 90);
+  const top = clearTop(words, [keys, head], 130);
+  assert.ok(top !== null && top < 80 && top > 40, String(top));
+  assert.ok(![keys, head].some((one) => overlap({ ...words, top: top ?? 0 }, one)));
+  assert.equal(clearTop({ ...words, top: 2 }, [keys, head], 130), 29);
+  assert.equal(clearTop(words, [{ left: 0, top: 0, width: 400, height: 130 }], 130), null);
+  assert.equal(clearTop({ ...words, left: 10 }, [keys, head], 130), 90); // beside the keys
+});
+
+test('the bar of the scale keeps to the room that the keys leave', () => {
+  for (let mpp = CLOSEST; mpp <= WIDEST; mpp *= 1.07) {
+    for (const room of [150, 134, 72]) assert.ok(scaleBar_m(mpp, room) / mpp <= room, `${mpp} ${room}`);
+  }
+  assert.equal(scaleBar_m(FIRST, 134), 10);
 });

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, readScan } from '../../static/js/scan/scan-frame.js';
-import { NOT_IN_VIEW, beamWords, behind, clearOf, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
+import { NOT_IN_VIEW, beamWords, behind, clearOf, coversAny, namedSectors, pinched, placeOf, plotScale, pointsOf, reachWithin, ringsOf, sectorSentences, sectorsOf, unseenOf, zoomed } from '../../static/js/scan/scan-layout.js';
 import { edgesOf, endOf } from '../../static/js/scan/scan-corridor.js';
 import { beside, follow, nearestShown, nearestTo } from '../../static/js/scan/scan-pick.js';
 import { ScanMark } from '../../static/js/scan/scan-mark.js';
@@ -226,4 +226,13 @@ test('a plot too low for its foot still has a scale: what lies ahead is above, a
     assert.ok(k > 0 && far_m > 0, String(height));
     assert.ok(at(5, 0)[1] < at(0, 0)[1], String(height));
   }
+});
+
+test('words that would cover a return are found', () => {
+  const scale = { cx: 200, cy: 300, k: 10 };
+  const box = { left: 100, top: 190, width: 60, height: 20 };
+  assert.ok(coversAny(box, [10, 7], scale)); // 10 m ahead and 7 m left is at 130, 200
+  assert.ok(coversAny(box, [0, 0, 10, 3.9], scale)); // its square of 5 px reaches into the box
+  assert.ok(!coversAny(box, [10, -7, 12.5, 7, 10, 3], scale));
+  assert.ok(!coversAny(box, [], scale));
 });

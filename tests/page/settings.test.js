@@ -160,7 +160,7 @@ test('what can be picked: the own choice of the server, what is gone, what fits'
   const fits = [{ topic: '/vel', type: 'T' }, { topic: '/odom', type: 'O' }];
   assert.deepEqual(optionsOf(fits, '/vel', undefined).map(({ topic, says, isChosen }) => [topic, says, isChosen]), [[null, 'now /vel', true], ['/vel', 'T · now', false], ['/odom', 'O', false]]);
   assert.deepEqual(optionsOf(fits, null, '/gone').map(({ topic, isChosen }) => [topic, isChosen]), [[null, false], ['/gone', true], ['/vel', false], ['/odom', false]]);
-  assert.deepEqual(optionsOf(null, null, '/x').map(({ topic, says }) => [topic, says]), [[null, 'by name, then by type'], ['/x', 'picked']]);
+  assert.deepEqual(optionsOf(null, null, '/x').map(({ topic, says }) => [topic, says]), [[null, 'by type, publisher, namespace, frame and name'], ['/x', 'picked']]);
   assert.deepEqual(optionsOf([], null, undefined).map(({ says }) => says), ['no match now']);
 });
 

@@ -27,7 +27,9 @@ async def test_home_and_signals_say_not_measured_and_why(phone: Phone, canned: C
         await expect(phone.f(name)).to_have_text("not measured")
     await expect(phone.f("brake")).to_have_text("no value")
     await expect(phone.page.locator(".near [data-f=none]")).to_have_text("not measured")
-    await expect(phone.page.locator("#panel-home .gauge")).to_contain_text("not measured")
+    await expect(phone.page.locator("#panel-home .gauge .aval")).to_have_text("acceleration –")
+    meter = phone.page.get_by_role("meter", name="Acceleration")
+    await expect(meter).to_have_attribute("aria-valuetext", "not measured")
     assert await phone.page.locator("#panel-home .n, #panel-home .v").evaluate_all(CUT) == []
     assert await phone.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     await phone.page.evaluate("dispatchEvent(new CustomEvent('catgraph-open', { detail: { screen: 'signals' } }))")

@@ -6,6 +6,8 @@ export const LAG_GRACE_S = 0.6;
 /**
  * @typedef {import('./protocol-types.js').SignalState<any>} Signal
  * @typedef {import('./protocol-types.js').SignalFreshness} Freshness
+ * @typedef {import('./protocol-types.js').Question} Question
+ * @typedef {Freshness | 'not_chosen' | 'not_in_unit'} Ink not_chosen: which topic carries the signal is asked; not_in_unit: its unit is asked
  */
 
 /**
@@ -21,4 +23,18 @@ export function freshnessStyle(signal, lag_s) {
   if (signal.freshness === 'stale') return { ink: 'stale', age_s };
   if (lag_s <= LAG_GRACE_S) return { ink: signal.freshness, age_s };
   return { ink: age_s > (signal.horizon_s ?? 1) ? 'stale' : 'ageing', age_s };
+}
+
+/**
+ * The same of a signal of which a question stands: a value that is missing is not missing by the car.
+ * @param {{ink: Freshness, age_s: number | null}} state
+ * @param {string} signal
+ * @param {Question[] | undefined} questions that stand
+ * @returns {{ink: Ink, age_s: number | null}}
+ */
+export function withQuestion(state, signal, questions) {
+  if (state.age_s !== null) return state;
+  const question = questions?.find((one) => one.signal === signal);
+  if (!question) return state;
+  return { ink: question.kind === 'source' ? 'not_chosen' : 'not_in_unit', age_s: null };
 }

@@ -3,13 +3,14 @@
 import { setAttribute, setText } from './dom.js';
 import { age } from './format.js';
 
-/** @typedef {import('./protocol-types.js').SignalFreshness} Freshness */
+/** @typedef {import('./freshness.js').Ink} Freshness */
 
-/** @typedef {'not_measured' | 'no_value' | 'never' | 'not_published'} Absent */
+/** @typedef {'not_measured' | 'no_value' | 'never' | 'not_published' | 'not_chosen' | 'not_in_unit'} Absent */
 
 /** What stands in the place of a value that never came. */
 export const ABSENT = /** @type {Record<Absent, string>} */ ({
   not_measured: 'not measured', no_value: 'no value', never: 'no message yet', not_published: 'not published',
+  not_chosen: 'not chosen', not_in_unit: 'unit unknown',
 });
 
 /** @param {Freshness} ink @returns {ink is Absent} */

@@ -7,3 +7,20 @@
 export function openScreen(screen, of) {
   window.dispatchEvent(new CustomEvent('catgraph-open', { detail: { screen, of } }));
 }
+
+/** What is to be searched for in Settings, which may not be loaded yet. */
+let wanted = '';
+
+/** Shows the settings that a search finds. @param {string} query */
+export function openSettings(query) {
+  wanted = query;
+  location.hash = '#settings';
+  window.dispatchEvent(new Event('catgraph-settings'));
+}
+
+/** What is to be searched for, once; '': nothing. */
+export function takeWanted() {
+  const query = wanted;
+  wanted = '';
+  return query;
+}

@@ -4,7 +4,7 @@ import { ServerClock } from './clock.js';
 import { DeadMan } from './dead-man.js';
 import { Emitter } from './emitter.js';
 import { EventLog } from './event-log.js';
-import { freshnessStyle } from './freshness.js';
+import { freshnessStyle, withQuestion } from './freshness.js';
 import { chainOf } from './link.js';
 import { Known } from './known.js';
 import { challengeOf, fenceOf } from './live-car.js';
@@ -180,7 +180,7 @@ export class Store extends Known {
 
   /** How much ink a signal deserves now. @param {string} name */
   ink(name) {
-    return freshnessStyle(this.signal(name), this.lag_s);
+    return withQuestion(freshnessStyle(this.signal(name), this.lag_s), name, this.frame?.questions);
   }
 
   /**

@@ -1,7 +1,8 @@
 // The chart of the whole drive: up to four signals on one clock, live and of a recording. It fills any box from 300 × 200 px on.
 
 import { listen, setAttribute, setWords, show, svg } from '../core/dom.js';
-import { timeOfDay } from '../core/format.js';
+import { NOTHING, timeOfDay } from '../core/format.js';
+import { isAbsent } from '../core/ink.js';
 import { Brush } from './drive-brush.js';
 import { chosenSignals } from './drive-choice.js';
 import { DriveFeed } from './drive-feed.js';
@@ -224,7 +225,7 @@ class DriveChart {
         pane.write(isBlind ? 'no data' : foundWords(found, spec), 'fresh', found.kind === 'value' && !isBlind, true);
       } else if (this.scope.follows && !this.feed.isLate && !store.isSilent) {
         const { ink, text, value } = nowOf(spec, store);
-        pane.write(text, ink, value !== null);
+        pane.write(isAbsent(ink) && pane.isLow ? NOTHING : text, ink, value !== null);
       } else pane.write('–', 'fresh', true);
     }
   }

@@ -7,6 +7,8 @@ import { shownIn } from '../core/units.js';
 import { clockWords, extentOf, lineOf, valueTicks } from './drive-layout.js';
 import { AXIS_PX, axisOf, BARE, INCRS_S, LOW_PX, PaneStack, plotSize } from './pane-stack.js';
 
+/** A pane that is lower has no room for words of two lines under its label [px]. */
+const WORDS_PX = 72;
 /** Width of the value axes [px]. */
 const VALUES_PX = 38;
 
@@ -81,6 +83,11 @@ class Pane {
     const shown = (/** @type {number | null} */ value) => shownIn(value, this.spec.unit).value;
     const begin_s = (answer?.start_ms ?? 0) / 1000;
     this.plot.setData(/** @type {any} */ ([line.times_s.map((at_s) => begin_s + at_s), line.lowest.map(shown), line.highest.map(shown)]), false); // drawn with the view
+  }
+
+  /** Too low for words of two lines beside it. */
+  get isLow() {
+    return this.plot.height < WORDS_PX;
   }
 
   resize() {

@@ -1,6 +1,6 @@
 // The gauge: speed over 180°, acceleration within, the operator's limit at the edge.
 
-import { html, setAttribute, setText, show, svg } from '../core/dom.js';
+import { html, need, setAttribute, setText, show, svg } from '../core/dom.js';
 import { accelerationAngle, band, digitsBox, faceOf, orderMark, speedAngle } from './gauge-layout.js';
 import { ABSENT, isAbsent } from '../core/ink.js';
 import { orderOf } from '../slowdown/slow-layout.js';
@@ -80,7 +80,7 @@ class Gauge {
   draw() {
     this.#drawFace();
     const { root, store } = this;
-    const { speed, box, struck, unit, note, speedMeter } = this.parts;
+    const { speed, box, struck, unit, note, why, speedMeter } = this.parts;
     const scale = this.#scale();
     const speedInk = store.ink('speed');
     const speed_mps = number(store.signal('speed')?.value?.speed_mps);
@@ -99,7 +99,10 @@ class Gauge {
     const isBack = isSpeedKnown && speed_mps < 0 && digits.startsWith('−');
     setAttribute(unit, 'x', block.unitX);
     setText(unit, isSpeedKnown ? (isBack ? `${unitWord} back` : unitWord) : '');
-    setText(note, noteOf(speedInk, isSpeedKnown));
+    const words = noteOf(speedInk, isSpeedKnown);
+    setText(note, words);
+    show(why, words !== '');
+    setAttribute(why, 'aria-label', `Speed: ${words}. Show its source`);
     const isSpeedNow = isSpeedKnown && speedInk.ink !== 'stale';
     const isOrdered = this.#drawOrder(isSpeedNow ? speed_mps : null, scale);
     meter(speedMeter, isSpeedNow ? Math.abs(speedIn(speed_mps)) : null, speedIn(scale.speed_max_mps), `${digits} ${spokenSpeedUnit()}${isOrdered}`);
@@ -114,11 +117,12 @@ class Gauge {
     const push = number(store.signal('acceleration')?.value?.acceleration_mps2);
     const isPushKnown = push !== null && !isAbsent(pushInk.ink);
     setAttribute(root, 'data-push', isPushKnown ? pushInk.ink : 'never');
-    const why = !isPushKnown && isAbsent(pushInk.ink) && pushInk.ink !== 'never' ? ABSENT[pushInk.ink] : '';
-    setText(acceleration, why || (isPushKnown ? signed(push) : '–'));
-    setText(accelerationUnit, why ? '' : 'm/s²');
+    const why = isAbsent(pushInk.ink) ? ABSENT[pushInk.ink] : 'unknown';
+    setAttribute(need(root, '.aval'), 'data-none', !isPushKnown);
+    setText(acceleration, isPushKnown ? signed(push) : 'acceleration –'); // by name: it stands right above the speed
+    setText(accelerationUnit, isPushKnown ? 'm/s²' : '');
     setAttribute(accelerationMeter, 'aria-valuemin', -scale.acceleration_max_mps2);
-    meter(accelerationMeter, isPushKnown && pushInk.ink !== 'stale' ? push : null, scale.acceleration_max_mps2, `${signed(push)} metres per second squared`);
+    meter(accelerationMeter, isPushKnown && pushInk.ink !== 'stale' ? push : null, scale.acceleration_max_mps2, `${signed(push)} metres per second squared`, why);
   }
 
   /** Draws the speed of a slow-down order; returns its text for the meter. @param {number | null} speed_mps @param {Scale} scale */
@@ -160,12 +164,13 @@ function build(root) {
   const top = svg('svg', { viewBox: VIEW, 'aria-hidden': 'true' }, bug, arc, order,
     svg('text', { class: 'aval', x: 190, y: 124, 'text-anchor': 'middle' }, acceleration, accelerationUnit), box, speed, struck, unit, note);
   const speedMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Speed', 'aria-valuemin': 0 });
+  const why = html('button', { type: 'button', class: 'why', 'data-age-of': 'speed', hidden: true });
   const accelerationMeter = html('div', { class: 'unseen', role: 'meter', 'aria-label': 'Acceleration' });
   root.replaceChildren(
     face, html('div', { class: 'clip' }, white), html('div', { class: 'clip' }, turn), html('div', { class: 'clip right' }, faster),
-    html('div', { class: 'clip left' }, slower), pointer, top, speedMeter, accelerationMeter,
+    html('div', { class: 'clip left' }, slower), pointer, top, speedMeter, accelerationMeter, why,
   );
-  return { face, white, red, turn, faster, slower, pointer, bug, acceleration, accelerationUnit, box, speed, struck, unit, note, arc, ordered, order, speedMeter, accelerationMeter };
+  return { face, white, red, turn, faster, slower, pointer, bug, acceleration, accelerationUnit, box, speed, struck, unit, note, why, arc, ordered, order, speedMeter, accelerationMeter };
 }
 
 /**
@@ -190,7 +195,7 @@ function showFace({ face, bug }, scale) {
 }
 
 /**
- * @param {{ink: import('../core/protocol-types.js').SignalFreshness, age_s: number | null}} state
+ * @param {{ink: import('../core/freshness.js').Ink, age_s: number | null}} state
  * @param {boolean} isKnown
  */
 function noteOf({ ink, age_s }, isKnown) {
@@ -234,11 +239,12 @@ function rotate(element, degrees) {
  * @param {number | null} value null: unknown
  * @param {number} max
  * @param {string} text
+ * @param {string} [unknown] where it is
  */
-function meter(element, value, max, text) {
+function meter(element, value, max, text, unknown = 'unknown') {
   setAttribute(element, 'aria-valuemax', Number(max.toFixed(1)));
   setAttribute(element, 'aria-valuenow', (value ?? 0).toFixed(1));
-  setAttribute(element, 'aria-valuetext', value === null ? 'unknown' : text);
+  setAttribute(element, 'aria-valuetext', value === null ? unknown : text);
 }
 
 /**

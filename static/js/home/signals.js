@@ -4,6 +4,7 @@ import { html, icon, setAttribute, setText, setWords, show } from '../core/dom.j
 import { isAbsent, write } from '../core/ink.js';
 import { shownIn, speedWords } from '../core/units.js';
 import { age, counted, fixed, NOTHING } from '../core/format.js';
+import { CandidateFeed, SignalMore } from './signal-more.js';
 
 /** @typedef {import('../core/protocol-types.js').SignalState<any>} Signal */
 
@@ -49,6 +50,9 @@ export function details(signal, name) {
   const rows = /** @type {[string, string | null | undefined][]} */ ([
     ['Topic', signal.topic ?? (signal.value ? 'no own stamp' : 'no known topic')],
     ['Type', signal.type],
+    ['Why this', signal.why],
+    ['Frame', signal.frame ?? (name === 'scan' ? signal.value?.['frame_id'] : null)],
+    ['Shown in', signal.unit],
     ['Note', signal.note],
     ['Messages', signal.topic ? String(signal.count) : null],
     ['Rejected', signal.rejected ? `${signal.rejected}: ${signal.rejected_why ?? 'no reason given'}` : signal.count ? '0' : null],
@@ -57,7 +61,6 @@ export function details(signal, name) {
     ['Stale after', signal.horizon_s ? `${fixed(signal.horizon_s)} s` : null],
     ['Range so far', rangeWords(signal)],
     ['Derived from', typeof signal.value?.['source'] === 'string' && signal.value['source'] !== 'topic' ? signal.value['source'] : null],
-    ['Frame', name === 'scan' ? signal.value?.['frame_id'] : null],
     ['Usable beams', name === 'scan' && signal.value ? `${signal.value['usable']} of ${signal.value['beams']}` : null],
     ['Components', name === 'diagnostics' ? componentWords(signal.value?.['components']) : null],
   ]);
@@ -71,8 +74,9 @@ function rangeWords({ lowest, highest, unit = '' }) {
   return `${fixed(low.value, 2)} to ${fixed(high.value, 2)} ${low.unit}`.trim();
 }
 
-/** Where a signal comes from, in a word. @param {Signal} signal */
-export function kindWords({ type, topic, value }) {
+/** Where a signal comes from, in a word. @param {Signal} signal @param {import('../core/freshness.js').Ink} [ink] */
+export function kindWords({ type, topic, value }, ink = 'fresh') {
+  if (ink === 'not_chosen') return 'press to choose';
   const source = value?.['source'];
   if (typeof source === 'string' && source !== 'topic') return `from ${source}`; // also where the topic's messages hold no value
   if (type) return type.split('/').at(-1) ?? type;
@@ -88,11 +92,13 @@ function componentWords(components) {
 /**
  * @param {HTMLElement} root
  * @param {import('../core/store.js').Store} store
+ * @param {{say: (sentence: string, title?: string) => void, of?: string}} where `of`: the signal that is open at first
  */
-export function mount(root, store) {
+export function mount(root, store, { say, of }) {
   const summary = html('p', { class: 'note-line' });
   const table = html('div', { class: 'sigs' });
   root.replaceChildren(html('div', { class: 'sig h' }, ...['Signal', 'Value', 'Hz', 'Age, s'].map((word) => html('span', {}, word))), table, summary);
+  const feed = new CandidateFeed(store);
   /** @type {Map<string, ReturnType<typeof row>>} */
   const rows = new Map();
 
@@ -102,34 +108,40 @@ export function mount(root, store) {
     for (const [name, signal] of Object.entries(frame.signals)) {
       let found = rows.get(name);
       if (!found) {
-        found = row(() => pick(store, name));
+        found = row(new SignalMore(store, name, say, feed), draw);
         rows.set(name, found);
-        table.append(found.element, found.more);
+        table.append(found.element, found.more.element);
+        if (name === of) open(found);
       }
       fill(found, name, signal, store.ink(name));
     }
-    const { session, link, server } = frame;
-    const isNone = Object.values(frame.signals).every(({ count }) => count === 0);
-    const parts = [
-      isNone ? 'No signal has arrived yet. A row fills with the first message of its topic; press a row to choose its topic.' : '',
-      `${session.received} messages received, ${session.rejected} rejected.`,
-      link.unreadable_frames ? `${counted(link.unreadable_frames, 'frame')} from the bridge unreadable: ${link.unreadable_why ?? ''}.` : '',
-      server.frames_skipped ? `${counted(server.frames_skipped, 'frame')} skipped for pages that were slower than the car.` : '',
-      store.unreadable ? `${counted(store.unreadable, 'frame')} from the server unreadable here.` : '',
-    ];
-    setWords(summary, parts.filter(Boolean).join(' '));
+    setWords(summary, summaryWords(store, frame));
   }
 
   draw();
   const stop = store.on('draw', draw);
+  if (of) rows.get(of)?.element.scrollIntoView({ block: 'start' });
   return () => {
     stop();
     root.replaceChildren();
   };
 }
 
-/** @param {() => void} choose */
-function row(choose) {
+/** @param {import('../core/store.js').Store} store @param {import('../core/protocol-types.js').State} frame */
+function summaryWords(store, { signals, session, link, server }) {
+  const isNone = Object.values(signals).every(({ count }) => count === 0);
+  const parts = [
+    isNone ? 'No signal has arrived yet. A row fills with the first message of its topic; press a row to choose its topic.' : '',
+    `${session.received} messages received, ${session.rejected} rejected.`,
+    link.unreadable_frames ? `${counted(link.unreadable_frames, 'frame')} from the bridge unreadable: ${link.unreadable_why ?? ''}.` : '',
+    server.frames_skipped ? `${counted(server.frames_skipped, 'frame')} skipped for pages that were slower than the car.` : '',
+    store.unreadable ? `${counted(store.unreadable, 'frame')} from the server unreadable here.` : '',
+  ];
+  return parts.filter(Boolean).join(' ');
+}
+
+/** @param {SignalMore} more @param {() => void} draw */
+function row(more, draw) {
   const name = html('span');
   const kind = html('small');
   const value = html('span', { class: 'n' });
@@ -139,55 +151,35 @@ function row(choose) {
   const clock = icon('clock', 's');
   const element = html('button', { type: 'button', class: 'sig', 'aria-expanded': 'false' }, html('span', {}, name, kind), html('span', {}, value, unit), rate,
     html('span', { class: 'mini' }, clock, old));
-  const more = html('dl', { class: 'sig-more', hidden: true });
-  const choice = html('button', { type: 'button', class: 'key wide' }, 'Choose another topic');
-  choice.addEventListener('click', choose);
+  const found = { element, more, name, kind, value, unit, rate, old, clock };
   element.addEventListener('click', () => {
-    show(more, more.hasAttribute('hidden'));
-    setAttribute(element, 'aria-expanded', String(!more.hasAttribute('hidden')));
+    open(found, !more.isOpen);
+    draw();
   });
-  return { element, more, choice, name, kind, value, unit, rate, old, clock };
+  return found;
+}
+
+/** @param {{element: HTMLElement, more: SignalMore}} row @param {boolean} [isOpen] */
+function open({ element, more }, isOpen = true) {
+  show(more.element, isOpen);
+  setAttribute(element, 'aria-expanded', String(isOpen));
 }
 
 /**
  * @param {ReturnType<typeof row>} at
  * @param {string} name
  * @param {Signal} signal
- * @param {{ink: import('../core/protocol-types.js').SignalFreshness, age_s: number | null}} state
+ * @param {{ink: import('../core/freshness.js').Ink, age_s: number | null}} state
  */
 function fill(at, name, signal, { ink, age_s }) {
   const [text, unit] = headline(name, signal.value, signal.unit);
   setText(at.name, signal.label);
-  setText(at.kind, kindWords(signal));
+  setText(at.kind, kindWords(signal, ink));
   setAttribute(at.element, 'data-faulty', signal.rejected > 0);
   write(at.value, ink, text, at.unit, unit);
-  setText(at.rate, ink === 'never' || ink === 'not_published' ? NOTHING : fixed(signal.rate_hz));
+  setText(at.rate, ['never', 'not_published', 'not_chosen'].includes(ink) ? NOTHING : fixed(signal.rate_hz));
   setText(at.old, isAbsent(ink) ? NOTHING : age(age_s, 2));
   setAttribute(at.old, 'data-age', ink);
   show(at.clock, ink === 'ageing');
-  if (at.more.hasAttribute('hidden')) return;
-  const key = JSON.stringify(details(signal, name));
-  if (at.more.dataset['key'] === key) return;
-  at.more.replaceChildren(...details(signal, name).flatMap(([term, text]) => {
-    const description = html('dd');
-    setWords(description, text);
-    return [html('dt', {}, term), description];
-  }), html('dt', {}, 'Choice'), html('dd', {}, at.choice));
-  at.more.dataset['key'] = key;
-}
-
-/**
- * Lets another topic be picked; what that takes is loaded now.
- * @param {import('../core/store.js').Store} store
- * @param {string} name
- */
-async function pick(store, name) {
-  try {
-    const [{ openTopicPicker }, { settingsOf }] = await Promise.all([import('../settings/topic-picker.js'), import('../settings/settings-model.js')]);
-    const model = settingsOf(store);
-    model.look();
-    await openTopicPicker(store, model, name);
-  } catch {
-    console.warn('The list of topics could not be loaded: the server does not answer.');
-  }
+  if (at.more.isOpen) at.more.draw(details(signal, name));
 }

@@ -1,12 +1,12 @@
 // The last minute on Home: one sparkline for each signal, in fixed places; a press opens the chart of the drive.
 
 import { field, html, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
-import { write } from '../core/ink.js';
+import { isAbsent, write } from '../core/ink.js';
 import { showInTrends } from './drive-choice.js';
 import { colours, drawSpark } from './spark.js';
 import { nowOf, trendsOf } from './trend-feed.js';
 import { SPECS, specOf } from './trends-layout.js';
-import { fixed } from '../core/format.js';
+import { fixed, NOTHING } from '../core/format.js';
 import { shownIn } from '../core/units.js';
 import { floorQuery, isFloor } from '../shell/layout.js';
 
@@ -97,6 +97,7 @@ function drawText({ spec, label, value, key }, store) {
   const { text, ink } = nowOf(spec, store);
   setText(label, spec.name === 'acceleration' ? spec.label : `${spec.label} ${unit}`); // its unit has no room beside it
   write(value, ink, text);
+  if (isAbsent(ink)) setText(value, NOTHING); // the words have no room: the label of the key has them
   setAttribute(key, 'aria-label', `${spec.title}: ${ink === 'stale' ? 'stale, last ' : ''}${text} ${unit}; open the chart of the drive`);
 }
 

@@ -4,7 +4,7 @@
 import { offsetOf, placeAt, turned } from '../core/geodesy.js';
 import { setAttribute, svg } from '../core/dom.js';
 import { distanceWords } from '../core/format.js';
-import { gridPaths, groundMatrix, pixelOf, round, scaleBar_m, turnedPixels } from './map-layout.js';
+import { clearTop, gridPaths, groundMatrix, overlap, pixelOf, round, scaleBar_m, turnedPixels } from './map-layout.js';
 import { OtherPhones } from './map-others.js';
 import { trackPaths } from './map-track.js';
 import { bearingWords } from './map-text.js';
@@ -34,6 +34,12 @@ const LETTER_PX = 7.6;
 const KEYS_PX = 70;
 /** Lower, the compass and the scale are one above the other [px]. */
 const LOW_PX = 120;
+/** A lower map hides words that have no clear place [px]. */
+const HIDING_PX = 170;
+/** Half the side of a mark [px]. */
+const MARK_PX = 16;
+/** The room of a name: above its base line, and all [px]. */
+const NAME_PX = { up: 14, high: 19 };
 /** Marks nearer than this leave no room for a number between them [px]. */
 const ROOM_PX = 70;
 
@@ -89,9 +95,10 @@ export class Figure {
     this.others.draw(others, view, size);
     this.#drawCar(view, car, carAt ?? null);
     this.#drawPhone(view, phone, phoneAt ?? null);
-    this.#drawWay(size, apart, carAt ?? null, phoneAt ?? null);
+    this.#taken = [...(size.taken ?? []), this.#drawScale(view, size)];
+    for (const at of size.height < HIDING_PX ? [carAt, phoneAt] : []) if (at) this.#taken.push(around(at, MARK_PX, MARK_PX));
     this.#drawNames(view, size, car, phone, carAt ?? null, phoneAt ?? null);
-    this.#drawScale(view, size);
+    this.#drawWay(size, apart, carAt ?? null, phoneAt ?? null);
   }
 
   /** @param {View} view @param {Size} size */
@@ -177,7 +184,10 @@ export class Figure {
     const [number, unit] = distanceWords(apart.distance_m);
     write(this.apart, `${number} ${unit}`, bearingWords(apart.bearing_deg));
     const [x, y] = besideWay(ends, size);
-    place(this.apart, x, y - 2); // two lines: the first stands above the middle
+    const box = around([x, y], HALF.x, HALF.y);
+    const top = clearTop(box, this.#taken, size.height);
+    if (top === null && size.height < HIDING_PX) shown(this.apart, false);
+    place(this.apart, x, (top ?? box.top) + HALF.y - 2); // two lines: the first stands above the middle
   }
 
   /** @param {View} view @param {Size} size @param {import('./map-text.js').CarShown} car @param {import('./map-text.js').PhoneOnMap} phone @param {Pixel | null} carAt @param {Pixel | null} phoneAt */
@@ -185,13 +195,14 @@ export class Figure {
     const isCarAbove = !carAt || !phoneAt || phoneAt[1] >= carAt[1]; // the names stand away from each other
     const carRoom = Math.max(28, car.isLive && car.ellipse ? reachUp(car.ellipse, view) : 0);
     const phoneRoom = Math.max(18, phone.isLive ? (phone.accuracy_m ?? 0) / view.mpp : 0);
-    this.#scaleEnd_px = scaleLeft(size) + scaleBar_m(view.mpp) / view.mpp;
     this.#drawName(this.carName, size, carAt, car.label, isCarAbove, carRoom);
     this.#drawName(this.phoneName, size, phoneAt, phone.label, !isCarAbove, phoneRoom);
   }
 
   /** Where the bar of the scale ends. */
   #scaleEnd_px = 0;
+  /** By keys, by a head, by words that stand already. @type {import('./map-layout.js').Box[]} */
+  #taken = [];
 
   /** @param {SVGElement} text @param {Size} size @param {Pixel | null} at @param {string} words @param {boolean} isAbove @param {number} room */
   #drawName(text, size, at, words, isAbove, room) {
@@ -203,19 +214,32 @@ export class Figure {
     const y = isAbove ? at[1] - room - 10 : at[1] + room + 20;
     const x = Math.min(size.width - KEYS_PX - half, Math.max(half, at[0]));
     const isBesideScale = x - half > this.#scaleEnd_px + 8;
-    place(text, x, Math.min(size.height - (isBesideScale ? 8 : 44), Math.max(20, y)));
+    const box = { left: x - half, top: Math.min(size.height - (isBesideScale ? 8 : 44), Math.max(20, y)) - NAME_PX.up, width: 2 * half, height: NAME_PX.high };
+    const top = clearTop(box, this.#taken, size.height);
+    if (top === null && size.height < HIDING_PX) shown(text, false);
+    else if (isShown) this.#taken.push({ ...box, top: top ?? box.top });
+    place(text, x, (top ?? box.top) + NAME_PX.up);
   }
 
-  /** @param {View} view @param {Size} size */
+  /** Gives the room that it takes. @param {View} view @param {Size} size @returns {import('./map-layout.js').Box} */
   #drawScale(view, size) {
-    const length_m = scaleBar_m(view.mpp);
-    const [number, unit] = length_m >= 1000 ? [String(length_m / 1000), 'km'] : [String(length_m), 'm'];
     const y = size.height - 26;
     const left = scaleLeft(size);
+    const band = { left, top: y - 20, width: size.width, height: 32 };
+    const end = Math.min(size.width, ...(size.taken ?? []).filter((one) => one.left > left && overlap(one, band)).map((one) => one.left - 10));
+    const length_m = scaleBar_m(view.mpp, end - left);
+    const [number, unit] = length_m >= 1000 ? [String(length_m / 1000), 'km'] : [String(length_m), 'm'];
+    this.#scaleEnd_px = left + length_m / view.mpp;
     setAttribute(this.bar, 'd', `M${left} ${y}v8h${round(length_m / view.mpp)}v-8`);
     write(this.barText, `${number} ${unit}`);
     place(this.barText, left + 2, y - 5);
+    return { ...band, width: this.#scaleEnd_px - left };
   }
+}
+
+/** A box around a point. @param {Pixel} at @param {number} x_px half its width @param {number} y_px half its height */
+function around([x, y], x_px, y_px) {
+  return { left: x - x_px, top: y - y_px, width: 2 * x_px, height: 2 * y_px };
 }
 
 /** On a low map the compass stands above the bar. @param {Size} size */

@@ -6,7 +6,8 @@ import { mercatorScale, offsetOf, placeAt, turnTo, turned } from '../core/geodes
  * @typedef {import('../core/geodesy.js').Place} Place
  * @typedef {import('../core/geodesy.js').Offset} Offset
  * @typedef {{centre: Place, mpp: number, up_deg: number}} View mpp: metres a CSS pixel; up_deg: the bearing that points up
- * @typedef {{width: number, height: number}} Size of the map in CSS pixels
+ * @typedef {{width: number, height: number, taken?: Box[]}} Size of the map in CSS pixels; taken: by keys and heads that lie over it
+ * @typedef {{left: number, top: number, width: number, height: number}} Box [px]
  * @typedef {[number, number]} Pixel from the top left corner
  * @typedef {{major_m: number, minor_m: number, bearing_deg: number}} Ellipse semi-axes, and where the major one points
  */
@@ -96,9 +97,27 @@ export function gridStep_m(mpp) {
   return STEPS_M.find((step) => step / mpp >= LINES_PX) ?? 5e6;
 }
 
-/** The length of the scale's bar: at most 150 px of it. @param {number} mpp */
-export function scaleBar_m(mpp) {
-  return STEPS_M.findLast((step) => step / mpp <= SCALE_PX) ?? 0.01;
+/** The length of the scale's bar: at most 150 px of it. @param {number} mpp @param {number} [room_px] there is for it */
+export function scaleBar_m(mpp, room_px = SCALE_PX) {
+  return STEPS_M.findLast((step) => step / mpp <= Math.min(SCALE_PX, room_px)) ?? 0.01;
+}
+
+/** @param {Box} a @param {Box} b */
+export function overlap(a, b) {
+  return a.left < b.left + b.width && b.left < a.left + a.width && a.top < b.top + b.height && b.top < a.top + a.height;
+}
+
+/**
+ * Where words stand: in their place, or as near above or below it as they are clear of what is taken.
+ * @param {Box} box of the words
+ * @param {Box[]} taken
+ * @param {number} height of the map [px]
+ * @returns {number | null} top of the words; null: nowhere
+ */
+export function clearTop(box, taken, height) {
+  const beside = taken.flatMap(({ top, height: high }) => [top - box.height - 1, top + high + 1]);
+  const fits = [box.top, ...beside].filter((top) => top >= 0 && top + box.height <= height && !taken.some((one) => overlap({ ...box, top }, one)));
+  return fits.sort((a, b) => Math.abs(a - box.top) - Math.abs(b - box.top))[0] ?? null;
 }
 
 /**

@@ -8,7 +8,7 @@ import { age, distanceWords, fixed, heading } from '../core/format.js';
 /**
  * @typedef {import('../core/geodesy.js').Place} Place
  * @typedef {import('../core/protocol-types.js').State} State
- * @typedef {import('../core/protocol-types.js').SignalFreshness} Freshness
+ * @typedef {import('../core/freshness.js').Ink} Freshness
  * @typedef {object} CarShown
  * @property {Place | null} place where it was last known to be
  * @property {boolean} isLive the place may be shown as where it is

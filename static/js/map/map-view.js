@@ -18,6 +18,7 @@ const LEAP_PX = 120;
 export class MapView {
   /** @type {Mode} */
   mode;
+  /** @type {import('./map-layout.js').Size} */
   size = { width: 0, height: 0 };
   /** Whether there is anything to look at. */
   isPlaced = false;

@@ -1,6 +1,6 @@
 // The map's tab: car, track and phone in true metres, following the car until the operator moves the map.
 
-import { field, listen, setAttribute, setText, show, svg } from '../core/dom.js';
+import { field, listen, need, setAttribute, setText, show, svg } from '../core/dom.js';
 import { Figure } from './map-figure.js';
 import { mountGestures } from './map-gestures.js';
 import { Ground } from './map-layers.js';
@@ -23,6 +23,8 @@ import { othersOn } from '../phone/phones-layout.js';
 const LOST_MS = 1000;
 /** Factor of one press on a zoom key. */
 const KEY_ZOOM = 1.6;
+/** The head that lies over the map of a tablet: right of the compass, and so high [px]. */
+const HEAD_PX = { from: 64, high: 28 };
 /** Time between attempts to load the layers of the map [ms]. */
 const RETRY_MS = 5000;
 
@@ -38,7 +40,7 @@ export function mount(root, { store, say, isFront }) {
   const tab = new MapTab(at, new MapPanel(root, store), store, isFront);
   const { map } = tab;
   const sized = new ResizeObserver(() => {
-    map.size = { width: at('box').clientWidth, height: at('box').clientHeight };
+    map.size = { width: at('box').clientWidth, height: at('box').clientHeight, taken: takenOf(root, at('box')) };
     if (map.size.width && map.size.height) tab.draw();
   });
   sized.observe(at('box'));
@@ -205,4 +207,14 @@ class MapTab {
     setAttribute(at('fit'), 'aria-pressed', String(map.mode === 'both'));
     setAttribute(at('north'), 'aria-pressed', String(map.isHeadingUp));
   }
+}
+
+/** What lies over the map: the keys, and the head of its pane where it is no row of its own. @param {HTMLElement} root @param {HTMLElement} box of the map */
+function takenOf(root, box) {
+  const { left, top, width } = box.getBoundingClientRect();
+  const keys = need(root, '.fabs').getBoundingClientRect();
+  const head = root.querySelector(':scope > .ph');
+  const isOver = head !== null && getComputedStyle(head).position === 'absolute';
+  const strip = { left: HEAD_PX.from, top: 0, width, height: HEAD_PX.high };
+  return [{ left: keys.left - left, top: keys.top - top, width: keys.width, height: keys.height }, ...(isOver ? [strip] : [])];
 }

@@ -242,3 +242,20 @@ export function clearOf(taken, box) {
   const by = [0, -0.5, 0.5, -1, 1].find((share) => !covers(box.top + share * box.height));
   return by === undefined ? null : { ...box, top: box.top + by * box.height };
 }
+
+/** Half the side of a drawn return [px]. */
+const DOT_PX = 2.5;
+
+/**
+ * Does a box cover any of the returns that are drawn?
+ * @param {Box} box [px]
+ * @param {ArrayLike<number>} points x ahead and y left of each, one after the other [m]
+ * @param {{cx: number, cy: number, k: number}} scale where the laser is on the plot, and pixels for a metre
+ */
+export function coversAny({ left, top, width, height }, points, { cx, cy, k }) {
+  for (let i = 0; i < points.length; i += 2) {
+    const [x, y] = [cx - (points[i + 1] ?? 0) * k, cy - (points[i] ?? 0) * k];
+    if (x > left - DOT_PX && x < left + width + DOT_PX && y > top - DOT_PX && y < top + height + DOT_PX) return true;
+  }
+  return false;
+}

@@ -2,7 +2,7 @@
 
 import { edgesOf, endOf } from './scan-corridor.js';
 import { bearingOf, rangeOf } from './scan-frame.js';
-import { clearOf, codeWords, namedSectors, plotScale, pointsOf, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
+import { clearOf, codeWords, coversAny, namedSectors, plotScale, pointsOf, ringsOf, sectorsOf, unseenOf } from './scan-layout.js';
 import { Hatching, ScanGrid, fit, penOf } from './scan-grid.js';
 import { fixed } from '../core/format.js';
 
@@ -43,6 +43,8 @@ export class ScanPlot {
   #width = 0;
   /** Where words stand already. @type {Box[]} */
   #taken = [];
+  /** The returns, which words of a line keep clear of. @type {{scale: Scale, points: Float32Array} | null} */
+  #dots = null;
 
   /** @param {Surface} canvas */
   constructor(canvas) {
@@ -68,11 +70,13 @@ export class ScanPlot {
     const corridor = around.car ? { ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad } : null;
     if (corridor) this.#stoppingStrip(g, scale, corridor, scan.judged.stopping_m);
     this.#hatch(g, scale, sectors, width + height, dpr, theme.key);
+    const points = pointsOf(scan, reach_m * 1.05, 1 / scale.k);
+    this.#dots = { scale, points };
     const nearest = this.#nearestAt(g, scale, scan, reach_m); // its room is kept by all other words
     if (corridor) this.#corridor(g, scale, corridor, reach_m, scan.judged.stopping_m, around.limit_m);
     this.#names(g, scale, reach_m, sectors, width);
     this.#rings(g, scale, reach_m);
-    this.#points(g, scale, pointsOf(scan, reach_m * 1.05, 1 / scale.k));
+    this.#points(g, scale, points);
     if (nearest) this.#nearest(g, nearest);
     if (around.mark) this.#mark(g, scale, around.mark);
     this.#car(g, scale, height);
@@ -124,12 +128,12 @@ export class ScanPlot {
     }
     g.setLineDash([]);
     if (stopping_m !== null && stopping_m > 0 && stopping_m <= end_m) {
-      const [left] = this.#across(g, scale, corridor, stopping_m, colour.ink, 5, 5);
-      if (left && left[1] > 0) this.#words(g, `stop ${fixed(stopping_m)} m`, Math.max(100, left[0] - 7), left[1], colour.ink, 'right');
+      const [left, right] = this.#across(g, scale, corridor, stopping_m, colour.ink, 5, 5);
+      if (left && right && left[1] > 0) this.#beside(g, `stop ${fixed(stopping_m)} m`, [['right', Math.max(100, left[0] - 7)], ['left', Math.min(scale.width - 92, right[0] + 12)]], left[1], colour.ink, 400);
     }
     if (limit_m !== null && limit_m > 0 && limit_m <= end_m) {
       const [, right] = this.#across(g, scale, corridor, limit_m, colour.you, 3, 0);
-      if (right && right[1] > 0) this.#words(g, `limit ${fixed(limit_m)} m`, Math.min(scale.width - 92, right[0] + 12), right[1], colour.you, 'left', 14, 700);
+      if (right && right[1] > 0) this.#beside(g, `limit ${fixed(limit_m)} m`, [['left', Math.min(scale.width - 92, right[0] + 12)]], right[1], colour.you, 700);
     }
   }
 
@@ -248,6 +252,17 @@ export class ScanPlot {
     if (!plate) return;
     this.#taken.push(plate);
     this.#write(g, text, plate, css);
+  }
+
+  /** Words of a line beside it, in the first place where they cover neither words nor a return; else not: the numbers beside the plot have them. @param {Pen} g @param {string} text @param {[CanvasTextAlign, number][]} places @param {number} y @param {string} css @param {number} weight */
+  #beside(g, text, places, y, css, weight) {
+    for (const [align, x] of places) {
+      const plate = clearOf(this.#taken, this.#plate(g, text, x, y, align, 14, weight));
+      if (!plate || !this.#dots || coversAny(plate, this.#dots.points, this.#dots.scale)) continue;
+      this.#taken.push(plate);
+      this.#write(g, text, plate, css);
+      return;
+    }
   }
 
   /** The plate of these words. @param {Pen} g @param {string} text @param {number} x @param {number} y @param {CanvasTextAlign} align @param {number} size @param {number} weight @returns {Box} */

@@ -44,10 +44,15 @@ export class ScanReadout {
     show(at('hint'), isNow && mark.at === null);
     setWords(at('marked'), this.#markedWords());
     show(at('straight'), isThere && !isSteeringKnown(store));
+    const note = isThere ? (store.signal('scan')?.note ?? '') : '';
+    show(at('note'), note !== '');
+    setAttribute(at('note'), 'title', note);
+    setWords(at('note-words'), note);
+    setText(at('note-short'), isOfMounting(note) ? 'Mounting' : 'Note');
     this.#describe(isNow ? scan : null, missing);
   }
 
-  /** @param {Scan | null} scan null: there is none of now @param {import('../core/protocol-types.js').SignalFreshness} ink */
+  /** @param {Scan | null} scan null: there is none of now @param {import('../core/freshness.js').Ink} ink */
   #drawNearest(scan, ink) {
     const { at } = this;
     const judged = scan?.judged ?? null;
@@ -110,6 +115,11 @@ export function scanInk(store, shown) {
   // The server has no limit while it does not know the rate of the laser; a picture of a moving world gets ten periods.
   const period_s = store.signal('scan')?.period_s ?? 0.1;
   return { ink: age_s > Math.max(1, 10 * period_s) ? /** @type {const} */ ('stale') : state.ink, age_s };
+}
+
+/** Whether what is to be known of the scan is where its laser is mounted. @param {string} note */
+export function isOfMounting(note) {
+  return /mounting|assumed to look/i.test(note);
 }
 
 /** Without the steering angle the corridor is drawn straight. @param {import('../core/store.js').Store} store */

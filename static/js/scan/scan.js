@@ -1,10 +1,11 @@
 // The scan's tab: the plot and how far it reaches, the return that was tapped; the texts are in scan-readout.js.
 
 import { field, listen, setAttribute } from '../core/dom.js';
+import { openScreen, openSettings } from '../core/open-screen.js';
 import { THUMB_PX } from './scan-pick.js';
 import { ScanMark } from './scan-mark.js';
 import { ScanGlass } from './scan-glass.js';
-import { ScanReadout, scanInk } from './scan-readout.js';
+import { ScanReadout, isOfMounting, scanInk } from './scan-readout.js';
 import { mountTouch } from './scan-touch.js';
 import { REACH_M, pinched, placeOf, plotScale, reachWithin, zoomed } from './scan-layout.js';
 
@@ -26,6 +27,7 @@ export function mount(root, { store, isFront }) {
     ...tab.ranges.map((key) => listen(key, 'click', () => tab.reach(Number(key.dataset['range'])))),
     listen(at('nearer'), 'click', () => tab.zoom(1)),
     listen(at('farther'), 'click', () => tab.zoom(-1)),
+    listen(at('note'), 'click', () => (isOfMounting(store.signal('scan')?.note ?? '') ? openSettings('mounting') : openScreen('signals', 'scan'))),
     listen(root, 'keydown', (event) => tab.press(event)),
     listen(window, 'catgraph-theme', themed),
     listen(matchMedia('(prefers-color-scheme: light)'), 'change', themed),

@@ -7,7 +7,7 @@ import { fixed } from '../core/format.js';
  * @typedef {import('../core/protocol-types.js').SettingField} Field
  * @typedef {import('../core/protocol-types.js').SettingsAnswer} Settings
  *
- * @typedef {{values?: Record<string, number | null>, topics?: Record<string, string | null>, profile?: string}} Change
+ * @typedef {{values?: Record<string, number | null>, topics?: Record<string, string | null>, units?: Record<string, string | null>, profile?: string}} Change
  */
 
 /** A slider's positions from one end to the other. */
@@ -130,23 +130,30 @@ export function found(query, texts) {
 /**
  * What must be set so that what is in force becomes what is wanted; null takes a thing back to its default.
  * @param {Settings} now
- * @param {Pick<Settings, 'values' | 'changed' | 'topics'> & {profile: {chosen: string}}} wanted
+ * @param {Pick<Settings, 'values' | 'changed' | 'topics' | 'units'> & {profile: {chosen: string}}} wanted
  * @returns {Change}
  */
 export function changeTo(now, wanted) {
   const own = (/** @type {{values: Record<string, number>, changed: string[]}} */ of, /** @type {string} */ name) =>
     (of.changed.includes(name) ? (of.values[name] ?? null) : null);
   const names = [...new Set([...now.changed, ...wanted.changed])].filter((name) => own(now, name) !== own(wanted, name));
-  const signals = [...new Set([...Object.keys(now.topics), ...Object.keys(wanted.topics)])].filter((signal) => now.topics[signal] !== wanted.topics[signal]);
+  const [topics, units] = /** @type {const} */ (['topics', 'units']).map((part) => chosenAnew(now[part] ?? {}, wanted[part] ?? {}));
   return {
     ...(names.length ? { values: Object.fromEntries(names.map((name) => [name, own(wanted, name)])) } : {}),
-    ...(signals.length ? { topics: Object.fromEntries(signals.map((signal) => [signal, wanted.topics[signal] ?? null])) } : {}),
+    ...(topics ? { topics } : {}),
+    ...(units ? { units } : {}),
     ...(now.profile.chosen === wanted.profile.chosen ? {} : { profile: wanted.profile.chosen }),
   };
 }
 
+/** What differs of the choices for each signal; null: nothing. @param {Record<string, string>} now @param {Record<string, string>} wanted @returns {Record<string, string | null> | null} */
+function chosenAnew(now, wanted) {
+  const signals = [...new Set([...Object.keys(now), ...Object.keys(wanted)])].filter((signal) => now[signal] !== wanted[signal]);
+  return signals.length ? Object.fromEntries(signals.map((signal) => [signal, wanted[signal] ?? null])) : null;
+}
+
 /** Everything as the kind of car gives it. */
-export const DEFAULTS = Object.freeze({ values: {}, changed: [], topics: {}, profile: { chosen: 'auto' } });
+export const DEFAULTS = Object.freeze({ values: {}, changed: [], topics: {}, units: {}, profile: { chosen: 'auto' } });
 
 /**
  * What a change does, a line each: "Speed limit: 9.0 → 11.0 m/s".
@@ -154,7 +161,7 @@ export const DEFAULTS = Object.freeze({ values: {}, changed: [], topics: {}, pro
  * @param {Change} change
  * @param {(signal: string) => string} label of a signal
  */
-export function changeLines(now, { values = {}, topics = {}, profile }, label) {
+export function changeLines(now, { values = {}, topics = {}, units = {}, profile }, label) {
   const lines = Object.entries(now.schema).flatMap(([name, field]) => {
     const value = values[name];
     if (value === undefined) return [];
@@ -164,11 +171,20 @@ export function changeLines(now, { values = {}, topics = {}, profile }, label) {
   for (const [signal, topic] of Object.entries(topics)) {
     lines.push(`Topic of ${label(signal)}: ${now.topics[signal] ?? 'chosen automatically'} → ${topic ?? 'chosen automatically'}`);
   }
+  for (const [signal, unit] of Object.entries(units)) {
+    lines.push(`Unit of ${label(signal)}: ${unitWords(now, signal, now.units?.[signal])} → ${unitWords(now, signal, unit)}`);
+  }
   if (profile !== undefined) {
     const title = (/** @type {string} */ name) => (name === 'auto' ? 'as recognised' : (now.profiles.find((one) => one.name === name)?.title ?? name));
     lines.push(`Kind of car: ${title(now.profile.chosen)} → ${title(profile)}`);
   }
   return lines;
+}
+
+/** A unit that may be chosen for a signal, as an operator reads it. @param {Settings} settings @param {string} signal @param {string | null | undefined} name null: none is chosen */
+export function unitWords(settings, signal, name) {
+  if (name === null || name === undefined) return 'as found';
+  return settings.unit_choices?.[signal]?.find((one) => one.name === name)?.label ?? name;
 }
 
 /** @param {number} shown @param {Field} field */

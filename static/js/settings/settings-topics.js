@@ -2,6 +2,7 @@
 
 import { html, icon, setAttribute, setIcon, setText, setWords, show } from '../core/dom.js';
 import { missingWords } from '../files/missing-topics.js';
+import { openScreen } from '../core/open-screen.js';
 import { found } from './settings-layout.js';
 import { openTopicPicker } from './topic-picker.js';
 import { age, fixed, NOTHING } from '../core/format.js';
@@ -16,11 +17,13 @@ import { age, fixed, NOTHING } from '../core/format.js';
  * @param {Signal} signal
  * @param {string | undefined} picked by the operator
  * @param {boolean} isLive
+ * @param {boolean} [isAsked] the operator is asked which topic it is
  * @returns {Shown}
  */
-export function topicWords(signal, picked, isLive) {
+export function topicWords(signal, picked, isLive, isAsked = false) {
   const kind = signal.type?.split('/').at(-1);
   const label = signal.label.toLowerCase();
+  if (isAsked && !signal.value) return { topic: signal.label, says: 'not chosen: press to choose', icon: 'warn', rate: NOTHING };
   if (!signal.topic) {
     const source = typeof signal.value?.['source'] === 'string' ? `from ${signal.value['source']}` : 'not published';
     return picked
@@ -57,7 +60,9 @@ export class SettingsTopics {
     this.count = html('span');
     this.list = html('ul', { class: 'topics' });
     this.missing = html('p', { class: 'm', 'data-f': 'topics-missing', hidden: true });
-    this.element = html('section', { 'aria-label': 'Topics' }, html('div', { class: 'sec' }, html('span', {}, 'Topics'), this.count), this.list, this.missing);
+    this.signals = html('button', { type: 'button', class: 'key wide', 'data-f': 'open-signals' }, icon('link'), 'Signals: source, frame, unit');
+    this.signals.addEventListener('click', () => openScreen('signals'));
+    this.element = html('section', { 'aria-label': 'Topics' }, html('div', { class: 'sec' }, html('span', {}, 'Topics'), this.count), this.list, this.missing, html('div', { class: 'keys' }, this.signals));
     /** @type {Map<string, ReturnType<SettingsTopics['row']>>} */
     this.rows = new Map();
   }
@@ -83,7 +88,7 @@ export class SettingsTopics {
     for (const [name, signal] of Object.entries(frame.signals)) {
       const at = this.rows.get(name) ?? this.row(name);
       this.rows.set(name, at);
-      const shown = topicWords(signal, this.model.body?.topics[name], isLive);
+      const shown = topicWords(signal, this.model.body?.topics[name], isLive, this.store.ink(name).ink === 'not_chosen');
       setText(at.topic, shown.topic);
       setWords(at.says, shown.says);
       setIcon(at.mark, shown.icon);

@@ -6,6 +6,7 @@ import { SettingsGroup } from './settings-group.js';
 import { groupsOf } from './settings-layout.js';
 import { settingsOf } from './settings-model.js';
 import { SettingsTopics } from './settings-topics.js';
+import { takeWanted } from '../core/open-screen.js';
 import { openPreferences } from '../shell/preferences.js';
 import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
 import { counted, timeOfDay } from '../core/format.js';
@@ -22,7 +23,7 @@ export function mount(panel, { store, say, isFront }) {
   panel.style.visibility = 'hidden';
   void styled('limits').then(() => panel.style.removeProperty('visibility'));
   const tab = new SettingsTab(panel, store, say, isFront);
-  tab.draw();
+  tab.begin();
   return { stop: () => tab.stop() };
 }
 
@@ -63,6 +64,7 @@ class SettingsTab {
       listen(this.parts.undo, 'click', () => void this.#undo()),
       listen(this.parts.phone, 'click', openPreferences),
       listen(window, 'catgraph-units', draw),
+      listen(window, 'catgraph-settings', () => this.#searchWanted()),
       store.on('log', (events) => this.#announce(events)),
     ];
   }
@@ -89,6 +91,11 @@ class SettingsTab {
     for (const stop of this.stops) stop();
     for (const part of [...this.#groups, this.topics, this.file, this.mail, this.people, this.departure, this.devices]) part.stop();
     this.panel.replaceChildren();
+  }
+
+  begin() {
+    this.#searchWanted();
+    this.draw();
   }
 
   draw() {
@@ -119,6 +126,14 @@ class SettingsTab {
     this.#groups = groupsOf(body.schema).map((group, i) => new SettingsGroup(model, group, i < OPEN_AT_FIRST));
     this.parts.groups.replaceChildren(html('div', { class: 'sec' }, html('span', {}, 'Limits'), html('span', {}, 'apply at once, recorded')), ...this.#groups.map((group) => group.element));
     this.#filter(true);
+  }
+
+  /** Searches for what another part of the page leads to. */
+  #searchWanted() {
+    const query = takeWanted();
+    if (!query) return;
+    /** @type {HTMLInputElement} */ (this.parts.search).value = query;
+    this.#filter();
   }
 
   #filter(isForced = false) {

@@ -19,10 +19,15 @@ import { counted } from '../core/format.js';
 export function optionsOf(candidates, now, picked) {
   const gone = picked !== undefined && !candidates?.some(({ topic }) => topic === picked);
   return [
-    { topic: null, title: 'Choose automatically', says: picked === undefined ? (now ? `now ${now}` : 'no match now') : 'by name, then by type', isChosen: picked === undefined },
+    { topic: null, title: 'Choose automatically', says: picked === undefined ? (now ? `now ${now}` : 'no match now') : 'by type, publisher, namespace, frame and name', isChosen: picked === undefined },
     ...(gone ? [{ topic: picked, title: picked, says: candidates ? 'chosen, but not published with a matching type' : 'picked', isChosen: true }] : []),
-    ...(candidates ?? []).map(({ topic, type }) => ({ topic, title: topic, says: topic === now ? `${type} · now` : type, isChosen: topic === picked })),
+    ...(candidates ?? []).map((one) => ({ topic: one.topic, title: one.topic, says: saysOf(one, one.topic === now), isChosen: one.topic === picked })),
   ];
+}
+
+/** Type, frame and what speaks for a candidate. @param {Candidate} candidate @param {boolean} isNow it carries the signal now */
+function saysOf({ type, frame, why }, isNow) {
+  return [type, isNow ? 'now' : '', frame ? `frame ${frame}` : '', why ?? ''].filter(Boolean).join(' · ');
 }
 
 /**

@@ -119,7 +119,7 @@ class CarItem {
   }
 }
 
-/** A speed with its ink; a dash where there is none. @param {HTMLElement} element @param {HTMLElement} unit @param {CarRow['speed']} speed */
+/** A speed with its ink; a dash where there is none. @param {HTMLElement} element @param {HTMLElement} unit @param {{ink: import('../core/freshness.js').Ink, value_mps: number | null}} speed */
 function drawSpeed(element, unit, { ink, value_mps }) {
   const isKnown = value_mps !== null && ink !== 'never' && ink !== 'not_published';
   const [text, of] = speedWords(isKnown ? value_mps : null);

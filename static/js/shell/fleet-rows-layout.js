@@ -6,7 +6,7 @@ import { age, counted, fixed, timeOfDay } from '../core/format.js';
 
 /**
  * @typedef {import('../core/protocol-types.js').Cars} Cars
- * @typedef {import('../core/protocol-types.js').SignalFreshness} Freshness
+ * @typedef {import('../core/freshness.js').Ink} Freshness
  * @typedef {import('./fleet-layout.js').Item} Item
  * @typedef {import('./fleet-layout.js').Seen} Seen
  *

@@ -53,6 +53,10 @@ export class Screens {
       listen(field(root, 'menu'), 'click', () => openSheet(this.menu)),
       listen(field(root, 'back'), 'click', () => this.show(null)),
       listen(field(root, 'link'), 'click', () => this.show('signals')),
+      listen(root, 'click', (event) => {
+        const name = /** @type {HTMLElement | null} */ (event.target.closest('[data-age-of]'))?.dataset['ageOf'];
+        if (name) this.show('signals', name); // the age of a value leads to what stands behind it
+      }),
       listen(field(root, 'strip'), 'click', () => this.show(field(root, 'strip').dataset['opens'] ?? 'alarms')),
       listen(need(root, '.tabs'), 'click', (event) => {
         const tab = /** @type {HTMLElement | null} */ (event.target.closest('[data-tab]'))?.dataset['tab'];

@@ -8,7 +8,7 @@ import { ABSENT, isAbsent } from '../core/ink.js';
  * @typedef {import('../core/protocol-types.js').State} State
  * @typedef {import('../core/protocol-types.js').ReachState} Reach
  * @typedef {import('../core/protocol-types.js').ControlState} Control
- * @typedef {{key: string, cells: string[], ink?: string}} Line
+ * @typedef {{key: string, cells: string[], ink?: string, of?: string}} Line of: the signal whose age it has
  */
 
 /** Height of a line [px], as in wall.css. */
@@ -23,7 +23,7 @@ export function signalLines(signals) {
   const published = Object.entries(signals).filter(([, signal]) => signal.freshness !== 'not_published');
   const isLate = (/** @type {string} */ freshness) => Number(freshness === 'fresh');
   return published.sort(([, a], [, b]) => isLate(a.freshness) - isLate(b.freshness)).map(([name, { label, rate_hz, age_s, freshness }]) => ({
-    key: name, ink: freshness,
+    key: name, ink: freshness, of: name,
     cells: [label, isAbsent(freshness) ? ABSENT[freshness] : `${rate_hz === null || rate_hz === undefined ? NOTHING : fixed(rate_hz)} Hz`, age_s === null ? NOTHING : `${freshness === 'stale' ? 'STALE ' : ''}${age(age_s, 2)} s`],
   }));
 }
@@ -68,10 +68,11 @@ export class Lines {
     this.#drawn = new Map(shown.map(({ key, cells }) => [key, old.get(key) ?? html('li', {}, ...cells.map(() => html('span')))]));
     const elements = [...this.#drawn.values()];
     if (elements.length !== this.list.children.length || elements.some((one, i) => one !== this.list.children[i])) this.list.replaceChildren(...elements);
-    shown.forEach(({ cells, ink }, i) => {
+    shown.forEach(({ cells, ink, of }, i) => {
       const line = elements[i];
       if (!line) return;
       setAttribute(line, 'data-ink', ink ?? null);
+      setAttribute(line, 'data-age-of', of ?? null);
       cells.forEach((text, n) => setWords(/** @type {HTMLElement} */ (line.children[n]), text));
     });
   }

@@ -1,0 +1,70 @@
+// What is asked of the operator in control, and how: pure functions of the questions of the newest frame.
+
+import { counted } from '../core/format.js';
+
+/**
+ * @typedef {import('../core/protocol-types.js').Question} Question
+ * @typedef {import('../core/protocol-types.js').Option} Option
+ * @typedef {import('../core/protocol-types.js').ControlState} ControlState
+ * @typedef {import('./settings-layout.js').Change} Change
+ */
+
+/**
+ * Who answers: this page, or another one.
+ * @param {{isViewer: boolean, page: string, control: ControlState | null}} seen
+ * @returns {boolean} where nobody is in control, the first to act is
+ */
+export function mayAnswer({ isViewer, page, control }) {
+  if (isViewer || !control) return false;
+  return control.holder === null || (page !== '' && control.page === page);
+}
+
+/**
+ * A question of a car keeps its key when options come and go: what was put off once is not asked again.
+ * @param {string} vehicle
+ * @param {Question} question
+ */
+export function keyOf(vehicle, { signal, kind }) {
+  return JSON.stringify([vehicle, signal, kind]);
+}
+
+/**
+ * Which question is asked with a card, and which were put off.
+ * @param {string} vehicle
+ * @param {Question[]} questions that stand, the most urgent first
+ * @param {ReadonlySet<string>} later keys of those put off
+ */
+export function dealt(vehicle, questions, later) {
+  const isLater = (/** @type {Question} */ one) => later.has(keyOf(vehicle, one));
+  return { asked: questions.filter((one) => !isLater(one)), waiting: questions.filter(isLater) };
+}
+
+/** The change of settings that answers. @param {Question} question @param {string} value of an option @returns {Change} */
+export function answerOf({ signal, kind }, value) {
+  return kind === 'source' ? { topics: { [signal]: value } } : { units: { [signal]: value } };
+}
+
+/**
+ * What holds while nobody has answered.
+ * @param {Question} question
+ * @param {string} label of its signal
+ */
+export function meanwhileWords({ kind }, label) {
+  return kind === 'source' ? `${label} is not used until one is chosen.` : `${label} is not used until its unit is known.`;
+}
+
+/**
+ * The line that stays of what was put off: "Not chosen: Laser, unit of Brake".
+ * @param {Question[]} waiting
+ * @param {(signal: string) => string} label
+ */
+export function waitingWords(waiting, label) {
+  const names = waiting.map(({ signal, kind }) => (kind === 'source' ? label(signal) : `unit of ${label(signal)}`));
+  return `Not chosen: ${names.slice(0, 3).join(', ')}${names.length > 3 ? ` and ${names.length - 3} more` : ''}`;
+}
+
+/** What of the options is not listed; '': nothing. @param {Question} question */
+export function restWords({ options, options_count }) {
+  const more = options_count - options.length;
+  return more > 0 ? `${counted(options_count, 'candidate')} in all; the ${options.length} most probable are listed.` : '';
+}
