@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from monitor.corridor import Corridor, Sight, look
+from monitor.corridor import Corridor, Sight, covered, look
 from monitor.instruments import ObstacleLimits
 from monitor.snapshot import Snapshot
 from monitor.values import LaserScan
@@ -14,6 +14,7 @@ BLIND_SHARE = 0.9  # of them without a return: nothing can be said
 ANGLE_STEP_RAD = 0.005  # 10 cm aside at 10 m: a computed bend is reused for the next scan
 WIDEST_TYRE_RAD = 0.6  # no car turns its wheels farther
 ASIDE_DEADBAND_M = 0.2  # hysteresis at the corridor's edge
+COVERED_SHARE = 0.9  # of the corridor's directions: in the rest, something could stand unseen
 
 
 def corridor_ahead(snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bool = False) -> Corridor:
@@ -21,10 +22,21 @@ def corridor_ahead(snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bo
     angle_rad = tyre_angle_rad(snapshot) or 0.0
     angle_rad = max(-WIDEST_TYRE_RAD, min(WIDEST_TYRE_RAD, angle_rad))
     angle_rad = round(angle_rad / ANGLE_STEP_RAD) * ANGLE_STEP_RAD
+    scan = snapshot.get("scan")
+    mounting = scan.value.mounting if scan is not None else None
+    laser_ahead_m, laser_left_m = limits.laser_ahead_m, 0.0
+    nose_ahead_m = limits.bumper_ahead_m or None
+    if mounting is not None:
+        laser_left_m = mounting.y_m
+        if mounting.x_m is not None:
+            laser_ahead_m = mounting.x_m
+            nose_ahead_m = limits.bumper_ahead_m  # of a laser behind the rear axle, the nose is at least there
     return Corridor(
         half_width_m=limits.half_width_m + (ASIDE_DEADBAND_M if was_active else 0.0),
         wheelbase_m=limits.wheelbase_m,
-        laser_ahead_m=limits.laser_ahead_m,
+        laser_ahead_m=laser_ahead_m,
+        laser_left_m=laser_left_m,
+        nose_ahead_m=nose_ahead_m,
         tyre_angle_rad=angle_rad,
     )
 
@@ -43,6 +55,39 @@ def look_ahead(scan: LaserScan, corridor: Corridor) -> Sight:
     return look(scan, corridor, BLIND_AT_M)
 
 
+def sweep_ahead(snapshot: Snapshot, scan: LaserScan, corridor: Corridor) -> Sight:
+    """What the newest scan shows of the corridor, and where it looks only into a part of it, what the other parts of
+    its sweep show."""
+    newest = look_ahead(scan, corridor)
+    if newest.covered >= COVERED_SHARE or not snapshot.scan_parts:
+        return newest
+    scans = [scan, *(part.value for part in snapshot.scan_parts)]
+    sights = [look_ahead(one, corridor) for one in scans]
+    gap_m, bearing_rad = min(((s.gap_m, s.bearing_rad) for s in sights if s.gap_m is not None), default=(None, None))
+    geometries = tuple((one.beams, one.angle_min_rad, one.angle_increment_rad) for one in scans)
+    return Sight(
+        beams=sum(sight.beams for sight in sights),
+        blind=sum(sight.blind for sight in sights),
+        gap_m=gap_m,
+        bearing_rad=bearing_rad,
+        covered=covered(geometries, corridor, BLIND_AT_M),
+    )
+
+
 def is_blind(sight: Sight) -> bool:
     """Too few beams of the corridor have a return to detect an obstacle or its absence."""
     return sight.beams > 0 and sight.blind > BLIND_SHARE * sight.beams
+
+
+def is_covered(sight: Sight) -> bool:
+    """Whether the laser looks into the whole corridor: only then nothing seen is nothing there."""
+    return sight.covered >= COVERED_SHARE
+
+
+def why_unseen(scan: LaserScan, sight: Sight) -> str | None:
+    """Why an obstacle in the corridor could be there and not be seen; None: it would be seen."""
+    if scan.mounting is not None and scan.mounting.why_not is not None:
+        return scan.mounting.why_not
+    if not is_covered(sight):
+        return "The laser does not look ahead" if sight.beams == 0 else "The laser looks into a part of the corridor"
+    return "The laser sees nothing in the corridor" if is_blind(sight) else None

@@ -177,6 +177,9 @@ def _note(run: Rehearsed, name: str) -> str | None:
     notes = [] if source is None or source.note is None else [source.note]
     if tally is not None and tally.not_measured:
         notes.append(f"{tally.not_measured} of {tally.received} {tally.why_not_measured or 'not measured'}")
+    scan = run.snapshot.get("scan") if name == "scan" else None
+    if scan is not None and scan.value.mounting is not None and scan.value.mounting.note is not None:
+        notes.append(scan.value.mounting.note)
     if name == "scan" and (habit := habit_words(run.snapshot.scan_habit)) is not None:
         notes.append(habit)
     return "; ".join(notes) or None

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Protocol
 
 from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
+from server.judge.frames import Frames, is_static, is_transforms
 from server.judge.message import Json, RosVersion
+from server.judge.message_fields import text
 from server.judge.recorded_events import NewSettings, RecordedEvents
 from server.judge.ros_names import BadName, canonical_name
 from server.judge.settings import BadSetting
 from server.judge.settings_override import SettingsOverride, recorded_override, tuning_for
 from server.judge.topics import Source, map_signals
+from server.judge.transforms import Contradiction
+
+MOST_STATIC = 1_000  # messages: a static transform that is sent again and again is read so often
+FIRST_MOVING = 200  # messages of those that move, from which a run knows where the laser is when it begins
 
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, message
 
@@ -38,6 +45,10 @@ class MessageSource(Protocol):
 
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
         """From `start_s` after the beginning on, in time order; messages of topics not named may be empty."""
+        ...
+
+    def only(self, topics: Collection[str]) -> Iterator[Row]:
+        """From the beginning on, in time order, nothing but messages of these topics."""
         ...
 
 
@@ -113,7 +124,48 @@ class Drive:
             self.epochs += [
                 self._recorded_epoch(event.toml) for _, event in recorded.events if isinstance(event, NewSettings)
             ]
-        self.topics = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
+        listened = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
+        self.frames = Frames()
+        self.moving_transforms: frozenset[str] = frozenset()  # topics to be followed: a laser is placed by them
+        if signals is None or "scan" in signals:
+            self.moving_transforms = self._read_transforms(source)
+        self.topics = listened | self.moving_transforms
+
+    def _read_transforms(self, source: MessageSource) -> frozenset[str]:
+        """Reads the static transforms, wherever in the recording they are: a latched message is only at the beginning,
+        and what it says holds for the whole drive. The topics of those that move are returned if a laser's frame is
+        placed by them alone; they are then followed."""
+        scans = {
+            topic: one.topic
+            for epoch in self.epochs
+            for topic, sources in epoch.listeners.items()
+            for one in sources
+            if one.signal == "scan"
+        }
+        found = {topic for topic, name in self._names.items() if is_transforms(name, source.topics[topic].type)}
+        if not scans or not found:
+            return frozenset()
+        moving = frozenset(topic for topic in found if not is_static(topic))
+        self._learn_frames(source, found - moving, MOST_STATIC)
+        if moving and not all(self._is_placed(source, topic, name) for topic, name in scans.items()):
+            self._learn_frames(source, moving, FIRST_MOVING)
+        else:
+            moving = frozenset()
+        self.notes += self.frames.notes
+        return moving
+
+    def _learn_frames(self, source: MessageSource, topics: Collection[str], most: int) -> None:
+        for _, topic, _, message in islice(source.only(topics) if topics else (), most):
+            self.frames.receive(self._names[topic], message)
+
+    def _is_placed(self, source: MessageSource, topic: str, name: str) -> bool:
+        """Whether the static transforms place the laser of a topic, by the frame of its first message."""
+        for _, _, _, message in source.only({topic}):
+            try:
+                return self.frames.locate(name, text(message, "header", "frame_id")) is not None
+            except Contradiction:
+                return True  # moving ones do not resolve it
+        return True
 
     def _recorded_epoch(self, toml: str) -> SettingsEpoch:
         override, left_out = recorded_override(toml)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from copy import deepcopy
 from typing import Any
 
 from monitor.alarm import Transition
@@ -85,6 +86,7 @@ class OfflineRun:
         is_new = run_state is None
         self.run_state = self._begin(from_s) if run_state is None else run_state
         self._epoch = drive.epochs[self.run_state.epoch]
+        self._frames = drive.frames if self.run_state.frames is None else self.run_state.frames
         self._rows = self._read()
         self._next: Row | None = next(self._rows, None)
         if is_new:
@@ -103,6 +105,7 @@ class OfflineRun:
             opened_s=from_s,
             at_s=from_s,
             recorded_alarms=Monitor(limits=limits).alarms,
+            frames=deepcopy(self.drive.frames) if self.drive.moving_transforms else None,
         )
 
     @property
@@ -186,6 +189,9 @@ class OfflineRun:
         run_state = self.run_state
         _, topic, _, message = row
         self._observer.message_received(topic, now_s)
+        if topic in self.drive.moving_transforms:
+            self._frames.receive(topic, message)
+            return
         sources = self._epoch.listeners.get(topic)
         if sources is None:
             return
@@ -201,6 +207,8 @@ class OfflineRun:
             profile=self._epoch.tuning.profile,
             tyre_rad_per_unit=run_state.monitor.limits.steering.tyre_rad_per_unit,
             transport=self.drive.delay,
+            frames=self._frames,
+            limits=run_state.monitor.limits,
             on_value=self._observer.value_decoded,
         )
         if changed:

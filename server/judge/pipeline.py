@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
+from monitor.catalog import AllLimits
 from monitor.runner import Monitor, Transition
 from monitor.state import State
-from monitor.values import DriveMode, Steering
+from monitor.values import DriveMode, LaserScan, Steering
 from server.judge.active_settings import PERCENT_A_RAD
+from server.judge.frames import Frames
 from server.judge.message_fields import stamp_s
 from server.judge.profiles import Profile
 from server.judge.reception_stats import Reception
@@ -49,11 +51,14 @@ def receive(
     profile: Profile,
     tyre_rad_per_unit: float,
     transport: Delays | None = None,
+    frames: Frames | None = None,
+    limits: AllLimits | None = None,
     on_value: Callable[[str, Any, float, float | None], None] | None = None,
 ) -> tuple[str, ...]:
     """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock;
     `tyre_rad_per_unit` of the steering signal, 0: not known; `transport` None: it came without
-    delay, as far as is known. `on_value` receives each decoded value: signal, value, `at_s`, stamp.
+    delay, as far as is known. `frames` and `limits`: by which a laser is mounted; None: at the nose.
+    `on_value` receives each decoded value: signal, value, `at_s`, stamp.
     """
     reception.received += 1
     stamp = stamp_s(message)
@@ -74,6 +79,8 @@ def receive(
             continue
         if type(value) is Steering:
             value = steered(value, profile, tyre_rad_per_unit)
+        elif type(value) is LaserScan and frames is not None and limits is not None:
+            value = frames.mounted(source.topic, value, limits)
         elif type(value) is DriveMode and (mode := profile.modes.get(value.said.casefold())) is not None:
             value = DriveMode(mode=mode, said=value.said)
         if on_value is not None:

@@ -238,9 +238,9 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "why": source.why if source else None,
         "frame": facts.reception.frame_of(source.topic) if source else None,
         "note": (unusable.words if unusable else None)
+        or (_scan_note(source, snapshot) if signal.name == "scan" else None)
         or (source.note if source else None)
-        or (_unknown_part(reading.value) if reading else None)
-        or (habit_words(snapshot.scan_habit) if signal.name == "scan" else None),
+        or (_unknown_part(reading.value) if reading else None),
         "unusable": unusable.words if unusable else None,
         "count": tally.received,
         "rejected": tally.rejected,
@@ -251,6 +251,14 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "lowest": serialize.plain(extent.lowest) if extent else None,
         "highest": serialize.plain(extent.highest) if extent else None,
     }
+
+
+def _scan_note(source: Source | None, snapshot: Snapshot) -> str | None:
+    """Of the laser all is to be known at once: the choice of its topic, its mounting, how its driver counts."""
+    scan = snapshot.get("scan")
+    mounting = scan.value.mounting if scan is not None else None
+    notes = (source.note if source else None, mounting.note if mounting else None, habit_words(snapshot.scan_habit))
+    return "; ".join(note for note in notes if note) or None
 
 
 def _unknown_part(value: Any) -> str | None:
