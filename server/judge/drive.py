@@ -9,6 +9,7 @@ from typing import Protocol
 
 from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
+from server.judge.body_axes import TYPES
 from server.judge.frames import Frames, is_static, is_transforms
 from server.judge.message import Json, RosVersion
 from server.judge.message_fields import text
@@ -127,8 +128,7 @@ class Drive:
         listened = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
         self.frames = Frames()
         self.moving_transforms: frozenset[str] = frozenset()  # topics to be followed: a laser is placed by them
-        if signals is None or "scan" in signals:
-            self.moving_transforms = self._read_transforms(source)
+        self.moving_transforms = self._read_transforms(source)
         self.topics = listened | self.moving_transforms
 
     def _read_transforms(self, source: MessageSource) -> frozenset[str]:
@@ -143,7 +143,8 @@ class Drive:
             if one.signal == "scan"
         }
         found = {topic for topic, name in self._names.items() if is_transforms(name, source.topics[topic].type)}
-        if not scans or not found:
+        heard = {one.type for epoch in self.epochs for sources in epoch.listeners.values() for one in sources}
+        if not found or not (scans or heard & TYPES):
             return frozenset()
         moving = frozenset(topic for topic in found if not is_static(topic))
         self._learn_frames(source, found - moving, MOST_STATIC)

@@ -10,6 +10,7 @@ from monitor.runner import Monitor, Transition
 from monitor.state import State
 from monitor.values import DriveMode, LaserScan, Steering
 from server.judge.active_settings import PERCENT_A_RAD
+from server.judge.body_axes import TYPES, in_body_axes
 from server.judge.frames import Frames
 from server.judge.message_fields import stamp_s
 from server.judge.profiles import Profile
@@ -66,6 +67,11 @@ def receive(
     delay_s = 0.0 if transport is None else transport.receive(sources[0].topic, at_s, stamp)
     changed: tuple[str, ...] = ()
     is_proper = True
+    if frames is not None and sources[0].type in TYPES:
+        message, why_not = in_body_axes(frames, sources[0].topic, sources[0].type, message)
+        if why_not is not None:
+            _refuse(sources, why_not, at_s, reception, state)
+            return ()
     for source in sources:
         value = reception.read(source, message, note)
         if value is None:
@@ -89,6 +95,16 @@ def receive(
     if not is_proper:
         reception.rejected += 1
     return changed
+
+
+def _refuse(sources: tuple[Source, ...], why: str, at_s: float, reception: Reception, state: State) -> None:
+    reception.rejected += 1
+    for source in sources:
+        tally = reception.tally(source.signal)
+        tally.received += 1
+        tally.reject(why)
+        if source.decode is not None:
+            state.refuse(source.signal, why, at_s)
 
 
 def steered(signal: Steering, profile: Profile, tyre_rad_per_unit: float) -> Steering:

@@ -42,13 +42,12 @@ class Pose:
         """The pose of a frame that has the pose `inner` in this one."""
         x, y, z = rotated(self.rotation, (inner.x_m, inner.y_m, inner.z_m))
         return Pose(
-            x_m=self.x_m + x, y_m=self.y_m + y, z_m=self.z_m + z, rotation=_product(self.rotation, inner.rotation)
+            x_m=self.x_m + x, y_m=self.y_m + y, z_m=self.z_m + z, rotation=product(self.rotation, inner.rotation)
         )
 
     def inverse(self) -> Pose:
         """The pose of the other frame in this one."""
-        x, y, z, w = self.rotation
-        back = (-x, -y, -z, w)
+        back = inverse(self.rotation)
         at = rotated(back, (-self.x_m, -self.y_m, -self.z_m))
         return Pose(x_m=at[0], y_m=at[1], z_m=at[2], rotation=back)
 
@@ -73,7 +72,8 @@ def rotated(rotation: Rotation, of: tuple[float, float, float]) -> tuple[float, 
     )
 
 
-def _product(a: Rotation, b: Rotation) -> Rotation:
+def product(a: Rotation, b: Rotation) -> Rotation:
+    """The rotation `b`, in the axes that `a` turns; the norm is the product of theirs."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
     return (
@@ -82,6 +82,12 @@ def _product(a: Rotation, b: Rotation) -> Rotation:
         aw * bz + ax * by - ay * bx + az * bw,
         aw * bw - ax * bx - ay * by - az * bz,
     )
+
+
+def inverse(rotation: Rotation) -> Rotation:
+    """The rotation back."""
+    x, y, z, w = rotation
+    return -x, -y, -z, w
 
 
 @dataclass(slots=True)
