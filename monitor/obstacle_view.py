@@ -24,19 +24,14 @@ def corridor_ahead(snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bo
     angle_rad = round(angle_rad / ANGLE_STEP_RAD) * ANGLE_STEP_RAD
     scan = snapshot.get("scan")
     mounting = scan.value.mounting if scan is not None else None
-    laser_ahead_m, laser_left_m = limits.laser_ahead_m, 0.0
-    nose_ahead_m = limits.bumper_ahead_m or None
-    if mounting is not None:
-        laser_left_m = mounting.y_m
-        if mounting.x_m is not None:
-            laser_ahead_m = mounting.x_m
-            nose_ahead_m = limits.bumper_ahead_m  # of a laser behind the rear axle, the nose is at least there
+    is_placed = mounting is not None and mounting.x_m is not None
     return Corridor(
         half_width_m=limits.half_width_m + (ASIDE_DEADBAND_M if was_active else 0.0),
         wheelbase_m=limits.wheelbase_m,
-        laser_ahead_m=laser_ahead_m,
-        laser_left_m=laser_left_m,
-        nose_ahead_m=nose_ahead_m,
+        laser_ahead_m=mounting.x_m if mounting is not None and mounting.x_m is not None else limits.laser_ahead_m,
+        laser_left_m=mounting.y_m if mounting is not None else 0.0,
+        # Of a laser that is placed behind the rear axle, the nose is at least there.
+        nose_ahead_m=limits.bumper_ahead_m if is_placed else limits.bumper_ahead_m or None,
         tyre_angle_rad=angle_rad,
     )
 

@@ -7,7 +7,7 @@ drivers count one beam more or less in every scan; that is theirs, and a change 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import lru_cache
 
 from monitor.check import (
     Action,
@@ -27,11 +27,12 @@ from monitor.check import (
     unknown,
 )
 from monitor.corridor import Corridor
+from monitor.instruments import ObstacleLimits
+from monitor.mounting import Mounting
 from monitor.obstacle_view import sweep_ahead
 from monitor.scan_shape import difference, habit_words
 from monitor.snapshot import Snapshot
 
-CORRIDOR = Corridor(half_width_m=1.2, wheelbase_m=2.62, laser_ahead_m=2.5)
 DEADBAND_PERCENT = 10.0  # three of the beams of the corridor: single ones come and go from scan to scan
 SWEEP_SLACK = 1.1  # a sweep may take so much longer than the time between two scans
 
@@ -52,6 +53,17 @@ def _laser_is_absent(snapshot: Snapshot) -> bool:
     return snapshot.get("scan") is None and "scan" not in snapshot.link.published
 
 
+@lru_cache(maxsize=16)
+def _straight_ahead(mounting: Mounting | None) -> Corridor:
+    """That of the obstacle check with its default measures, so that a scan is looked at once for both."""
+    usual = ObstacleLimits()
+    if mounting is None or mounting.x_m is None:
+        place = {"laser_ahead_m": usual.laser_ahead_m, "laser_left_m": mounting.y_m if mounting is not None else 0.0}
+    else:
+        place = {"laser_ahead_m": mounting.x_m, "laser_left_m": mounting.y_m, "nose_ahead_m": 0.0}
+    return Corridor(half_width_m=usual.half_width_m, wheelbase_m=usual.wheelbase_m, **place)
+
+
 def ends(limits: BlindLimits) -> End:
     return End("below", limits.blind_percent - DEADBAND_PERCENT, "%")
 
@@ -62,8 +74,7 @@ def sees(snapshot: Snapshot, limits: BlindLimits, was_active: bool) -> Finding:
     scan = snapshot.need("scan")
     if scan.mounting is not None and scan.mounting.why_not is not None:
         return unknown(scan.mounting.why_not, short="mounting")
-    corridor = CORRIDOR if scan.mounting is None else replace(CORRIDOR, laser_left_m=scan.mounting.y_m)
-    sight = sweep_ahead(snapshot, scan, corridor)
+    sight = sweep_ahead(snapshot, scan, _straight_ahead(scan.mounting))
     limit = Quantity(label="At most", value=limits.blind_percent, unit="%")
     if sight.beams == 0:
         return fault("The scan has no beam ahead of the car", brief="no beam", limit=limit, causes=("scan",))

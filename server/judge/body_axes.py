@@ -7,25 +7,25 @@ from collections.abc import Mapping
 from typing import Any
 
 from server.judge.frames import Frames
-from server.judge.transforms import Rotation, frame_name, inverse, product, rotated
+from server.judge.transforms import MAX_NAME, Rotation, inverse, product, rotated
 
 IMU, ODOMETRY = "sensor_msgs/Imu", "nav_msgs/Odometry"
 TYPES = frozenset({IMU, ODOMETRY, "sensor_msgs/msg/Imu", "nav_msgs/msg/Odometry"})  # in both spellings
 NEGLIGIBLE = 1e-6  # of a unit vector: an axis that plays no part may be NaN
 
 
-def in_body_axes(frames: Frames, topic: str, type: str | None, message: Any) -> tuple[Any, str | None]:
+def in_body_axes(frames: Frames, topic: str, kind: str | None, message: Any) -> tuple[Any, str | None]:
     """The message as a sensor with the body's axes would send it, and why that cannot be known.
 
     An Imu is in its header's frame (REP-145); the twist of an Odometry is in `child_frame_id`, whose pose it states. A
     frame that no transform names is taken for the body, as drivers without transforms mean it.
     """
-    if type not in TYPES or not isinstance(message, Mapping):
+    if kind not in TYPES or not isinstance(message, Mapping):
         return message, None
-    is_imu = type.endswith("Imu")
+    is_imu = kind.endswith("Imu")
     header = message.get("header") if is_imu else None
     named = header.get("frame_id") if isinstance(header, Mapping) else message.get("child_frame_id")
-    turn = frames.turn(topic, frame_name(named))
+    turn = frames.turn(topic, named) if isinstance(named, str) and len(named) <= MAX_NAME else None
     if turn is None or isinstance(turn, str):
         return message, turn
     return (_imu(message, turn) if is_imu else _odometry(message, turn)), None

@@ -35,12 +35,13 @@ class Frames:
 
     def __init__(self) -> None:
         self._trees: dict[str, FrameTree] = {}  # by namespace
+        self._changes = 0  # of all trees: what is kept is worked out anew with each
         self._kept: dict[tuple[str, str], tuple[int, Any, Mounting]] = {}  # by topic and frame
         self._turns: dict[tuple[str, str], tuple[int, Rotation | str | None]] = {}  # by topic and frame
         self._located: dict[str, str] = {}  # topic → the frame whose place its transforms gave
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"_trees": self._trees, "_kept": {}, "_turns": {}, "_located": self._located}
+        return {"_trees": self._trees, "_changes": self._changes, "_kept": {}, "_turns": {}, "_located": self._located}
 
     def receive(self, topic: str, message: Any) -> None:
         """A message of a topic for which `is_transforms` holds."""
@@ -50,7 +51,9 @@ class Frames:
             if len(self._trees) >= MAX_TREES:
                 return
             tree = self._trees[space] = FrameTree()
+        before = tree.version
         tree.add(message, is_static=is_static(topic))
+        self._changes += tree.version - before
 
     @property
     def notes(self) -> list[str]:
@@ -77,14 +80,13 @@ class Frames:
     def turn(self, topic: str, frame: str) -> Rotation | str | None:
         """How a sensor's axes are turned in the body frame; None: not at all, or no transform says; a text: why that
         cannot be known."""
-        tree = self.tree_of(topic)
-        if tree is None:
+        if not self._trees:
             return None
         kept = self._turns.get((topic, frame))
-        if kept is None or kept[0] != tree.version:
+        if kept is None or kept[0] != self._changes:
             if len(self._turns) >= MAX_SENSORS:
                 self._turns.clear()
-            kept = self._turns[topic, frame] = tree.version, self._turn(topic, frame)
+            kept = self._turns[topic, frame] = self._changes, self._turn(topic, frame_name(frame))
         return kept[1]
 
     def _turn(self, topic: str, frame: str) -> Rotation | str | None:
@@ -98,13 +100,12 @@ class Frames:
 
     def mounted(self, topic: str, scan: LaserScan, limits: AllLimits) -> LaserScan:
         """The scan with its angles in the car's axes."""
-        tree, key = self.tree_of(topic), (topic, scan.frame_id)
-        version = 0 if tree is None else tree.version
+        key = (topic, scan.frame_id)
         kept = self._kept.get(key)
-        if kept is None or kept[0] != version or kept[1] is not limits:
+        if kept is None or kept[0] != self._changes or kept[1] is not limits:
             if len(self._kept) >= MAX_SENSORS:
                 self._kept.clear()
-            kept = self._kept[key] = version, limits, self._mounting(topic, frame_name(scan.frame_id), limits)
+            kept = self._kept[key] = self._changes, limits, self._mounting(topic, frame_name(scan.frame_id), limits)
         return mounted(scan, kept[2])
 
     def _mounting(self, topic: str, frame: str, limits: AllLimits) -> Mounting:
