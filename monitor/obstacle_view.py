@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from monitor.corridor import Corridor, Sight, covered, look
 from monitor.instruments import ObstacleLimits
@@ -56,8 +57,9 @@ def sweep_ahead(snapshot: Snapshot, scan: LaserScan, corridor: Corridor) -> Sigh
     newest = look_ahead(scan, corridor)
     if newest.covered >= COVERED_SHARE or not snapshot.scan_parts:
         return newest
-    scans = [scan, *(part.value for part in snapshot.scan_parts)]
-    sights = [look_ahead(one, corridor) for one in scans]
+    parts = (part.value for part in snapshot.scan_parts)
+    scans = [scan, *(part for part in parts if part.mounting is None or part.mounting.why_not is None)]
+    sights = [look_ahead(one, _from(one, scan, corridor)) for one in scans]
     gap_m, bearing_rad = min(((s.gap_m, s.bearing_rad) for s in sights if s.gap_m is not None), default=(None, None))
     geometries = tuple((one.beams, one.angle_min_rad, one.angle_increment_rad) for one in scans)
     return Sight(
@@ -67,6 +69,15 @@ def sweep_ahead(snapshot: Snapshot, scan: LaserScan, corridor: Corridor) -> Sigh
         bearing_rad=bearing_rad,
         covered=covered(geometries, corridor, BLIND_AT_M),
     )
+
+
+def _from(part: LaserScan, newest: LaserScan, corridor: Corridor) -> Corridor:
+    """The corridor of the newest scan as the laser of a part looks into it: it may be another one."""
+    theirs = part.mounting
+    if theirs is None or theirs == newest.mounting:
+        return corridor
+    ahead_m = corridor.laser_ahead_m if theirs.x_m is None else theirs.x_m
+    return replace(corridor, laser_ahead_m=ahead_m, laser_left_m=theirs.y_m, nose_ahead_m=corridor.nose_m)
 
 
 def is_blind(sight: Sight) -> bool:
