@@ -71,7 +71,63 @@ class ObstacleLimits(Limits):
     )
     wheelbase_m: float = threshold(2.62, "Wheelbase", unit="m", low=0.5, high=8.0, step=0.01, heading=VEHICLE)
     laser_ahead_m: float = threshold(
-        2.5, "Laser ahead of the rear axle", unit="m", low=-2.0, high=8.0, step=0.1, heading=VEHICLE
+        2.5,
+        "Laser ahead of the rear axle",
+        unit="m",
+        low=-2.0,
+        high=8.0,
+        step=0.1,
+        help="As long as it is at its default, the car's transforms count instead, where there are some.",
+        heading=VEHICLE,
+    )
+    bumper_ahead_m: float = threshold(
+        0.0,
+        "Front bumper ahead of the rear axle",
+        unit="m",
+        low=0.0,
+        high=15.0,
+        step=0.05,
+        help="Gaps are measured from here. 0: from the laser. With transforms, the rear axle is base_link.",
+        heading=VEHICLE,
+    )
+
+
+class MountingLimits(Limits):
+    """How the laser is mounted, beside its place ahead of the rear axle."""
+
+    yaw_deg: float = threshold(
+        0.0,
+        "Laser turned to the left",
+        unit="°",
+        low=-180.0,
+        high=180.0,
+        step=0.5,
+        help="Where its own zero points: 0 ahead, 90 left, 180 back. What is not at its default overrides the "
+        "car's transforms.",
+        heading=VEHICLE,
+    )
+    left_m: float = threshold(
+        0.0, "Laser left of the centre line", unit="m", low=-3.0, high=3.0, step=0.05, heading=VEHICLE
+    )
+    upside_down: float = threshold(
+        0.0,
+        "Laser upside down",
+        unit="0/1",
+        low=0.0,
+        high=1.0,
+        step=1.0,
+        help="1: its angles count clockwise, seen from above.",
+        heading=VEHICLE,
+    )
+    by_settings: float = threshold(
+        0.0,
+        "Laser mounted as set here",
+        unit="0/1",
+        low=0.0,
+        high=1.0,
+        step=1.0,
+        help="1: the settings count as they are, also those at their default, whatever the car's transforms say.",
+        heading=VEHICLE,
     )
 
 
@@ -234,6 +290,7 @@ GROUPS: dict[str, type[Limits]] = {
     "driving": DrivingLimits,
     "gauge": GaugeLimits,
     "obstacle": ObstacleLimits,
+    "mounting": MountingLimits,
 }
 
 

@@ -66,6 +66,7 @@ class Snapshot:
     phone: PhoneView = NO_PHONE  # the operator's phone beside the car
     phones: tuple[PhoneView, ...] = ()  # every phone that shares its position, in order of arrival
     scan_before: Reading[LaserScan] | None = None  # some 0.4 s before the newest
+    scan_parts: tuple[Reading[LaserScan], ...] = ()  # beside the newest: other parts of a sweep that is sent in parts
     scan_habit: frozenset[int] | None = None  # see `scan_shape.ScanHabit.usual`
     distance_before: Reading[Distance] | None = None
     standing_since_s: float | None = None  # when the wheels stopped; None: the car moves, or unknown

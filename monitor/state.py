@@ -19,6 +19,7 @@ from monitor.reading import Extent, Freshness, Reading
 from monitor.reading_history import ReadingHistory
 from monitor.reading_table import ReadingTable
 from monitor.recorder import RecorderFacts
+from monitor.scan_parts import ScanParts
 from monitor.scan_shape import ScanHabit
 from monitor.signal_stats import SignalStats
 from monitor.signals import SIGNALS
@@ -60,6 +61,7 @@ class State:
         self._clock_jump: ClockJump | None = None
         self._components = Components()
         self._scan_habit = ScanHabit()
+        self._scan_parts = ScanParts()
         self._phones = Phones()
         self._fix_s = -math.inf  # when the newest position was sent
         self._rides: str | None = None
@@ -112,6 +114,8 @@ class State:
         if stats.jump_s is not None:
             self._clock_jump = merged(self._clock_jump, signal, received_s, stats.jump_s)
         self._table.put(signal, reading)
+        if kind is LaserScan:
+            self._scan_parts.add(reading)
         if stats.headline is not None:
             number = getattr(value, stats.headline, None)
             if number is not None and not stats.lowest <= number <= stats.highest:
@@ -178,6 +182,7 @@ class State:
                 stats.restart()
             self._clock_jump = None
             self._scan_habit = ScanHabit()
+            self._scan_parts = ScanParts()
             self._components.opened(facts.opened_s)
             self._unusable = MappingProxyType({})
 
@@ -233,6 +238,7 @@ class State:
             phones=self._phones.views,
             scan_habit=self._scan_habit.usual,
             scan_before=self._scan_history.before,
+            scan_parts=self._scan_parts.others(now_s),
             distance_before=self._distance_history.before,
             standing_since_s=derived.standstill.since_s if table.is_fresh("speed", now_s) else None,
             speed_slope_mps2=derived.slope_mps2,
@@ -264,6 +270,7 @@ class State:
         self._slow_proof.forget()
         self._modes.forget()
         self._fix_s = -math.inf
+        self._scan_parts = ScanParts()
         self._phones = Phones()  # they report again within seconds
         self._phones.ride(self._rides, at_s)
         self._table.shift(shift_s)

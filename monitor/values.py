@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor import scan as _scan
+from monitor.mounting import Mounting, within_half_turn
 
 NO_FIX = -1  # sensor_msgs/NavSatStatus
 STATUS_UNSET = -2  # of ROS 2 since Kilted
@@ -109,7 +110,8 @@ class Heading:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LaserScan:
-    """One sweep of a laser; beam i stands at angle_min_rad + i·angle_increment_rad in the laser's frame."""
+    """One sweep of a laser; beam i stands at angle_min_rad + i·angle_increment_rad, counter-clockwise from the car's
+    ahead as far as its mounting is known, else from the laser's own zero."""
 
     ranges_m: NDArray[np.float32]  # NaN, +Inf and −Inf kept as they came (REP-117); never written to
     angle_min_rad: float
@@ -120,6 +122,7 @@ class LaserScan:
     range_min_m: float
     range_max_m: float
     frame_id: str
+    mounting: Mounting | None = None  # None: as a laser at the nose that looks ahead
 
     @property
     def beams(self) -> int:
@@ -132,12 +135,12 @@ class LaserScan:
 
     @property
     def nearest(self) -> tuple[float, float] | None:
-        """Range [m] and bearing [rad, counter-clockwise] of the nearest usable return, None without any."""
+        """Range [m] and bearing [rad, counter-clockwise, −π to π] of the nearest usable return, None without any."""
         found = _scan.nearest(self.ranges_m, self.range_min_m, self.range_max_m)
         if found is None:
             return None
         index, range_m = found
-        return range_m, self.angle_min_rad + index * self.angle_increment_rad
+        return range_m, within_half_turn(self.angle_min_rad + index * self.angle_increment_rad)
 
     @property
     def nearest_m(self) -> float | None:

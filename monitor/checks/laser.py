@@ -7,6 +7,8 @@ drivers count one beam more or less in every scan; that is theirs, and a change 
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from monitor.check import (
     Action,
     AlarmSpec,
@@ -24,12 +26,13 @@ from monitor.check import (
     threshold,
     unknown,
 )
-from monitor.corridor import Corridor, look
+from monitor.corridor import Corridor
+from monitor.instruments import ObstacleLimits
+from monitor.mounting import Mounting
+from monitor.obstacle_view import sweep_ahead
 from monitor.scan_shape import difference, habit_words
 from monitor.snapshot import Snapshot
 
-CORRIDOR = Corridor(half_width_m=1.2, wheelbase_m=2.62, laser_ahead_m=2.5)
-LOOK_AHEAD_M = 5.0  # where the beams of the corridor are counted
 DEADBAND_PERCENT = 10.0  # three of the beams of the corridor: single ones come and go from scan to scan
 SWEEP_SLACK = 1.1  # a sweep may take so much longer than the time between two scans
 
@@ -50,6 +53,17 @@ def _laser_is_absent(snapshot: Snapshot) -> bool:
     return snapshot.get("scan") is None and not snapshot.link.offers("scan")
 
 
+@lru_cache(maxsize=16)
+def _straight_ahead(mounting: Mounting | None) -> Corridor:
+    """That of the obstacle check with its default measures, so that a scan is looked at once for both."""
+    usual = ObstacleLimits()
+    if mounting is None or mounting.x_m is None:
+        place = {"laser_ahead_m": usual.laser_ahead_m, "laser_left_m": mounting.y_m if mounting is not None else 0.0}
+    else:
+        place = {"laser_ahead_m": mounting.x_m, "laser_left_m": mounting.y_m, "nose_ahead_m": 0.0}
+    return Corridor(half_width_m=usual.half_width_m, wheelbase_m=usual.wheelbase_m, **place)
+
+
 def ends(limits: BlindLimits) -> End:
     return End("below", limits.blind_percent - DEADBAND_PERCENT, "%")
 
@@ -57,7 +71,10 @@ def ends(limits: BlindLimits) -> End:
 def sees(snapshot: Snapshot, limits: BlindLimits, was_active: bool) -> Finding:
     if _laser_is_absent(snapshot):
         return absent("The laser is not published")
-    sight = look(snapshot.need("scan"), CORRIDOR, LOOK_AHEAD_M)
+    scan = snapshot.need("scan")
+    if scan.mounting is not None and scan.mounting.why_not is not None:
+        return unknown(scan.mounting.why_not, short="mounting")
+    sight = sweep_ahead(snapshot, scan, _straight_ahead(scan.mounting))
     limit = Quantity(label="At most", value=limits.blind_percent, unit="%")
     if sight.beams == 0:
         return fault("The scan has no beam ahead of the car", brief="no beam", limit=limit, causes=("scan",))

@@ -17,6 +17,7 @@ from monitor.check import (
     Priority,
     Quantity,
     Sound,
+    Verdict,
     absent,
     fault,
     ok,
@@ -24,7 +25,8 @@ from monitor.check import (
 )
 from monitor.figures import beside
 from monitor.instruments import ObstacleLimits, stopping_m
-from monitor.obstacle_view import corridor_ahead, is_blind, look_ahead, tyre_angle_rad
+from monitor.mounting import within_half_turn
+from monitor.obstacle_view import corridor_ahead, is_blind, look_ahead, sweep_ahead, tyre_angle_rad, why_unseen
 from monitor.snapshot import NotFresh, Snapshot
 
 CLOSING_AT_LEAST_MPS = 0.3  # slower is noise of two distances
@@ -37,10 +39,14 @@ def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Fi
         return absent("The laser is not published")
     scan = snapshot.need("scan")
     speed_mps = _speed(snapshot)
+    mounting = scan.mounting
+    if mounting is not None and mounting.why_not is not None:
+        return unknown(mounting.why_not, short="mounting")
     corridor = corridor_ahead(snapshot, limits, was_active=was_active)
-    sight = look_ahead(scan, corridor)
-    if is_blind(sight):
-        return unknown("The laser sees nothing in the corridor", short="blind")
+    sight = sweep_ahead(snapshot, scan, corridor)
+    why_not = why_unseen(scan, sight)
+    if why_not is not None and (sight.gap_m is None or is_blind(sight)):
+        return unknown(why_not, short="blind" if sight.beams else "no view")
     before = snapshot.scan_before
     closing_mps = None
     if sight.gap_m is not None and sight.gap_m < _soon_m(speed_mps, limits):
@@ -48,6 +54,10 @@ def by_laser(snapshot: Snapshot, limits: ObstacleLimits, was_active: bool) -> Fi
         span_s = snapshot.readings["scan"].received_s - before.received_s if before is not None else 0.0
         closing_mps = _closing(sight.gap_m, gap_before_m, span_s, speed_mps)
     found = _judge(sight.gap_m, sight.bearing_rad, speed_mps, closing_mps, limits, was_active, cause="scan")
+    if why_not is not None and found.verdict is Verdict.OK:
+        return unknown(why_not, short="no view")  # what is seen is far enough, and something nearer may be unseen
+    if mounting is not None and mounting.reservation is not None:
+        found = found._replace(text=f"{found.text} ({mounting.reservation})")
     if tyre_angle_rad(snapshot) is None:
         found = found._replace(text=f"{found.text}; steering unknown, checked straight ahead")
     return found
@@ -128,6 +138,7 @@ def _judge(
 def _side(bearing_rad: float) -> str:
     if not math.isfinite(bearing_rad):
         return ""
+    bearing_rad = within_half_turn(bearing_rad)
     return f", {abs(math.degrees(bearing_rad)):.0f}° {'left' if bearing_rad > 0 else 'right'}"
 
 

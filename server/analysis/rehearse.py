@@ -116,6 +116,10 @@ class _Injected:
         found = self._faults.over(messages, self.start_s, lambda message: self._signals.get(message.topic))
         return ((message.at_s, message.topic, message.type, message.message) for message in found)
 
+    def only(self, topics: Collection[str]) -> Iterator[Row]:
+        """As those of the recording."""
+        return self._recording.only(topics)
+
 
 class _Rehearsal(Observer):
     """Collects what a run through a recording brings."""

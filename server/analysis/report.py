@@ -209,6 +209,9 @@ def _note(run: Rehearsed, name: str) -> str | None:
     if source is not None and (unit := run.reception.units.note(name, source.topic)) is not None:
         if tally is None or unit != tally.why_not_measured:
             notes.append(unit)
+    scan = run.snapshot.get("scan") if name == "scan" else None
+    if scan is not None and scan.value.mounting is not None and scan.value.mounting.note is not None:
+        notes.append(scan.value.mounting.note)
     if name == "scan" and (habit := habit_words(run.snapshot.scan_habit)) is not None:
         notes.append(habit)
     return "; ".join(notes) or None

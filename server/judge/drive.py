@@ -11,6 +11,7 @@ from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
 from server.judge.message import Json, RosVersion
 from server.judge.recorded_events import NewSettings, RecordedEvents
+from server.judge.recorded_transforms import RecordedTransforms
 from server.judge.ros_names import BadName, canonical_name
 from server.judge.settings import BadSetting
 from server.judge.settings_override import SettingsOverride, recorded_override, tuning_for
@@ -48,6 +49,10 @@ class MessageSource(Protocol):
 
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
         """From `start_s` after the beginning on, in time order; messages of topics not named may be empty."""
+        ...
+
+    def only(self, topics: Collection[str]) -> Iterator[Row]:
+        """From the beginning on, in time order, nothing but messages of these topics."""
         ...
 
 
@@ -132,6 +137,7 @@ class Drive:
             except BadName:
                 self.notes.append(f"{topic[:60]!r} is not a valid topic name and is ignored.")
         self.offered = {name: source.topics[topic].type for topic, name in self._names.items()}
+        self._transforms = RecordedTransforms(source, self._names, self.offered)
         self.settings_from_recording = override is None and recorded.settings is not None
         if override is not None:
             events = tuple(event for event in recorded.events if not isinstance(event[1], NewSettings))
@@ -143,7 +149,19 @@ class Drive:
             self.epochs += [
                 self._recorded_epoch(event.toml) for _, event in recorded.events if isinstance(event, NewSettings)
             ]
-        self.topics = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
+        listened = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
+        scans = {
+            topic: one.topic
+            for epoch in self.epochs
+            for topic, sources in epoch.listeners.items()
+            for one in sources
+            if one.signal == "scan"
+        }
+        # Topics of transforms to be followed: a laser is placed by them.
+        self.moving_transforms = self._transforms.follow(scans)
+        self.frames = self._transforms.frames
+        self.notes += self.frames.notes
+        self.topics = listened | self.moving_transforms
 
     @cached_property
     def unit_evidence(self) -> dict[Key, UnitEvidence]:
@@ -194,5 +212,7 @@ class Drive:
             # Of all that could compete: with the next settings others may.
             topics, found = to_compare(self.offered, {}) | to_compare(self.offered, picked), self._source.topics
             silent = [name for topic, name in self._names.items() if getattr(found[topic], "count", 1) == 0]
-            self.evidence = source_survey.survey(self._source, self._names, topics, silent)
+            self.evidence = source_survey.survey(
+                self._source, self._names, topics, silent, self._transforms.looks_ahead
+            )
         return self.evidence

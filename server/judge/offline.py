@@ -91,6 +91,7 @@ class OfflineRun:
         is_new = run_state is None
         self.run_state = self._begin(from_s) if run_state is None else run_state
         self._epoch = drive.epochs[self.run_state.epoch]
+        self._frames = drive.frames if self.run_state.frames is None else self.run_state.frames
         self._rows = self._read()
         self._next: Row | None = next(self._rows, None)
         if is_new:
@@ -110,6 +111,7 @@ class OfflineRun:
             at_s=from_s,
             recorded_alarms=Monitor(limits=limits).alarms,
             reception=Reception(units=UnitWatch(deepcopy(self.drive.unit_evidence))),
+            frames=deepcopy(self.drive.frames) if self.drive.moving_transforms else None,
         )
 
     @property
@@ -193,6 +195,9 @@ class OfflineRun:
         run_state = self.run_state
         _, topic, _, message = row
         self._observer.message_received(topic, now_s)
+        if topic in self.drive.moving_transforms:
+            self._frames.receive(topic, message)
+            return
         sources = self._epoch.listeners.get(topic)
         if sources is None:
             if topic in self._epoch.competing:
@@ -211,6 +216,8 @@ class OfflineRun:
             tyre_rad_per_unit=run_state.monitor.limits.steering.tyre_rad_per_unit,
             units=self._epoch.tuning.settings.units,
             transport=self.drive.delay,
+            frames=self._frames,
+            limits=run_state.monitor.limits,
             on_value=self._observer.value_decoded,
             on_number=self._observer.number_decoded,
         )

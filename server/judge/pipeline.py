@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
+from monitor.catalog import AllLimits
 from monitor.runner import Monitor, Transition
 from monitor.state import State
-from monitor.values import DriveMode
+from monitor.values import DriveMode, LaserScan
+from server.judge.body_axes import TYPES, in_body_axes
+from server.judge.frames import Frames
 from server.judge.message_fields import stamp_s
 from server.judge.profiles import Profile
 from server.judge.reception_stats import Reception
@@ -52,14 +55,16 @@ def receive(
     tyre_rad_per_unit: float,
     units: Mapping[str, str] = NO_UNITS,
     transport: Delays | None = None,
+    frames: Frames | None = None,
+    limits: AllLimits | None = None,
     on_value: Callable[[str, Any, float, float | None], None] | None = None,
     on_number: Callable[[str, float, float, float | None], None] | None = None,
 ) -> tuple[str, ...]:
     """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock;
     `tyre_rad_per_unit` of the steering signal, 0: not known; `units` are the operator's choices, signal → name;
-    `transport` None: it came without
-    delay, as far as is known. `on_value` receives each decoded value: signal, value, `at_s`, stamp; `on_number` each
-    number whose unit is not known, as it was published.
+    `transport` None: it came without delay, as far as is known. `frames` and `limits`: by which a laser is mounted;
+    None: at the nose. `on_value` receives each decoded value: signal, value, `at_s`, stamp; `on_number` each number
+    whose unit is not known, as it was published.
     """
     reception.received += 1
     stamp = stamp_s(message)
@@ -67,6 +72,11 @@ def receive(
     delay_s = 0.0 if transport is None else transport.receive(sources[0].topic, at_s, stamp)
     changed: tuple[str, ...] = ()
     is_proper = True
+    if frames is not None and sources[0].type in TYPES:
+        message, why_not = in_body_axes(frames, sources[0].topic, sources[0].type, message)
+        if why_not is not None:
+            _refuse(sources, why_not, at_s, reception, state)
+            return ()
     for source in sources:
         value = reception.read(source, message, note)
         if value is not None and source.signal in UNITS:
@@ -88,7 +98,9 @@ def receive(
             continue
         if source.carries:
             reception.units.see(source.signal, value, at_s)
-        if type(value) is DriveMode and (mode := profile.modes.get(value.said.casefold())) is not None:
+        if type(value) is LaserScan and frames is not None and limits is not None:
+            value = frames.mounted(source.topic, value, limits)
+        elif type(value) is DriveMode and (mode := profile.modes.get(value.said.casefold())) is not None:
             value = DriveMode(mode=mode, said=value.said)
         if on_value is not None:
             on_value(source.signal, value, at_s, stamp)
@@ -96,6 +108,16 @@ def receive(
     if not is_proper:
         reception.rejected += 1
     return changed
+
+
+def _refuse(sources: tuple[Source, ...], why: str, at_s: float, reception: Reception, state: State) -> None:
+    reception.rejected += 1
+    for source in sources:
+        tally = reception.tally(source.signal)
+        tally.received += 1
+        tally.reject(why)
+        if source.decode is not None:
+            state.refuse(source.signal, why, at_s)
 
 
 def judge(

@@ -10,6 +10,7 @@ from monitor.load import RecentLoad
 from monitor.runner import Monitor
 from monitor.state import State
 from monitor.trends import Trends
+from server.judge.frames import Frames
 from server.judge.reception_stats import Reception
 from server.judge.recorded_slowdown import RecordedSlowDown
 
@@ -37,3 +38,4 @@ class RunState:
     paused_s: float | None = None
     paused_by: str | None = None
     slow_down: RecordedSlowDown = field(default_factory=RecordedSlowDown)
+    frames: Frames | None = None  # where transforms move; None: those of the drive count throughout

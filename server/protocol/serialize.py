@@ -15,6 +15,7 @@ from monitor.alarm import Alarm, Transition
 from monitor.alarm_spec import AlarmSpec
 from monitor.check import Finding, Quantity, Verdict
 from monitor.load import AlarmLoad
+from monitor.mounting import within_half_turn
 from monitor.obstacle_view import ANGLE_STEP_RAD
 from monitor.runner import Tile
 from monitor.scan import usable
@@ -27,10 +28,11 @@ from server.protocol.signal_state import ComponentState, ScanValue, SignalValue
 from server.protocol.state import Step, Trends
 
 SCAN_MAGIC = 0x53
-SCAN_VERSION = 2
-SCAN_HEADER = struct.Struct("<BBHIHHffffbBH")  # 32 bytes, so that the ranges that follow are aligned
+SCAN_VERSION = 3
+SCAN_HEADER = struct.Struct("<BBHIHHffffbBHfff")  # 44 bytes, so that the ranges that follow are aligned
 NO_BEAM, BLIND = 65535, 65534  # in the place of the nearest beam: nothing in the corridor; it could not be seen
 STOPPING_UNKNOWN = 65535
+LEAST_GAP_M = 0.01  # of what touches the nose: 0 is no gap
 UNUSABLE, TOO_CLOSE, NOTHING, INVALID = 0, 65535, 65534, 65533
 _STEPS = 65000  # units from 0 to range_max: 1.2 mm for a range of 81 m
 _OPEN_RANGE_M = 200.0  # the scale's end for a sensor that states none
@@ -103,7 +105,7 @@ def _scan_summary(scan: values.LaserScan) -> ScanValue:
     if good.any():
         at = int(np.argmin(np.where(good, scan.ranges_m, np.inf)))
         nearest = float(scan.ranges_m[at])
-        bearing = scan.angle_min_rad + at * scan.angle_increment_rad
+        bearing = within_half_turn(scan.angle_min_rad + at * scan.angle_increment_rad)
     return {
         "beams": int(scan.ranges_m.size),
         "usable": int(np.count_nonzero(good)),
@@ -114,6 +116,7 @@ def _scan_summary(scan: values.LaserScan) -> ScanValue:
         "nearest_m": plain(nearest),
         "nearest_bearing_rad": plain(bearing),
         "frame_id": scan.frame_id,
+        "mounting": (scan.mounting.why_not or scan.mounting.reservation) if scan.mounting is not None else None,
     }
 
 
@@ -127,6 +130,9 @@ class Judged:
     bearing_rad: float | None  # of it
     is_blind: bool  # too little of the corridor was seen to say anything
     stopping_m: float | None  # None: the speed is not known
+    laser_ahead_m: float  # of the rear axle
+    laser_left_m: float  # of the centre line
+    nose_ahead_m: float  # of the rear axle: the gap is measured from there
 
 
 def scan_frame(scan: values.LaserScan, *, number: int, age_s: float, kinds_kept: bool, judged: Judged) -> bytes:
@@ -157,10 +163,13 @@ def scan_frame(scan: values.LaserScan, *, number: int, age_s: float, kinds_kept:
         scan.angle_min_rad,
         scan.angle_increment_rad,
         end_m,
-        0.0 if judged.is_blind or judged.gap_m is None else judged.gap_m,
+        0.0 if judged.is_blind or judged.gap_m is None else max(LEAST_GAP_M, judged.gap_m),
         round(judged.tyre_angle_rad / ANGLE_STEP_RAD),
         round(judged.wider_m * 100),
         _nearest_beam(scan, judged),
+        judged.laser_ahead_m,
+        judged.laser_left_m,
+        judged.nose_ahead_m,
     )
     return header + codes.tobytes()
 
@@ -170,7 +179,11 @@ def _nearest_beam(scan: values.LaserScan, judged: Judged) -> int:
         return BLIND
     if judged.bearing_rad is None or not scan.angle_increment_rad:
         return NO_BEAM
-    return round((judged.bearing_rad - scan.angle_min_rad) / scan.angle_increment_rad)
+    # The bearing is from −π to π, and the beams may be counted from anywhere.
+    beams = (judged.bearing_rad - scan.angle_min_rad) / scan.angle_increment_rad
+    turn = math.tau / abs(scan.angle_increment_rad)
+    beam = round(beams - turn * math.floor((beams + 0.5) / turn))
+    return beam if beam < scan.beams else NO_BEAM  # it is of another part of the sweep
 
 
 def tile(tile: Tile) -> TileState:

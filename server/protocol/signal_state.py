@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Generic, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Generic, Literal, NotRequired, TypeVar
 
 from typing_extensions import TypeAliasType, TypedDict
 
@@ -72,6 +72,9 @@ class ScanValue(TypedDict):
     nearest_m: float | None
     nearest_bearing_rad: float | None
     frame_id: str
+    mounting: NotRequired[
+        Annotated[str | None, doc("*laser assumed to look ahead*: what limits what it says of the road; null: nothing")]
+    ]
 
 
 class ComponentState(TypedDict):

@@ -161,6 +161,10 @@ class SessionRecording:
         """A message of the car, or the RawFrame that holds it."""
         self._parts.take(topic, type, message, now_s, size)
 
+    def hold(self, topic: str, type: str | None, message: Any) -> None:
+        """A message that is sent once and holds for the whole drive: every later part begins with it."""
+        self._parts.hold(topic, type, message)
+
     def own(self, channel: Own, said: Mapping[str, Any]) -> None:
         """Something of ours, on one of our channels."""
         self._parts.own(channel, said)

@@ -26,6 +26,7 @@ from server.version import catgraph_version
 EARLY_S = 10.0  # entries from before a session began are kept, if it was not long before: how it came to be connected
 NOTE_EVERY_S = 2.0  # at most: what is missing in a part, written into it
 BEGIN_AFTER_S = 2.0  # a silent car is recorded too, as silent
+MOST_HELD = 100  # messages of transforms
 SETTLE_S = 5.0  # a disk that takes longer is not waited for when the server ends
 
 
@@ -55,6 +56,7 @@ class RecordingParts:
         self._on_finished = on_finished
         self._on_unreadable = on_unreadable
         self._definitions: dict[str, str] = {}
+        self._held: dict[tuple[str, ...], tuple[str, str | None, Any]] = {}
         self._anchor = (0.0, 0)  # a moment of `now`, and the time of day then [ns]: spacing stays true in a part
         self._ended_ms = 0
 
@@ -113,6 +115,8 @@ class RecordingParts:
         self.recorder.begin(part)
         if self._definitions:
             self.recorder.learn(self._definitions)
+        for topic, type, message in self._held.values():
+            self.recorder.take(topic, type, message, self._ns(self._now()), 0, self._now())
         self.own("settings", settings)
         for channel, said in early:
             self.own(channel, said)
@@ -135,6 +139,14 @@ class RecordingParts:
             self.begin(session)
         if session.is_open and self.recorder is not None:
             self.recorder.take(topic, type, message, self._ns(now_s), size, now_s)
+
+    def hold(self, topic: str, type: str | None, message: Any) -> None:
+        """Transforms that are sent once: a later part begins with them, for they are not sent again."""
+        rows = message.get("transforms") if isinstance(message, Mapping) else None
+        children = [row.get("child_frame_id") for row in rows or () if isinstance(row, Mapping)]
+        key = (topic, *map(str, children[:MOST_HELD]))
+        if key in self._held or len(self._held) < MOST_HELD:
+            self._held[key] = topic, type, message
 
     def own(self, channel: Own, said: Mapping[str, Any]) -> None:
         """An entry of one of our own channels."""
@@ -196,6 +208,7 @@ class RecordingParts:
         """The car is another one from now on: nothing that was learnt or held is of it."""
         self.early.clear()
         self._definitions.clear()
+        self._held.clear()
 
     async def stop(self) -> None:
         """Completes what is being written; for the end of the server."""

@@ -19,6 +19,7 @@ from monitor.transport import TransportDelay
 from monitor.trends import Trends
 from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
+from server.judge.frames import Frames
 from server.judge.reception_stats import Reception
 from server.judge.topics import Source
 
@@ -54,6 +55,7 @@ class Judgement:
         """Another car is to be judged: nothing is known of it. The monitor keeps its alarms until `end`."""
         self.reception = Reception()
         self.transport = TransportDelay()
+        self.frames = Frames()
         self.state = State(expected_rates(self._tuning.limits))
         self.state.ride(self.rides, self._now())
         self.trends = Trends(self._now())
@@ -94,6 +96,8 @@ class Judgement:
             tyre_rad_per_unit=self.monitor.limits.steering.tyre_rad_per_unit,
             units=self._tuning.settings.units,
             transport=self.transport,
+            frames=self.frames,
+            limits=self.monitor.limits,
         )
         if changed:
             self.judge(now_s, changed)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
+from monitor.values import LaserScan
 from server.bus.bus import SessionBus
+from server.judge.frames import is_static
 from server.recording.controller import SessionRecording
 from server.rosbridge.raw_frame import RawFrame
 from server.slowdown.command_target import GUARD_STATE
@@ -15,6 +18,7 @@ from server.vehicle.connection import Connection
 from server.vehicle.judgement import Judgement
 from server.vehicle.marks import Marks
 from server.vehicle.scan_feed import ScanFeed
+from server.vehicle.subscription_table import TRANSFORMS_MS
 from server.vehicle.tick_parts import TickParts
 from server.vehicle.undelivered import CLIENT_COUNT
 
@@ -50,10 +54,15 @@ class MessageIntake:
     def follow(self, connection: Connection) -> None:
         """From now on messages of this connection come; to be called once."""
         self._connection = connection
+        connection.subscriptions.signals.place_by(self._looks_ahead)
+
+    def _looks_ahead(self, topic: str, scan: LaserScan) -> bool | None:
+        return self._judgement.frames.looks_ahead(topic, scan)
 
     def reset(self) -> None:
         """Another car's messages come."""
         self._scans = ScanFeed(self._vehicle, self._bus)
+        self._transforms_s = -math.inf  # when transforms that move were parsed last
 
     def junk_received(self, why: str) -> None:
         """Something came that is no message."""
@@ -75,6 +84,8 @@ class MessageIntake:
         topics = connection.subscriptions
         if frame.topic not in topics.others:
             return False
+        if frame.topic in topics.table.transforms and self._places_sensors(frame.topic):
+            return False
         topics.received(frame.topic)
         if self._recording.is_on:
             self._record(connection, frame.topic, frame, self._now(), len(frame.payload))
@@ -93,6 +104,11 @@ class MessageIntake:
             return  # recorded as a mark
         if self._recording.is_on and connection.link is not None:
             self._record(connection, topic, message, now_s, connection.link.frame_bytes)
+        if topic in topics.table.transforms:
+            self._judgement.frames.receive(topic, message)
+            if is_static(topic):
+                self._recording.hold(topic, topics.type_of(topic), message)
+            return
         if is_button or self._slow_down.receive(topic, message) or topics.took(topic, message):
             return
         if topic in topics.others:
@@ -111,6 +127,16 @@ class MessageIntake:
         changed = self._judgement.receive(sources, topic, message, note, now_s)
         if "scan" in changed:
             self._show_scan(message, now_s)
+
+    def _places_sensors(self, topic: str) -> bool:
+        """Whether a message of transforms is to be parsed; of those that move, a few a second are enough."""
+        if is_static(topic):
+            return True
+        now_s = self._now()
+        is_due = now_s - self._transforms_s >= TRANSFORMS_MS / 1000
+        if is_due:
+            self._transforms_s = now_s
+        return is_due
 
     def _show_scan(self, message: Any, now_s: float) -> None:
         self._scans.count()

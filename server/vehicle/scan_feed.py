@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from monitor.instruments import ObstacleLimits, stopping_m
-from monitor.obstacle_view import corridor_ahead, is_blind, look_ahead
+from monitor.obstacle_view import corridor_ahead, is_blind, sweep_ahead, why_unseen
 from monitor.state import Snapshot
 from monitor.values import LaserScan, Twist
 from server.bus.bus import SessionBus
@@ -51,10 +51,15 @@ class ScanFeed:
             self._bus.put(self._vehicle, "scan", frame, made_s=snapshot.now_s)
 
 
+def _is_out_of_place(scan: LaserScan) -> bool:
+    return scan.mounting is not None and scan.mounting.why_not is not None
+
+
 def judged(scan: LaserScan, snapshot: Snapshot, limits: ObstacleLimits, *, was_active: bool) -> serialize.Judged:
     """The geometry by which the obstacle check judges this scan at this moment, and what it sees."""
     corridor = corridor_ahead(snapshot, limits, was_active=was_active)
-    sight = look_ahead(scan, corridor)
+    sight = sweep_ahead(snapshot, scan, corridor)
+    is_seen = why_unseen(scan, sight) is None
     speed = snapshot.get("speed")
     twist = speed.value if speed is not None and speed.is_fresh(snapshot.now_s) else None
     is_known = isinstance(twist, Twist) and math.isfinite(twist.speed_mps)
@@ -63,6 +68,9 @@ def judged(scan: LaserScan, snapshot: Snapshot, limits: ObstacleLimits, *, was_a
         tyre_angle_rad=corridor.tyre_angle_rad,
         gap_m=sight.gap_m,
         bearing_rad=sight.bearing_rad,
-        is_blind=is_blind(sight),
+        is_blind=not is_seen and (sight.gap_m is None or is_blind(sight) or _is_out_of_place(scan)),
+        laser_ahead_m=corridor.laser_ahead_m,
+        laser_left_m=corridor.laser_left_m,
+        nose_ahead_m=corridor.nose_m,
         stopping_m=stopping_m(twist.speed_mps, limits) if twist is not None and is_known else None,
     )

@@ -239,9 +239,9 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "why": source.why if source else None,
         "frame": facts.reception.frame_of(source.topic) if source else None,
         "note": (unusable.words if unusable else None)
+        or (_scan_note(source, snapshot) if signal.name == "scan" else None)
         or (source.note if source else undecided)
         or (_unknown_part(reading.value) if reading else None)
-        or (habit_words(snapshot.scan_habit) if signal.name == "scan" else None)
         or (facts.reception.units.note(signal.name, source.topic) if source else None),
         "unusable": unusable.words if unusable else None,
         "count": tally.received,
@@ -258,6 +258,14 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
 def _is_unit_known(facts: Facts, source: Source) -> bool:
     decision = facts.reception.units.decision(source.signal, source.topic)
     return decision is None or decision.unit is not None or decision.is_rest
+
+
+def _scan_note(source: Source | None, snapshot: Snapshot) -> str | None:
+    """Of the laser all is to be known at once: the choice of its topic, its mounting, how its driver counts."""
+    scan = snapshot.get("scan")
+    mounting = scan.value.mounting if scan is not None else None
+    notes = (source.note if source else None, mounting.note if mounting else None, habit_words(snapshot.scan_habit))
+    return "; ".join(note for note in notes if note) or None
 
 
 def _unknown_part(value: Any) -> str | None:

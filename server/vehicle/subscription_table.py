@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 
+from server.judge.frames import is_static, is_transforms
 from server.judge.topics import Source
 from server.recording.recorded_topics import Also
 from server.rosbridge.live_source import LiveSource
@@ -17,6 +18,10 @@ from server.vehicle.probation import Probation
 from server.vehicle.type_definitions import TypeDefinitions
 from server.vehicle.undelivered import CLIENT_COUNT
 
+TRANSFORMS_MS = (
+    200  # of transforms that move: where a laser is changes slowly, and /tf is sent a hundred times a second
+)
+MOST_TRANSFORMS = 8  # topics: one or two of each namespace
 BY_NAME_AGAIN_S, BY_NAME_LAST_S = 5.0, 60.0  # each attempt without rosapi costs the bridge a line in its log a name
 
 
@@ -44,6 +49,7 @@ class SubscriptionTable:
         self.guard: str | None = None  # a topic that is subscribed to besides
         self.also: Also = "none"  # what is to be recorded beyond the signals
         self.recorded = wanted_topics.Recorded(topics={}, left_out=())
+        self.transforms: frozenset[str] = frozenset()  # topics that say where the sensors are
         self.judged = 0  # topics that are subscribed to for their signals
         self.button: car_marks.Asked | None = None  # how the car's button was subscribed to
 
@@ -93,6 +99,7 @@ class SubscriptionTable:
             if has_button:
                 button = Subscription(topic=car_marks.TOPIC, type=offered[car_marks.TOPIC], queue_length=10)
                 wanted.setdefault(car_marks.TOPIC, button)
+            wanted |= self._transform_rows(offered, wanted, too_large)
             if needs_client_count and CLIENT_COUNT in offered:
                 kind = offered[CLIENT_COUNT] or None
                 wanted.setdefault(CLIENT_COUNT, Subscription(topic=CLIENT_COUNT, type=kind, queue_length=1))
@@ -101,6 +108,23 @@ class SubscriptionTable:
         self._apply(
             wanted, [topic for topic in wanted if topic in by_topic or topic in watched], [*self.recorded.topics]
         )
+
+    def _transform_rows(
+        self, offered: Mapping[str, str], wanted: Mapping[str, Subscription], without: Collection[str]
+    ) -> dict[str, Subscription]:
+        """Subscriptions of the transforms, as far as they are not `wanted` to be recorded whole."""
+        found = sorted(topic for topic, kind in offered.items() if is_transforms(topic, kind) and topic not in without)
+        self.transforms = frozenset(found[:MOST_TRANSFORMS])
+        return {
+            topic: Subscription(
+                topic=topic,
+                type=offered[topic],
+                throttle_ms=0 if is_static(topic) else TRANSFORMS_MS,
+                queue_length=50 if is_static(topic) else 1,  # of static ones each publisher sends one, at once
+            )
+            for topic in self.transforms
+            if topic not in wanted
+        }
 
     def subscribe_by_name(self, picked: Mapping[str, str]) -> Mapping[str, tuple[Source, ...]]:
         """Without rosapi, by the names that are known; the signals that each topic would fill."""

@@ -112,7 +112,9 @@ def test_settings_begin_with_the_first_tile_and_headings_stand_together() -> Non
     assert headings[-1] == "Expert", "what is seldom changed is the last"
     assert list(dict.fromkeys(headings))[-2] == "Gauge"
     assert {name for name, field in catalog.schema().items() if field["heading"] == "Vehicle"} == {
-        "obstacle.half_width_m", "obstacle.wheelbase_m", "obstacle.laser_ahead_m", "steering.tyre_rad_per_unit",
+        "obstacle.half_width_m", "obstacle.wheelbase_m", "obstacle.laser_ahead_m", "obstacle.bumper_ahead_m",
+        "mounting.yaw_deg", "mounting.left_m", "mounting.upside_down", "mounting.by_settings",
+        "steering.tyre_rad_per_unit",
     }  # fmt: skip
 
 

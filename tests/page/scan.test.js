@@ -42,6 +42,44 @@ test('a frame is read as it is written', () => {
   assert.deepEqual({ ...read?.judged, gap_m: Math.fround(12.4) }, { tyre_angle_rad: -0.05, wider_m: 0.2, gap_m: Math.fround(12.4), beam: 1, isBlind: false, stopping_m: 7.14 });
 });
 
+test('a laser behind the nose and aside: its returns are drawn from the nose', () => {
+  const old = new Uint8Array(frame([1000], { version: 3 }));
+  const bytes = new Uint8Array(old.length + 12);
+  bytes.set(old.subarray(0, 32));
+  bytes.set(old.subarray(32), 44);
+  const view = new DataView(bytes.buffer);
+  [1.5, 0.4, 3.7].forEach((value, i) => view.setFloat32(32 + 4 * i, value, true));
+  view.setFloat32(12, 4 * Math.PI, true); // counted from two turns on: straight ahead
+  const read = readScan(bytes.buffer);
+  assert.ok(read);
+  assert.equal(read.nose_ahead_m, Math.fround(3.7));
+  near(pointsOf(read, 20)[0] ?? NaN, 10 - 2.2, 1e-5);
+  near(pointsOf(read, 20)[1] ?? NaN, 0.4, 1e-5);
+  const found = nearestTo(read, 7.8, 0.4, 0.1);
+  near(found?.bearing_rad ?? NaN, 0, 1e-5);
+  near(found?.range_m ?? NaN, 10, 1e-6);
+  assert.equal(readScan(bytes.buffer.slice(0, 44)), null, 'cut in its beams');
+  view.setFloat32(36, NaN, true);
+  assert.equal(readScan(bytes.buffer), null);
+});
+
+test('a full circle has no seam: what is hatched on both sides of it is one sector, ahead', () => {
+  const codes = Array.from({ length: 360 }, (_, i) => (i < 10 || i >= 350 ? NO_RETURN : 500));
+  for (const angle_increment_rad of [DEGREE, -DEGREE]) {
+    const [only, ...more] = sectorsOf(scan(codes, { angle_min_rad: 0, angle_increment_rad }));
+    assert.deepEqual(more, []);
+    assert.equal(only?.beams, 20);
+    near((only?.from_rad ?? NaN) + (only?.to_rad ?? NaN), -Math.sign(angle_increment_rad) * DEGREE, 1e-9);
+    near((only?.to_rad ?? NaN) - (only?.from_rad ?? NaN), 20 * DEGREE, 1e-9);
+  }
+  assert.equal(sectorsOf(scan(codes.slice(0, 270).concat(Array(10).fill(NO_RETURN)))).length, 2, 'no full circle');
+});
+
+test('bearings count from minus half a turn, wherever the laser begins', () => {
+  const right = scan([NO_RETURN, 500], { angle_min_rad: 1.75 * Math.PI, angle_increment_rad: DEGREE });
+  near(nearestShown(right, 20)?.bearing_rad ?? NaN, -Math.PI / 4 + DEGREE, 1e-9);
+});
+
 test('nothing in the corridor, a corridor not seen and a speed not known are three things', () => {
   assert.deepEqual(readScan(frame([1, 2], { gap: 0, beam: 65535 }))?.judged, { tyre_angle_rad: -0.05, wider_m: 0.2, gap_m: null, beam: null, isBlind: false, stopping_m: 7.14 });
   assert.deepEqual(readScan(frame([1, 2], { gap: 0, beam: 65534, stopping: 65535 }))?.judged, { tyre_angle_rad: -0.05, wider_m: 0.2, gap_m: null, beam: null, isBlind: true, stopping_m: null });

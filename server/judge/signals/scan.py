@@ -11,6 +11,7 @@ from server.judge.topic import Topic
 
 MAX_BEAMS = 65535
 FARTHEST_SCAN_M = 10_000.0  # a range_max beyond is "no end", which drivers write as the largest float there is
+LOOKS_AHEAD = ("/catvehicle/front_laser_points",)  # topics in lower case whose laser is at the nose by its definition
 WIDEST_RAD = 4 * math.pi  # two turns: no laser sweeps more
 
 

@@ -16,6 +16,7 @@ import orjson
 from server.judge.message import Json, Message, RosVersion
 from server.recording.mcap.mcap_file import McapFile
 from server.recording.own import PREFIX
+from server.recording.read.beforehand import beforehand
 from server.recording.read.decode import Decode, compile_decoder
 from server.recording.read.definitions import definitions_of
 from server.recording.read.errors import NoRoom, RecordingUnreadable, Undecodable
@@ -146,6 +147,15 @@ class Recording:
             Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=self._read(source, readers, start_ns, topics))
             for source, readers in zip(self._sources, self._readers, strict=True)
             if readers
+        ]
+        return in_time_order(streams, operator.itemgetter(0))
+
+    def only(self, topics: Collection[str]) -> Iterator[Row]:
+        """Messages of these topics alone, in time order, for what is to be known before a reading; see `beforehand`."""
+        streams = [
+            Stream(start_ns=source.start_ns, end_ns=source.end_ns, rows=beforehand(source, ways))
+            for source, readers in zip(self._sources, self._readers, strict=True)
+            if (ways := {n: (r.topic, r.type, r.decode) for n, r in readers.items() if r.topic in topics})
         ]
         return in_time_order(streams, operator.itemgetter(0))
 

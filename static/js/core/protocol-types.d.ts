@@ -1990,6 +1990,8 @@ export interface ScanValue {
   nearest_m: number | null;
   nearest_bearing_rad: number | null;
   frame_id: string;
+  /** *laser assumed to look ahead*: what limits what it says of the road; null: nothing */
+  mounting?: string | null;
 }
 
 /** To a moment; beyond an end is that end. */

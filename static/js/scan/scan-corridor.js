@@ -1,4 +1,4 @@
-// The corridor as the obstacle check bends it, as lines to draw: pure functions. x is ahead and y left of the laser, in metres.
+// The corridor as the obstacle check bends it, as lines to draw: pure functions. x is ahead and y left of the car's nose, in metres.
 
 /** A radius of more than five kilometres is straight, as the check has it. */
 const STRAIGHT_RAD = 0.0005;
@@ -9,7 +9,7 @@ const STEP_M = 0.5;
  * @typedef {object} Corridor
  * @property {number} half_width_m
  * @property {number} wheelbase_m
- * @property {number} laser_ahead_m of the rear axle
+ * @property {number} laser_ahead_m of the rear axle; of the nose, where the laser is behind it
  * @property {number} tyre_angle_rad positive = left
  *
  * @typedef {[number, number]} Point x ahead, y left [m]

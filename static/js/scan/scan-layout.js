@@ -1,4 +1,4 @@
-// What the plot of a scan shows and where: pure functions. x is ahead and y left of the laser, in metres.
+// What the plot of a scan shows and where: pure functions. x is ahead and y left of the car's nose, in metres.
 
 import { INVALID, NO_RETURN, NOTHING_IN_RANGE, TOO_CLOSE, bearingOf, rangeOf } from './scan-frame.js';
 import { bearing } from '../core/format.js';
@@ -9,7 +9,7 @@ const NAMED_RAD = (6 * Math.PI) / 180;
 export const REACH_M = { least: 4, most: 120, first: 20 };
 /** One press of + or −. */
 const ZOOM_STEP = Math.SQRT2;
-/** Farther behind the laser than this a return is below the plot [m]. */
+/** Farther behind the nose than this a return is below the plot [m]. */
 const BEHIND_M = 0.5;
 /** Above this many beams, a return whose square of 5 px would cover its neighbour's but for this is not drawn again [px]. */
 const THINNED = { beams: 1000, px: 1.5 };
@@ -26,7 +26,7 @@ const THINNED = { beams: 1000, px: 1.5 };
  */
 export function pointsOf(scan, reach_m, pixel_m = 0) {
   const points = new Float32Array(2 * scan.codes.length);
-  const { codes, scale_m, angle_min_rad, angle_increment_rad } = scan;
+  const { codes, scale_m, angle_min_rad, angle_increment_rad, x_m = 0, y_m = 0 } = scan;
   const apart_m = codes.length > THINNED.beams ? THINNED.px * pixel_m : -1;
   let used = 0;
   let [px, py] = [Infinity, Infinity];
@@ -34,8 +34,8 @@ export function pointsOf(scan, reach_m, pixel_m = 0) {
     const code = codes[i] ?? NO_RETURN;
     if (code === NO_RETURN || code >= INVALID || code * scale_m > reach_m) continue;
     const angle = angle_min_rad + i * angle_increment_rad;
-    const x = code * scale_m * Math.cos(angle);
-    const y = code * scale_m * Math.sin(angle);
+    const x = code * scale_m * Math.cos(angle) + x_m;
+    const y = code * scale_m * Math.sin(angle) + y_m;
     if (Math.abs(x - px) <= apart_m && Math.abs(y - py) <= apart_m) continue;
     points[used] = px = x;
     points[used + 1] = py = y;
@@ -45,13 +45,14 @@ export function pointsOf(scan, reach_m, pixel_m = 0) {
 }
 
 /**
- * How many usable returns lie behind the laser, where the plot does not reach.
+ * How many usable returns lie behind the nose, where the plot does not reach.
  * @param {Scan} scan
  */
 export function behind(scan) {
   let count = 0;
   for (let i = 0; i < scan.codes.length; i += 1) {
-    if ((rangeOf(scan, i) ?? 0) * Math.cos(bearingOf(scan, i)) < -BEHIND_M) count += 1;
+    const range_m = rangeOf(scan, i);
+    if (range_m !== null && range_m * Math.cos(bearingOf(scan, i)) + (scan.x_m ?? 0) < -BEHIND_M) count += 1;
   }
   return count;
 }
@@ -114,7 +115,25 @@ export function sectorsOf(scan) {
     if (isBlind && !open) open = { code, from: i };
   }
   close(scan.codes.length);
-  return sectors;
+  return joined(scan, sectors).map(beforeTheCar);
+}
+
+/** A full circle has no seam: what ends at the last beam goes on at the first. @param {Scan} scan @param {Sector[]} sectors */
+function joined({ codes, angle_increment_rad }, sectors) {
+  const [first, last] = [sectors[0], sectors.at(-1)];
+  const step = Math.abs(angle_increment_rad);
+  const isRound = Math.abs(2 * Math.PI - codes.length * step) <= 1.01 * step;
+  const touch = first && last && first !== last && first.code === last.code && codes[0] === first.code && codes[codes.length - 1] === last.code;
+  if (!isRound || !touch) return sectors;
+  const width = first.to_rad - first.from_rad + last.to_rad - last.from_rad;
+  const { from_rad } = angle_increment_rad > 0 ? last : first;
+  return [...sectors.slice(1, -1), { from_rad, to_rad: from_rad + width, code: first.code, beams: first.beams + last.beams }];
+}
+
+/** The same sector, its middle within half a turn of ahead. @param {Sector} sector @returns {Sector} */
+function beforeTheCar(sector) {
+  const turned = 2 * Math.PI * Math.round((sector.from_rad + sector.to_rad) / (4 * Math.PI));
+  return turned ? { ...sector, from_rad: sector.from_rad - turned, to_rad: sector.to_rad - turned } : sector;
 }
 
 /** @param {number} code */

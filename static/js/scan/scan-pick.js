@@ -24,7 +24,8 @@ export function returnOf(scan, beam) {
   const range_m = rangeOf(scan, beam);
   if (range_m === null) return null;
   const bearing_rad = bearingOf(scan, beam);
-  return { beam, range_m, bearing_rad, x_m: range_m * Math.cos(bearing_rad), y_m: range_m * Math.sin(bearing_rad) };
+  const { x_m = 0, y_m = 0 } = scan;
+  return { beam, range_m, bearing_rad, x_m: range_m * Math.cos(bearing_rad) + x_m, y_m: range_m * Math.sin(bearing_rad) + y_m };
 }
 
 /**

@@ -67,14 +67,16 @@ export class ScanPlot {
     const scale = plotScale(width, height, reach_m);
     const sectors = [...sectorsOf(scan), ...unseenOf(scan)];
     const { tyre_angle_rad, wider_m } = scan.judged;
-    const corridor = around.car ? { ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad } : null;
+    const corridor = around.car ? {
+      ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad, laser_ahead_m: scan.nose_ahead_m ?? around.car.laser_ahead_m,
+    } : null;
     if (corridor) this.#stoppingStrip(g, scale, corridor, scan.judged.stopping_m);
-    this.#hatch(g, scale, sectors, width + height, dpr, theme.key);
+    this.#hatch(g, scale, scan, sectors, width + height, dpr, theme.key);
     const points = pointsOf(scan, reach_m * 1.05, 1 / scale.k);
     this.#dots = { scale, points };
     const nearest = this.#nearestAt(g, scale, scan, reach_m); // its room is kept by all other words
     if (corridor) this.#corridor(g, scale, corridor, reach_m, scan.judged.stopping_m, around.limit_m);
-    this.#names(g, scale, reach_m, sectors, width);
+    this.#names(g, scale, scan, reach_m, sectors, width);
     this.#rings(g, scale, reach_m);
     this.#points(g, scale, points);
     if (nearest) this.#nearest(g, nearest);
@@ -93,9 +95,10 @@ export class ScanPlot {
     g.fill();
   }
 
-  /** @param {Pen} g @param {Scale} scale @param {import('./scan-layout.js').Sector[]} sectors @param {number} far @param {number} dpr @param {string} look */
-  #hatch(g, { cx, cy }, sectors, far, dpr, look) {
+  /** @param {Pen} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {import('./scan-layout.js').Sector[]} sectors @param {number} far @param {number} dpr @param {string} look */
+  #hatch(g, { at }, { x_m = 0, y_m = 0 }, sectors, far, dpr, look) {
     if (!sectors.length) return;
+    const [cx, cy] = at(x_m, y_m);
     g.beginPath();
     for (const { from_rad, to_rad } of sectors) {
       g.moveTo(cx, cy);
@@ -162,15 +165,15 @@ export class ScanPlot {
     for (const r of ringsOf(reach_m)) this.#words(g, String(r), ...at(r * Math.cos(a), r * Math.sin(a)), this.#colour.ink2, 'center');
   }
 
-  /** @param {Pen} g @param {Scale} scale @param {number} reach_m @param {import('./scan-layout.js').Sector[]} sectors @param {number} width */
-  #names(g, { cx, k, at }, reach_m, sectors, width) {
+  /** @param {Pen} g @param {Scale} scale @param {import('./scan-frame.js').Scan} scan @param {number} reach_m @param {import('./scan-layout.js').Sector[]} sectors @param {number} width */
+  #names(g, { cx, k, at }, { x_m = 0, y_m = 0 }, reach_m, sectors, width) {
     for (const sector of namedSectors(sectors, NAMES_SHOWN)) {
       const a = (sector.from_rad + sector.to_rad) / 2;
       if (Math.cos(a) < 0) continue; // behind: not in the picture
       const aside = Math.abs(Math.sin(a));
       // As far out as the edge allows, so that the word stands where its sector is wide.
       const r = Math.min(reach_m * 0.36, aside > 0.05 ? (cx - 44) / (k * aside) : reach_m);
-      const [x, y] = at(r * Math.cos(a), r * Math.sin(a));
+      const [x, y] = at(r * Math.cos(a) + x_m, r * Math.sin(a) + y_m);
       this.#words(g, codeWords(sector.code), Math.min(width - 42, Math.max(42, x)), y, this.#colour.ink, 'center', 14, 700);
     }
   }
@@ -189,7 +192,7 @@ export class ScanPlot {
     const range_m = beam === null ? null : rangeOf(scan, beam);
     if (beam === null || range_m === null || range_m > reach_m) return null;
     const bearing_rad = bearingOf(scan, beam);
-    const [x, y] = at(range_m * Math.cos(bearing_rad), range_m * Math.sin(bearing_rad));
+    const [x, y] = at(range_m * Math.cos(bearing_rad) + (scan.x_m ?? 0), range_m * Math.sin(bearing_rad) + (scan.y_m ?? 0));
     const way = x + 120 > this.#width ? -1 : 1;
     const text = `${fixed(gap_m)} m`;
     const where = /** @type {Where} */ ([x + 44 * way, y - 1, way > 0 ? 'left' : 'right', 22, 700]);
@@ -223,7 +226,7 @@ export class ScanPlot {
     g.stroke();
   }
 
-  /** The car, its nose at the laser. @param {Pen} g @param {Scale} scale @param {number} height */
+  /** The car, its nose at the foot of the plot. @param {Pen} g @param {Scale} scale @param {number} height */
   #car(g, { cx, cy, k }, height) {
     const half = Math.min(60, Math.max(7, 0.9 * k));
     g.strokeStyle = this.#colour.ink;

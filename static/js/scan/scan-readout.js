@@ -37,7 +37,7 @@ export class ScanReadout {
     const missing = isThere ? `STALE ${age(age_s)} s` : isAbsent(ink) ? ABSENT[ink] : ink === 'stale' ? 'no scan' : 'waiting for a scan';
     if (!isNow) setText(at('none-words'), missing);
     this.#drawNearest(isNow ? scan : null, isNow ? ink : 'fresh');
-    setWords(at('beams'), isThere && scan ? beamWords(scan) : '');
+    setWords(at('beams'), isThere && scan ? [beamWords(scan), store.signal('scan')?.value?.mounting].filter(Boolean).join(' · ') : '');
     // The marked return takes the place of the count of beams: the keys below must not move.
     show(at('marked'), mark.at !== null);
     show(at('beams'), mark.at === null);
@@ -57,7 +57,7 @@ export class ScanReadout {
     const { at } = this;
     const judged = scan?.judged ?? null;
     const side = judged?.beam != null && scan ? bearing(bearingOf(scan, judged.beam)) : null;
-    write(at('distance'), ink, judged ? (judged.isBlind ? 'blind' : side ? fixed(judged.gap_m) : 'none') : '–', at('distance-unit'), side ? 'm' : '');
+    write(at('distance'), ink, judged ? (judged.isBlind ? 'blind' : judged.gap_m !== null ? fixed(judged.gap_m) : 'none') : '–', at('distance-unit'), judged?.gap_m != null ? 'm' : '');
     write(at('bearing'), ink, side?.degrees ?? '–', at('side'), side?.side ?? '');
     const stopping_m = judged?.stopping_m ?? null;
     write(at('stops'), ink, fixed(stopping_m), at('stops-unit'), stopping_m === null ? '' : 'm');
@@ -85,7 +85,8 @@ export class ScanReadout {
     }
     const { beam, gap_m, isBlind } = scan.judged;
     const side = beam === null ? null : bearing(bearingOf(scan, beam));
-    const nearest = isBlind ? 'the corridor cannot be seen' : side ? `nearest return in the corridor ${fixed(gap_m)} metres, ${side.degrees} ${side.side}` : 'no return in the corridor';
+    const where = side ? `, ${side.degrees} ${side.side}` : '';
+    const nearest = isBlind ? 'the corridor cannot be seen' : gap_m !== null ? `nearest return in the corridor ${fixed(gap_m)} metres${where}` : 'no return in the corridor';
     setAttribute(canvas, 'aria-label', `Laser scan from above: ${nearest}`);
     const sectors = sectorSentences([...sectorsOf(scan), ...unseenOf(scan)], 6);
     setText(text, `${beamWords(scan)}. ${sectors.length ? `No data from these sectors: ${sectors.join('; ')}.` : ''}`);

@@ -121,14 +121,14 @@ def test_any_number_of_beams(beams: int) -> None:
     assert np.allclose(frame.codes * frame.scale_m, 7.0, atol=2e-3)
 
 
-def test_a_laser_that_looks_back_sees_nothing_in_the_corridor() -> None:
+def test_a_laser_that_looks_back_cannot_see_the_corridor() -> None:
     scan = replace(
         sweep([]),
         ranges_m=np.full(90, 2.0, dtype=np.float32),
         angle_min_rad=math.pi / 2 + 0.1,
         angle_increment_rad=0.03,
     )
-    assert sent(seen(scan)).beam == serialize.NO_BEAM
+    assert sent(seen(scan)).beam == serialize.BLIND
 
 
 def test_an_open_end_invents_no_return() -> None:

@@ -1,0 +1,73 @@
+"""The transforms of a recording: read before it is judged, wherever in it they are."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from copy import deepcopy
+from functools import cached_property
+from itertools import islice
+from typing import Any, Protocol
+
+from monitor.values import LaserScan
+from server.judge.body_axes import TYPES
+from server.judge.frames import Frames, is_static, is_transforms
+from server.judge.message_fields import text
+from server.judge.topics import plain_type
+from server.judge.transforms import Contradiction
+
+MOST_STATIC = 1_000  # messages: a static transform that is sent again and again is read so often
+FIRST_MOVING = 200  # messages of those that move, from which a run knows where the laser is when it begins
+PLACED = {plain_type(kind) for kind in TYPES} | {"sensor_msgs/LaserScan"}  # types of what has a place on the car
+
+
+class Rows(Protocol):
+    """Messages of a recording."""
+
+    def only(self, topics: Collection[str]) -> Iterator[tuple[float, str, str, Any]]: ...
+
+
+class RecordedTransforms:
+    """A latched message is only at the beginning, and what it says holds for the whole drive."""
+
+    def __init__(self, source: Rows, names: Mapping[str, str], types: Mapping[str, str]) -> None:
+        """`names`: topic as the recording spells it → as a bridge would offer it; `types`: that → type."""
+        self._source = source
+        self._names = names
+        found = {topic for topic, name in names.items() if is_transforms(name, types[name])}
+        if not any(plain_type(kind) in PLACED for kind in types.values()):
+            found = set()
+        self._moving = frozenset(topic for topic in found if not is_static(names[topic]))
+        self.frames = Frames()
+        self._learn(self.frames, found - self._moving, MOST_STATIC)
+
+    def looks_ahead(self, topic: str, scan: LaserScan) -> bool | None:
+        """Whether the laser of a topic, as a bridge would offer it, looks ahead; None: no transform says."""
+        found = self.frames.looks_ahead(topic, scan)
+        return self._with_moving.looks_ahead(topic, scan) if found is None and self._moving else found
+
+    def follow(self, scans: Mapping[str, str]) -> frozenset[str]:
+        """The topics of transforms that move if the laser of one of `scans` (topic as the recording spells it → as a
+        bridge would) is placed by them alone: a run has to follow them; `frames` then has their first messages."""
+        if not self._moving or all(self._is_placed(topic, name) for topic, name in scans.items()):
+            return frozenset()
+        self.frames = self._with_moving
+        return self._moving
+
+    @cached_property
+    def _with_moving(self) -> Frames:
+        frames = deepcopy(self.frames)
+        self._learn(frames, self._moving, FIRST_MOVING)
+        return frames
+
+    def _learn(self, frames: Frames, topics: Collection[str], most: int) -> None:
+        for _, topic, _, message in islice(self._source.only(topics) if topics else (), most):
+            frames.receive(self._names[topic], message)
+
+    def _is_placed(self, topic: str, name: str) -> bool:
+        """Whether the static transforms place the laser of a topic, by the frame of its first message."""
+        for _, _, _, message in self._source.only({topic}):
+            try:
+                return self.frames.locate(name, text(message, "header", "frame_id")) is not None
+            except Contradiction:
+                return True  # moving ones do not resolve it
+        return True

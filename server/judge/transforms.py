@@ -1,0 +1,238 @@
+"""The frames of a car, from its transforms (tf2_msgs/TFMessage on /tf_static and /tf). Bounded; nothing is guessed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from server.judge.message_fields import Rejected, finite
+from server.system.clean_text import clean
+
+TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")  # ROS 1 spelling
+MAX_FRAMES = 500
+MAX_NAME = 100
+MAX_DEPTH = 50  # a chain of more frames is none
+MAX_NOTES = 20
+UNIT_WITHIN = 0.01  # a rotation whose norm is farther from 1 is not one
+FARTHEST_M = 50.0  # on a car no sensor is farther from the rear axle; what is, is in another unit
+SAME = 0.002  # m, and of each part of a rotation: no contradiction, but rounding
+
+BODIES = ("base_link", "base_footprint")  # REP-105, REP-120; the first that there is
+ROOTS = ("base", "body", "chassis", "vehicle", "car", "ego_vehicle", "base_frame", "vehicle_frame", "robot")
+
+Rotation = tuple[float, float, float, float]  # unit quaternion x, y, z, w
+
+
+class Contradiction(Exception):
+    """Where a frame is cannot be known; `str()` is the reason in a few words."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pose:
+    """Of one frame in another: its origin [m] and its axes."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    z_m: float = 0.0
+    rotation: Rotation = (0.0, 0.0, 0.0, 1.0)
+
+    def of(self, inner: Pose) -> Pose:
+        """The pose of a frame that has the pose `inner` in this one."""
+        x, y, z = rotated(self.rotation, (inner.x_m, inner.y_m, inner.z_m))
+        return Pose(
+            x_m=self.x_m + x, y_m=self.y_m + y, z_m=self.z_m + z, rotation=product(self.rotation, inner.rotation)
+        )
+
+    def inverse(self) -> Pose:
+        """The pose of the other frame in this one."""
+        back = inverse(self.rotation)
+        at = rotated(back, (-self.x_m, -self.y_m, -self.z_m))
+        return Pose(x_m=at[0], y_m=at[1], z_m=at[2], rotation=back)
+
+    def differs(self, other: Pose) -> bool:
+        """Whether it is another pose, beyond what rounding makes of one."""
+        sign = math.copysign(1.0, sum(a * b for a, b in zip(self.rotation, other.rotation, strict=True)))
+        pairs = [(self.x_m, other.x_m), (self.y_m, other.y_m), (self.z_m, other.z_m)]
+        pairs += [(a, sign * b) for a, b in zip(self.rotation, other.rotation, strict=True)]
+        return any(abs(a - b) > SAME for a, b in pairs)
+
+
+def rotated(rotation: Rotation, of: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A vector of the inner frame in the axes of the outer one."""
+    x, y, z, w = rotation
+    vx, vy, vz = of
+    # v + 2w(q × v) + 2q × (q × v)
+    cx, cy, cz = y * vz - z * vy, z * vx - x * vz, x * vy - y * vx
+    return (
+        vx + 2 * (w * cx + y * cz - z * cy),
+        vy + 2 * (w * cy + z * cx - x * cz),
+        vz + 2 * (w * cz + x * cy - y * cx),
+    )
+
+
+def product(a: Rotation, b: Rotation) -> Rotation:
+    """The rotation `b`, in the axes that `a` turns; the norm is the product of theirs."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def inverse(rotation: Rotation) -> Rotation:
+    """The rotation back."""
+    x, y, z, w = rotation
+    return -x, -y, -z, w
+
+
+@dataclass(slots=True)
+class _Link:
+    """A frame below another one."""
+
+    parent: str
+    pose: Pose | None  # None: what was sent is no pose
+    is_static: bool
+    fault: str | None = None  # why it cannot be used; stays, for who is right cannot be known
+
+
+def frame_name(name: Any) -> str:
+    """A frame as it is looked up: without the slash that ROS 1 allowed before it; empty: none, or no name."""
+    if not isinstance(name, str):
+        return ""
+    name = name.strip().lstrip("/")
+    return clean(name) if len(name) <= MAX_NAME else ""
+
+
+class FrameTree:
+    """Which frame is where in which. `version` grows with each change."""
+
+    def __init__(self) -> None:
+        self.version = 0
+        self.notes: list[str] = []  # what could not be used, in sentences
+        self._links: dict[str, _Link] = {}  # by the lower frame
+
+    @property
+    def is_empty(self) -> bool:
+        return not self._links
+
+    def add(self, message: Any, *, is_static: bool) -> None:
+        """The transforms of one message. What is not static may move: then the newest counts."""
+        rows = message.get("transforms") if isinstance(message, Mapping) else None
+        if isinstance(rows, list | tuple):
+            for row in rows[:MAX_FRAMES]:
+                self._add(row, is_static)
+
+    def _add(self, row: Any, is_static: bool) -> None:
+        header = row.get("header") if isinstance(row, Mapping) else None
+        parent = frame_name(header.get("frame_id") if isinstance(header, Mapping) else None)
+        child = frame_name(row.get("child_frame_id") if isinstance(row, Mapping) else None)
+        if not parent or not child:
+            self._note("A transform names no frames, or longer ones than are read.")
+            return
+        known = self._links.get(child)
+        if known is None and len(self._links) >= MAX_FRAMES:
+            self._note(f"More than {MAX_FRAMES} frames are sent: the rest is left out.")
+            return
+        try:
+            pose, fault = _pose(row), None
+        except Rejected as why:
+            pose, fault = None, f"the transform of {child} is not usable, {why}"
+        if known is None:
+            self._links[child] = _Link(parent, pose, is_static, fault)
+        else:
+            if known.fault is not None or (
+                parent == known.parent and is_static == known.is_static and pose == known.pose and fault is None
+            ):
+                return
+            fault = fault or _contradiction(child, known, parent, pose, is_static)
+            if fault is not None:
+                known.fault = fault
+            elif is_static == known.is_static:
+                known.pose = pose
+            else:
+                return  # the same, by another topic
+        if fault is not None:
+            self._note(f"{fault[0].upper()}{fault[1:]}.")
+        self.version += 1
+
+    def body_of(self, frame: str) -> str | None:
+        """The body frame of the car that a frame is part of; None: there is none."""
+        above = list(self._above(frame_name(frame)))
+        for body in BODIES:
+            found = [name for name in above if _last(name) == body]
+            if found:
+                return found[0]
+            beside = {name for name in self._links if _last(name) == body and above[-1] in self._above(name)}
+            if len(beside) == 1:
+                return beside.pop()
+        return above[-1] if _last(above[-1]) in ROOTS else None
+
+    def pose(self, frame: str, body: str) -> Pose | None:
+        """The pose of a frame in another one; None: nothing connects them. Raises Contradiction."""
+        to_body = self._chain(frame_name(body))
+        to_frame = self._chain(frame_name(frame))
+        common = next((name for name in to_frame if name in to_body), None)
+        if common is None:
+            return None
+        found = self._down(to_body, common).inverse().of(self._down(to_frame, common))
+        if math.hypot(found.x_m, found.y_m, found.z_m) > FARTHEST_M:
+            raise Contradiction(f"{frame_name(frame)} is more than {FARTHEST_M:.0f} m from {frame_name(body)}")
+        return found
+
+    def _above(self, frame: str) -> Iterator[str]:
+        """A frame and all above it, as far as there is no loop."""
+        for _ in range(MAX_DEPTH):
+            yield frame
+            link = self._links.get(frame)
+            if link is None:
+                return
+            frame = link.parent
+
+    def _chain(self, frame: str) -> list[str]:
+        """Raises Contradiction where the frames above it never end."""
+        found = list(self._above(frame))
+        if len(set(found)) < len(found) or len(found) == MAX_DEPTH:
+            raise Contradiction(f"the frames above {frame} form a loop")
+        return found
+
+    def _down(self, chain: list[str], common: str) -> Pose:
+        """The pose of the first frame of a chain in one above it. Raises Contradiction."""
+        pose = Pose()
+        for name in chain[: chain.index(common)]:
+            link = self._links[name]
+            if link.fault is not None or link.pose is None:
+                raise Contradiction(link.fault or f"the transform of {name} is not usable")
+            pose = link.pose.of(pose)
+        return pose
+
+    def _note(self, sentence: str) -> None:
+        if sentence not in self.notes and len(self.notes) < MAX_NOTES:
+            self.notes.append(sentence)
+
+
+def _contradiction(child: str, known: _Link, parent: str, pose: Pose | None, is_static: bool) -> str | None:
+    """What speaks against a further transform of a frame; None: it is the newest."""
+    if parent != known.parent:
+        return f"the frame {child} is below {known.parent} and also below {parent}"
+    if (is_static or known.is_static) and pose is not None and known.pose is not None and pose.differs(known.pose):
+        return f"the frame {child} is static, and is sent at two places in {parent}"
+    return None
+
+
+def _pose(row: Mapping[str, Any]) -> Pose:
+    """Raises Rejected for what is no pose."""
+    x_m, y_m, z_m = (finite(row, "transform", "translation", axis) for axis in "xyz")
+    x, y, z, w = (finite(row, "transform", "rotation", axis) for axis in "xyzw")
+    norm = math.hypot(x, y, z, w)
+    if abs(norm - 1.0) > UNIT_WITHIN:
+        raise Rejected("its rotation is not a unit quaternion")
+    return Pose(x_m=x_m, y_m=y_m, z_m=z_m, rotation=(x / norm, y / norm, z / norm, w / norm))
+
+
+def _last(frame: str) -> str:
+    return frame.rpartition("/")[2].lower()

@@ -1,0 +1,120 @@
+"""Imu and Odometry of sensors mounted anyhow, against rotation matrices."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from monitor.state import State
+from server.judge import pipeline
+from server.judge.body_axes import in_body_axes
+from server.judge.frames import Frames
+from server.judge.profiles import GENERIC
+from server.judge.reception_stats import Reception
+from server.judge.signals.acceleration import acceleration_of_imu
+from server.judge.signals.heading import heading_of_imu
+from server.judge.signals.odometry import odometry
+from server.judge.signals.speed import twist_of_odometry
+from server.judge.topics import map_signals
+from tests.server.judge.mounted_lasers import Laser, quaternion, row
+
+ANGLE = st.floats(-math.pi, math.pi)
+
+
+def vector(of: NDArray[np.float64]) -> dict[str, float]:
+    return dict(zip("xyz", map(float, of), strict=True))
+
+
+def turned(matrix: NDArray[np.float64]) -> dict[str, float]:
+    return dict(zip("xyzw", quaternion(matrix), strict=True))
+
+
+def imu(mounting: Laser, course_rad: float, acceleration: list[float], frame: str = "imu") -> dict[str, Any]:
+    """What an IMU so mounted sends in a car on this course (0 east) with this acceleration in the body frame."""
+    own, body = mounting.matrix, Laser(yaw_rad=course_rad).matrix
+    return {
+        "header": {"frame_id": frame},
+        "orientation": turned(body @ own),
+        "orientation_covariance": [0.01] * 9,
+        "angular_velocity": vector(own.T @ np.array([0.0, 0.0, 0.1])),
+        "linear_acceleration": vector(own.T @ np.array(acceleration)),
+        "linear_acceleration_covariance": [0.01] * 9,
+    }
+
+
+def moving(mounting: Laser, course_rad: float, speed_mps: float, child: str = "imu") -> dict[str, Any]:
+    own, body = mounting.matrix, Laser(yaw_rad=course_rad).matrix
+    twist = {"linear": vector(own.T @ [speed_mps, 0, 0]), "angular": vector(own.T @ [0, 0, 0.2])}
+    pose = {"position": vector(np.zeros(3)), "orientation": turned(body @ own)}
+    return {"header": {"frame_id": "odom"}, "child_frame_id": child, "pose": {"pose": pose}, "twist": {"twist": twist}}
+
+
+def frames(mounting: Laser) -> Frames:
+    found = Frames()
+    found.receive("/tf_static", {"transforms": [mounting.transform(child="imu")]})
+    return found
+
+
+@given(yaw_rad=ANGLE, roll_rad=ANGLE, pitch_rad=st.floats(-1.5, 1.5), course_rad=ANGLE, ahead=st.floats(-5, 5))
+def test_acceleration_heading_and_speed_are_the_cars_however_the_sensor_is_mounted(
+    yaw_rad: float, roll_rad: float, pitch_rad: float, course_rad: float, ahead: float
+) -> None:
+    mounting = Laser(yaw_rad=yaw_rad, roll_rad=roll_rad, pitch_rad=pitch_rad, x_m=0.7)
+    by = frames(mounting)
+    message, why = in_body_axes(by, "/imu/data", "sensor_msgs/Imu", imu(mounting, course_rad, [ahead, 0.3, 9.81]))
+    assert why is None
+    assert acceleration_of_imu(message).acceleration_mps2 == pytest.approx(ahead, abs=0.05)
+    heading = heading_of_imu(message).heading_deg - (90 - math.degrees(course_rad))
+    assert math.remainder(heading, 360) == pytest.approx(0.0, abs=0.3)
+    message, why = in_body_axes(by, "/odom", "nav_msgs/msg/Odometry", moving(mounting, course_rad, ahead))
+    assert twist_of_odometry(message).speed_mps == pytest.approx(ahead, abs=0.02)
+    assert twist_of_odometry(message).yaw_rate_radps == pytest.approx(0.2, abs=0.01)
+    assert math.remainder((odometry(message).yaw_rad or 0.0) - course_rad, math.tau) == pytest.approx(0.0, abs=0.01)
+
+
+def test_without_a_transform_or_turned_by_nothing_the_message_is_as_it_came() -> None:
+    backwards = Laser(yaw_rad=math.pi)
+    sent = imu(backwards, 0.0, [1.0, 0.0, 9.81])
+    assert in_body_axes(Frames(), "/imu", "sensor_msgs/Imu", sent)[0] is sent
+    assert in_body_axes(frames(Laser(x_m=2.0)), "/imu", "sensor_msgs/Imu", sent)[0] is sent
+    assert in_body_axes(frames(backwards), "/imu", "sensor_msgs/Imu", {**sent, "header": {}})[0]["header"] == {}
+    assert in_body_axes(frames(backwards), "/scan", "sensor_msgs/LaserScan", sent)[0] is sent
+
+
+def test_an_axis_that_plays_no_part_may_be_unknown_and_one_that_does_may_not() -> None:
+    by, sent = frames(Laser(yaw_rad=math.pi)), imu(Laser(yaw_rad=math.pi), 0.0, [1.0, 0.0, 9.81])
+    sent["linear_acceleration"]["z"] = math.nan
+    assert acceleration_of_imu(in_body_axes(by, "/imu", "sensor_msgs/Imu", sent)[0]).acceleration_mps2 == pytest.approx(
+        1.0
+    )
+    sent["linear_acceleration"]["x"] = None
+    message = in_body_axes(by, "/imu", "sensor_msgs/Imu", sent)[0]
+    with pytest.raises(ValueError, match="not a number"):
+        acceleration_of_imu(message)
+
+
+def test_axes_that_cannot_be_known_are_no_value() -> None:
+    by = frames(Laser(yaw_rad=math.pi))
+    by.receive("/tf_static", {"transforms": [row("mast", "imu")]})
+    state, reception = State(), Reception()
+    sources = pipeline.by_topic(map_signals({"/imu/data": "sensor_msgs/Imu"}).values())["/imu/data"]
+    changed = pipeline.receive(
+        sources,
+        imu(Laser(), 0.0, [1.0, 0.0, 9.81]),
+        1.0,
+        None,
+        reception=reception,
+        state=state,
+        profile=GENERIC,
+        tyre_rad_per_unit=0.0,
+        frames=by,
+    )
+    assert changed == ()
+    assert "also below mast" in state.snapshot(1.0).unusable["acceleration"].words
+    assert reception.rejected == 1

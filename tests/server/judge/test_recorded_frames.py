@@ -1,0 +1,117 @@
+"""Transforms of a recording: wherever they are in it, they hold for the whole drive, and where it is continued."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from monitor.mounting import Mounting
+from server.judge.drive import Drive as JudgedDrive
+from server.judge.offline import OfflineRun
+from server.recording.event_channels import read_recorded_events
+from server.recording.read.read import Recording, open_recording
+from server.replay import checkpoint
+from tests.server.judge.mounted_lasers import Laser, row
+from tests.server.recording.bags import Drive, Row, write_ros1, write_ros2
+
+TF = "tf2_msgs/msg/TFMessage"
+TF_TEXT = {TF: "geometry_msgs/TransformStamped[] transforms\n"}
+BACKWARDS = Laser(x_m=0.5, yaw_rad=math.pi, beams=360, increment_rad=math.tau / 360)
+POST = [(3.8, 0.0, 0.3)]
+
+
+def scans(from_s: float, to_s: float, frame: str = "laser") -> list[Row]:
+    fields = BACKWARDS.scan(POST, frame=frame)
+    count = round((to_s - from_s) * 10)
+    return [(from_s + 0.1 * n + 0.01, "/scan", "sensor_msgs/msg/LaserScan", fields) for n in range(count)]
+
+
+def sent(at_s: float, *rows: dict[str, Any], topic: str = "/tf_static") -> Row:
+    return (at_s, topic, TF, {"transforms": [*rows]})
+
+
+def written(path: Path, version: int, rows: list[Row]) -> Path:
+    rows = sorted(rows, key=lambda one: one[0])
+    if version == 1:
+        return write_ros1(path.with_suffix(".bag"), Drive(messages=rows, definitions=TF_TEXT, latched={"/tf_static"}))
+    return write_ros2(path, Drive(messages=rows, latched={"/tf_static"}))
+
+
+def judged_drive(recording: Recording) -> JudgedDrive:
+    return JudgedDrive(recording, read_recorded_events(recording))
+
+
+def mounting(run: OfflineRun) -> Mounting:
+    found = run.run_state.state.snapshot(run.at_s).need("scan").mounting
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("at_s", [0.0, 5.0, 9.9])
+@pytest.mark.parametrize("topic", ["/tf_static", "/tf"])
+def test_transforms_hold_for_the_whole_drive_wherever_they_are_in_it(
+    tmp_path: Path, version: int, at_s: float, topic: str
+) -> None:
+    path = written(tmp_path / "drive", version, [*scans(0.0, 10.0), sent(at_s, BACKWARDS.transform(), topic=topic)])
+    with open_recording([path]) as recording:
+        drive = judged_drive(recording)
+        assert drive.moving_transforms == (frozenset() if topic == "/tf_static" else {"/tf"})
+        for from_s in (0.0, 7.0):  # a replay that starts in the middle too
+            run = OfflineRun(recording, drive, from_s=from_s)
+            run.advance(from_s + 1.0)
+            assert mounting(run).yaw_rad == pytest.approx(math.pi, abs=1e-4)
+            (tile,) = (tile for tile in run.run_state.monitor.tiles() if "obstacle" in tile.checks)
+            assert tile.verdict == "fault"
+
+
+def test_the_second_part_of_a_split_drive_has_those_of_the_first(tmp_path: Path) -> None:
+    first = written(tmp_path / "one", 1, [*scans(0.0, 5.0), sent(0.0, BACKWARDS.transform())])
+    second = written(tmp_path / "two", 1, scans(5.0, 10.0))
+    with open_recording([second, first]) as recording:
+        run = OfflineRun(recording, judged_drive(recording), from_s=7.0)
+        run.advance(8.0)
+        assert mounting(run).origin == "transforms"
+
+
+def test_a_laser_on_a_tower_that_turns_is_where_it_was_sent_last_also_after_a_checkpoint(tmp_path: Path) -> None:
+    turning = [sent(0.5 * n, Laser(yaw_rad=0.2 * n).transform(), topic="/tf") for n in range(20)]
+    path = written(tmp_path / "drive", 2, [*scans(0.0, 10.0), *turning])
+    with open_recording([path]) as recording:
+        run = OfflineRun(recording, drive := judged_drive(recording))
+        run.advance(3.2)
+        assert mounting(run).yaw_rad == pytest.approx(1.2, abs=1e-4)
+        saved = checkpoint.save(run.run_state)
+        run.advance(9.9)
+        assert math.remainder(mounting(run).yaw_rad - 3.8, math.tau) == pytest.approx(0.0, abs=1e-4)
+        again = OfflineRun(recording, drive, run_state=checkpoint.restore(saved))
+        again.advance(4.2)
+        assert mounting(again).yaw_rad == pytest.approx(1.6, abs=1e-4)
+
+
+def test_what_moves_is_not_decoded_where_static_transforms_place_the_laser(tmp_path: Path) -> None:
+    moving = [sent(0.1 * n, row("odom", "base_link", 0.1 * n), topic="/tf") for n in range(100)]
+    path = written(tmp_path / "drive", 2, [*scans(0.0, 10.0), *moving, sent(0.0, BACKWARDS.transform())])
+    with open_recording([path]) as recording:
+        assert judged_drive(recording).moving_transforms == frozenset()
+
+
+def test_a_frame_that_is_renamed_in_mid_drive_ends_the_check(tmp_path: Path) -> None:
+    rows = [*scans(0.0, 5.0), *scans(5.0, 10.0, frame="laser_2"), sent(0.0, BACKWARDS.transform())]
+    with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:
+        run = OfflineRun(recording, judged_drive(recording))
+        run.advance(4.0)
+        assert mounting(run).why_not is None
+        run.advance(6.0)
+        assert "its frame was laser and is laser_2" in (mounting(run).why_not or "")
+
+
+def test_what_is_wrong_with_transforms_is_a_note_of_the_drive(tmp_path: Path) -> None:
+    rows = [*scans(0.0, 2.0), sent(0.0, BACKWARDS.transform()), sent(1.0, row("rear_link", "laser"))]
+    with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:
+        drive = judged_drive(recording)
+        assert "The frame laser is below base_link and also below rear_link." in drive.notes
+        assert recording.rejected == {}
