@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from monitor.reading import Reading
+from monitor.scan_shape import ScanHabit
 from monitor.values import LaserScan
 
 SWEEP_S = 1.0  # a slower laser is of no use for driving
@@ -40,3 +41,22 @@ class ScanParts:
         return tuple(
             part for key, part in self._parts.items() if key != self._newest and now_s - part.received_s <= SWEEP_S
         )
+
+
+class Scans:
+    """What is kept of a laser's messages beside the newest one."""
+
+    __slots__ = ("habit", "parts")
+
+    def __init__(self) -> None:
+        self.habit = ScanHabit()
+        self.parts = ScanParts()
+
+    def add(self, reading: Reading[LaserScan]) -> None:
+        """The newest scan."""
+        self.habit.add(reading.value)
+        self.parts.add(reading)
+
+    def forget_times(self) -> None:
+        """The clock was set back: how old a part is, is not known."""
+        self.parts = ScanParts()

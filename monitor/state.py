@@ -19,8 +19,7 @@ from monitor.reading import Extent, Freshness, Reading
 from monitor.reading_history import ReadingHistory
 from monitor.reading_table import ReadingTable
 from monitor.recorder import RecorderFacts
-from monitor.scan_parts import ScanParts
-from monitor.scan_shape import ScanHabit
+from monitor.scan_parts import Scans
 from monitor.signal_stats import SignalStats
 from monitor.signals import SIGNALS
 from monitor.slow_proof import ProofFollower
@@ -60,8 +59,7 @@ class State:
         self._wheels = Wheels()
         self._clock_jump: ClockJump | None = None
         self._components = Components()
-        self._scan_habit = ScanHabit()
-        self._scan_parts = ScanParts()
+        self._scans = Scans()
         self._phones = Phones()
         self._fix_s = -math.inf  # when the newest position was sent
         self._rides: str | None = None
@@ -105,8 +103,6 @@ class State:
             value = self._components.merge(value, received_s)  # type: ignore[arg-type]
             components = self._components
             self._stats[signal].meter.hold(components.horizon_s(received_s), components.period_s(received_s))
-        elif kind is LaserScan:
-            self._scan_habit.add(value)  # type: ignore[arg-type]
         elif kind is DriveMode:
             self._modes.add(received_s, value)  # type: ignore[arg-type]
         stats = self._stats[signal]
@@ -115,7 +111,7 @@ class State:
             self._clock_jump = merged(self._clock_jump, signal, received_s, stats.jump_s)
         self._table.put(signal, reading)
         if kind is LaserScan:
-            self._scan_parts.add(reading)
+            self._scans.add(reading)
         if stats.headline is not None:
             number = getattr(value, stats.headline, None)
             if number is not None and not stats.lowest <= number <= stats.highest:
@@ -181,8 +177,7 @@ class State:
             for stats in self._stats.values():
                 stats.restart()
             self._clock_jump = None
-            self._scan_habit = ScanHabit()
-            self._scan_parts = ScanParts()
+            self._scans = Scans()
             self._components.opened(facts.opened_s)
             self._unusable = MappingProxyType({})
 
@@ -236,9 +231,9 @@ class State:
             gps=derived.gps,
             phone=self._phones.view,
             phones=self._phones.views,
-            scan_habit=self._scan_habit.usual,
+            scan_habit=self._scans.habit.usual,
             scan_before=self._scan_history.before,
-            scan_parts=self._scan_parts.others(now_s),
+            scan_parts=self._scans.parts.others(now_s),
             distance_before=self._distance_history.before,
             standing_since_s=derived.standstill.since_s if table.is_fresh("speed", now_s) else None,
             speed_slope_mps2=derived.slope_mps2,
@@ -270,7 +265,7 @@ class State:
         self._slow_proof.forget()
         self._modes.forget()
         self._fix_s = -math.inf
-        self._scan_parts = ScanParts()
+        self._scans.forget_times()
         self._phones = Phones()  # they report again within seconds
         self._phones.ride(self._rides, at_s)
         self._table.shift(shift_s)

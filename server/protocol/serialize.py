@@ -28,8 +28,8 @@ from server.protocol.signal_state import ComponentState, ScanValue, SignalValue
 from server.protocol.state import Step, Trends
 
 SCAN_MAGIC = 0x53
-SCAN_VERSION = 3
-SCAN_HEADER = struct.Struct("<BBHIHHffffbBHfff")  # 44 bytes, so that the ranges that follow are aligned
+SCAN_VERSION = 2
+SCAN_HEADER = struct.Struct("<BBHIHHffffbBH")  # 32 bytes, so that the ranges that follow are aligned
 NO_BEAM, BLIND = 65535, 65534  # in the place of the nearest beam: nothing in the corridor; it could not be seen
 STOPPING_UNKNOWN = 65535
 LEAST_GAP_M = 0.01  # of what touches the nose: 0 is no gap
@@ -116,6 +116,8 @@ def _scan_summary(scan: values.LaserScan) -> ScanValue:
         "nearest_m": plain(nearest),
         "nearest_bearing_rad": plain(bearing),
         "frame_id": scan.frame_id,
+        "laser_ahead_m": plain(scan.mounting.x_m, 3) if scan.mounting is not None else None,
+        "laser_left_m": plain(scan.mounting.y_m, 3) if scan.mounting is not None else 0.0,
         "mounting": (scan.mounting.why_not or scan.mounting.reservation) if scan.mounting is not None else None,
     }
 
@@ -130,9 +132,6 @@ class Judged:
     bearing_rad: float | None  # of it
     is_blind: bool  # too little of the corridor was seen to say anything
     stopping_m: float | None  # None: the speed is not known
-    laser_ahead_m: float  # of the rear axle
-    laser_left_m: float  # of the centre line
-    nose_ahead_m: float  # of the rear axle: the gap is measured from there
 
 
 def scan_frame(scan: values.LaserScan, *, number: int, age_s: float, kinds_kept: bool, judged: Judged) -> bytes:
@@ -167,9 +166,6 @@ def scan_frame(scan: values.LaserScan, *, number: int, age_s: float, kinds_kept:
         round(judged.tyre_angle_rad / ANGLE_STEP_RAD),
         round(judged.wider_m * 100),
         _nearest_beam(scan, judged),
-        judged.laser_ahead_m,
-        judged.laser_left_m,
-        judged.nose_ahead_m,
     )
     return header + codes.tobytes()
 

@@ -72,6 +72,10 @@ class ScanValue(TypedDict):
     nearest_m: float | None
     nearest_bearing_rad: float | None
     frame_id: str
+    laser_ahead_m: NotRequired[
+        Annotated[float | None, doc("of the rear axle, by the transforms; null: as the setting has it")]
+    ]
+    laser_left_m: NotRequired[Annotated[float | None, doc("of the centre line")]]
     mounting: NotRequired[
         Annotated[str | None, doc("*laser assumed to look ahead*: what limits what it says of the road; null: nothing")]
     ]

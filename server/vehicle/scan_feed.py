@@ -69,8 +69,5 @@ def judged(scan: LaserScan, snapshot: Snapshot, limits: ObstacleLimits, *, was_a
         gap_m=sight.gap_m,
         bearing_rad=sight.bearing_rad,
         is_blind=not is_seen and (sight.gap_m is None or is_blind(sight) or _is_out_of_place(scan)),
-        laser_ahead_m=corridor.laser_ahead_m,
-        laser_left_m=corridor.laser_left_m,
-        nose_ahead_m=corridor.nose_m,
         stopping_m=stopping_m(twist.speed_mps, limits) if twist is not None and is_known else None,
     )

@@ -23,9 +23,6 @@ class ScanFrame:
     tyre_angle_rad: float
     wider_m: float
     beam: int
-    laser_ahead_m: float
-    laser_left_m: float
-    nose_ahead_m: float
     codes: npt.NDArray[np.uint16]
 
     @property
@@ -37,9 +34,8 @@ def read(frame: bytes) -> ScanFrame:
     """Asserts the shape, gives the rest."""
     magic, version, beams, number, age_ms, stopping_cm = struct.unpack_from("<BBHIHH", frame)
     angle_min, increment, range_max, gap, tyre, wider, beam = struct.unpack_from("<ffffbBH", frame, 12)
-    laser_ahead, laser_left, nose_ahead = struct.unpack_from("<fff", frame, 32)
-    assert (magic, version) == (0x53, 3)
-    assert len(frame) == 44 + 2 * beams
+    assert (magic, version) == (0x53, 2)
+    assert len(frame) == 32 + 2 * beams
     return ScanFrame(
         number=number,
         age_s=age_ms / 1000,
@@ -51,8 +47,5 @@ def read(frame: bytes) -> ScanFrame:
         tyre_angle_rad=tyre * 0.005,
         wider_m=wider / 100,
         beam=beam,
-        laser_ahead_m=laser_ahead,
-        laser_left_m=laser_left,
-        nose_ahead_m=nose_ahead,
-        codes=np.frombuffer(frame[44:], dtype="<u2"),
+        codes=np.frombuffer(frame[32:], dtype="<u2"),
     )

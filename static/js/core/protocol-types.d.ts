@@ -1990,6 +1990,10 @@ export interface ScanValue {
   nearest_m: number | null;
   nearest_bearing_rad: number | null;
   frame_id: string;
+  /** of the rear axle, by the transforms; null: as the setting has it */
+  laser_ahead_m?: number | null;
+  /** of the centre line */
+  laser_left_m?: number | null;
   /** *laser assumed to look ahead*: what limits what it says of the road; null: nothing */
   mounting?: string | null;
 }

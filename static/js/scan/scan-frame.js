@@ -1,8 +1,8 @@
 // The binary scan frame of docs/protocol.md, decoded.
 
 const MAGIC = 0x53;
-/** Bytes before the ranges, by version; an agent on a car may be of an earlier one. */
-const HEADER_BYTES = /** @type {Record<number, number>} */ ({ 2: 32, 3: 44 });
+const VERSION = 2;
+const HEADER_BYTES = 32;
 /** Units from 0 to range_max. */
 const STEPS = 65000;
 const ANGLE_STEP_RAD = 0.005;
@@ -25,9 +25,8 @@ const BLIND = 65534;
  * @property {number} angle_increment_rad may be negative
  * @property {number} range_max_m
  * @property {number} scale_m metres a unit
- * @property {number} [x_m] place of the laser ahead of the car's nose: 0, or negative
- * @property {number} [y_m] place of the laser to the left of the nose
- * @property {number | null} [nose_ahead_m] of the rear axle; null: not sent
+ * @property {number} [x_m] place of the laser ahead of the car's nose: 0, or negative; the state has it, the frame has not
+ * @property {number} [y_m] place of the laser to the left of the nose, likewise
  * @property {Judged} judged
  * @property {Uint16Array} codes range / scale, or one of the codes above
  *
@@ -46,14 +45,11 @@ const BLIND = 65534;
  * @returns {Scan | null}
  */
 export function readScan(bytes) {
-  if (bytes.byteLength < 2) return null;
+  if (bytes.byteLength < HEADER_BYTES) return null;
   const view = new DataView(bytes);
-  const header = HEADER_BYTES[view.getUint8(1)];
-  if (view.getUint8(0) !== MAGIC || header === undefined || bytes.byteLength < header) return null;
+  if (view.getUint8(0) !== MAGIC || view.getUint8(1) !== VERSION) return null;
   const beams = view.getUint16(2, true);
-  if (bytes.byteLength < header + 2 * beams) return null;
-  const laser = header >= 44 ? [32, 36, 40].map((at) => view.getFloat32(at, true)) : [];
-  const [ahead_m = 0, left_m = 0, nose_m = 0] = laser;
+  if (bytes.byteLength < HEADER_BYTES + 2 * beams) return null;
   const range_max_m = view.getFloat32(20, true);
   const stopping_cm = view.getUint16(10, true);
   const beam = view.getUint16(30, true);
@@ -65,9 +61,6 @@ export function readScan(bytes) {
     angle_increment_rad: view.getFloat32(16, true),
     range_max_m,
     scale_m: Math.max(range_max_m, 0.1) / STEPS,
-    x_m: ahead_m - nose_m,
-    y_m: left_m,
-    nose_ahead_m: laser.length ? nose_m : null,
     judged: {
       tyre_angle_rad: view.getInt8(28) * ANGLE_STEP_RAD,
       wider_m: view.getUint8(29) / 100,
@@ -76,9 +69,9 @@ export function readScan(bytes) {
       isBlind: beam === BLIND,
       stopping_m: stopping_cm === STOPPING_UNKNOWN ? null : stopping_cm / 100,
     },
-    codes: littleEndian(bytes, header, beams),
+    codes: littleEndian(bytes, beams),
   };
-  const isSound = [scan.angle_min_rad, scan.angle_increment_rad, scan.range_max_m, gap_m, ...laser].every(Number.isFinite);
+  const isSound = [scan.angle_min_rad, scan.angle_increment_rad, scan.range_max_m, gap_m].every(Number.isFinite);
   return isSound ? scan : null;
 }
 
@@ -113,11 +106,10 @@ const IS_LITTLE_ENDIAN = new Uint8Array(Uint16Array.of(1).buffer)[0] === 1;
 
 /**
  * @param {ArrayBuffer} bytes
- * @param {number} from byte
  * @param {number} beams
  */
-function littleEndian(bytes, from, beams) {
-  if (IS_LITTLE_ENDIAN) return new Uint16Array(bytes, from, beams);
-  const view = new DataView(bytes, from);
+function littleEndian(bytes, beams) {
+  if (IS_LITTLE_ENDIAN) return new Uint16Array(bytes, HEADER_BYTES, beams);
+  const view = new DataView(bytes, HEADER_BYTES);
   return Uint16Array.from({ length: beams }, (_, i) => view.getUint16(2 * i, true));
 }

@@ -67,9 +67,7 @@ export class ScanPlot {
     const scale = plotScale(width, height, reach_m);
     const sectors = [...sectorsOf(scan), ...unseenOf(scan)];
     const { tyre_angle_rad, wider_m } = scan.judged;
-    const corridor = around.car ? {
-      ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad, laser_ahead_m: scan.nose_ahead_m ?? around.car.laser_ahead_m,
-    } : null;
+    const corridor = around.car ? { ...around.car, half_width_m: around.car.half_width_m + wider_m, tyre_angle_rad } : null;
     if (corridor) this.#stoppingStrip(g, scale, corridor, scan.judged.stopping_m);
     this.#hatch(g, scale, scan, sectors, width + height, dpr, theme.key);
     const points = pointsOf(scan, reach_m * 1.05, 1 / scale.k);

@@ -115,7 +115,7 @@ class ScanTab {
     else {
       const side = /** @type {Record<string, 1 | -1 | 0>} */ ({ ArrowLeft: 1, ArrowRight: -1, Home: 0, Enter: 0, ' ': 0 })[key];
       if (side === undefined || !scans.newest || !this.#isLive) return false;
-      mark.step(scans.newest, side, this.reach_m, scans.at_ms);
+      mark.step(newestOf(this.store) ?? scans.newest, side, this.reach_m, scans.at_ms);
     }
     this.announceMark();
     return true;
@@ -127,7 +127,7 @@ class ScanTab {
     if (!scans.newest || !this.#isLive) return;
     const scale = plotScale(canvas.clientWidth, canvas.clientHeight, this.reach_m);
     const { x_m, y_m } = placeOf(scale, x_px, y_px);
-    this.mark.touch(scans.newest, x_m, y_m, THUMB_PX / scale.k, scans.at_ms);
+    this.mark.touch(newestOf(this.store) ?? scans.newest, x_m, y_m, THUMB_PX / scale.k, scans.at_ms);
     this.announceMark();
   }
 
@@ -140,7 +140,7 @@ class ScanTab {
 
   /** Follows the mark into a new scan. */
   receive() {
-    const { newest, at_ms } = this.store.scans;
+    const [newest, { at_ms }] = [newestOf(this.store), this.store.scans];
     if (newest && !this.mark.hear(newest, at_ms)) this.announceMark('the marked return is gone');
     this.drawSoon();
   }
@@ -149,7 +149,7 @@ class ScanTab {
     const { mark, store } = this;
     if (!this.#isFront) return;
     this.glass.draw(() => !this.#isFront || !store.scans.newest ? null : {
-      scan: store.scans.newest,
+      scan: newestOf(store) ?? store.scans.newest,
       at_ms: store.scans.at_ms,
       around: {
         reach_m: this.reach_m, car: carOf(store), limit_m: store.limit('obstacle.standoff_m'),
@@ -171,8 +171,27 @@ class ScanTab {
 
 /** The car's measures as the obstacle check has them; null before they are known. @param {import('../core/store.js').Store} store */
 function carOf(store) {
-  const [half_width_m, wheelbase_m, laser_ahead_m] = ['half_width_m', 'wheelbase_m', 'laser_ahead_m'].map((name) => store.limit(`obstacle.${name}`));
-  return half_width_m == null || wheelbase_m == null || laser_ahead_m == null ? null : { half_width_m, wheelbase_m, laser_ahead_m };
+  const [half_width_m, wheelbase_m] = ['half_width_m', 'wheelbase_m'].map((name) => store.limit(`obstacle.${name}`));
+  const place = placeOfLaser(store);
+  return half_width_m == null || wheelbase_m == null || place === null ? null : { half_width_m, wheelbase_m, laser_ahead_m: place.nose_ahead_m };
+}
+
+/** The newest scan, with the laser's place from the car's nose. @param {import('../core/store.js').Store} store */
+function newestOf(store) {
+  const { newest } = store.scans;
+  const place = placeOfLaser(store);
+  return newest === null || place === null ? newest : { ...newest, x_m: place.x_m, y_m: place.y_m };
+}
+
+/** Where laser and nose are, by the protocol; null before the settings are known. @param {import('../core/store.js').Store} store */
+function placeOfLaser(store) {
+  const set_m = store.limit('obstacle.laser_ahead_m');
+  if (set_m == null) return null;
+  const value = store.signal('scan')?.value;
+  const laser_ahead_m = value?.laser_ahead_m ?? set_m;
+  const foremost_m = [laser_ahead_m, store.limit('obstacle.bumper_ahead_m') || (value?.laser_ahead_m == null ? laser_ahead_m : 0)];
+  const nose_ahead_m = Math.max(...foremost_m);
+  return { nose_ahead_m, x_m: laser_ahead_m - nose_ahead_m, y_m: value?.laser_left_m ?? 0 };
 }
 
 function recall() {

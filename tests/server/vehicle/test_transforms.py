@@ -70,7 +70,8 @@ async def test_a_latched_transform_turns_the_laser(bridge: RosBridge, server: st
         assert frame.gap_m == pytest.approx(3.0, abs=0.05)
         bearing = frame.angle_min_rad + frame.beam * frame.angle_increment_rad
         assert math.remainder(bearing, math.tau) == pytest.approx(math.atan2(0.6, 3.3), abs=0.1)
-        assert (frame.laser_ahead_m, frame.nose_ahead_m) == (0.5, 0.5)
+        place = state["signals"]["scan"]["value"]
+        assert (place["laser_ahead_m"], place["laser_left_m"]) == (0.5, 0.0)
 
 
 @pytest.mark.virtual_time
