@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from monitor.values import LaserScan
 from server.bus.bus import SessionBus
 from server.judge.frames import is_static
 from server.recording.controller import SessionRecording
@@ -54,10 +53,6 @@ class MessageIntake:
     def follow(self, connection: Connection) -> None:
         """From now on messages of this connection come; to be called once."""
         self._connection = connection
-        connection.subscriptions.signals.place_by(self._looks_ahead)
-
-    def _looks_ahead(self, topic: str, scan: LaserScan) -> bool | None:
-        return self._judgement.frames.looks_ahead(topic, scan)
 
     def reset(self) -> None:
         """Another car's messages come."""

@@ -122,6 +122,7 @@ def session_parts(
             learned=recording.learn,
             noted=lambda text: event_log.note("not_received", text),
             timed=lambda asked_s, ros_s: judgement.transport.clock.answered(asked_s, now(), ros_s),
+            place=lambda topic, scan: judgement.frames.looks_ahead(topic, scan),
         )
 
     authorization = Authorization(event_log.note, fence=bus.last_event(vehicle))

@@ -31,20 +31,17 @@ class Delivers(Protocol):
 class SignalMap:
     """Of one car, over all openings of its link."""
 
-    def __init__(self) -> None:
+    def __init__(self, place: Place | None = None) -> None:
+        """`place`: as of `Evidence`."""
         self.sources: Mapping[str, Source] = {}  # by signal
         self.unmapped: Mapping[str, str] = {}  # topic → type of what carries no signal
         self.offers_nothing = False  # no topic of the car can be read
         self.undecided: Mapping[str, str] = {}  # signal → why none of its topics carries it
         self.questions: Sequence[Question] = ()
         self.watched: Mapping[str, Source] = {}  # topic → what it may carry; compared, and not judged
-        self._evidence = Evidence()
+        self._evidence = Evidence(place)
         self._choice: Choice | None = None
         self._compared_since_s: float | None = None
-
-    def place_by(self, place: Place) -> None:
-        """From now on this says whether a laser looks ahead, see `Evidence`."""
-        self._evidence.place = place
 
     def update(
         self,

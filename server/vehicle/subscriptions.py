@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 
 from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
+from server.judge.sources.evidence import Place
 from server.judge.topics import Source, could_carry
 from server.recording.recorded_topics import Also, Missing
 from server.rosbridge.connection_errors import Problem
@@ -42,8 +43,10 @@ class Subscriptions:
         learned: Callable[[Mapping[str, str]], None] = lambda _: None,
         noted: Callable[[str], None] = lambda _: None,
         timed: Callable[[float, float], None] = lambda *_: None,
+        place: Place | None = None,
     ) -> None:
-        """`link` None: no car is dialled. `timed`: the time of the call and the time of ROS."""
+        """`link` None: no car is dialled. `timed`: the time of the call and the time of ROS; `place`: as of
+        `server.judge.sources.evidence.Evidence`."""
         self._link = link
         self._tuning = tuning
         self._now = now
@@ -63,7 +66,7 @@ class Subscriptions:
             type_of=self.type_of,
         )
         self.table = SubscriptionTable(link, self._definitions, self._missing.delivery, now=now)
-        self.signals = SignalMap()
+        self.signals = SignalMap(place)
         self.by_topic: Mapping[str, tuple[Source, ...]] = {}
         self.ros = RosWatch(link, now=now, timed=timed)
         self.ros_version: int | None = None
