@@ -357,7 +357,7 @@ def test_the_way_decides_the_unit_of_a_speed(type: str, reference: str, factor: 
 
 
 @pytest.mark.parametrize(
-    ("seconds", "mps", "factor"), [(2.0, 8.0, 3.6), (60.0, 1.5, 3.6), (20.0, 8.0, 2.0), (20.0, 8.0, 0.0)]
+    ("seconds", "mps", "factor"), [(2.0, 8.0, 3.6), (60.0, 1.8, 3.6), (20.0, 8.0, 2.0), (20.0, 8.0, 0.0)]
 )
 def test_a_short_slow_or_odd_way_decides_nothing(seconds: float, mps: float, factor: float) -> None:
     car = Car({"speed": TWIST})
