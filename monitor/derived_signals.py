@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from monitor.gps_watch import GpsFollower, GpsWatch
@@ -9,6 +10,7 @@ from monitor.heading_fusion import HeadingFusion
 from monitor.motion import Slope, Standstill
 from monitor.reading import Reading
 from monitor.reading_table import ReadingTable
+from monitor.signal_stats import SignalStats
 from monitor.tracks import Track
 from monitor.values import Acceleration, GpsFix, Heading, Odometry, Twist, Value
 
@@ -97,3 +99,11 @@ class DerivedSignals:
         if known is not None and known.derived_from is None:
             return None
         return Acceleration(acceleration_mps2=slope_mps2, source="speed")
+
+
+def forget(signal: str, stats: SignalStats, table: ReadingTable, derived: DerivedSignals) -> None:
+    """Forget what was received of a signal, and what was derived from it."""
+    stats.lowest, stats.highest = math.inf, -math.inf
+    table.forget(signal)
+    if signal == "speed":
+        derived.forget_speed()

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from monitor.components import Components
-from monitor.derived_signals import SOURCES, DerivedSignals
+from monitor.derived_signals import SOURCES, DerivedSignals, forget
 from monitor.freeze_detection import Wheels
 from monitor.heard_modes import HeardModes
 from monitor.link import LinkFacts, Phase
@@ -85,9 +85,7 @@ class State:
         self, signal: str, value: Value, received_s: float, stamp_s: float | None = None, delay_s: float = 0.0
     ) -> tuple[str, ...]:
         """Take one decoded value; returns the signals that changed by it, derived ones included, for `Monitor.step`.
-
-        `delay_s`: how old it was when it came, at most.
-        """
+        `delay_s`: how old it was when it came, at most."""
         if received_s >= self._latest_s:
             self._latest_s = received_s
         else:
@@ -142,12 +140,7 @@ class State:
 
     def forget(self, signal: str) -> None:
         """What was received of a signal is void, and so is what was derived from it: its unit was another."""
-        stats = self._stats[signal]
-        stats.lowest, stats.highest = math.inf, -math.inf
-        self._table.forget(signal)
-        if signal == "speed":
-            self._derived.forget_speed()
-            self._wheels = Wheels()
+        forget(signal, self._stats[signal], self._table, self._derived)
 
     def receive_phone(self, report: PhoneReport, now_s: float) -> None:
         """Take the report of an operator's phone; judged on the next tick."""

@@ -83,7 +83,7 @@ def receive(
             basis = UnitBasis(profile=profile, chosen=units, tyre_rad_per_unit=tyre_rad_per_unit)
             published = value
             value = reception.in_unit(source, published, at_s, basis)
-            if reception.units.takes_back(source):
+            if reception.units.is_void:
                 state.forget(source.signal)
                 if value is None and on_number is not None and (number := number_of(published)) is not None:
                     on_number(source.signal, number, at_s, stamp)

@@ -58,10 +58,13 @@ class Evidence:
         """Whether units alternate from now on."""
         if last <= REST or self.alternates:
             return False
-        small, large = min(last, size), max(last, size)
-        is_step = large > SLOWEST and abs(large / (small * self.step) - 1.0) <= STEP_TOLERANCE
-        if is_step and self.step < HUNDRED:
-            is_step = small > SLOWEST
+        small, large = (last, size) if last < size else (size, last)
+        is_step = (
+            large > 2.0 * small  # nearly never, and cheap
+            and large > SLOWEST
+            and abs(large / (small * self.step) - 1.0) <= STEP_TOLERANCE
+            and (self.step == HUNDRED or small > SLOWEST)
+        )
         if not is_step and not self._steps:
             return False
         self._steps.append(is_step)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from monitor.values import Effort, GpsFix, Level, Odometry, Steering, Twist
 from server.judge.active_settings import PERCENT_A_RAD
@@ -49,8 +49,7 @@ class UnitUnknown(NotMeasured):
     """A proper message whose unit is not known; `str()` is the reason."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UnitBasis:
+class UnitBasis(NamedTuple):
     """What is known beforehand of the units of a car."""
 
     profile: Profile
@@ -72,6 +71,7 @@ class _Watched:
 
     rule: UnitRule
     evidence: Evidence
+    known: tuple[str, str | None, float]  # profile, choice and ratio that `chosen` and `profiled` follow from
     chosen: Unit | None
     profiled: Unit | None
     decision: Decision = UNDECIDED
@@ -88,7 +88,8 @@ class UnitWatch:
         self._watched: dict[Key, _Watched] = {}
         self._speeds: dict[str, Evidence] = {}  # by topic
         self.has_moved = False
-        self._voided: set[Key] = set()
+        self._voided: set[Key] = set()  # changed their unit with the newest place
+        self.is_void = False  # by the newest message: what was received of its signal was of another unit, or of none
 
     def see(self, signal: str, value: Any, at_s: float) -> None:
         """Compare a value of any signal: its way decides the unit of a speed."""
@@ -102,37 +103,31 @@ class UnitWatch:
 
     def convert(self, source: Source, value: Any, at_s: float, basis: UnitBasis) -> Any:
         """The value in the unit of its signal. Raises UnitUnknown, and Rejected for what its unit does not allow."""
+        self.is_void = False
         get = _NUMBERS.get(type(value))
         if get is None:
             return value
         key = (source.signal, source.topic)
         watched = self._watched.get(key)
-        chosen, profiled = unit_named(source.signal, basis.chosen.get(source.signal)), basis.unit_of(source.signal)
+        known = (basis.profile.name, basis.chosen.get(source.signal), basis.tyre_rad_per_unit)
         if watched is None:
-            watched = self._begin(key, source, chosen, profiled)
+            watched = self._begin(key, source, basis, known)
             if watched is None:
                 return value
-        elif watched.chosen != chosen or watched.profiled != profiled:
-            watched.chosen, watched.profiled = chosen, profiled
+        elif watched.known != known:
+            watched.known, watched.chosen = known, unit_named(source.signal, known[1])
+            watched.profiled = basis.unit_of(source.signal)
             self._decide(*key)
         number, evidence = get(value), watched.evidence
         if evidence.add(number, watched.rule.units):
             self._decide(*key)
         if evidence.ways is not None and not evidence.is_whole:
             evidence.ways.add_speed(number, at_s)
-        return self._in_unit(value, number, watched, basis)
-
-    def takes_back(self, source: Source) -> bool:
-        """Whether what was received of a signal is void: its unit is another, or is not known. True once, as long as
-        none is known each time."""
-        key = (source.signal, source.topic)
-        if not source.carries:
-            return False
-        if key in self._voided:
+        decision = watched.decision
+        if (decision.unit is None and not decision.is_rest) or (self._voided and key in self._voided):
             self._voided.discard(key)
-            return True
-        watched = self._watched.get(key)
-        return watched is not None and watched.decision.unit is None and not watched.decision.is_rest
+            self.is_void = source.carries
+        return self._in_unit(value, number, watched, basis)
 
     def decision(self, signal: str, topic: str) -> Decision | None:
         """What is decided of a topic; None: nothing came, or its unit is not in doubt."""
@@ -166,17 +161,22 @@ class UnitWatch:
         is_usual = unit == found.rule.definition or why.startswith("as this kind")
         return None if is_usual else f"published in {unit.label}, {why}"
 
-    def _begin(self, key: Key, source: Source, chosen: Unit | None, profiled: Unit | None) -> _Watched | None:
+    def _begin(
+        self, key: Key, source: Source, basis: UnitBasis, known: tuple[str, str | None, float]
+    ) -> _Watched | None:
         rule = rule_for(source.signal, plain_type(source.type or ""))
         if rule is None or len(self._watched) >= MOST_TOPICS:
             return None
+        chosen, profiled = unit_named(source.signal, known[1]), basis.unit_of(source.signal)
         evidence = self._surveyed.get(key) or new_evidence(source.signal, rule)
         if rule.by_way:
             if profiled is not None:
                 evidence.ways = None
             if evidence.ways is not None and not evidence.is_whole:
                 self._speeds[source.topic] = evidence
-        watched = self._watched[key] = _Watched(rule=rule, evidence=evidence, chosen=chosen, profiled=profiled)
+        watched = self._watched[key] = _Watched(
+            rule=rule, evidence=evidence, known=known, chosen=chosen, profiled=profiled
+        )
         self._decide(*key)
         return watched
 

@@ -32,7 +32,9 @@ TYRE_RAD = Unit(name="tyre_rad", label="tyre angle in rad, positive left", facto
 TYRE_DEG = Unit(name="tyre_deg", label="tyre angle in degrees, positive left", factor=None, most=70.0)
 WHEEL_RAD = Unit(name="wheel_rad", label="steering wheel in rad", factor=None, most=25.0)
 WHEEL_DEG = Unit(name="wheel_deg", label="steering wheel in degrees", factor=None, most=1400.0)
-BY_RATIO = Unit(name="ratio", label="by the tyre angle per unit of steering", factor=None, most=10_000.0)  # a setting
+BY_RATIO = Unit(
+    name="ratio", label="the unit of the setting *Tyre angle per unit of steering*", factor=None, most=10_000.0
+)  # a setting
 
 _PEDAL = (SHARE, PERCENT)
 _STEERING = (STEERING_PERCENT, TYRE_RAD, TYRE_DEG, WHEEL_RAD, WHEEL_DEG)

@@ -138,7 +138,7 @@ class SignalState(TypedDict, Generic[Value]):
     """One signal."""
 
     label: str
-    unit: Annotated[str, doc("of the headline number")]
+    unit: Annotated[str, doc("of the headline number; empty: it has none, or its unit is not known")]
     freshness: Annotated[
         SignalFreshness,
         doc(

@@ -2161,7 +2161,7 @@ export type SignalFreshness = "fresh" | "ageing" | "stale" | "not_measured" | "n
 /** One signal. */
 export interface SignalState<Value> {
   label: string;
-  /** of the headline number */
+  /** of the headline number; empty: it has none, or its unit is not known */
   unit: string;
   /** ageing: > 3 periods; stale: > max(10 periods, 1 s); not_measured: messages came, which declare that; no_value: messages came, none of which could be used; never: subscribed to, and nothing came */
   freshness: SignalFreshness;

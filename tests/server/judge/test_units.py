@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from monitor.checks.pedals import PedalLimits
@@ -177,6 +177,7 @@ def test_the_catvehicle_has_percent_whatever_the_values_and_one_wrong_value_chan
     assert "as this kind of car has it, but values are beyond it" in car.why("brake")
 
 
+@settings(deadline=None)
 @given(
     st.sampled_from([("brake", FLOAT), ("accelerator", WRENCH), ("fuel", FLOAT), ("fuel", BATTERY)]),
     st.sampled_from([SHARE, PERCENT]),
@@ -199,6 +200,7 @@ def test_a_drive_has_the_right_unit_or_none(kind: tuple[str, str], unit: Any, pa
         assert decided[0] == "percent"
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-200.0, 200.0), max_size=80), st.sampled_from(["brake", "steering", "fuel"]))
 def test_a_decision_never_changes_back(numbers: list[float], signal: str) -> None:
     car = Car({signal: FLOAT})
@@ -355,7 +357,7 @@ def test_the_way_decides_the_unit_of_a_speed(type: str, reference: str, factor: 
 
 
 @pytest.mark.parametrize(
-    ("seconds", "mps", "factor"), [(2.0, 8.0, 3.6), (60.0, 1.5, 3.6), (20.0, 8.0, 2.0), (20.0, 8.0, 0.0)]
+    ("seconds", "mps", "factor"), [(2.0, 8.0, 3.6), (60.0, 1.8, 3.6), (20.0, 8.0, 2.0), (20.0, 8.0, 0.0)]
 )
 def test_a_short_slow_or_odd_way_decides_nothing(seconds: float, mps: float, factor: float) -> None:
     car = Car({"speed": TWIST})
