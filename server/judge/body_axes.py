@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from server.judge.frames import Frames
+from server.judge.message_fields import has_fields
 from server.judge.transforms import MAX_NAME, Rotation, inverse, product, rotated
 
 IMU, ODOMETRY = "sensor_msgs/Imu", "nav_msgs/Odometry"
@@ -20,11 +21,11 @@ def in_body_axes(frames: Frames, topic: str, kind: str | None, message: Any) -> 
     An Imu is in its header's frame (REP-145); the twist of an Odometry is in `child_frame_id`, whose pose it states. A
     frame that no transform names is taken for the body, as drivers without transforms mean it.
     """
-    if kind not in TYPES or not isinstance(message, Mapping):
+    if kind not in TYPES or not has_fields(message):
         return message, None
     is_imu = kind.endswith("Imu")
     header = message.get("header") if is_imu else None
-    named = header.get("frame_id") if isinstance(header, Mapping) else message.get("child_frame_id")
+    named = header.get("frame_id") if has_fields(header) else message.get("child_frame_id")
     turn = frames.turn(topic, named) if isinstance(named, str) and len(named) <= MAX_NAME else None
     if turn is None or isinstance(turn, str):
         return message, turn

@@ -43,6 +43,11 @@ class Frames:
     def __getstate__(self) -> dict[str, Any]:
         return {"_trees": self._trees, "_changes": self._changes, "_kept": {}, "_turns": {}, "_located": self._located}
 
+    def forget(self) -> None:
+        """The link opens again: what is latched is sent again, and may be of another calibration by now."""
+        self._trees.clear()
+        self._changes += 1
+
     def receive(self, topic: str, message: Any) -> None:
         """A message of a topic for which `is_transforms` holds."""
         space = topic.rpartition("/")[0]
@@ -133,6 +138,8 @@ class Frames:
         before = self._located.get(topic)
         if before is not None:
             why = f"its frame was {before} and is {frame or 'none'}, whose place is not sent"
+            if frame == before:
+                why = f"the place of its frame {frame} is not sent any more"
             return Mounting(origin="transforms", why_unknown=why, note=f"mounting not known: {why}")
         if topic.lower() in LOOKS_AHEAD:
             return Mounting(origin="profile")

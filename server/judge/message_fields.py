@@ -70,11 +70,12 @@ def known(value: float) -> float | None:
 def text(message: Any, *path: str, default: str = "") -> str:
     value = message
     for name in path:
-        value = value.get(name) if _has_fields(value) else None
+        value = value.get(name) if has_fields(value) else None
     return clean(value[:200]) if isinstance(value, str) else default
 
 
-def _has_fields(value: Any) -> TypeGuard[Mapping[str, Any]]:
+def has_fields(value: Any) -> TypeGuard[Mapping[str, Any]]:
+    """Whether this is a message, and no number, text or list."""
     return type(value) is dict or isinstance(value, Mapping)  # an abstract class takes its time
 
 
@@ -82,9 +83,9 @@ def stamp_s(message: Any) -> float | None:
     """The header's stamp in seconds, ROS 1 or ROS 2; None where there is none or it is zero or absurd."""
     if type(message) is dict and "header" not in message:
         return None
-    header = message.get("header") if _has_fields(message) else None
-    stamp = header.get("stamp") if _has_fields(header) else None
-    if not _has_fields(stamp):
+    header = message.get("header") if has_fields(message) else None
+    stamp = header.get("stamp") if has_fields(header) else None
+    if not has_fields(stamp):
         return None
     seconds = stamp.get("secs", stamp.get("sec"))
     nanoseconds = stamp.get("nsecs", stamp.get("nanosec"))

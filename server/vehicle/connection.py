@@ -46,6 +46,9 @@ class ConnectionObserver(Protocol):
 class MessageHandler(Protocol):
     """What takes the frames of a link."""
 
+    def link_opened(self) -> None:
+        """Nothing has come yet over this opening."""
+
     def frame_received(self, frame: RawFrame) -> bool:
         """Takes a frame as it came; False: it has to be parsed."""
 
@@ -133,6 +136,7 @@ class Connection:
     def link_opened(self) -> None:
         link = self.link
         assert link is not None
+        self._messages.link_opened()
         if self.phase == "connecting" or not self.is_proved:
             self._supervisor.keep("proof", partial(self._demand_proof, link), may_end=True)
         if self.is_proved:

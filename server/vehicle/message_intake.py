@@ -59,6 +59,10 @@ class MessageIntake:
         self._scans = ScanFeed(self._vehicle, self._bus)
         self._transforms_s = -math.inf  # when transforms that move were parsed last
 
+    def link_opened(self) -> None:
+        """The car's messages come from the beginning, also those that are sent once."""
+        self._judgement.frames.forget()
+
     def junk_received(self, why: str) -> None:
         """Something came that is no message."""
         self._judgement.reception.junk(why)

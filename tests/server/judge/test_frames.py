@@ -326,6 +326,19 @@ def test_a_frame_that_is_renamed_in_mid_drive_is_not_guessed_at() -> None:
     assert asked(scanned(laser, posts, by, frame="laser_2")).verdict == "fault"
 
 
+def test_after_the_link_was_lost_transforms_are_sent_again_and_may_be_others() -> None:
+    posts = [(3.3, 0.0, 0.3)]
+    by = frames(Laser(yaw_rad=math.pi).transform())
+    assert asked(scanned(Laser(yaw_rad=math.pi), posts, by)).verdict == "fault"
+    by.forget()
+    waiting = asked(scanned(Laser(yaw_rad=math.pi), posts, by))
+    assert (waiting.verdict, "is not sent any more" in waiting.text) == ("unknown", True), (
+        "it is known not to look ahead"
+    )
+    by.receive("/tf_static", {"transforms": [Laser(yaw_rad=1.0).transform()]})
+    assert asked(scanned(Laser(yaw_rad=1.0), posts, by)).verdict == "fault"
+
+
 def test_frames_that_name_no_body_are_no_answer() -> None:
     assert "assumed" in asked(scanned(Laser(), [], frames(row("map", "odom"), row("odom", "laser")))).text
     assert "assumed" in asked(scanned(Laser(), [], frames(row("base_link", "camera")))).text
