@@ -8,6 +8,7 @@ import { soundOf } from './alarms/alarm-layout.js';
 import { Arming } from './boot/arming.js';
 import { deviceName, keptHere } from './control/device-name.js';
 import { breath, field, listen, need, show } from './core/dom.js';
+import { styled } from './core/style-sheet.js';
 import { gapWords } from './core/event-log.js';
 import { takeEarly } from './boot/early-socket.js';
 import { forgetWork } from './boot/forget.js';
@@ -322,7 +323,7 @@ function mountDesk({ monitor, say, store, tabs }) {
 
 /** Fetches the screens that an operator may want when the server is gone. */
 function prefetch() {
-  for (const load of [() => import('./slowdown/slow-sheet.js'), () => import('./alarms/log.js'), () => import('./home/signals.js'), () => import('./scan/scan.js'), () => import('./home/drive-screen.js')]) load().catch(() => {});
+  for (const load of [() => import('./slowdown/slow-sheet.js'), () => import('./alarms/log.js'), () => import('./home/signals.js'), () => styled('sources'), () => import('./scan/scan.js'), () => import('./home/drive-screen.js')]) load().catch(() => {});
 }
 
 /**

@@ -18,6 +18,7 @@ from playwright.async_api import Browser, Page, async_playwright
 from tests.chromium import FLAGS, find_chromium
 from tests.page import canned_fleet
 from tests.page.canned import Canned, alarm, check, idle, live, slow, slowed
+from tests.page.canned_questions import NOT_CHOSEN, brake_unit, laser_offers, two_lasers
 from tests.server.web.map_files import png
 
 OUT = Path(__file__).resolve().parents[2] / "out" / "screenshots"
@@ -343,6 +344,32 @@ async def scan(server: Canned, page: Page) -> None:
     server.state = live()
     await page.wait_for_selector("[data-tab=scan]:visible")
     await page.tap("[data-tab=scan]")
+
+
+@scene("question")
+async def question(server: Canned, page: Page) -> None:
+    state = live()
+    state["questions"] = [two_lasers(), brake_unit()]
+    state["signals"]["scan"] |= NOT_CHOSEN
+    state["signals"]["brake"] |= NOT_CHOSEN
+    server.state = state
+    server.candidates = {"scan": laser_offers()}
+    await page.wait_for_selector("[data-f=question-open]:visible")
+
+
+@scene("question-sheet")
+async def question_sheet(server: Canned, page: Page) -> None:
+    await question(server, page)
+    await page.tap("[data-f=question-open]")
+    await page.wait_for_selector("#sheet-question .sketch")
+
+
+@scene("signal")
+async def signal(server: Canned, page: Page) -> None:
+    server.state = live()
+    server.candidates = {"distance": laser_offers()}
+    await page.tap('[data-part="nearest"] [data-f=age]')
+    await page.wait_for_selector(".sig-more .others")
 
 
 @scene("signals")

@@ -17,6 +17,7 @@ STATES = {
     "files": ("files", "files-menu", "mail", "outbox", "replay"),
     "settings": ("settings", "topic", "preferences"),
     "alarms": ("alarms", "check", "check-unknown"),
+    "sources": ("question", "question-sheet", "signal"),
     "menu": ("menu", "stop", "scan", "signals", "alarm-log"),
     "connect": ("connect", "connect-saved", "connect-failed"),
 }

@@ -5,6 +5,7 @@ import { openScreen, openSettings } from '../core/open-screen.js';
 import { THUMB_PX } from './scan-pick.js';
 import { ScanMark } from './scan-mark.js';
 import { ScanGlass } from './scan-glass.js';
+import { styled } from '../core/style-sheet.js';
 import { ScanReadout, isOfMounting, scanInk } from './scan-readout.js';
 import { mountTouch } from './scan-touch.js';
 import { REACH_M, pinched, placeOf, plotScale, reachWithin, zoomed } from './scan-layout.js';
@@ -16,6 +17,7 @@ const STORED = 'catgraph.range';
  * @param {import('../shell/tab-contents.js').TabPage} page
  */
 export function mount(root, { store, isFront }) {
+  void styled('sources');
   const tab = new ScanTab(root, store);
   const at = (/** @type {string} */ name) => field(root, name);
   const themed = () => {

@@ -48,7 +48,7 @@ class QuestionSheet {
 
   /** @param {Store} store @param {Question} question @param {Does} does */
   constructor(store, question, does) {
-    void styled('questions');
+    void styled('sources');
     this.store = store;
     this.question = question;
     this.does = does;

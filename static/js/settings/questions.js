@@ -21,7 +21,7 @@ const MOST_STORED = 30;
  * @param {(sentence: string, title?: string) => void} say
  */
 export async function mount(monitor, store, say) {
-  await styled('questions');
+  await styled('sources');
   const questions = new Questions(monitor, store, say);
   questions.draw();
   return store.on('draw', () => questions.draw());

@@ -9,13 +9,9 @@ const AGAIN_MS = 1000;
  * @param {(sentence: string, title?: string) => void} say
  */
 export function whenAsked(monitor, store, say) {
-  let isLoading = false;
   const off = store.on('draw', () => {
-    if (isLoading || !store.frame?.questions?.length) return;
-    isLoading = true;
-    import('./questions.js').then(({ mount }) => {
-      off();
-      return mount(monitor, store, say);
-    }).catch(() => setTimeout(() => { isLoading = false; }, AGAIN_MS));
+    if (!store.frame?.questions?.length) return;
+    off();
+    import('./questions.js').then(({ mount }) => mount(monitor, store, say)).catch(() => setTimeout(() => whenAsked(monitor, store, say), AGAIN_MS));
   });
 }

@@ -3,6 +3,7 @@
 import { addSheet, closeSheet, openSheet } from './sheet.js';
 import { field, html, listen, need, setText, words } from '../core/dom.js';
 import { isFloor } from './layout.js';
+import { styled } from '../core/style-sheet.js';
 
 /**
  * @typedef {'acknowledge' | 'silence' | 'mark' | 'tab' | 'help' | 'watch' | 'play' | 'step'} Act
@@ -126,6 +127,7 @@ class PageKeys {
   }
 
   help() {
+    void styled('menu');
     const toggle = html('button', { type: 'button', class: 'key' });
     const label = () => setText(toggle, this.#isOn ? 'Turn these keys off' : 'Turn these keys on');
     label();

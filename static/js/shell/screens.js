@@ -19,8 +19,8 @@ const SCREENS = /** @type {Record<string, {title: string, hasHead?: boolean, loa
   departure: { title: 'Departure check', load: async () => (await import('../drive/departure-check.js')).mount },
   log: { title: 'Alarm log', load: async () => (await import('../alarms/log.js')).mount },
   trends: { title: 'Trends', load: async () => (await import('../home/drive-screen.js')).mount },
-  signals: { title: 'Signals', load: async () => (await import('../home/signals.js')).mount },
-  license: { title: 'License', load: async () => (await import('./about.js')).mountLicense },
+  signals: { title: 'Signals', load: async () => (await Promise.all([import('../home/signals.js'), styled('sources')]))[0].mount },
+  license: { title: 'License', load: async () => (await Promise.all([import('./about.js'), styled('menu')]))[0].mountLicense },
   about: { title: 'About', load: async () => (await import('./about.js')).mountAbout },
 });
 const NOT_HERE = still(['This screen could not be loaded from the server. Go back and open it again.']);
