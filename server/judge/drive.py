@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -13,6 +13,7 @@ from server.judge.recorded_events import NewSettings, RecordedEvents
 from server.judge.ros_names import BadName, canonical_name
 from server.judge.settings import BadSetting
 from server.judge.settings_override import SettingsOverride, recorded_override, tuning_for
+from server.judge.stamp_steps import ClockStep
 from server.judge.topics import Source, map_signals
 
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, message
@@ -94,7 +95,9 @@ class Drive:
         self.length_s = source.duration_s
         self.ros_version = source.ros_version
         self.delay = delay
-        self.notes: list[str] = [*source.notes, *recorded.notes]
+        self.clock_steps: Sequence[ClockStep] = getattr(source, "clock_steps", ())  # what is no file has none
+        self.notes: list[str] = [f"{step.sentence}." for step in self.clock_steps]
+        self.notes += [*source.notes, *recorded.notes]
         self._names: dict[str, str] = {}  # as the recording spells a topic → as a bridge would offer it
         for topic in source.topics:
             try:

@@ -12,6 +12,7 @@ from monitor.state import State
 from monitor.trends import Trends
 from server.judge.reception_stats import Reception
 from server.judge.recorded_slowdown import RecordedSlowDown
+from server.judge.stamp_steps import StampSteps
 
 
 @dataclass(slots=True, kw_only=True)
@@ -36,4 +37,5 @@ class RunState:
     last_message_s: float | None = None
     paused_s: float | None = None
     paused_by: str | None = None
+    stamps: StampSteps = field(default_factory=StampSteps)
     slow_down: RecordedSlowDown = field(default_factory=RecordedSlowDown)

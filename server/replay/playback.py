@@ -28,6 +28,7 @@ from server.vehicle.check_detail import check_answer
 RATES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 WARM_UP_S = 25.0  # of the recording, before a moment that the time line has not come to: less than a second of work
 REACH_S = 30.0  # a moment so little ahead is played to
+EMPTY_S, SHOWN_S, LEAD_S = 60.0, 10.0, 2.0  # playing shows so much of a gap of at least EMPTY_S, and so much of its end
 BEHIND_S = 0.3  # wall time: further behind, it does not reach the requested rate
 
 
@@ -149,6 +150,9 @@ class Playback:
             self._keep_pace_from(self._run.at_s, now_s)
         if not self.is_playing:
             return
+        if (behind_s := self._behind_gap()) is not None:
+            self._target_s = behind_s
+            return
         due_s = min(self.length_s, self._from_s + (now_s - self._from_now_s) * self.rate)
         if not self._run.advance(due_s, is_over) and due_s - self._run.at_s > BEHIND_S * self.rate:
             since_s, from_s = self._paced
@@ -160,6 +164,13 @@ class Playback:
             self._paced = (now_s, self._run.at_s)
         if self._run.at_s >= self.length_s:
             self.pause(now_s)
+
+    def _behind_gap(self) -> float | None:
+        """Where playing goes on, where nothing was recorded for long; None: something comes soon."""
+        run, last_s = self._run, self._run.run_state.last_message_s
+        is_shown = run.at_s - (0.0 if last_s is None else last_s) >= SHOWN_S
+        next_s = min(run.next_s, self.length_s)
+        return next_s - LEAD_S if is_shown and next_s - run.at_s > EMPTY_S - SHOWN_S else None
 
     def _keep_pace_from(self, at_s: float, now_s: float) -> None:
         self._from_s, self._from_now_s = at_s, now_s
@@ -221,7 +232,7 @@ class Playback:
 
     def timeline(self, events: TimelineEvents = NOTHING) -> Timeline:
         """The time line so far, the recorded events of the drive, and the notes on the recording."""
-        said = [*self.drive.notes]
+        said = [*self.drive.notes, *self.index.empty_stretches(EMPTY_S)]
         if self.index.is_done:
             said += [f"{sentence}." for sentence in self._index_recording.damage]
         for why in (self.index.broke_off, self.broke_off):
