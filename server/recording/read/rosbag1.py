@@ -53,6 +53,7 @@ class BagIndex(Protocol):
     bio: BinaryIO | None
     indexes: dict[int, list[Entry]]  # by connection, in order
     chunks: dict[int, Packed]  # by place in the file
+    records: dict[int, list[tuple[int, bytes]]]  # of each chunk's index: connection, entries; empty: not kept
 
     @property
     def channels(self) -> Sequence[Channel]: ...
@@ -82,6 +83,7 @@ class _Reader(Reader):
         super().__init__(path)
         self._on_first_chunk: Callable[[int], None] | None = on_first_chunk
         self._indexed: set[tuple[int, int]] = set()  # chunk and connection
+        self.records: dict[int, list[tuple[int, bytes]]] = {}
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -115,6 +117,7 @@ class _Reader(Reader):
         if (pos, number) in self._indexed:  # a small bag could hold any number of messages
             raise ReaderError("The index names a part twice.")
         self._indexed.add((pos, number))
+        self.records.setdefault(pos, []).append((number, entries))
         indexes[number] += [
             (seconds * 10**9 + nanoseconds, pos, place, number)
             for seconds, nanoseconds, place in _ENTRY.iter_unpack(entries)
@@ -164,6 +167,7 @@ class Bag1:
     def messages(
         self, numbers: set[int], start_ns: int, damage: Damage | None = None
     ) -> Iterator[tuple[int, int, bytes]]:
+        self._reader.records.clear()  # needed on opening only
         entries: list[Entry] = []
         for number in numbers:
             entries += _since(start_ns, self._reader.indexes.get(number, ()))
@@ -185,6 +189,11 @@ class Bag1:
             yield time_ns, number, raw
 
     def arrivals(self) -> Iterator[Arrivals]:
+        if records := self._reader.records:
+            for number, at in enumerate(sorted(self._reader.chunks)):
+                if at in records:
+                    yield _arrivals(number, records[at])
+            return
         entries = [_table(index) for index in self._reader.indexes.values() if index]
         if entries:
             table = np.concatenate(entries)
@@ -261,6 +270,16 @@ class Bag1:
             _, old = self._chunks.popitem(last=False)
             self._chunk_bytes -= len(old)
         return chunk
+
+
+def _arrivals(number: int, records: Sequence[tuple[int, bytes]]) -> Arrivals:
+    """The messages of a chunk by the records of its index."""
+    table = np.frombuffer(b"".join(entries for _, entries in records), "<u4").reshape(-1, 3).astype(np.int64)
+    counts = [len(entries) // _ENTRY.size for _, entries in records]
+    connections = np.repeat(np.array([one for one, _ in records], np.int64), counts)
+    order = np.argsort(table[:, 2], kind="stable")
+    times_ns = table[order, 0] * 10**9 + table[order, 1]
+    return Arrivals(table[order, 2] + number * PLACES_A_PART, times_ns, connections[order])
 
 
 def _table(index: Sequence[Entry]) -> Table:
