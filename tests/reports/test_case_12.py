@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import re
+import zipfile
 from collections.abc import Callable, Sequence
-from itertools import cycle
+from datetime import datetime
+from itertools import cycle, pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from server.cli.main import main
 from server.judge.drive import Drive
 from server.judge.offline import Observer, OfflineRun
+from server.recording.catalog.survey import survey
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import open_recording
 from server.replay.playback import Playback
 from tests.reports.cases import judged, made, raised
+from tests.server.recording.bags import BEGIN_S
 from tests.server.recording.stepped import CONTAINERS, LENGTH_S, Container, Step, write
 
 FOLDER = "12-clock-set-during-recording"
@@ -140,3 +146,40 @@ def test_a_replay_plays_a_short_silence(tmp_path: Path) -> None:
     playback, took_s = played(path, lambda one: not one.is_playing, at_s=30.0)
     assert took_s == pytest.approx(LENGTH_S, abs=1.0)  # with the 30 s, from 30 s on
     playback.close()
+
+
+def test_the_list_has_the_length_that_was_driven(tmp_path: Path) -> None:
+    found = survey(write(tmp_path, "bag", steps=[(25.0, 230 * DAY_S)]))
+    assert found["length_s"] == pytest.approx(LENGTH_S, abs=0.2)
+    assert found["started_ms"] == pytest.approx((BEGIN_S + 230 * DAY_S) * 1000, abs=300)
+    assert found["distance_m"] == pytest.approx(LENGTH_S * 7e-5 * 111_200.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("format", "container"), [("csv", "plain"), ("gpx", "bag"), ("bag", "bag"), ("ros2", "db3")])
+def test_exports_go_on_and_say_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], format: str, container: Container
+) -> None:
+    path, out = write(tmp_path, container, steps=[(25.0, 230 * DAY_S), (40.0, -70.0)]), tmp_path / "exported"
+    assert main(["export", str(path), "--format", format, "--out", str(out)]) == 0  # nothing is left out
+    said = capsys.readouterr()
+    assert (said.out + said.err).count("clock was set") == 2
+    match format:
+        case "csv":
+            with zipfile.ZipFile(out) as packed:
+                lines = packed.read("speed.csv").decode().splitlines()[1:]
+                assert packed.read("README.txt").decode().count("clock was set") == 2
+            times_s = [float(line.split(",")[1]) for line in lines]
+        case "gpx":
+            found = re.findall("<trkpt.*?<time>(.*?)</time>", out.read_text(), re.DOTALL)
+            times_s = [datetime.fromisoformat(one).timestamp() for one in found]
+        case _:
+            if format == "ros2":
+                with zipfile.ZipFile(out) as packed:
+                    packed.extractall(tmp_path / "bag")
+                out = next((tmp_path / "bag").iterdir())
+            with open_recording([out]) as recording:
+                assert not recording.clock_steps
+                times_s = [at_s for at_s, *_ in recording.rows()]
+    assert len(times_s) > 200
+    assert times_s[-1] - times_s[0] == pytest.approx(LENGTH_S, abs=0.5)
+    assert all(0.0 <= later - before < 1.0 for before, later in pairwise(times_s))
