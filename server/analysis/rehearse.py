@@ -100,7 +100,6 @@ class _Injected:
     def __init__(self, recording: Recording, faults: Faults, drive: Drive) -> None:
         self.start_s, self.duration_s = recording.start_s, recording.duration_s
         self.ros_version, self.notes, self.topics = recording.ros_version, recording.notes, recording.topics
-        self.clock_steps = recording.clock_steps
         self._recording = recording
         self._faults = faults
         self._signals = {topic: sources[0].signal for topic, sources in drive.epochs[0].listeners.items()}

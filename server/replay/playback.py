@@ -20,6 +20,7 @@ from server.recording.delay import recorded_delay
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, RecordingUnreadable
 from server.replay import replay_frames
+from server.replay.gaps import EMPTY_S, behind_gap
 from server.replay.recorded_events import MOST, NOTHING, TimelineEvents
 from server.replay.timeline import Index
 from server.vehicle import queries
@@ -28,7 +29,6 @@ from server.vehicle.check_detail import check_answer
 RATES = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 WARM_UP_S = 25.0  # of the recording, before a moment that the time line has not come to: less than a second of work
 REACH_S = 30.0  # a moment so little ahead is played to
-EMPTY_S, SHOWN_S, LEAD_S = 60.0, 10.0, 2.0  # playing shows so much of a gap of at least EMPTY_S, and so much of its end
 BEHIND_S = 0.3  # wall time: further behind, it does not reach the requested rate
 
 
@@ -59,6 +59,7 @@ class Playback:
         self.index = Index(self._index_recording, self.drive, sketch)
         self._run = OfflineRun(recording, self.drive)
         self.is_playing = False
+        self.passes_gaps = True
         self.rate = 1.0
         self.reached_rate: float | None = None  # where it does not keep the pace; None: it does
         self.is_settled = True  # False: the checks were only warmed up
@@ -126,8 +127,6 @@ class Playback:
         self.seek(found, now_s)
         return True
 
-    # -- work --------------------------------------------------------------------------------------------------------
-
     def work(self, now_s: float, is_over: Callable[[], bool]) -> None:
         """Advance to the position for `now_s`, within the time budget; the rest is spent on the time line."""
         try:
@@ -150,8 +149,8 @@ class Playback:
             self._keep_pace_from(self._run.at_s, now_s)
         if not self.is_playing:
             return
-        if (behind_s := self._behind_gap()) is not None:
-            self._target_s = behind_s
+        self._target_s = behind_gap(self._run, self.length_s) if self.passes_gaps else None
+        if self._target_s is not None:
             return
         due_s = min(self.length_s, self._from_s + (now_s - self._from_now_s) * self.rate)
         if not self._run.advance(due_s, is_over) and due_s - self._run.at_s > BEHIND_S * self.rate:
@@ -164,13 +163,6 @@ class Playback:
             self._paced = (now_s, self._run.at_s)
         if self._run.at_s >= self.length_s:
             self.pause(now_s)
-
-    def _behind_gap(self) -> float | None:
-        """Where playing goes on, where nothing was recorded for long; None: something comes soon."""
-        run, last_s = self._run, self._run.run_state.last_message_s
-        is_shown = run.at_s - (0.0 if last_s is None else last_s) >= SHOWN_S
-        next_s = min(run.next_s, self.length_s)
-        return next_s - LEAD_S if is_shown and next_s - run.at_s > EMPTY_S - SHOWN_S else None
 
     def _keep_pace_from(self, at_s: float, now_s: float) -> None:
         self._from_s, self._from_now_s = at_s, now_s
@@ -235,9 +227,8 @@ class Playback:
         said = [*self.drive.notes, *self.index.empty_stretches(EMPTY_S)]
         if self.index.is_done:
             said += [f"{sentence}." for sentence in self._index_recording.damage]
-        for why in (self.index.broke_off, self.broke_off):
-            if why is not None:
-                said.append(f"Not all of it can be read: {why}.")
+        broken = (why for why in (self.index.broke_off, self.broke_off) if why is not None)
+        said += [f"Not all of it can be read: {why}." for why in broken]
         notes = list(dict.fromkeys(said))[:20]
         return {
             "kind": "timeline", **self.index.as_json(), "notes": notes, "flags": list(events.flags[:MOST]),

@@ -148,6 +148,19 @@ def test_a_replay_plays_a_short_silence(tmp_path: Path) -> None:
     playback.close()
 
 
+def test_a_replay_beside_another_one_keeps_its_pace(tmp_path: Path) -> None:
+    path = write(tmp_path, "bag", silent_s=(35.0, 300.0))
+    playback = Playback(open_recording([path]), lambda: open_recording([path]), settings="", now_s=0.0, at_s=34.0)
+    playback.passes_gaps = False
+    while playback.is_seeking:
+        playback.work(0.0, lambda: False)
+    playback.play(0.0)
+    for now_s in (10.0, 20.0, 60.0):
+        playback.work(now_s, lambda: False)
+        assert playback.at_s == pytest.approx(34.0 + now_s, abs=0.1)
+    playback.close()
+
+
 def test_the_list_has_the_length_that_was_driven(tmp_path: Path) -> None:
     found = survey(write(tmp_path, "bag", steps=[(25.0, 230 * DAY_S)]))
     assert found["length_s"] == pytest.approx(LENGTH_S, abs=0.2)
