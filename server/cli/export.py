@@ -169,8 +169,7 @@ def _write(
 
 def _with_clock(recording: Recording, outcome: Outcome) -> Outcome:
     """The outcome with what was corrected in the times."""
-    steps = [f"{step.sentence}." for step in recording.clock_steps]
-    outcome.notices[:0] = [sentence for sentence in steps if sentence not in outcome.notices]
+    outcome.notices[:0] = [note for note in recording.clock_notes if note not in outcome.notices]
     return outcome
 
 

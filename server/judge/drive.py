@@ -96,8 +96,7 @@ class Drive:
         self.ros_version = source.ros_version
         self.delay = delay
         self.clock_steps: Sequence[ClockStep] = getattr(source, "clock_steps", ())  # what is no file has none
-        self.notes: list[str] = [f"{step.sentence}." for step in self.clock_steps]
-        self.notes += [*source.notes, *recorded.notes]
+        self.notes: list[str] = [*getattr(source, "clock_notes", ()), *source.notes, *recorded.notes]
         self._names: dict[str, str] = {}  # as the recording spells a topic → as a bridge would offer it
         for topic in source.topics:
             try:

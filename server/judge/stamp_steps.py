@@ -24,11 +24,6 @@ class ClockStep(Protocol):
         """Ahead positive, back negative."""
         ...
 
-    @property
-    def sentence(self) -> str:
-        """What happened, without a full stop."""
-        ...
-
 
 @dataclass(slots=True)
 class _Stamps:

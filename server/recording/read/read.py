@@ -22,7 +22,7 @@ from server.recording.read.errors import NoRoom, RecordingUnreadable, Undecodabl
 from server.recording.read.open_file import open_file
 from server.recording.read.recognise import Found, FoundRecording, by_name, recognise
 from server.recording.read.source import Channel, Damage, FileSource, why_not_decoded
-from server.recording.read.steady_time import ClockStep, make_steady
+from server.recording.read.steady_time import ClockStep, make_steady, notes_on
 from server.recording.read.time_order import Stream, in_time_order
 from server.recording.read.unpack import PartTooLarge
 
@@ -83,6 +83,7 @@ class Recording:
         self.lacking = lacking
         self.paths = paths
         self.clock_steps = _made_steady(sources)  # the times of the files are corrected for them
+        self.clock_notes = notes_on(self.clock_steps)  # for a person
         self.ros_version: RosVersion = next((s for s in sources if s.channels), sources[0]).ros_version
         self.topics: dict[str, TopicInfo] = {}
         self.metadata: dict[str, str] = next(

@@ -26,6 +26,7 @@ from server.recording.read.source import FileSource
 from server.recording.read.spans import span
 from server.recording.read.stamp_witness import StampWitness
 
+MOST_NOTED = 10
 BETWEEN_FILES_NS = S  # parts of one recording may overlap by less
 _PART = re.compile(r"(.*)_(\d+)")
 
@@ -46,6 +47,13 @@ class ClockStep:
             f"The recorder's clock was set {way} by {span(abs(self.by_s))} at {_clock(self.at_wall_s)}, "
             f"{self.at_s:.1f} s after the start: times before and after it are joined"
         )
+
+
+def notes_on(steps: Sequence[ClockStep]) -> list[str]:
+    """A sentence on each of the first steps, and one on the others."""
+    notes = [f"{step.sentence}." for step in steps[:MOST_NOTED]]
+    more = len(steps) - len(notes)
+    return [*notes, f"The recorder's clock was set {more} more times."] if more else notes
 
 
 @dataclass(slots=True)

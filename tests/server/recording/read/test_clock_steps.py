@@ -142,3 +142,12 @@ def test_parts_of_a_split_bag_follow_each_other_where_the_clock_was_set_between_
         assert [topic for _, topic in times] == [topic for _, topic in true_times()]
         [step] = recording.clock_steps
         assert step.by_s == pytest.approx(-500.0, abs=0.2)
+
+
+def test_a_clock_that_is_set_again_and_again_fills_no_page_with_notes(tmp_path: Path) -> None:
+    steps = [(2.0 + 3.5 * number, -4.0) for number in range(16)]
+    with open_recording([write(tmp_path, "bag", steps=steps)]) as recording:
+        assert len(recording.clock_steps) == 16
+        assert recording.duration_s == pytest.approx(LENGTH_S, abs=1.0)
+        assert len(recording.clock_notes) == 11
+        assert recording.clock_notes[-1] == "The recorder's clock was set 6 more times."
