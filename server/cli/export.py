@@ -145,12 +145,12 @@ def _cut(
     outcome = write_clip(recording, clip, window, clip_of=name, progress=lambda part: progress(part * share))
     if args.format == CLIP:
         os.rename(clip, new)
-        return outcome
+        return _with_clock(recording, outcome)
     with open_recording([clip]) as cut:
         made = _write(cut, new, f"{name}, clip", args, lambda part: progress(share + part * (1.0 - share)))
     made.notes[:0] = outcome.notes
     made.notices[:0] = outcome.notices
-    return made
+    return _with_clock(recording, made)
 
 
 def _write(
@@ -164,6 +164,12 @@ def _write(
     outcome: Outcome = getattr(importlib.import_module(module), function)(recording, path, progress=progress, **options)
     named = tuple(outcome.notes)
     outcome.notes += [note for topic, note in unread if not any(one.startswith(topic) for one in named)]
+    return _with_clock(recording, outcome)
+
+
+def _with_clock(recording: Recording, outcome: Outcome) -> Outcome:
+    """The outcome with what was corrected in the times."""
+    outcome.notices[:0] = [note for note in recording.clock_notes if note not in outcome.notices]
     return outcome
 
 

@@ -19,6 +19,7 @@ from server.judge.sources import survey as source_survey
 from server.judge.sources.candidates import to_compare
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence
+from server.judge.stamp_steps import ClockStep
 from server.judge.topics import Source
 from server.judge.unit_evidence import Evidence as UnitEvidence
 from server.judge.unit_survey import Surveyed, survey
@@ -129,7 +130,8 @@ class Drive:
         self.length_s = source.duration_s
         self.ros_version = source.ros_version
         self.delay = delay
-        self.notes: list[str] = [*source.notes, *recorded.notes]
+        self.clock_steps: Sequence[ClockStep] = getattr(source, "clock_steps", ())  # what is no file has none
+        self.notes: list[str] = [*getattr(source, "clock_notes", ()), *source.notes, *recorded.notes]
         self._names: dict[str, str] = {}  # as the recording spells a topic → as a bridge would offer it
         for topic in source.topics:
             try:

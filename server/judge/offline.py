@@ -26,6 +26,7 @@ from server.judge.run_state import RunState
 from server.judge.unit_watch import UnitWatch
 
 SILENCE_S = 600.0  # after so long without a message nothing new can be said: the judge is not stepped through the rest
+QUIET_S, QUIET_TICKS = 60.0, 20  # after so long without a message, every check is judged at one tick in so many
 STEPS_PER_CLOCK_READ = 24  # some 2 ms
 
 
@@ -182,11 +183,16 @@ class OfflineRun:
             return math.inf
         tick_s = run_state.opened_s + run_state.ticks * TICK_S
         received_s = run_state.opened_s if run_state.last_message_s is None else run_state.last_message_s
-        if tick_s - received_s > SILENCE_S and min(message_s, self.drive.length_s) - tick_s > 1.0:
-            until_s = min(message_s, self.drive.length_s)
+        until_s = min(message_s, self.drive.length_s)
+        if tick_s - received_s <= QUIET_S or until_s - tick_s <= 1.0:
+            return tick_s
+        if tick_s - received_s > SILENCE_S:
             run_state.ticks = max(run_state.ticks, math.floor((until_s - run_state.opened_s) / TICK_S) - 5)
             tick_s = run_state.opened_s + run_state.ticks * TICK_S
             self._observer.skipped(received_s, until_s)
+        else:
+            run_state.ticks = -(-run_state.ticks // QUIET_TICKS) * QUIET_TICKS
+            tick_s = run_state.opened_s + run_state.ticks * TICK_S
         return tick_s
 
     # -- what comes --------------------------------------------------------------------------------------------------
@@ -220,6 +226,7 @@ class OfflineRun:
             limits=run_state.monitor.limits,
             on_value=self._observer.value_decoded,
             on_number=self._observer.number_decoded,
+            steady_stamp=self._steady_stamp(topic, now_s) if self.drive.clock_steps else None,
         )
         if changed:
             if self._with_checks:
@@ -229,6 +236,10 @@ class OfflineRun:
             if "scan" in changed:
                 run_state.scans += 1
                 run_state.kinds_kept = not isinstance(message["ranges"], list)
+
+    def _steady_stamp(self, topic: str, now_s: float) -> Callable[[float], float]:
+        steps = self.drive.clock_steps
+        return lambda stamp_s: self.run_state.stamps.corrected(topic, stamp_s, now_s, steps)
 
     def _tick(self, now_s: float) -> None:
         run_state = self.run_state
@@ -309,7 +320,7 @@ class OfflineRun:
             last_message_s=run_state.last_message_s,
             published=self._epoch.published,
             undecided=self._epoch.undecided,
-            wall_zero_s=self.drive.start_s,
+            wall_zero_s=None if self.drive.clock_steps else self.drive.start_s,  # one that was set proves nothing
         )
 
 

@@ -59,17 +59,19 @@ def receive(
     limits: AllLimits | None = None,
     on_value: Callable[[str, Any, float, float | None], None] | None = None,
     on_number: Callable[[str, float, float, float | None], None] | None = None,
+    steady_stamp: Callable[[float], float] | None = None,
 ) -> tuple[str, ...]:
     """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock;
     `tyre_rad_per_unit` of the steering signal, 0: not known; `units` are the operator's choices, signal → name;
     `transport` None: it came without delay, as far as is known. `frames` and `limits`: by which a laser is mounted;
     None: at the nose. `on_value` receives each decoded value: signal, value, `at_s`, stamp; `on_number` each number
-    whose unit is not known, as it was published.
+    whose unit is not known, as it was published; `steady_stamp` corrects a stamp by a clock that was set.
     """
     reception.received += 1
     stamp = stamp_s(message)
     reception.note_frame(sources[0].topic, message)
-    delay_s = 0.0 if transport is None else transport.receive(sources[0].topic, at_s, stamp)
+    steady_s = stamp if stamp is None or steady_stamp is None else steady_stamp(stamp)
+    delay_s = 0.0 if transport is None else transport.receive(sources[0].topic, at_s, steady_s)
     changed: tuple[str, ...] = ()
     is_proper = True
     if frames is not None and sources[0].type in TYPES:
@@ -104,7 +106,7 @@ def receive(
             value = DriveMode(mode=mode, said=value.said)
         if on_value is not None:
             on_value(source.signal, value, at_s, stamp)
-        changed += state.receive(source.signal, value, at_s, stamp, delay_s)
+        changed += state.receive(source.signal, value, at_s, steady_s, delay_s)
     if not is_proper:
         reception.rejected += 1
     return changed

@@ -13,6 +13,7 @@ from monitor.trends import Trends
 from server.judge.frames import Frames
 from server.judge.reception_stats import Reception
 from server.judge.recorded_slowdown import RecordedSlowDown
+from server.judge.stamp_steps import StampSteps
 
 
 @dataclass(slots=True, kw_only=True)
@@ -37,5 +38,6 @@ class RunState:
     last_message_s: float | None = None
     paused_s: float | None = None
     paused_by: str | None = None
+    stamps: StampSteps = field(default_factory=StampSteps)
     slow_down: RecordedSlowDown = field(default_factory=RecordedSlowDown)
     frames: Frames | None = None  # where transforms move; None: those of the drive count throughout

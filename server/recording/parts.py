@@ -7,6 +7,7 @@ import contextlib
 import math
 import uuid
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from server.recording.recorded_topics import Missing
 from server.recording.recorder import Recorder
 from server.recording.recorder_queue import Attachment, Part
 from server.recording.recorder_thread import Status
+from server.recording.recording_clock import RecordingClock
 from server.recording.recording_session import ControllerState, RecordingSession
 from server.recording.recording_settings import RecordingSettings
 from server.version import catgraph_version
@@ -57,7 +59,7 @@ class RecordingParts:
         self._on_unreadable = on_unreadable
         self._definitions: dict[str, str] = {}
         self._held: dict[tuple[str, ...], tuple[str, str | None, Any]] = {}
-        self._anchor = (0.0, 0)  # a moment of `now`, and the time of day then [ns]: spacing stays true in a part
+        self._clock = RecordingClock(now, wall_ms)
         self._ended_ms = 0
 
     @property
@@ -87,6 +89,7 @@ class RecordingParts:
         now_s = self._now()
         if self.recorder is not None:
             self.recorder.forget_dropped()
+        self._clock.start()
         id = self._folder.first_id(self._vehicle, self._wall_ms())  # made unique by the thread, which may ask the disk
         session = RecordingSession(id=id, session=str(uuid.uuid4()), by=by, began_s=now_s, due_s=now_s + BEGIN_AFTER_S)
         self._state.session = session
@@ -102,11 +105,10 @@ class RecordingParts:
         session.part += 1
         session.is_open = True
         self._state.saved = None
-        wall_ms = self._wall_ms()
-        self._anchor = self._now(), wall_ms * 1_000_000
+        started_ms = self._clock.ms()  # in the same clock as the parts before
         settings = self._settings.as_entry()
         early = self.early.take(session.began_s - EARLY_S if session.part == 1 else -math.inf)
-        part = self._part(session, wall_ms, settings)
+        part = self._part(session, started_ms, settings)
         self.prepare()
         assert self.recorder is not None
         self.recorder.allowance = self._settings.allowance()
@@ -116,7 +118,7 @@ class RecordingParts:
         if self._definitions:
             self.recorder.learn(self._definitions)
         for topic, type, message in self._held.values():
-            self.recorder.take(topic, type, message, self._ns(self._now()), 0, self._now())
+            self.recorder.take(topic, type, message, self._clock.ns(self._now()), 0, self._now())
         self.own("settings", settings)
         for channel, said in early:
             self.own(channel, said)
@@ -138,7 +140,7 @@ class RecordingParts:
         if session.due_s is not None:
             self.begin(session)
         if session.is_open and self.recorder is not None:
-            self.recorder.take(topic, type, message, self._ns(now_s), size, now_s)
+            self.recorder.take(topic, type, message, self._clock.ns(now_s), size, now_s)
 
     def hold(self, topic: str, type: str | None, message: Any) -> None:
         """Transforms that are sent once: a later part begins with them, for they are not sent again."""
@@ -152,7 +154,7 @@ class RecordingParts:
         """An entry of one of our own channels."""
         session = self._state.session
         if session is not None and session.is_open and self.recorder is not None:
-            self.recorder.own(channel, said, self._ns(self._now()))
+            self.recorder.own(channel, self._clock.entry(said), self._clock.ns(self._now()))
             self.early.note(channel, said)
         elif self._folder is not None:
             self.early.hold(self._now(), channel, {"time_ms": self._wall_ms(), **said})
@@ -161,14 +163,16 @@ class RecordingParts:
         """Records at `at_ms` what is said of a mark; False: the part that is written does not cover its moment."""
         recorder = self._covering(marked_ms)
         if recorder is not None:
-            recorder.own("marks", said, at_ms * 1_000_000)
+            recorder.own("marks", self._clock.entry(said), round(self._clock.moment_ms(at_ms)) * 1_000_000)
         return recorder is not None
 
     def attach(self, attachment: Attachment) -> bool:
         """False: the part that is written does not cover it."""
-        recorder = self._covering(attachment.at_ns / 1e6)
+        at_ms = attachment.at_ns / 1e6
+        recorder = self._covering(at_ms)
         if recorder is not None:
-            recorder.attach(attachment)
+            moment_ns = attachment.at_ns + round(self._clock.moment_ms(at_ms) - at_ms) * 1_000_000
+            recorder.attach(replace(attachment, at_ns=moment_ns))
         return recorder is not None
 
     def _covering(self, moment_ms: float) -> Recorder | None:
@@ -176,7 +180,8 @@ class RecordingParts:
         session = self._state.session
         if session is None or not session.is_open or session.begun is None:
             return None
-        return self.recorder if moment_ms >= int(session.begun.metadata["started_ms"]) else None
+        started_ms = int(session.begun.metadata["started_ms"])
+        return self.recorder if self._clock.moment_ms(moment_ms) >= started_ms else None
 
     def delays(self, delays: Mapping[str, float], link: LinkDelay) -> None:
         """Record the delay of messages once a tick, because a later evaluation needs it."""
@@ -184,7 +189,7 @@ class RecordingParts:
         if session is not None and session.is_open and self.recorder is not None:
             row = session.delays.row(delays, link)
             if row is not None:
-                self.recorder.own("delay", row, self._ns(self._now()))
+                self.recorder.own("delay", row, self._clock.ns(self._now()))
 
     def tick(self, session: RecordingSession, now_s: float) -> None:
         """The settings of the disk's room hold at once; what is missing in the part is written into it."""
@@ -221,7 +226,7 @@ class RecordingParts:
                 async with asyncio.timeout(SETTLE_S):
                     await done.wait()
 
-    def _part(self, session: RecordingSession, wall_ms: int, settings: Mapping[str, Any]) -> Part:
+    def _part(self, session: RecordingSession, started_ms: int, settings: Mapping[str, Any]) -> Part:
         assert self._folder is not None
         version: RosVersion = 2 if self._state.ros_version == 2 else 1
         return Part(
@@ -233,7 +238,7 @@ class RecordingParts:
                 "session": session.session,
                 "part": str(session.part),
                 "version": catgraph_version(),
-                "started_ms": str(wall_ms),
+                "started_ms": str(started_ms),
                 "started_by": session.by or "",
                 "profile": str(settings["profile"]),
                 "settings": str(settings["toml"]),
@@ -247,7 +252,3 @@ class RecordingParts:
     def _finished(self, path: Path) -> None:
         self._state.saved = id_of(path), self._ended_ms or self._wall_ms()
         self._on_finished(path)
-
-    def _ns(self, now_s: float) -> int:
-        since_s, since_ns = self._anchor
-        return since_ns + round((now_s - since_s) * 1e9)

@@ -135,6 +135,11 @@ class ReplayClient:
         if self.failed is None:
             self._order({"kind": "scan", "wanted": is_wanted})
 
+    def pass_gaps(self, is_wanted: bool) -> None:
+        """Whether playing passes over long gaps: two recordings side by side keep their pace."""
+        if self.failed is None:
+            self._order({"kind": "pass_gaps", "wanted": is_wanted})
+
     @property
     def silent_s(self) -> float:
         """Since its process said anything."""

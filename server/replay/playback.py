@@ -20,6 +20,7 @@ from server.recording.delay import recorded_delay
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import Recording, RecordingUnreadable
 from server.replay import replay_frames
+from server.replay.gaps import EMPTY_S, behind_gap
 from server.replay.recorded_events import MOST, NOTHING, TimelineEvents
 from server.replay.timeline import Index
 from server.vehicle import queries
@@ -58,6 +59,7 @@ class Playback:
         self.index = Index(self._index_recording, self.drive, sketch)
         self._run = OfflineRun(recording, self.drive)
         self.is_playing = False
+        self.passes_gaps = True
         self.rate = 1.0
         self.reached_rate: float | None = None  # where it does not keep the pace; None: it does
         self.is_settled = True  # False: the checks were only warmed up
@@ -125,8 +127,6 @@ class Playback:
         self.seek(found, now_s)
         return True
 
-    # -- work --------------------------------------------------------------------------------------------------------
-
     def work(self, now_s: float, is_over: Callable[[], bool]) -> None:
         """Advance to the position for `now_s`, within the time budget; the rest is spent on the time line."""
         try:
@@ -148,6 +148,9 @@ class Playback:
             self._target_s = None
             self._keep_pace_from(self._run.at_s, now_s)
         if not self.is_playing:
+            return
+        self._target_s = behind_gap(self._run, self.length_s) if self.passes_gaps else None
+        if self._target_s is not None:
             return
         due_s = min(self.length_s, self._from_s + (now_s - self._from_now_s) * self.rate)
         if not self._run.advance(due_s, is_over) and due_s - self._run.at_s > BEHIND_S * self.rate:
@@ -221,12 +224,11 @@ class Playback:
 
     def timeline(self, events: TimelineEvents = NOTHING) -> Timeline:
         """The time line so far, the recorded events of the drive, and the notes on the recording."""
-        said = [*self.drive.notes]
+        said = [*self.drive.notes, *self.index.empty_stretches(EMPTY_S)]
         if self.index.is_done:
             said += [f"{sentence}." for sentence in self._index_recording.damage]
-        for why in (self.index.broke_off, self.broke_off):
-            if why is not None:
-                said.append(f"Not all of it can be read: {why}.")
+        broken = (why for why in (self.index.broke_off, self.broke_off) if why is not None)
+        said += [f"Not all of it can be read: {why}." for why in broken]
         notes = list(dict.fromkeys(said))[:20]
         return {
             "kind": "timeline", **self.index.as_json(), "notes": notes, "flags": list(events.flags[:MOST]),

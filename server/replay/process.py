@@ -169,6 +169,8 @@ class _Process:
             case "scan":
                 self._wants_scan = order["wanted"] is True
                 self._scan_key = (-1, -1.0)
+            case "pass_gaps":
+                playback.passes_gaps = order["wanted"] is True
             case "trends" | "track_points" | "drive_trends" | "check":
                 self._is_urgent = False
                 return playback.answer(order)

@@ -23,12 +23,14 @@ from server.judge.speed_trace import SpeedTrace
 from server.protocol import serialize
 from server.protocol.messages import IndexedTimeline, Mark
 from server.recording.read.read import Recording
+from server.recording.read.spans import span
 from server.replay.alarm_history import AlarmHistory
 from server.replay.checkpoint import restore, save
 
 GAP_S = 1.0  # nothing at all was recorded for longer: a gap
 KEYFRAMES = 240  # of some 20 kB each
 LEAST_KEYFRAME_S = 10.0
+MOST_NAMED = 5  # gaps in a sentence each
 MOST_MARKS = 400  # more alarms than a person can view: the most urgent are kept
 
 
@@ -114,6 +116,16 @@ class Index(Observer):
             "marks": [mark for _, _, mark in sorted(marks, key=lambda mark: mark[1])],
             "marks_left_out": len(self._marks) + self._lost_marks - len(marks),
         }
+
+    def empty_stretches(self, least_s: float) -> list[str]:
+        """The gaps that playing passes over, in sentences."""
+        gaps = [(from_s, to_s - from_s) for from_s, to_s in self._gaps if to_s - from_s >= least_s]
+        named = [
+            f"Nothing was recorded for {span(gap_s)} from {from_s:.1f} s on: playing passes over it."
+            for from_s, gap_s in gaps[:MOST_NAMED]
+        ]
+        more = len(gaps) - len(named)
+        return [*named, f"{more} more gaps are passed over."] if more else named
 
     def judged(self, transitions: Sequence[Transition], now_s: float) -> None:
         """Alarms are marked where the recording does not hold them."""

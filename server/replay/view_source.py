@@ -134,12 +134,16 @@ class ViewSource:
             await self._replays.close(client)
             raise NoReplay("The replay was left meanwhile.")
         before, self._beside = self._beside, client
+        for one in (first, client):
+            one.pass_gaps(False)
         self._on_turned()
         await self._close(before)
 
     async def close_beside(self) -> None:
         """The first recording alone."""
         before, self._beside = self._beside, None
+        if self._client is not None:
+            self._client.pass_gaps(True)
         self._on_turned()
         await self._close(before)
 

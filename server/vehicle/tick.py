@@ -17,7 +17,7 @@ from server.vehicle import departure_seen, facts
 from server.vehicle.car_summary import SummaryPublisher
 from server.vehicle.link_load import RESTORE_BELOW_S
 from server.vehicle.session_parts import SessionParts
-from server.vehicle.tick_parts import LogKeeper, OpenFilesWatch, TickParts
+from server.vehicle.tick_parts import ClockWatch, LogKeeper, OpenFilesWatch, TickParts
 
 log = logging.getLogger("catgraph.session")
 
@@ -51,6 +51,7 @@ class Tick:
         self._wall_ms = wall_ms
         self._log_keeper = LogKeeper(parts.event_log, bus)
         self._open_files = OpenFilesWatch()
+        self._clock_watch = ClockWatch(parts.event_log, wall_ms=wall_ms)
         self.summary = SummaryPublisher(vehicle, parts, bus, server, now=now, wall_ms=wall_ms)
 
     @property
@@ -94,6 +95,7 @@ class Tick:
         """Time judges: freshness, silence, delays. `put`: then the pages get a state."""
         for part, work in (
             ("event log", self._log_keeper.tick),
+            ("server's clock", self._clock_watch.tick),
             ("link load", self.watch_load),
             ("link", self.watch_link),
             ("files and connections", self._open_files.tick),

@@ -6,11 +6,13 @@ import logging
 from collections.abc import Callable
 
 from server.bus.bus import SessionBus
+from server.recording.read.spans import span
 from server.system import open_files
 from server.vehicle.event_log import EventLog
 
 log = logging.getLogger("catgraph.session")
 
+SET_S = 1.0  # a clock that is slewed changes less from one tick to the next
 EVERY_S = 1.0  # interval of checking the log and counting open files
 
 
@@ -55,6 +57,24 @@ class LogKeeper:
             self._looked_s = now_s
             self._event_log.retry()
             self.trouble = self._event_log.trouble or self._bus.save_events()
+
+
+class ClockWatch:
+    """Notes where the server's clock was set; ages and recordings go on by the time that passes."""
+
+    def __init__(self, event_log: EventLog, *, wall_ms: Callable[[], int]) -> None:
+        self._event_log = event_log
+        self._wall_ms = wall_ms
+        self._zero_s: float | None = None  # the time of day at 0 of the session's clock
+
+    def tick(self, now_s: float) -> None:
+        """`now_s`: the session's clock, which is never set."""
+        zero_s = self._wall_ms() / 1000 - now_s
+        before_s, self._zero_s = self._zero_s, zero_s
+        by_s = 0.0 if before_s is None else zero_s - before_s
+        if abs(by_s) >= SET_S:
+            how = f"ahead by {span(by_s)}, or it was suspended" if by_s > 0 else f"back by {span(-by_s)}"
+            self._event_log.note("clock_set", f"The server's clock was set {how}: ages are not changed by it.")
 
 
 class OpenFilesWatch:

@@ -115,3 +115,18 @@ def test_standing_while_the_clock_goes_back() -> None:
     for at_s in (100.0, 103.0, 1.0):
         still.add(at_s, 0.0)
     assert (still.is_standing, still.since_s) == (True, 1.0)
+
+
+@pytest.mark.parametrize("by_s", [-3600.0, -5.0, -0.7, -0.3, 0.4, 1.5, 2.9, 3.5, 7200.0])
+def test_a_clock_that_is_set_makes_no_spike_of_the_slope(by_s: float) -> None:
+    """The car gains 1 m/s each second, and its stamps leap once."""
+    slope = Slope()
+    found = []
+    for number in range(100):
+        at_s = 100.0 + number / 20
+        found.append(slope.add(at_s + (by_s if number >= 50 else 0.0), number / 20))
+    known = [one for one in found if one is not None]
+    assert len(known) > 60
+    assert max(known) < 1.05
+    assert min(known) > 0.0
+    assert known[-1] == pytest.approx(1.0)

@@ -21,6 +21,7 @@ from server.recording.read.unpack import verified
 _MESSAGE = int(Opcode.MESSAGE)
 _MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 
+EVERYWHERE = range(2**62)
 ChunkRow = tuple[int, int, bytes]  # ns, channel, message
 
 
@@ -66,32 +67,41 @@ def read_chunk(file: IO[bytes], at: int) -> Chunk:
 
 
 def chunk_rows(
-    file: IO[bytes], at: int, channels: Container[int], from_ns: int, to_ns: int = 2**64 - 1
+    file: IO[bytes],
+    at: int,
+    channels: Container[int],
+    from_ns: int,
+    to_ns: int = 2**64 - 1,
+    places: range = EVERYWHERE,
 ) -> list[ChunkRow]:
     """What came on these channels within a time, in its order, of the chunk whose record begins at a place in the file.
+    `places`: of its content, where the records of these messages begin.
 
     Raises PartTooLarge and MemoryError; damage makes the reader fail in every other way there is.
     """
-    return _rows(verified(read_chunk(file, at)), channels, from_ns, to_ns)
+    return _rows(verified(read_chunk(file, at)), channels, from_ns, to_ns, places)
 
 
-def run_rows(file: IO[bytes], at: int, size: int, channels: Container[int], from_ns: int) -> list[ChunkRow]:
+def run_rows(
+    file: IO[bytes], at: int, size: int, channels: Container[int], from_ns: int, places: range = EVERYWHERE
+) -> list[ChunkRow]:
     """As `chunk_rows`, of `size` bytes of messages outside of a chunk."""
     file.seek(at)
     data = file.read(size)
     if len(data) < size:
         raise ValueError("it is longer than its file")
-    return _rows(data, channels, from_ns, 2**64)
+    return _rows(data, channels, from_ns, 2**64, places)
 
 
-def _rows(data: bytes, channels: Container[int], from_ns: int, to_ns: int) -> list[ChunkRow]:
+def _rows(data: bytes, channels: Container[int], from_ns: int, to_ns: int, places: range) -> list[ChunkRow]:
     size = len(data)
     rows: list[ChunkRow] = []
+    is_all = places is EVERYWHERE
     place = 0
     while place < size:
         if data[place] == _MESSAGE:
             _, length, channel, _, time_ns, _ = _MESSAGE_HEAD.unpack_from(data, place)
-            if channel in channels and from_ns <= time_ns < to_ns:
+            if channel in channels and from_ns <= time_ns < to_ns and (is_all or place in places):
                 rows.append((time_ns, channel, data[place + _MESSAGE_HEAD.size : place + HEAD_BYTES + length]))
         elif data[place]:
             length = int.from_bytes(data[place + 1 : place + HEAD_BYTES], "little")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -12,10 +13,12 @@ from mcap.reader import McapReader, make_reader
 from mcap.records import ChunkIndex, Statistics
 
 from server.judge.message import RosVersion
-from server.recording.mcap.chunk_rows import ChunkRow, chunk_rows, in_order, run_rows
+from server.recording.mcap.chunk_rows import EVERYWHERE, ChunkRow, chunk_rows, in_order, run_rows
 from server.recording.mcap.chunks import MAGIC
+from server.recording.mcap.part_times import arrivals_of, corrected_parts
 from server.recording.mcap.scan import Index, Part, by_name, scan
-from server.recording.own import METADATA
+from server.recording.own import METADATA, PREFIX
+from server.recording.read.clock_steps import PLACES_A_PART, Arrivals, Stretch
 from server.recording.read.compressed_messages import PACKED, unpacked_rows
 from server.recording.read.errors import RecordingUnreadable
 from server.recording.read.qos import is_latched
@@ -44,6 +47,9 @@ class McapFile:
         """
         self.path = path
         self.distro: str | None = None
+        self.is_listed = False
+        self._has_arrivals = True
+        self.stretches: Sequence[Stretch] = ()
         self._copy = copy
         self._file = (content or path).open("rb")
         if copy is not None:
@@ -94,15 +100,13 @@ class McapFile:
             noted = self.damage = self._new_damage()
         parts = [part for part in self._parts if _matters(part, numbers, start_ns)]
         noted.parts = len(parts)
+        self._forget_arrivals()
         yield from in_order(parts, lambda part: self._whole(part, numbers, start_ns, noted))
 
     def _whole(self, part: Part, numbers: set[int], start_ns: int, damage: Damage) -> list[ChunkRow]:
         """The messages of a part that are wanted; none where it is damaged."""
         try:
-            if part.run_bytes:
-                rows = run_rows(self._file, part.at, part.run_bytes, numbers, start_ns)
-            else:
-                rows = chunk_rows(self._file, part.at, numbers, start_ns)
+            rows = self._rows(part, numbers, start_ns)
         except MemoryError:
             raise
         except Exception as why:  # damage makes the readers fail in every way there is
@@ -112,6 +116,46 @@ class McapFile:
             rows, lost = unpacked_rows(rows, self._cdr)
             damage.pieces += lost
         return rows
+
+    def _rows(self, part: Part, numbers: Container[int], start_ns: int) -> list[ChunkRow]:
+        """The messages of a part. Damage raises any exception."""
+        is_whole = part.to_place - part.from_place == PLACES_A_PART
+        places = EVERYWHERE if is_whole else range(part.from_place, part.to_place)
+        from_ns = start_ns - part.shift_ns
+        if part.run_bytes:
+            rows = run_rows(self._file, part.at, part.run_bytes, numbers, from_ns, places)
+        else:
+            rows = chunk_rows(self._file, part.at, numbers, from_ns, places=places)
+        return [(one[0] + part.shift_ns, one[1], one[2]) for one in rows] if part.shift_ns else rows
+
+    def arrivals(self) -> Iterator[Arrivals]:
+        if self.metadata or any(channel.topic.startswith(PREFIX) for channel in self.channels):
+            return  # catgraph's recorder counts from the time of day at its beginning
+        yield from arrivals_of(self._file, self._parts)
+
+    def _forget_arrivals(self) -> None:
+        for part in self._parts if self._has_arrivals else ():
+            part.arrivals = None
+        self._has_arrivals = False
+
+    def raw_at(self, place: int, channel: int) -> bytes | None:
+        number, offset = divmod(place, PLACES_A_PART)
+        part = sorted(self._parts, key=lambda part: part.at)[number]
+        try:
+            rows = self._rows(replace(part, from_place=offset, to_place=offset + 1), {channel}, 0)
+        except MemoryError:
+            raise
+        except Exception:  # damage makes the readers fail in every way there is
+            return None
+        rows, _ = unpacked_rows(rows, self._cdr)
+        return rows[0][2] if rows else None
+
+    def correct(self, stretches: Sequence[Stretch]) -> None:
+        self.stretches = stretches
+        parts = corrected_parts(self._parts, stretches)
+        self._parts = sorted(parts, key=lambda part: (part.message_start_time, part.message_end_time))
+        self.start_ns = stretches[0].first_ns + stretches[0].shift_ns
+        self.end_ns = stretches[-1].last_ns + stretches[-1].shift_ns
 
     def _new_damage(self) -> Damage:
         return Damage(is_cut=self.is_cut, pieces=self._pieces)
@@ -187,6 +231,8 @@ def _parts(indexes: Sequence[ChunkIndex]) -> list[Part]:
                 message_end_time=index.message_end_time,
                 at=index.chunk_start_offset,
                 channels=known.setdefault(channels, channels),
+                index_at=index.chunk_start_offset + index.chunk_length,
+                index_bytes=index.message_index_length,
             )
         )
     return parts

@@ -10,16 +10,19 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from typing import IO, Any
 
+import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, Channel, Header, Metadata, Schema
 
 from server.recording.mcap.chunk_rows import read_chunk
 from server.recording.mcap.chunks import HEAD_BYTES, MAGIC
+from server.recording.read.clock_steps import PLACES_A_PART, Arrivals
 from server.recording.read.unpack import verified
 
 RUN_BYTES = 1 << 20  # messages outside of chunks are read in runs of about this size
 MOST_TEXT = 16 << 20  # bytes of a record that declares something
+LATEST_NS = np.uint64(2**62)
 _HEAD = struct.Struct("<BQ")  # opcode, length
 _MESSAGE = struct.Struct("<HIQ")  # channel, sequence, log time [ns]
 _MESSAGE_BYTES = 22  # before the data of a message
@@ -36,6 +39,12 @@ class Part:
     at: int  # place of its first record
     run_bytes: int = 0  # length of a run; 0: it is a chunk
     channels: frozenset[int] = frozenset()  # with messages in it; empty: unknown
+    index_at: int = 0  # where its message indexes are
+    index_bytes: int = 0
+    arrivals: Arrivals | None = None  # as the scan found them, with places from its beginning on
+    shift_ns: int = 0  # added to the times of its messages
+    from_place: int = 0  # of a chunk of which only some messages belong to this part
+    to_place: int = PLACES_A_PART
 
 
 @dataclass(slots=True, kw_only=True)
@@ -141,12 +150,14 @@ class _Run:
         self._first_ns, self._last_ns = 2**64, 0
         self._channels: set[int] = set()
         self._newest = (0, 0)  # place and channel of the last message
+        self._rows: list[tuple[int, int, int]] = []  # place, time [ns], channel
 
     def add(self, channel: int, time_ns: int, at: int) -> None:
         self.count += 1
         self._first_ns, self._last_ns = min(self._first_ns, time_ns), max(self._last_ns, time_ns)
         self._channels.add(channel)
         self._newest = at, channel
+        self._rows.append((at - self.at, time_ns, channel))
 
     def drop_torn(self, file: IO[bytes], end: int, counts: Counter[int]) -> None:
         """Leave out the last message where it ends in zeros and zeros follow, as behind a power loss: its rest may
@@ -165,6 +176,7 @@ class _Run:
             at=self.at,
             run_bytes=(self._torn_at or end) - self.at,
             channels=frozenset(self._channels),
+            arrivals=as_arrivals(self._rows[: self.count]),
         )
 
 
@@ -207,13 +219,13 @@ def _chunk(index: Index, file: IO[bytes], at: int, length: int) -> None:
     first_ns, last_ns = _TIMES.unpack(head)
     try:
         data = verified(read_chunk(file, at))
-        times_ns: list[int] = []
+        rows: list[tuple[int, int, int]] = []
         counts: Counter[int] = Counter()
         for opcode, place, size in _records(data):
             if opcode == Opcode.MESSAGE:
                 channel, _, time_ns = _MESSAGE.unpack_from(data, place)
                 counts[channel] += 1
-                times_ns.append(time_ns)
+                rows.append((place - HEAD_BYTES, time_ns, channel))
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 _declared(index, opcode, data[place : place + size])
     except MemoryError:
@@ -222,11 +234,23 @@ def _chunk(index: Index, file: IO[bytes], at: int, length: int) -> None:
         index.why = index.why or why
         index.parts.append(Part(message_start_time=first_ns, message_end_time=last_ns, at=at))
         return
-    if times_ns:
+    if rows:
+        times_ns = [time_ns for _, time_ns, _ in rows]
         index.counts.update(counts)
-        channels = frozenset(counts)
-        part = Part(message_start_time=min(times_ns), message_end_time=max(times_ns), at=at, channels=channels)
+        part = Part(
+            message_start_time=min(times_ns),
+            message_end_time=max(times_ns),
+            at=at,
+            channels=frozenset(counts),
+            arrivals=as_arrivals(rows),
+        )
         index.parts.append(part)
+
+
+def as_arrivals(rows: list[tuple[int, int, int]]) -> Arrivals:
+    """Messages by place, time [ns] and channel, in their order; times that no clock shows become the latest."""
+    table = np.minimum(np.array(rows, np.uint64).reshape(-1, 3), LATEST_NS).astype(np.int64)
+    return Arrivals(places=table[:, 0], times_ns=table[:, 1], channels=table[:, 2])
 
 
 def _records(data: bytes) -> Iterator[tuple[int, int, int]]:

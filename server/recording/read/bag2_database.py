@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import numpy as np
+
 from server.judge.message import RosVersion
+from server.recording.read.clock_steps import BACK_NS, GAP_NS, Arrivals, Stretch
 from server.recording.read.compressed_messages import PACKED, unpacked
 from server.recording.read.errors import RecordingUnreadable
 from server.recording.read.qos import is_latched
@@ -27,6 +30,7 @@ class Bag2Database:
     """A SQLite file of a ROS 2 bag."""
 
     ros_version: RosVersion = 2
+    is_listed = False
 
     def __init__(
         self,
@@ -40,6 +44,7 @@ class Bag2Database:
         Raises RecordingUnreadable, sqlite3.Error, OSError.
         """
         self.path = path
+        self.stretches: Sequence[Stretch] = ()
         self._copy = copy
         self._is_torn = False
         self._database: sqlite3.Connection | None = None
@@ -61,17 +66,47 @@ class Bag2Database:
         if not numbers:
             return
         marks = ",".join("?" * len(numbers))
-        rows = self._execute(
-            f"SELECT timestamp, topic_id, data FROM messages WHERE topic_id IN ({marks}) AND timestamp >= ? "
-            f"AND {_WHOLE} ORDER BY timestamp",
-            [*numbers, max(start_ns, -_LAST_NS)],
+        for within, shift_ns in self._ranges():
+            rows = self._execute(
+                f"SELECT timestamp, topic_id, data FROM messages WHERE topic_id IN ({marks}) AND timestamp >= ? "
+                f"AND {_WHOLE} {within} ORDER BY timestamp",
+                [*numbers, max(start_ns - shift_ns, -_LAST_NS)],
+            )
+            for time_ns, number, raw in rows:
+                message = unpacked(raw) if raw[:4] == PACKED else raw
+                if message is None:
+                    damage.pieces += 1
+                else:
+                    yield time_ns + shift_ns, number, message
+
+    def _ranges(self) -> Iterator[tuple[str, int]]:
+        """Which messages follow each other: a condition, and what is added to their times."""
+        if not self.stretches:
+            yield "", 0
+        for number, one in enumerate(self.stretches):
+            after = f"AND rowid >= {one.place}" if number else ""
+            is_last = number + 1 == len(self.stretches)
+            yield (after if is_last else f"{after} AND rowid < {self.stretches[number + 1].place}"), one.shift_ns
+
+    def arrivals(self) -> Iterator[Arrivals]:
+        table = f"FROM messages WHERE {_WHOLE} AND topic_id IN (SELECT id FROM topics)"
+        odd = self._execute(
+            f"SELECT 1 FROM (SELECT timestamp - LAG(timestamp) OVER (ORDER BY rowid) AS step {table}) "
+            f"WHERE step <= {-BACK_NS} OR step > {GAP_NS} LIMIT 1"
         )
-        for time_ns, number, raw in rows:
-            message = unpacked(raw) if raw[:4] == PACKED else raw
-            if message is None:
-                damage.pieces += 1
-            else:
-                yield time_ns, number, message
+        if odd.fetchone() is None:
+            return
+        rows = np.array(self._execute(f"SELECT rowid, timestamp, topic_id {table} ORDER BY rowid").fetchall(), np.int64)
+        yield Arrivals(places=rows[:, 0], times_ns=rows[:, 1], channels=rows[:, 2])
+
+    def raw_at(self, place: int, channel: int) -> bytes | None:
+        row = self._execute("SELECT data FROM messages WHERE rowid = ?", [place]).fetchone()
+        return None if row is None else unpacked(row[0]) if row[0][:4] == PACKED else row[0]
+
+    def correct(self, stretches: Sequence[Stretch]) -> None:
+        self.stretches = stretches
+        self.start_ns = stretches[0].first_ns + stretches[0].shift_ns
+        self.end_ns = stretches[-1].last_ns + stretches[-1].shift_ns
 
     def close(self) -> None:
         if self._database is not None:

@@ -36,6 +36,7 @@ def open_file(found: Found) -> FileSource:
         raise
     if found.bag is not None:
         latched = {topic for topic, offered in found.bag.qos.items() if is_latched(offered)}
+        source.is_listed = True
         source.distro = source.distro or found.bag.distro
         source.channels = [
             replace(channel, is_latched=True) if channel.topic in latched else channel for channel in source.channels

@@ -23,6 +23,7 @@ from server.recording.read.errors import NoRoom, RecordingUnreadable, Undecodabl
 from server.recording.read.open_file import open_file
 from server.recording.read.recognise import Found, FoundRecording, by_name, recognise
 from server.recording.read.source import Channel, Damage, FileSource, why_not_decoded
+from server.recording.read.steady_time import ClockStep, make_steady, notes_on
 from server.recording.read.time_order import Stream, in_time_order
 from server.recording.read.unpack import PartTooLarge
 
@@ -82,6 +83,8 @@ class Recording:
         self._sources = sources
         self.lacking = lacking
         self.paths = paths
+        self.clock_steps = _made_steady(sources)  # the times of the files are corrected for them
+        self.clock_notes = notes_on(self.clock_steps)  # for a person
         self.ros_version: RosVersion = next((s for s in sources if s.channels), sources[0]).ros_version
         self.topics: dict[str, TopicInfo] = {}
         self.metadata: dict[str, str] = next(
@@ -244,6 +247,15 @@ class Recording:
             raise
         except Exception as error:  # a damaged file makes the readers fail in every way there is
             raise RecordingUnreadable(_what_is_wrong(source.path, error)) from None
+
+
+def _made_steady(sources: Sequence[FileSource]) -> list[ClockStep]:
+    try:
+        return make_steady(sources)
+    except (RecordingUnreadable, MemoryError):
+        raise
+    except Exception as error:
+        raise RecordingUnreadable(_what_is_wrong(sources[0].path, error)) from None
 
 
 def _definition_of(channel: Channel) -> str | None:

@@ -12,11 +12,13 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, Protocol, cast
 
+import numpy as np
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.rosbag1.reader import Header, RecordType
 
 from server.judge.message import RosVersion
+from server.recording.read.clock_steps import PLACES_A_PART, Arrivals, Stretch, corrected_ns
 from server.recording.read.errors import RecordingUnreadable
 from server.recording.read.source import Channel, Damage
 from server.recording.read.unpack import PartTooLarge, unpack
@@ -33,6 +35,7 @@ _length = struct.Struct("<I").unpack_from
 
 
 Entry = tuple[int, int, int, int]  # of an index: ns, chunk, place in it, connection
+Table = np.ndarray[Any, np.dtype[np.int64]]  # of entries, (n, 4), or a column of one
 
 
 class Packed(NamedTuple):
@@ -50,6 +53,7 @@ class BagIndex(Protocol):
     bio: BinaryIO | None
     indexes: dict[int, list[Entry]]  # by connection, in order
     chunks: dict[int, Packed]  # by place in the file
+    records: dict[int, list[tuple[int, bytes]]]  # of each chunk's index: connection, entries; empty: not kept
 
     @property
     def channels(self) -> Sequence[Channel]: ...
@@ -79,6 +83,7 @@ class _Reader(Reader):
         super().__init__(path)
         self._on_first_chunk: Callable[[int], None] | None = on_first_chunk
         self._indexed: set[tuple[int, int]] = set()  # chunk and connection
+        self.records: dict[int, list[tuple[int, bytes]]] = {}
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -112,6 +117,7 @@ class _Reader(Reader):
         if (pos, number) in self._indexed:  # a small bag could hold any number of messages
             raise ReaderError("The index names a part twice.")
         self._indexed.add((pos, number))
+        self.records.setdefault(pos, []).append((number, entries))
         indexes[number] += [
             (seconds * 10**9 + nanoseconds, pos, place, number)
             for seconds, nanoseconds, place in _ENTRY.iter_unpack(entries)
@@ -138,10 +144,12 @@ class Bag1:
     ros_version: RosVersion = 1
     distro: str | None = None
     is_cut = False
+    is_listed = False
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.damage = Damage(is_cut=self.is_cut)  # else none that is left out: the format has no checksums
+        self.stretches: Sequence[Stretch] = ()
         self._chunks: OrderedDict[int, bytes] = OrderedDict()
         self._chunk_bytes = 0
         self._ahead = ThreadPoolExecutor(1, "bag")
@@ -159,6 +167,7 @@ class Bag1:
     def messages(
         self, numbers: set[int], start_ns: int, damage: Damage | None = None
     ) -> Iterator[tuple[int, int, bytes]]:
+        self._reader.records.clear()  # needed on opening only
         entries: list[Entry] = []
         for number in numbers:
             entries += _since(start_ns, self._reader.indexes.get(number, ()))
@@ -178,6 +187,44 @@ class Bag1:
             except (struct.error, IndexError):
                 raise RecordingUnreadable(f"{self.path.name} is damaged: a message lies outside its chunk") from None
             yield time_ns, number, raw
+
+    def arrivals(self) -> Iterator[Arrivals]:
+        if records := self._reader.records:
+            for number, at in enumerate(sorted(self._reader.chunks)):
+                if at in records:
+                    yield _arrivals(number, records[at])
+            return
+        entries = [_table(index) for index in self._reader.indexes.values() if index]
+        if entries:
+            table = np.concatenate(entries)
+            places = self._places(table)
+            order = np.argsort(places, kind="stable")
+            yield Arrivals(places=places[order], times_ns=table[order, 0], channels=table[order, 3])
+
+    def raw_at(self, place: int, channel: int) -> bytes | None:
+        part, offset = divmod(place, PLACES_A_PART)
+        try:
+            return _message(self._chunk(sorted(self._reader.chunks)[part]), offset)
+        except (struct.error, IndexError, RecordingUnreadable):  # reading it reports the reason
+            return None
+
+    def correct(self, stretches: Sequence[Stretch]) -> None:
+        self.stretches = stretches
+        for number, index in self._reader.indexes.items():
+            if index:
+                table = _table(index)
+                times_ns = corrected_ns(stretches, self._places(table), table[:, 0]).tolist()
+                self._reader.indexes[number] = sorted(
+                    (time_ns, *entry[1:]) for time_ns, entry in zip(times_ns, index, strict=True)
+                )
+        filled = [index for index in self._reader.indexes.values() if index]
+        self.start_ns = min(index[0][0] for index in filled)
+        self.end_ns = max(index[-1][0] for index in filled)
+
+    def _places(self, table: Table) -> Table:
+        """Of the entries of an index: the chunk's number in the file, and the place in it."""
+        chunks = np.array(sorted(self._reader.chunks), np.int64)
+        return np.searchsorted(chunks, table[:, 1]) * PLACES_A_PART + table[:, 2]
 
     def close(self) -> None:
         self._ahead.shutdown(cancel_futures=True)
@@ -223,6 +270,20 @@ class Bag1:
             _, old = self._chunks.popitem(last=False)
             self._chunk_bytes -= len(old)
         return chunk
+
+
+def _arrivals(number: int, records: Sequence[tuple[int, bytes]]) -> Arrivals:
+    """The messages of a chunk by the records of its index."""
+    table = np.frombuffer(b"".join(entries for _, entries in records), "<u4").reshape(-1, 3).astype(np.int64)
+    counts = [len(entries) // _ENTRY.size for _, entries in records]
+    connections = np.repeat(np.array([one for one, _ in records], np.int64), counts)
+    order = np.argsort(table[:, 2], kind="stable")
+    times_ns = table[order, 0] * 10**9 + table[order, 1]
+    return Arrivals(table[order, 2] + number * PLACES_A_PART, times_ns, connections[order])
+
+
+def _table(index: Sequence[Entry]) -> Table:
+    return np.array(index, np.int64).reshape(-1, 4)
 
 
 def _since(start_ns: int, index: Sequence[Entry]) -> Sequence[Entry]:

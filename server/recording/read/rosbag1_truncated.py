@@ -80,6 +80,7 @@ class _Scan:
         self.bio: BinaryIO | None = None
         self.indexes: dict[int, list[Entry]] = {}
         self.chunks: dict[int, Packed] = {}
+        self.records: dict[int, list[tuple[int, bytes]]] = {}
         self.channels: list[Channel] = []
         self.start_time = 2**63 - 1
         self.end_time = 0

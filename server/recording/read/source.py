@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from server.judge.message import RosVersion
+from server.recording.read.clock_steps import FIRST_NS, LAST_NS, Arrivals, Stretch
 from server.recording.read.unpack import PartTooLarge
 
 DefinitionFormat = Literal["none", "msg", "idl"]
+LEAST_SLACK_NS = 3600 * 10**9  # by which a damaged part can be before or behind what is whole
 UNDECLARED = ""  # the encoding of messages whose channel the file does not declare
 
 
@@ -66,12 +68,10 @@ class Damage:
         """What is missing and when, for a person."""
         said = []
         if self.lost:
-            first_s = (min(start_ns for start_ns, _ in self.lost) - origin_ns) / 1e9
-            last_s = (max(end_ns for _, end_ns in self.lost) - origin_ns) / 1e9
             which = "1 part" if len(self.lost) == 1 else f"{len(self.lost)} parts"
             what = "holds parts that are larger than may be read" if self.too_large else "is damaged"
             said.append(
-                f"{name} {what}: {which} of {self.parts}, between {first_s:.1f} s and {last_s:.1f} s, "
+                f"{name} {what}: {which} of {self.parts}{self._when(origin_ns, end_ns)} "
                 f"{'is' if len(self.lost) == 1 else 'are'} left out"
             )
         if self.pieces:
@@ -83,6 +83,16 @@ class Damage:
             )
         return said
 
+    def _when(self, origin_ns: int, end_ns: int) -> str:
+        """When the lost parts were recorded; nothing where the times that they declare are damaged too."""
+        first_ns, last_ns = min(first for first, _ in self.lost), max(last for _, last in self.lost)
+        slack_ns = max(end_ns - origin_ns, LEAST_SLACK_NS)
+        is_likely = origin_ns - slack_ns <= first_ns <= last_ns <= end_ns + slack_ns
+        is_dated = FIRST_NS <= first_ns <= last_ns < LAST_NS or not FIRST_NS <= origin_ns < LAST_NS
+        if not is_likely or not is_dated:
+            return ""
+        return f", between {(first_ns - origin_ns) / 1e9:.1f} s and {(last_ns - origin_ns) / 1e9:.1f} s,"
+
 
 class FileSource(Protocol):
     """One open file of a recording."""
@@ -93,6 +103,8 @@ class FileSource(Protocol):
     channels: Sequence[Channel]
     start_ns: int  # since 1970; of no meaning where there are no messages
     end_ns: int
+    stretches: Sequence[Stretch]  # by which its times were corrected; empty: they are log times
+    is_listed: bool  # a file of a bag that lists its files in metadata.yaml
 
     @property
     def damage(self) -> Damage:
@@ -105,7 +117,19 @@ class FileSource(Protocol):
         """(time in ns, number of the channel, raw message) in time order, from `start_ns` on.
 
         Where the file has checksums of its parts, damaged ones are left out and noted: in `damage` where that is given,
-        else in that of the file."""
+        else in that of the file. All times are corrected ones once `correct` was called."""
+        ...
+
+    def arrivals(self) -> Iterator[Arrivals]:
+        """The messages of each part in the order of receipt; none where the log times are known to go on."""
+        ...
+
+    def raw_at(self, place: int, channel: int) -> bytes | None:
+        """The message of a channel at a place that `arrivals` named; None: it cannot be read."""
+        ...
+
+    def correct(self, stretches: Sequence[Stretch]) -> None:
+        """Have all times corrected from now on, by stretches in the order of their places; called at most once."""
         ...
 
     def close(self) -> None: ...

@@ -65,8 +65,14 @@ class RemoteReplay(ReplayClient):
         return await self._json("POST", f"/{self._theirs}/ask", order)
 
     def watch_scan(self, is_wanted: bool) -> None:
+        self._say_soon({"kind": "scan", "wanted": is_wanted})
+
+    def pass_gaps(self, is_wanted: bool) -> None:
+        self._say_soon({"kind": "pass_gaps", "wanted": is_wanted})
+
+    def _say_soon(self, order: Mapping[str, Any]) -> None:
         if self.failed is None:
-            task = asyncio.create_task(self._say({"kind": "scan", "wanted": is_wanted}))
+            task = asyncio.create_task(self._say(order))
             self._said.add(task)
             task.add_done_callback(self._said.discard)
 

@@ -72,7 +72,7 @@ def write_csv_zip(recording: Recording, path: Path, *, progress: Progress = noth
             raise ExportRefused("Nothing in this recording fits a table.")
         outcome.entries = sum(tables.rows.values())
         outcome.notes = [*(f"{note}." for note in recording.notes), *_without_table(drive), *unfit, *drive.losses()]
-        outcome.notices = drive.not_measured()
+        outcome.notices = [*recording.clock_notes, *drive.not_measured()]
         if unset:
             outcome.notices.append(f"{unset} positions with coordinates 0, 0 have empty cells and status -1.")
         notes = [*outcome.notices, *outcome.notes]

@@ -1,0 +1,231 @@
+"""Finds where the clock of a recorder was set while it recorded, by the log times of messages in the order of receipt.
+
+A clock is set where the log times go back, where they begin before 2000 and leap to now, where they leap by more than a
+day, or where the stamps of a sensor with a clock of its own show that less time has passed. Every other gap is silence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+S = 10**9  # ns
+BACK_NS = S // 2  # less is the order in which threads of a recorder write
+GAP_NS = 2 * S  # the stamps of longer gaps are compared
+LEAP_NS = 86_400 * S  # a longer gap in one file is a clock that was set
+FIRST_NS, LAST_NS = 946_684_800 * S, 4_102_444_800 * S  # years 2000 and 2100: of other times a clock was never set
+MOST_STEPS = 100
+MOST_COMPARED = 50  # gaps whose stamps are compared
+WINDOW = 512  # messages before and behind a step whose interval is looked at
+UNKNOWN_NS = S // 100  # the interval where too few messages tell one
+LEAST = 3  # messages from which the clock of a stretch is believed
+PLACES_A_PART = 2**32
+
+
+@dataclass(frozen=True, slots=True)
+class Arrivals:
+    """Messages in the order of receipt: where each is in its file (`PLACES_A_PART` apart in different parts), its log
+    time [ns] and its channel."""
+
+    places: Ints
+    times_ns: Ints
+    channels: Ints
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """Messages between two steps of the clock; the corrected times of two stretches never overlap."""
+
+    place: int  # of the first message
+    count: int
+    first_ns: int  # by log time
+    last_ns: int
+    shift_ns: int = 0  # corrected minus log time
+
+    def moved(self, by_ns: int) -> Stretch:
+        """The stretch later by so much."""
+        return replace(self, shift_ns=self.shift_ns + by_ns)
+
+
+# (all, start of the stretch, its first message after a gap) → how far the clock was set ahead there [ns]; None: unknown
+Witness = Callable[[Arrivals, int, int], int | None]
+
+
+class _NotInOrder(Exception):
+    """The messages of a file are not in the order of receipt, as behind a tool that wrote topic by topic."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Cut:
+    at: int  # the first message behind the step
+    elapsed_ns: int | None = None  # since the latest one before it; None: unknown
+    is_leap: bool = False
+
+
+def find_stretches(arrivals: Callable[[], Iterator[Arrivals]], witness: Witness) -> list[Stretch]:
+    """The stretches of one file, the first with a shift of 0; empty: its clock was not set."""
+    if not _has_gaps(arrivals()):
+        return []
+    found = _joined(list(arrivals()))
+    try:
+        cuts = _cuts(found, witness)
+    except _NotInOrder:
+        return []
+    return _stretches(found, cuts) if cuts else []
+
+
+def corrected_ns(stretches: Sequence[Stretch], places: Any, times_ns: Any) -> Ints:
+    """The corrected times of messages at places."""
+    starts = np.array([one.place for one in stretches], np.int64)
+    shifts = np.array([one.shift_ns for one in stretches], np.int64)
+    moved: Ints = times_ns + shifts[np.maximum(np.searchsorted(starts, places, side="right") - 1, 0)]
+    return moved
+
+
+def _has_gaps(parts: Iterator[Arrivals]) -> bool:
+    """Whether times go back or leave a gap, in any part or between two."""
+    high_ns: int | None = None
+    for part in parts:
+        times_ns = part.times_ns
+        if not len(times_ns):
+            continue
+        if high_ns is not None:
+            times_ns = np.concatenate((np.array([high_ns], np.int64), times_ns))
+        highs_ns = np.maximum.accumulate(times_ns)
+        steps_ns = times_ns[1:] - highs_ns[:-1]
+        if len(steps_ns) and (int(steps_ns.min()) <= -BACK_NS or int(steps_ns.max()) > GAP_NS):
+            return True
+        high_ns = int(highs_ns[-1])
+    return False
+
+
+def _joined(parts: list[Arrivals]) -> Arrivals:
+    return Arrivals(
+        places=np.concatenate([part.places for part in parts]),
+        times_ns=np.concatenate([part.times_ns for part in parts]),
+        channels=np.concatenate([part.channels for part in parts]),
+    )
+
+
+def _cuts(found: Arrivals, witness: Witness) -> list[_Cut]:
+    cuts: list[_Cut] = []
+    begin, is_leap = 0, False
+    compared = 0
+
+    def shown(at: int) -> int | None:
+        nonlocal compared
+        compared += 1
+        return witness(found, begin, at) if compared <= MOST_COMPARED else None
+
+    while len(cuts) < MOST_STEPS and (cut := _next_cut(found, begin, is_leap, shown)) is not None:
+        cuts.append(cut)
+        begin, is_leap = cut.at, cut.is_leap
+    return cuts
+
+
+def _next_cut(found: Arrivals, begin: int, is_behind_leap: bool, shown: Callable[[int], int | None]) -> _Cut | None:
+    """The first step behind `begin`. `is_behind_leap`: what came before it was earlier by more than a day."""
+    times_ns = found.times_ns[begin:]
+    highs_ns = np.maximum.accumulate(times_ns)[:-1]
+    steps_ns = times_ns[1:] - highs_ns
+    back = _first_back(times_ns, highs_ns, steps_ns, found.channels[begin:], is_behind_leap)
+    for index in np.flatnonzero(steps_ns[:back] > GAP_NS):
+        gap_ns, high_ns, next_ns = int(steps_ns[index]), int(highs_ns[index]), int(times_ns[index + 1])
+        is_leap = gap_ns > LEAP_NS or high_ns < FIRST_NS <= next_ns
+        at = begin + int(index) + 1
+        elapsed_ns = _elapsed(gap_ns, shown(at))
+        if is_leap or elapsed_ns is not None:
+            return _Cut(at, elapsed_ns, is_leap)
+    if back is None:
+        return None
+    at = begin + back + 1
+    return _Cut(at, _elapsed(int(steps_ns[back]), shown(at)))
+
+
+def _elapsed(gap_ns: int, ahead_ns: int | None) -> int | None:
+    """What of a gap has passed, where the clock was set ahead by so much; None: that cannot be."""
+    if ahead_ns is None or not -BACK_NS <= gap_ns - ahead_ns <= LEAP_NS:
+        return None
+    return max(gap_ns - ahead_ns, 1)
+
+
+def _first_back(times_ns: Ints, highs_ns: Ints, steps_ns: Ints, channels: Ints, is_behind_leap: bool) -> int | None:
+    """Where the times first go back, as an index of `steps_ns`. Raises _NotInOrder.
+
+    The messages of one channel must do so, too: in a file that was written topic by topic they do not.
+    """
+    is_back = steps_ns <= -BACK_NS
+    if not is_back.any():
+        return None
+    sure = is_back & (times_ns[1:] < FIRST_NS) & (highs_ns >= FIRST_NS)
+    if is_behind_leap:
+        sure |= steps_ns < -LEAP_NS
+    sure |= is_back & _goes_back(times_ns, channels)[1:]
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], is_back, [False]))))
+    for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if sure[start:end].any():
+            return int(start)
+        if len(np.unique(channels[start + 1 : end + 1])) < end - start:
+            raise _NotInOrder
+    return None
+
+
+def _goes_back(times_ns: Ints, channels: Ints) -> Flags:
+    """Which messages are earlier than one of their own channel before them."""
+    order = np.argsort(channels, kind="stable")
+    bounds = np.flatnonzero(np.diff(channels[order])) + 1
+    flags = np.zeros(len(times_ns), np.bool_)
+    for group in np.split(order, bounds):
+        own_ns = times_ns[group]
+        flags[group[1:]] = np.maximum.accumulate(own_ns)[:-1] - own_ns[1:] >= BACK_NS
+    return flags
+
+
+def _stretches(found: Arrivals, cuts: Sequence[_Cut]) -> list[Stretch]:
+    starts = [0, *(cut.at for cut in cuts)]
+    ends = [*starts[1:], len(found.times_ns)]
+    stretches: list[Stretch] = []
+    for number, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        times_ns = found.times_ns[start:end]
+        one = Stretch(
+            place=int(found.places[start]),
+            count=end - start,
+            first_ns=int(times_ns.min()),
+            last_ns=int(times_ns.max()),
+        )
+        if stretches:
+            before, elapsed_ns = stretches[-1], cuts[number - 1].elapsed_ns
+            if elapsed_ns is None:
+                change_ns = _usual_change(found, starts[number - 1], start, end)
+            else:
+                change_ns = before.last_ns + elapsed_ns - int(times_ns[0])
+            one = follows(before, one, change_ns)
+        stretches.append(one)
+    return stretches
+
+
+def follows(before: Stretch, one: Stretch, change_ns: int) -> Stretch:
+    """A stretch whose shift differs by `change_ns` from that of the one before it, or by more where it overlapped."""
+    least_ns = before.last_ns + 1 - one.first_ns
+    return one.moved(before.shift_ns + max(change_ns, least_ns))
+
+
+def _usual_change(found: Arrivals, start: int, at: int, end: int) -> int:
+    """The change of the shift with which the most frequent channel goes on at its usual interval."""
+    start, end = max(start, at - WINDOW), min(end, at + WINDOW)
+    before, after = slice(start, at), slice(at, end)
+    best: tuple[int, int] | None = None
+    for channel in np.intersect1d(found.channels[before], found.channels[after]):
+        ends = found.times_ns[before][found.channels[before] == channel]
+        begins = found.times_ns[after][found.channels[after] == channel]
+        intervals_ns = np.concatenate((np.diff(ends), np.diff(begins)))
+        if len(intervals_ns) >= LEAST - 1 and (interval_ns := int(np.median(intervals_ns))) > 0:
+            best = min(best or (interval_ns + 1, 0), (interval_ns, int(ends[-1]) + interval_ns - int(begins[0])))
+    return best[1] if best is not None else int(found.times_ns[before].max()) + UNKNOWN_NS - int(found.times_ns[at])

@@ -1,0 +1,160 @@
+"""Has the files of a recording give times that go on where the recorder's clock was set, and describes each step.
+
+The clock of the last stretch is taken for the right one, as a clock is set to be right; 1970 never is.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from server.recording.mcap.mcap_file import McapFile
+from server.recording.read.clock_steps import (
+    FIRST_NS,
+    LAST_NS,
+    LEAP_NS,
+    LEAST,
+    UNKNOWN_NS,
+    S,
+    Stretch,
+    find_stretches,
+    follows,
+)
+from server.recording.read.source import FileSource
+from server.recording.read.spans import span
+from server.recording.read.stamp_witness import StampWitness
+
+MOST_NOTED = 10
+BETWEEN_FILES_NS = S  # parts of one recording may overlap by less
+_PART = re.compile(r"(.*)_(\d+)")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClockStep:
+    """The recorder's clock was set."""
+
+    at_s: float  # since the start of the recording, by its corrected times
+    by_s: float  # ahead positive, back negative
+    at_wall_s: float  # corrected time of day, since 1970
+
+    @property
+    def sentence(self) -> str:
+        """What happened, for a person, without a full stop."""
+        way = "ahead" if self.by_s > 0 else "back"
+        return (
+            f"The recorder's clock was set {way} by {span(abs(self.by_s))} at {_clock(self.at_wall_s)}, "
+            f"{self.at_s:.1f} s after the start: times before and after it are joined"
+        )
+
+
+def notes_on(steps: Sequence[ClockStep]) -> list[str]:
+    """A sentence on each of the first steps, and one on the others."""
+    notes = [f"{step.sentence}." for step in steps[:MOST_NOTED]]
+    more = len(steps) - len(notes)
+    return [*notes, f"The recorder's clock was set {more} more times."] if more else notes
+
+
+@dataclass(slots=True)
+class _File:
+    source: FileSource
+    stretches: list[Stretch]
+
+
+def make_steady(sources: Sequence[FileSource]) -> list[ClockStep]:
+    """Correct the times of files, and list the steps of their clocks in the order of time."""
+    files = [_File(source, _stretches_of(source)) for source in sources if any(one.count for one in source.channels)]
+    pairs = [pair for series in _series(files) for pair in _corrected(series)]
+    if not pairs:
+        return []
+    filled = [file.source for file in files]
+    start_ns = min(source.start_ns for source in filled)
+    return [
+        ClockStep(
+            at_s=(one.first_ns + one.shift_ns - start_ns) / S,
+            by_s=(before.shift_ns - one.shift_ns) / S,
+            at_wall_s=(one.first_ns + one.shift_ns) / S,
+        )
+        for before, one in sorted(pairs, key=lambda pair: pair[1].first_ns + pair[1].shift_ns)
+    ]
+
+
+def _stretches_of(source: FileSource) -> list[Stretch]:
+    found = find_stretches(source.arrivals, StampWitness(source.channels, source.raw_at).ahead_ns)
+    count = sum(one.count for one in source.channels)
+    return found or [Stretch(place=0, count=count, first_ns=source.start_ns, last_ns=source.end_ns)]
+
+
+def _corrected(series: Sequence[_File]) -> list[tuple[Stretch, Stretch]]:
+    """Corrects the times of files that follow each other; the stretches before and behind each step."""
+    flat: list[Stretch] = []
+    is_step: list[bool] = []  # between each and the next
+    for file in series:
+        own = file.stretches
+        if flat:
+            change_ns = _between(flat[-1], own[0])
+            is_step.append(change_ns is not None)
+            first = own[0].moved(flat[-1].shift_ns) if change_ns is None else follows(flat[-1], own[0], change_ns)
+            own = [one.moved(first.shift_ns - own[0].shift_ns) for one in own]
+        flat += own
+        is_step += [True] * (len(own) - 1)
+    if not any(is_step):
+        return []
+    by_ns = -_reference(flat).shift_ns
+    by_ns = max(by_ns, -min(one.first_ns + one.shift_ns for one in flat))
+    flat = [one.moved(by_ns) for one in flat]
+    at = 0
+    for file in series:
+        file.stretches = flat[at : at + len(file.stretches)]
+        at += len(file.stretches)
+        if any(one.shift_ns for one in file.stretches):
+            file.source.correct(file.stretches)
+    return [(flat[place], flat[place + 1]) for place, found in enumerate(is_step) if found]
+
+
+def _between(before: Stretch, one: Stretch) -> int | None:
+    """The change of the shift between two files; None: the clock was not set."""
+    gap_ns = one.first_ns - before.last_ns
+    if gap_ns < -BETWEEN_FILES_NS or before.last_ns < FIRST_NS <= one.first_ns or gap_ns > LEAP_NS:
+        return UNKNOWN_NS - gap_ns
+    return None
+
+
+def _reference(stretches: Sequence[Stretch]) -> Stretch:
+    """The stretch whose clock is taken for the right one."""
+    likely = [one for one in stretches if FIRST_NS <= one.first_ns and one.last_ns < LAST_NS] or stretches
+    return ([one for one in likely if one.count >= LEAST] or likely)[-1]
+
+
+def _series(files: Sequence[_File]) -> list[list[_File]]:
+    """Files of one recording in the order in which they were written; all others by themselves."""
+    groups: dict[Hashable, list[tuple[int, _File]]] = {}
+    for number, file in enumerate(files):
+        key, part = _part_of(file.source) or (number, 0)
+        groups.setdefault(key, []).append((part, file))
+    series: list[list[_File]] = []
+    for group in groups.values():
+        parts = [part for part, _ in group]
+        if len(set(parts)) < len(parts):
+            series += [[file] for _, file in group]
+        else:
+            series.append([file for _, file in sorted(group, key=lambda one: one[0])])
+    return series
+
+
+def _part_of(source: FileSource) -> tuple[Hashable, int] | None:
+    """The recording of which a file is a part, and the number of the part; None: it is not known to be one."""
+    if isinstance(source, McapFile) and "session" in source.metadata and "clip_of" not in source.metadata:
+        part = source.metadata.get("part", "")
+        recording = (source.metadata.get("vehicle", ""), source.metadata["session"])
+        return (recording, int(part)) if part.isdecimal() else None
+    name = _PART.fullmatch(source.path.name.partition(".")[0])
+    return ((source.path.parent, name[1]), int(name[2])) if source.is_listed and name is not None else None
+
+
+def _clock(at_s: float) -> str:
+    try:
+        return datetime.fromtimestamp(at_s, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    except (OverflowError, ValueError, OSError):
+        return f"{at_s:.1f} s since 1970"

@@ -1,0 +1,153 @@
+"""A clock that is set while a recorder writes: times go on, whatever the container and wherever it is set."""
+
+from __future__ import annotations
+
+import random
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from server.recording.read.read import Recording, open_recording
+from tests.server.recording.bags import BEGIN_S, Drive, Row, write_ros1, write_ros2
+from tests.server.recording.stepped import CONTAINERS, LENGTH_S, Container, Step, rows, write
+
+DAY_S = 86_400.0
+NEAR_S = 0.1  # twice the interval of the wheels
+
+
+def received(recording: Recording) -> list[tuple[float, str]]:
+    return [(at_s - recording.start_s, topic) for at_s, topic, *_ in recording.rows()]
+
+
+def true_times(**how: object) -> list[tuple[float, str]]:
+    found = rows(2, **how)  # type: ignore[arg-type]
+    return [(at_s - found[0][0], topic) for at_s, topic, *_ in found]
+
+
+def assert_goes_on(path: Path, steps: list[Step], **how: object) -> None:
+    """All messages come in the order of receipt, at their true times, with a note for each step."""
+    with open_recording([path]) as recording:
+        found, expected = received(recording), true_times(**how)
+        assert [topic for _, topic in found] == [topic for _, topic in expected]
+        late_s = NEAR_S * (1 + len(steps))
+        assert all(abs(at_s - true_s) < late_s for (at_s, _), (true_s, _) in zip(found, expected, strict=True))
+        assert [round(one.by_s) for one in recording.clock_steps] == [round(by_s) for _, by_s in steps]
+        assert all(
+            abs(one.at_s - after_s) < late_s for one, (after_s, _) in zip(recording.clock_steps, steps, strict=True)
+        )
+
+
+def random_steps(seed: int) -> list[Step]:
+    """Up to four, each far from the others; steps ahead of less than a day are seen by the sensor's own clock only."""
+    chance = random.Random(seed)
+    moments = chance.sample(range(4, int(LENGTH_S) - 4, 6), chance.randint(1, 4))
+    sizes = (-2.0, -7.0, -3600.0, -200 * DAY_S, 5.0, 90.0, 4 * 3600.0, 230 * DAY_S, 2 * DAY_S)
+    return [(moment + chance.random(), chance.choice(sizes)) for moment in sorted(moments)]
+
+
+@pytest.mark.parametrize("container", CONTAINERS)
+@pytest.mark.parametrize("seed", range(3))
+def test_times_go_on_over_steps_at_random_places(tmp_path: Path, container: Container, seed: int) -> None:
+    steps = random_steps(10 * CONTAINERS.index(container) + seed)
+    assert_goes_on(write(tmp_path, container, steps=steps), steps)
+
+
+@pytest.mark.parametrize("container", CONTAINERS)
+@pytest.mark.parametrize("by_s", [-3.0, -40 * DAY_S, 3 * DAY_S, 230 * DAY_S])
+def test_no_sensor_with_a_clock_of_its_own_is_needed(tmp_path: Path, container: Container, by_s: float) -> None:
+    steps = [(20.0, by_s)]
+    assert_goes_on(write(tmp_path, container, steps=steps, has_own_clock=False), steps, has_own_clock=False)
+
+
+@pytest.mark.parametrize("container", CONTAINERS)
+@pytest.mark.parametrize("has_own_clock", [True, False])
+def test_a_clock_that_begins_in_1970_is_set(tmp_path: Path, container: Container, has_own_clock: bool) -> None:
+    path = write(
+        tmp_path, container, steps=[(0.0, 12.0 - BEGIN_S), (15.0, BEGIN_S - 12.0)], has_own_clock=has_own_clock
+    )
+    with open_recording([path]) as recording:
+        assert recording.start_s == pytest.approx(BEGIN_S, abs=1.0)  # the later clock is the right one
+        assert recording.duration_s == pytest.approx(LENGTH_S, abs=0.3)
+        [step] = recording.clock_steps
+        assert step.at_s == pytest.approx(15.0, abs=0.2)
+        assert "53.9 years" in step.sentence
+
+
+@pytest.mark.parametrize("container", CONTAINERS)
+@pytest.mark.parametrize("silence_s", [30.0, 1200.0, 5 * 3600.0])
+def test_a_silence_stays_one(tmp_path: Path, container: Container, silence_s: float) -> None:
+    path = write(tmp_path, container, silent_s=(25.0, silence_s))
+    with open_recording([path]) as recording:
+        assert not recording.clock_steps
+        assert recording.duration_s == pytest.approx(LENGTH_S + silence_s, abs=0.2)
+
+
+def test_a_silence_during_which_the_clock_was_set_keeps_its_length(tmp_path: Path) -> None:
+    path = write(tmp_path, "bag", steps=[(40.0, 300 * DAY_S)], silent_s=(25.0, 30.0))
+    with open_recording([path]) as recording:
+        assert len(recording.clock_steps) == 1
+        assert recording.duration_s == pytest.approx(LENGTH_S + 30.0, abs=0.3)
+
+
+def test_messages_that_waited_in_a_queue_are_a_silence(tmp_path: Path) -> None:
+    """After an outage they come all at once: their stamps are of when they were sent."""
+    found: list[Row] = []
+    for at_s, topic, type, message in rows(1):
+        late_s = 32.0 + (at_s - 20.0) / 60 if topic == "/imu" and 20.0 <= at_s < 32.0 else at_s
+        if topic == "/imu" or not 20.0 <= at_s < 32.0:
+            found.append((late_s, topic, type, message))
+    path = write_ros1(tmp_path / "drive.bag", Drive(messages=sorted(found, key=lambda row: row[0])))
+    with open_recording([path]) as recording:
+        assert not recording.clock_steps
+        times_s = [at_s for at_s, _ in received(recording)]
+        assert max(b - a for a, b in pairwise(times_s)) == pytest.approx(12.0, abs=0.2)
+
+
+@pytest.mark.parametrize("has_two_writers", [False, True])
+def test_a_file_that_was_written_topic_by_topic_has_no_step(tmp_path: Path, has_two_writers: bool) -> None:
+    found = sorted(rows(1), key=lambda row: row[1])
+    if has_two_writers:
+        found += [(at_s, "/imu", type, message) for at_s, topic, type, message in found if topic == "/imu"]
+        found += [(at_s, "/last", type, message) for at_s, topic, type, message in found if topic == "/imu"]
+    with open_recording([write_ros1(tmp_path / "drive.bag", Drive(messages=found))]) as recording:
+        assert not recording.clock_steps
+        assert recording.duration_s == pytest.approx(LENGTH_S, abs=0.2)
+
+
+def test_a_seek_begins_at_a_corrected_time(tmp_path: Path) -> None:
+    for container in CONTAINERS:
+        path = write(tmp_path / container, container, steps=[(20.0, -50.0), (40.0, 230 * DAY_S)])
+        with open_recording([path]) as recording:
+            every = [row[:2] for row in recording.rows()]
+            for start_s in (10.0, 19.9, 25.0, 45.0):
+                expected = [row for row in every if row[0] >= recording.start_s + start_s - 1e-6]
+                assert [row[:2] for row in recording.rows(start_s)] == expected
+
+
+def test_parts_of_a_split_bag_follow_each_other_where_the_clock_was_set_between_them(tmp_path: Path) -> None:
+    folder = tmp_path / "drive"
+    found = rows(2, steps=[(30.0, -500.0)])
+    middle = len(rows(2)) // 2
+    first = write_ros2(tmp_path / "a", Drive(messages=found[:middle]))
+    second = write_ros2(tmp_path / "b", Drive(messages=found[middle:]))
+    first.rename(folder)
+    (folder / "a.mcap").rename(folder / "drive_0.mcap")
+    (second / "b.mcap").rename(folder / "drive_1.mcap")
+    text = (folder / "metadata.yaml").read_text()
+    (folder / "metadata.yaml").write_text(text.replace("a.mcap", "drive_0.mcap"))
+    with open_recording([folder]) as recording:
+        times = received(recording)
+        assert len(times) == len(found)
+        assert [topic for _, topic in times] == [topic for _, topic in true_times()]
+        [step] = recording.clock_steps
+        assert step.by_s == pytest.approx(-500.0, abs=0.2)
+
+
+def test_a_clock_that_is_set_again_and_again_fills_no_page_with_notes(tmp_path: Path) -> None:
+    steps = [(2.0 + 3.5 * number, -4.0) for number in range(16)]
+    with open_recording([write(tmp_path, "bag", steps=steps)]) as recording:
+        assert len(recording.clock_steps) == 16
+        assert recording.duration_s == pytest.approx(LENGTH_S, abs=1.0)
+        assert len(recording.clock_notes) == 11
+        assert recording.clock_notes[-1] == "The recorder's clock was set 6 more times."
