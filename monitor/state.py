@@ -140,6 +140,10 @@ class State:
             self._unusable, signal, reason, received_s, meter.horizon_s, meter.period_s, is_declared=is_declared
         )
 
+    def age(self, signal: str, received_s: float, delay_s: float) -> None:
+        """The message of a signal that came at `received_s` was so old when it came."""
+        self._table.age(signal, received_s, delay_s)
+
     def receive_phone(self, report: PhoneReport, now_s: float) -> None:
         """Take the report of an operator's phone; judged on the next tick."""
         self._follow_clock(now_s)

@@ -214,6 +214,12 @@ class SessionRecording:
         return self._state.session is not None and self._state.session.lost_s is None
 
     @property
+    def part(self) -> tuple[str, int] | None:
+        """The part that a message of the car would be recorded in: its session and number; None: it would not be."""
+        session = self._state.session
+        return (session.session, session.newest) if session is not None and session.lost_s is None else None
+
+    @property
     def also(self) -> Also:
         """Which topics beyond those that are judged are to be recorded now."""
         if self._state.session is None or self._status.state() == "stopped" or self._settings.value("all_topics") < 1:

@@ -19,10 +19,22 @@ from monitor.transport import TransportDelay
 from monitor.trends import Trends
 from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
+from server.judge.pipeline import Delays
 from server.judge.reception_stats import Reception
 from server.judge.topics import Source
 
 log = logging.getLogger("catgraph.session")
+
+
+class Aged:
+    """The delay of a message whose age is known [s]."""
+
+    def __init__(self, age_s: float) -> None:
+        self._age_s = age_s
+
+    def receive(self, topic: str, at_s: float, stamp_s: float | None = None) -> float:
+        """As of `Delays`."""
+        return self._age_s
 
 
 class Judgement:
@@ -63,7 +75,9 @@ class Judgement:
         self.minute = CheckMinute()
         self.track_number += 1  # with the state begins another track
         self.topics: set[str] = set()  # that came and carry signals
-        self.last_message_s: float | None = None
+        self._filled: dict[str, frozenset[str]] = {}  # topic → the signals that its newest message went to
+        self.last_message_s: float | None = None  # of a signal
+        self.other_message_s: float | None = None  # of a topic that is only recorded
 
     @property
     def load(self) -> AlarmLoad:
@@ -83,6 +97,30 @@ class Judgement:
         """Decodes, applies and judges one message in one pass; the signals that changed."""
         self.topics.add(topic)
         self.last_message_s = now_s
+        return self._apply(sources, topic, message, note, now_s, self.transport)
+
+    def receive_again(
+        self, sources: tuple[Source, ...], topic: str, message: Any, note: str | None, now_s: float, *, came_s: float
+    ) -> tuple[str, ...]:
+        """Count a message that the bridge sent again, and that came first at `came_s`. It says nothing new to the
+        signals that have it; any other signal takes it at its age."""
+        filled = self._filled.get(topic, frozenset())
+        others = tuple(source for source in sources if source.signal not in filled)
+        changed = self._apply(others, topic, message, note, now_s, Aged(now_s - came_s)) if others else ()
+        for source in sources:
+            self.reception.tally(source.signal).repeats += 1
+        self._filled[topic] = filled.union(source.signal for source in sources)
+        return changed
+
+    def correct_ages(self) -> None:
+        """Follow what becomes known of the age of topics' first messages."""
+        for topic, (at_s, age_s) in self.transport.older().items():
+            for signal in self._filled.get(topic, ()):
+                self.state.age(signal, at_s, age_s)
+
+    def _apply(
+        self, sources: tuple[Source, ...], topic: str, message: Any, note: str | None, now_s: float, delays: Delays
+    ) -> tuple[str, ...]:
         changed = pipeline.receive(
             sources,
             message,
@@ -92,8 +130,9 @@ class Judgement:
             state=self.state,
             profile=self._tuning.profile,
             tyre_rad_per_unit=self.monitor.limits.steering.tyre_rad_per_unit,
-            transport=self.transport,
+            transport=delays,
         )
+        self._filled[topic] = frozenset(source.signal for source in sources)
         if changed:
             self.judge(now_s, changed)
             self.trends.receive(changed, self.state, now_s)

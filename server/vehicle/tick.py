@@ -104,6 +104,7 @@ class Tick:
         ):
             self._attempts.attempt(part, partial(work, now_s))
         judgement, publisher = self._parts.judgement, self._parts.publisher
+        self._attempts.attempt("ages", judgement.correct_ages)
         judgement.monitor.failed_parts = self._attempts.failed
         judgement.judge(now_s)
         self._attempts.attempt("driving", partial(self._parts.driving.tick, now_s))
