@@ -50,6 +50,7 @@ class State:
             for name, signal in SIGNALS.items()
         }
         self._table = ReadingTable()
+        self.age = self._table.age
         self._derived = DerivedSignals(self._table)
         self._rates: Mapping[str, Rate] = MappingProxyType({})
         self._rates_at_s: float | None = None
@@ -139,10 +140,6 @@ class State:
         self._unusable = refused(
             self._unusable, signal, reason, received_s, meter.horizon_s, meter.period_s, is_declared=is_declared
         )
-
-    def age(self, signal: str, received_s: float, delay_s: float) -> None:
-        """The message of a signal that came at `received_s` was so old when it came."""
-        self._table.age(signal, received_s, delay_s)
 
     def receive_phone(self, report: PhoneReport, now_s: float) -> None:
         """Take the report of an operator's phone; judged on the next tick."""

@@ -23,6 +23,7 @@ ABSENT_AGAIN_S = 3.0  # interval of fetching the publishers of a signal's topic 
 SILENT_AGAIN_S = 10.0  # the same for a topic that is published and not received, and interval of renewal
 RECORDED_AGAIN_S = (10.0, 30.0, 60.0, 120.0, 300.0)  # the same for a recorded topic, which may have few messages
 FIRST_WITHIN_S = 5.0  # the first message of a publisher that came later
+QUIET_S = 2.0  # a signal's topic without a message for so long, when a recording begins
 FLOWS_S = 2.0  # anything within so long: the bridge delivers, so it is this topic and not all of them
 AT_ONCE = 8  # topics per round
 
@@ -131,6 +132,14 @@ class Delivery:
         row = self._rows.get(topic)
         if row is not None:
             row.was_given = True
+
+    def quiet(self, now_s: float) -> list[str]:
+        """Topics of signals that came on this connection, and not lately: the bridge may keep a sample of them."""
+        return [
+            topic
+            for topic, row in self._rows.items()
+            if row.is_judged and row.came and (row.newest_s is None or now_s - row.newest_s >= QUIET_S)
+        ]
 
     def has_its_time(self, topic: str, now_s: float) -> bool:
         """Whether a topic's publisher has only just come, so that no message yet is no silence."""

@@ -133,7 +133,7 @@ class MessageIntake:
             return None
         arrival = self._sent_again.receive(topic, message, size, now_s)
         if arrival.is_repeat:
-            connection.subscriptions.given(topic)
+            connection.subscriptions.table.given(topic)
             self._judgement.reception.repeats += 1
         else:
             connection.subscriptions.received(topic)

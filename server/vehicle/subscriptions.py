@@ -183,10 +183,6 @@ class Subscriptions:
         if self._missing.delivery.heard(topic, self._now()):
             self._look_soon = True  # it has a publisher now: it may carry a signal
 
-    def given(self, topic: str) -> None:
-        """A sample from before came again on a topic."""
-        self._missing.delivery.given(topic)
-
     def took(self, topic: str, message: object) -> bool:
         """A message about the bridge itself; whether it was one."""
         if topic != CLIENT_COUNT:

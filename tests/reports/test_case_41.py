@@ -13,7 +13,7 @@ from server.recording.read.read import open_recording
 from tests.reports.cases import made
 from tests.server.vehicle.keeping_bridge import KeepingBridge, Topic, monitored
 
-pytestmark = pytest.mark.virtual_time
+pytestmark = [pytest.mark.virtual_time, pytest.mark.slow]
 
 FUEL, SPEED = "/fuel", "/catvehicle/vel"
 SHOWN_EVERY_S = 0.5

@@ -18,7 +18,7 @@ from server.vehicle.undelivered import CLIENT_COUNT
 from tests.server.vehicle.keeping_bridge import KeepingBridge, Topic, monitored
 from tests.world.test_sent_again import stamped
 
-pytestmark = [pytest.mark.world(n=27), pytest.mark.virtual_time]
+pytestmark = [pytest.mark.world(n=27), pytest.mark.virtual_time, pytest.mark.slow]
 
 FUEL, SPEED, FIX, MAP = "/fuel", "/catvehicle/vel", "/fix", "/map_name"
 TICK_S = 0.1
@@ -145,6 +145,21 @@ async def test_each_part_of_a_recording_holds_the_kept_samples_once(tmp_path: Pa
         assert session._parts.judgement.reception.repeats >= 4
     assert recorded(tmp_path, FUEL) == [[60.0], [60.0]]
     assert recorded(tmp_path, MAP) == [["yard"], ["yard"]]
+
+
+async def test_a_recording_that_is_begun_by_hand_gets_the_kept_samples_of_before(tmp_path: Path) -> None:
+    bridge = KeepingBridge(topics())
+    async with monitored(bridge, tmp_path) as session:
+        await drive(bridge, 2.0)
+        session._parts.recording.order(on=False, by="Ann")
+        bridge.publish(FUEL, {"data": 60.0})
+        published_s = time.monotonic()
+        await drive(bridge, 6.0)
+        session._parts.recording.order(on=True, by="Ann")
+        await drive(bridge, 3.0)
+        fuel = signal(session, "fuel")
+        assert fuel["age_s"] >= time.monotonic() - published_s - ROUNDED_S
+    assert recorded(tmp_path, FUEL)[-1] == [60.0]
 
 
 async def test_a_sample_that_another_part_holds_keeps_its_age_there(tmp_path: Path) -> None:
