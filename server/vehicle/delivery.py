@@ -182,6 +182,8 @@ class Delivery:
             return False
         if row.publishers == () and publishers:
             row.since_s = now_s  # it has its time from here on
+        if publishers and publishers != row.publishers:
+            row.renewed = row.single = 0  # another publisher has its own renewals
         row.publishers = publishers
         if not publishers or not row.is_silent(now_s):
             return False

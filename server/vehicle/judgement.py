@@ -75,7 +75,7 @@ class Judgement:
         self.minute = CheckMinute()
         self.track_number += 1  # with the state begins another track
         self.topics: set[str] = set()  # that came and carry signals
-        self._filled: dict[str, frozenset[str]] = {}  # topic → the signals that its newest message went to
+        self._filled: dict[str, tuple[Source, ...]] = {}  # topic → where its newest message went to
         self.last_message_s: float | None = None  # of a signal
         self.other_message_s: float | None = None  # of a topic that is only recorded
 
@@ -104,19 +104,19 @@ class Judgement:
     ) -> tuple[str, ...]:
         """Count a message that the bridge sent again, and that came first at `came_s`. It says nothing new to the
         signals that have it; any other signal takes it at its age."""
-        filled = self._filled.get(topic, frozenset())
-        others = tuple(source for source in sources if source.signal not in filled)
+        filled = self._filled.get(topic, ())
+        others = tuple(source for source in sources if source not in filled)
         changed = self._apply(others, topic, message, note, now_s, Aged(now_s - came_s)) if others else ()
         for source in sources:
             self.reception.tally(source.signal).repeats += 1
-        self._filled[topic] = filled.union(source.signal for source in sources)
+        self._filled[topic] = sources
         return changed
 
     def correct_ages(self) -> None:
         """Follow what becomes known of the age of topics' first messages."""
         for topic, (at_s, age_s) in self.transport.older().items():
-            for signal in self._filled.get(topic, ()):
-                self.state.age(signal, at_s, age_s)
+            for source in self._filled.get(topic, ()):
+                self.state.age(source.signal, at_s, age_s)
 
     def _apply(
         self, sources: tuple[Source, ...], topic: str, message: Any, note: str | None, now_s: float, delays: Delays
@@ -132,7 +132,7 @@ class Judgement:
             tyre_rad_per_unit=self.monitor.limits.steering.tyre_rad_per_unit,
             transport=delays,
         )
-        self._filled[topic] = frozenset(source.signal for source in sources)
+        self._filled[topic] = sources
         if changed:
             self.judge(now_s, changed)
             self.trends.receive(changed, self.state, now_s)

@@ -142,6 +142,14 @@ def test_the_samples_of_several_publishers_are_given_again_in_any_order() -> Non
         assert not bridge.repeats(frame(transforms("new", str(renewed_s))), renewed_s + 0.2)
 
 
+@pytest.mark.parametrize("made", [level, stamped])
+def test_of_a_message_that_was_published_many_times_one_is_kept(made: Any) -> None:
+    bridge = Bridge()
+    assert not any(bridge.repeats(made(80.0), number / 10) for number in range(20))
+    bridge.subscribe(10.0)
+    assert [bridge.repeats(made(80.0), 10.3 + number / 10) for number in range(4)] == [True, False, False, False]
+
+
 def test_two_renewals_may_give_it_twice_and_no_more() -> None:
     bridge = Bridge()
     bridge.repeats(stamped(80.0), 0.0)
