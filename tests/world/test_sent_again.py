@@ -89,6 +89,32 @@ def test_a_value_that_came_when_it_was_due_may_be_new_and_one_between_is_not() -
         assert (found.is_repeat, found.may_be_new) == (True, may_be_new), at_s
 
 
+def test_two_messages_make_no_period() -> None:
+    bridge = Bridge()
+    bridge.repeats(level(79.0), 0.0)
+    bridge.repeats(level(80.0), 1.0)
+    bridge.subscribe(1.5)
+    found = bridge.known.receive(TOPIC, level(80.0), 100, 2.0)
+    assert (found.is_repeat, found.may_be_new) == (True, False)
+
+
+def test_without_a_stamp_a_value_of_before_the_newest_is_new() -> None:
+    bridge = Bridge()
+    bridge.repeats(level(80.0), 0.0)
+    bridge.repeats(level(79.0), 1.0)
+    bridge.subscribe(10.0)
+    assert not bridge.repeats(level(80.0), 10.1)
+
+
+def test_each_sample_is_given_again_once() -> None:
+    bridge = Bridge()
+    for name in ("laser", "camera"):
+        bridge.repeats(frame(transforms(name)), 0.1)
+    bridge.subscribe(10.0)
+    assert [bridge.repeats(frame(transforms("laser")), at_s) for at_s in (10.1, 10.2)] == [True, False]
+    assert bridge.repeats(frame(transforms("camera")), 10.3)
+
+
 def test_the_same_value_long_after_the_renewal_is_new() -> None:
     bridge = Bridge(reads_after_s=1.0)
     bridge.repeats(level(80.0), 0.0)
