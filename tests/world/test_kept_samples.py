@@ -147,6 +147,26 @@ async def test_each_part_of_a_recording_holds_the_kept_samples_once(tmp_path: Pa
     assert recorded(tmp_path, MAP) == [["yard"], ["yard"]]
 
 
+async def test_a_signal_that_gets_its_topic_later_takes_the_kept_sample_at_its_age() -> None:
+    bridge = KeepingBridge(topics())
+    async with monitored(bridge) as session:
+        await drive(bridge, 3.0)
+        bridge.publish(FUEL, {"data": 60.0})
+        published_s = time.monotonic()
+        await drive(bridge, 1.0)
+        judgement = session._parts.judgement
+        before = session._parts.connection.subscriptions.by_topic[FUEL]
+        bridge.renew(FUEL)
+        await drive(bridge, 3.0)
+        judgement._filled[FUEL] = ()  # as if it had come before any signal was mapped to it
+        bridge.renew(FUEL)
+        await drive(bridge, 1.0)
+        assert judgement._filled[FUEL] == before
+        fuel = signal(session, "fuel")
+        assert fuel["age_s"] == pytest.approx(time.monotonic() - published_s, abs=ROUNDED_S)
+        assert fuel["note"] == "sent again by the bridge after a renewed subscription: not new"
+
+
 async def test_a_recording_that_is_begun_by_hand_gets_the_kept_samples_of_before(tmp_path: Path) -> None:
     bridge = KeepingBridge(topics())
     async with monitored(bridge, tmp_path) as session:
