@@ -197,6 +197,31 @@ def test_a_sample_in_another_encoding_is_the_same() -> None:
     assert not bridge.repeats({**as_json, "ranges": [1.0, 2.0, 2.5]}, 30.1)
 
 
+def nested(depth: int) -> dict[str, Any]:
+    inner: dict[str, Any] = {}
+    for _ in range(depth):
+        inner = {"inner": inner}
+    return inner
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ({"data": np.array([1.0, 2.0])}, {"data": 1.0}),
+        ({"data": 1.0}, {"data": np.array([1.0, 2.0])}),
+        ({"data": np.array([1.0, 2.0])}, {"data": None}),
+        (nested(3000), nested(3000)),
+        ([1, 2], {"data": 1}),
+        ("text", 5),
+    ],
+)
+def test_messages_of_any_shape_are_compared(before: Any, after: Any) -> None:
+    bridge = Bridge()
+    bridge.repeats(before, 0.0)
+    bridge.subscribe(10.0)
+    assert not bridge.repeats(after, 10.1)
+
+
 def test_a_large_sample_is_known_by_its_hash() -> None:
     bridge = Bridge()
     large = frame({"data": [0] * KEPT_BYTES})
