@@ -41,6 +41,13 @@ class ReadingTable:
             self._extents = {name: extent for name, extent in self._extents.items() if name != signal}
             self._extents_shared = None
 
+    def age(self, signal: str, received_s: float, delay_s: float) -> None:
+        """The reading that came at `received_s`, and what was derived from it, was so old when it came."""
+        for name, reading in self.newest.items():
+            is_of_it = signal in (name, reading.derived_from) and reading.received_s == received_s
+            if is_of_it and reading.delay_s != delay_s:
+                self.put(name, replace(reading, delay_s=delay_s))
+
     def put_extent(self, signal: str, lowest: float, highest: float) -> None:
         """Replace the range of a signal's headline number."""
         if self._extents_shared is not None:

@@ -14,6 +14,7 @@ OVERDUE_S = 0.3  # later than this nothing of Wi-Fi's usual bunching explains
 FAST_HORIZON_S = 2.0  # signals that would be missed within the 2 s in which silence is to be named
 FALTERS_AT = 0.5  # of its horizon: an announced silence ends when no gap comes near another
 CROWD = 3  # so many fast signals do not die at one moment by themselves
+OTHERS_S, OTHERS_PERIODS = 1.5, 1.5  # another signal goes on if its newest message is no older than this
 BRIDGE_WITHIN_S = 2.6  # a half-open link is found within 2.5 s: then it has been called lost, or the bridge is alive
 
 
@@ -42,14 +43,19 @@ def silence(snapshot: Snapshot) -> Silence | None:
     margin_s = min(_overdue_s(one) for one in fast)
     newest_of_all_s = newest_s if snapshot.heard_s is None else snapshot.heard_s
     nothing_since = newest_of_all_s - newest_s <= margin_s
+    others_come = any(
+        one.at_s - newest_s > margin_s and now_s - one.at_s <= max(OTHERS_S, OTHERS_PERIODS * (one.period_s or 0.0))
+        for one in heard
+    )
     all_overdue = all(now_s - one.at_s > _overdue_s(one) for one in fast)
     bridge_s = max((s for s in (snapshot.link.bridge_heard_s, snapshot.heard_s) if s is not None), default=newest_s)
     return Silence(
         heard=len(heard),
         fresh=sum(one.is_coming(now_s) for one in heard),
-        is_quiet=all_overdue and (len(fast) >= CROWD or now_s - newest_of_all_s > margin_s),
-        is_silent=not any(one.is_coming(now_s) for one in fast) and (len(fast) >= CROWD or nothing_since),
-        falters=all(now_s - one.at_s > FALTERS_AT * one.horizon_s for one in fast),
+        is_quiet=all_overdue and not others_come and (len(fast) >= CROWD or now_s - newest_of_all_s > margin_s),
+        is_silent=not (others_come or any(one.is_coming(now_s) for one in fast))
+        and (len(fast) >= CROWD or nothing_since),
+        falters=not others_come and all(now_s - one.at_s > FALTERS_AT * one.horizon_s for one in fast),
         silent_s=max(0.0, now_s - newest_s),
         is_bridge_proved=bridge_s - newest_s > margin_s,
     )

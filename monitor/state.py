@@ -50,6 +50,7 @@ class State:
             for name, signal in SIGNALS.items()
         }
         self._table = ReadingTable()
+        self.age = self._table.age
         self._derived = DerivedSignals(self._table)
         self._rates: Mapping[str, Rate] = MappingProxyType({})
         self._rates_at_s: float | None = None

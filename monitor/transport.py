@@ -27,6 +27,8 @@ WINDOW_S = 3.0  # round trips are compared over so long, or over two of the long
 JITTER_S = 0.05  # round trips that differ by less do not come from a connection that takes nothing
 EXACT_WITHIN_S = 0.12  # a bound by the queue that costs no more than this is taken as it is
 TRIM_S = 0.18  # the bound is at most so much too high where the link is healthy; stamps take no more off it
+OLDER_S = 0.5  # the first message of a topic that is so much older by its stamp was kept for us
+OLDEST_S = 30 * 86_400.0  # a stamp that is further behind is of another clock
 KEPT_S = 10.0  # the offset of a clock is the least of the last one to two of these: ±200 ppm are 4 ms
 RECENT_S = 3.0  # a topic that was silent for longer says nothing of the link now …
 FAST_S = 0.5  # … nor does one that comes less often than this, where others come more often
@@ -62,7 +64,20 @@ class _Clock:
 class _Topic:
     """What is kept of one subscription."""
 
-    __slots__ = ("at_s", "by_clock", "clock", "delay_s", "excess_s", "marks", "period_s", "queue_length", "throttle_s")
+    __slots__ = (
+        "at_s",
+        "by_clock",
+        "clock",
+        "delay_s",
+        "excess_s",
+        "first",
+        "marks",
+        "older_s",
+        "period_s",
+        "queue_length",
+        "stamped",
+        "throttle_s",
+    )
 
     def __init__(self, queue_length: int) -> None:
         self.queue_length = queue_length
@@ -74,14 +89,18 @@ class _Topic:
         self.at_s: float | None = None
         self.delay_s = 0.0
         self.excess_s: float | None = None  # later by the clock of ROS than by the pings; None: it is not known
+        self.first: tuple[float, float | None] | None = None  # when the only message came, and its stamp
+        self.older_s = 0.0  # how old the newest message was when it came, where that is not due to its transport
+        self.stamped = 0  # messages with a stamp on this connection
 
     def restart(self) -> None:
         """What came over another connection says nothing of this one, but for how often it comes."""
         self.marks.clear()
         self.clock = _Clock()
         self.by_clock = StampedDelay()
-        self.at_s = self.excess_s = None
-        self.delay_s = 0.0
+        self.at_s = self.excess_s = self.first = None
+        self.delay_s = self.older_s = 0.0
+        self.stamped = 0
 
     def follow_period(self, at_s: float) -> None:
         if self.at_s is None or self.throttle_s or at_s < self.at_s:
@@ -168,8 +187,51 @@ class TransportDelay:
                 delay_s = late_s
         else:
             delay_s += self._excess_s(at_s)
-        known.at_s, known.delay_s = at_s, delay_s
-        return delay_s
+        known.first = (at_s, stamp_s) if known.at_s is None else None
+        known.stamped += stamp_s is not None
+        known.at_s, known.delay_s, known.older_s = at_s, delay_s, 0.0
+        if known.first is not None:
+            self._find_older(topic, known)
+        return max(delay_s, known.older_s)
+
+    def given(self, topic: str, age_s: float) -> None:
+        """The bridge sent a message again that came `age_s` ago."""
+        known = self._topics.get(topic)
+        if known is not None:
+            known.older_s = age_s
+
+    def older(self) -> dict[str, tuple[float, float]]:
+        """Topics of which one message came on this connection: when it came, and how old it was then by all that is
+        known by now [s]."""
+        found: dict[str, tuple[float, float]] = {}
+        for name, topic in self._topics.items():
+            if topic.first is not None:
+                self._find_older(name, topic)
+                found[name] = topic.first[0], max(topic.delay_s, topic.older_s)
+        return found
+
+    def of_unknown_age(self) -> frozenset[str]:
+        """Topics of which one message came on this connection, whose age is not known: it may have been kept for us."""
+        return frozenset(
+            name
+            for name, topic in self._topics.items()
+            if topic.first is not None and (topic.first[1] is None or self._age_s(name, topic) is None)
+        )
+
+    def _find_older(self, name: str, topic: _Topic) -> None:
+        age_s = self._age_s(name, topic)
+        topic.older_s = age_s if age_s is not None and age_s > topic.delay_s + OLDER_S else 0.0
+
+    def _age_s(self, name: str, topic: _Topic) -> float | None:
+        """How old the only message of a topic was when it came; None where its stamp is not known to be of the clock of
+        ROS. One message cannot show that: the stamps of the car's other topics do, where there are any."""
+        if topic.first is None or topic.first[1] is None or self.clock.ahead_s is None:
+            return None
+        others = [one for other, one in self._topics.items() if other != name and one.stamped > 1]
+        if others and all(one.excess_s is None for one in others):
+            return None
+        age_s = topic.first[0] - topic.first[1] + self.clock.ahead_s
+        return age_s if age_s <= OLDEST_S else None
 
     def _bound_s(self, topic: _Topic, at_s: float) -> float:
         since_mark_s = max(0.0, at_s - self._mark_s)
@@ -207,7 +269,11 @@ class TransportDelay:
 
     def delays(self) -> dict[str, float]:
         """How old the newest message of each topic was when it came."""
-        return {name: topic.delay_s for name, topic in self._topics.items() if topic.at_s is not None}
+        return {
+            name: max(topic.delay_s, topic.older_s)
+            for name, topic in self._topics.items()
+            if topic.at_s is not None or topic.older_s
+        }
 
     def queued_s(self, now_s: float) -> float:
         """How much of that is because more is asked of the link than it carries."""

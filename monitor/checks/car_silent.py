@@ -34,7 +34,7 @@ def find(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     if not found.is_silent:
         proof = "messages come with gaps"
     elif found.is_bridge_proved:
-        proof = "the bridge answers, the car sends nothing"
+        proof = "the bridge answers, no signal of the car comes"
     else:
         proof = "neither car nor bridge answers"
     if snapshot.link.behind_title:

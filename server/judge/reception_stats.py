@@ -27,6 +27,7 @@ class Tally:
     repaired_why: str | None = None
     not_measured: int = 0  # proper messages that declare the value as not measured
     why_not_measured: str | None = None  # of the newest message without a value; None: that one was rejected
+    repeats: int = 0  # of the newest message, that the bridge sent again after a renewed subscription
 
     def reject(self, reason: str) -> None:
         self.rejected += 1
@@ -45,6 +46,7 @@ class Reception:
     received: int = 0
     rejected: int = 0
     unasked: int = 0  # messages on topics without a subscription
+    repeats: int = 0  # messages that the bridge sent again, of all topics
     frame_ids: dict[str, str] = field(default_factory=dict)  # topic → frame that its newest message names
     units: UnitWatch = field(default_factory=UnitWatch)
 
@@ -69,6 +71,7 @@ class Reception:
         """The decoded value, or None where it was rejected or is not measured; all are counted."""
         tally = self.by_signal.get(source.signal) or self.tally(source.signal)
         tally.received += 1
+        tally.repeats = 0
         if note is not None:
             tally.repaired += 1
             tally.repaired_why = note

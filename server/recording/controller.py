@@ -161,9 +161,10 @@ class SessionRecording:
         """A message of the car, or the RawFrame that holds it."""
         self._parts.take(topic, type, message, now_s, size)
 
-    def hold(self, topic: str, type: str | None, message: Any) -> None:
-        """A message that is sent once and holds for the whole drive: every later part begins with it."""
-        self._parts.hold(topic, type, message)
+    def hold(self, topic: str, type: str | None, message: Any) -> bool:
+        """A message that is sent once and holds for the whole drive: every later part begins with it. False: it is not
+        kept."""
+        return self._parts.hold(topic, type, message)
 
     def own(self, channel: Own, said: Mapping[str, Any]) -> None:
         """Something of ours, on one of our channels."""
@@ -216,6 +217,12 @@ class SessionRecording:
     def is_on(self) -> bool:
         """Whether a message of the car would be recorded."""
         return self._state.session is not None and self._state.session.lost_s is None
+
+    @property
+    def part(self) -> tuple[str, int] | None:
+        """The part that a message of the car would be recorded in: its session and number; None: it would not be."""
+        session = self._state.session
+        return (session.session, session.newest) if session is not None and session.lost_s is None else None
 
     @property
     def also(self) -> Also:

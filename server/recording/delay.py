@@ -23,7 +23,7 @@ EVERY_S = 0.1  # a row applies to the messages of this time before it
 FINE_S = 0.005  # a change of a delay that is written
 COARSE_S, COARSE_BELOW_S = 0.05, 0.3  # … where both are small: no check is near its limit
 MOST_ROWS = 2_000_000  # that are read: two days of a slow link
-MOST_S = 3600.0  # a longer delay is none of ours
+MOST_S = 3600.0  # a longer delay is none of ours; an older sample is written as so old
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +45,7 @@ class DelayWriter:
 
     def row(self, delays: Mapping[str, float], link: LinkDelay) -> dict[str, Any] | None:
         """What changed since the last row; None where nothing did. `delays`: of each topic's newest message [s]."""
+        delays = {topic: min(delay_s, MOST_S) for topic, delay_s in delays.items()}
         changed = {topic: delay_s for topic, delay_s in delays.items() if _differs(self._delays.get(topic), delay_s)}
         before = self._link
         is_other = (before.throttled, before.reduced) != (link.throttled, link.reduced)

@@ -142,13 +142,16 @@ class RecordingParts:
         if session.is_open and self.recorder is not None:
             self.recorder.take(topic, type, message, self._clock.ns(now_s), size, now_s)
 
-    def hold(self, topic: str, type: str | None, message: Any) -> None:
-        """Transforms that are sent once: a later part begins with them, for they are not sent again."""
+    def hold(self, topic: str, type: str | None, message: Any) -> bool:
+        """Transforms that are sent once: a later part begins with them, for they are not sent again. False: there are
+        too many, and these are not kept."""
         rows = message.get("transforms") if isinstance(message, Mapping) else None
         children = [row.get("child_frame_id") for row in rows or () if isinstance(row, Mapping)]
         key = (topic, *map(str, children[:MOST_HELD]))
         if key in self._held or len(self._held) < MOST_HELD:
             self._held[key] = topic, type, message
+            return True
+        return False
 
     def own(self, channel: Own, said: Mapping[str, Any]) -> None:
         """An entry of one of our own channels."""

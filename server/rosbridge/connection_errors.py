@@ -201,9 +201,25 @@ def hidden_topics(topics: Sequence[str]) -> Problem:
     )
 
 
+def _others(clients: int) -> str:
+    return f"{clients} other client{'s are' if clients != 1 else ' is'} connected to this bridge"
+
+
+def single_messages(topics: Sequence[str], clients: int) -> Problem:
+    """Topics that have a publisher, of which the bridge gives one message to each subscription."""
+    return Problem(
+        code="topics_once",
+        title=f"The bridge delivers one message per subscription from {_names(topics)}.",
+        hint=f"{_others(clients)}: while one stays subscribed, a ROS 2 bridge cannot receive a publisher that came "
+        "back with another quality of service. Disconnect all other clients, other catgraph servers too, or restart "
+        "rosbridge; the subscription is renewed by itself.",
+        mark="blocked topics",
+    )
+
+
 def blocked_topics(topics: Sequence[str], clients: int) -> Problem:
     """Topics that have a publisher, to which the bridge subscribed for us, and of which nothing comes."""
-    others = f"{clients} other client{'s are' if clients != 1 else ' is'} connected to this bridge"
+    others = _others(clients)
     return Problem(
         code="topics_blocked",
         title=f"No message arrives through the bridge from {_names(topics)}.",
@@ -245,7 +261,13 @@ def _sentence(text: str) -> str:
 CAR_SILENT = Problem(
     code="car_silent",
     title="The car fell silent.",
-    hint="Server and bridge answer; no message comes from the car.",
+    hint="Server and bridge answer; no signal comes from the car.",
+    mark="silent",
+)
+SIGNALS_SILENT = Problem(
+    code="signals_silent",
+    title="No signal of the car comes; its other topics do.",
+    hint="Server and bridge answer. Check the nodes that publish the signals.",
     mark="silent",
 )
 ROS_GONE = Problem(

@@ -16,10 +16,14 @@ RECORDED_AFTER_S = 4.0  # the same for a topic that is only recorded
 RENEW_AFTER_S = 4.0  # published, but nothing since subscribing: renewed as JSON
 STOPPED_AFTER_S = 4.0  # a topic that came and stopped is looked at after so long, and
 STOPPED_PERIODS = 10  # so many of its mean periods
+ONCE_AFTER_S = 5.0  # a signal's topic of which one message came is looked at after so long
+PROMPT_S = 2.0  # a message within so long after a subscription may be the one that a subscription gives
+RENEWED_AGAIN_S = (0.0, 10.0, 30.0, 60.0, 120.0, 300.0)  # least interval of renewals in a row of a topic that came
 ABSENT_AGAIN_S = 3.0  # interval of fetching the publishers of a signal's topic without one
 SILENT_AGAIN_S = 10.0  # the same for a topic that is published and not received, and interval of renewal
 RECORDED_AGAIN_S = (10.0, 30.0, 60.0, 120.0, 300.0)  # the same for a recorded topic, which may have few messages
 FIRST_WITHIN_S = 5.0  # the first message of a publisher that came later
+QUIET_S = 2.0  # a signal's topic without a message for so long, when a recording begins
 FLOWS_S = 2.0  # anything within so long: the bridge delivers, so it is this topic and not all of them
 AT_ONCE = 8  # topics per round
 
@@ -30,28 +34,51 @@ class _Row:
 
     since_s: float  # when it was subscribed to, the last time
     is_judged: bool
-    first_s: float | None = None  # of its messages on this connection
-    newest_s: float | None = None
-    count: int = 0
+    newest_s: float | None = None  # of its messages on this connection
+    was_given: bool = False  # a sample from before came again on this connection
+    gaps: int = 0  # between two messages without a renewal in between
+    gaps_s: float = 0.0  # their sum
+    got: int = 0  # messages since it was subscribed to
+    was_prompt: bool = False  # the first of them came with the subscription
+    single: int = 0  # renewals in a row before which the subscription gave one message at once, and no other
     publishers: tuple[str, ...] | None = None  # None: not known
     asked_s: float = -math.inf
-    renewed: int = 0  # times in a row, without a message since
+    renewed: int = 0  # times in a row, without two messages since
+
+    @property
+    def came(self) -> bool:
+        """Whether the bridge delivered anything of it on this connection."""
+        return self.newest_s is not None or self.was_given
 
     def heard(self, now_s: float) -> None:
-        if self.first_s is None:
-            self.first_s = now_s
+        if self.got:
+            self.renewed = self.single = 0
+            if self.newest_s is not None:
+                self.gaps += 1
+                self.gaps_s += now_s - self.newest_s
+        else:
+            self.was_prompt = now_s - self.since_s <= PROMPT_S
+        self.got += 1
         self.newest_s = now_s
-        self.count += 1
-        self.renewed = 0
+
+    def renew(self, now_s: float) -> None:
+        self.single = self.single + 1 if self.got == 1 and self.was_prompt else 0
+        self.since_s, self.got = now_s, 0
+        self.renewed += 1
 
     def is_silent(self, now_s: float) -> bool:
         """Whether something ought to have come."""
-        if self.newest_s is None or self.first_s is None:
+        if not self.came:
             return now_s - self.since_s >= (JUDGED_AFTER_S if self.is_judged else RECORDED_AFTER_S)
-        if not self.is_judged or self.count < 2:
+        if not self.is_judged:
             return False
-        period_s = (self.newest_s - self.first_s) / (self.count - 1)
-        return now_s - max(self.newest_s, self.since_s) >= max(STOPPED_AFTER_S, STOPPED_PERIODS * period_s)
+        due_s = max(STOPPED_AFTER_S, STOPPED_PERIODS * self.gaps_s / self.gaps) if self.gaps else ONCE_AFTER_S
+        return now_s - self.last_s >= due_s
+
+    @property
+    def last_s(self) -> float:
+        """Its newest message, or subscription."""
+        return max(self.since_s, -math.inf if self.newest_s is None else self.newest_s)
 
     def again_s(self) -> float:
         """The time until its publishers are fetched again."""
@@ -100,13 +127,27 @@ class Delivery:
             return True
         return False
 
+    def given(self, topic: str) -> None:
+        """A sample from before came again: the bridge delivers the topic, but nothing new was published."""
+        row = self._rows.get(topic)
+        if row is not None:
+            row.was_given = True
+
+    def quiet(self, now_s: float) -> list[str]:
+        """Topics of signals that came on this connection, and not lately: the bridge may keep a sample of them."""
+        return [
+            topic
+            for topic, row in self._rows.items()
+            if row.is_judged and row.came and (row.newest_s is None or now_s - row.newest_s >= QUIET_S)
+        ]
+
     def has_its_time(self, topic: str, now_s: float) -> bool:
         """Whether a topic's publisher has only just come, so that no message yet is no silence."""
         return now_s - self._came_s.get(topic, -math.inf) < FIRST_WITHIN_S
 
     def only_silent(self) -> str | None:
         """The one topic of which nothing ever came, where there is exactly one."""
-        silent = [topic for topic, row in self._rows.items() if row.newest_s is None]
+        silent = [topic for topic, row in self._rows.items() if not row.came]
         return silent[0] if len(silent) == 1 else None
 
     def to_ask(self, now_s: float, candidates: Collection[str] = ()) -> list[str]:
@@ -141,17 +182,20 @@ class Delivery:
             return False
         if row.publishers == () and publishers:
             row.since_s = now_s  # it has its time from here on
+        if publishers and publishers != row.publishers:
+            row.renewed = row.single = 0  # another publisher has its own renewals
         row.publishers = publishers
         if not publishers or not row.is_silent(now_s):
             return False
-        if (row.newest_s is not None or not row.is_judged) and now_s - self._newest_s > FLOWS_S:
+        if (row.came or not row.is_judged) and now_s - self._newest_s > FLOWS_S:
             return (
                 False  # nothing comes: the car is silent, not this topic; another client may block all of a few signals
             )
-        if now_s - max(row.since_s, row.newest_s or -math.inf) < RENEW_AFTER_S:
+        if now_s - row.last_s < RENEW_AFTER_S:
             return False
-        row.since_s = now_s
-        row.renewed += 1
+        if row.came and now_s - row.since_s < RENEWED_AGAIN_S[min(row.renewed, len(RENEWED_AGAIN_S) - 1)]:
+            return False
+        row.renew(now_s)
         return True
 
     def never_came(self, now_s: float) -> list[str]:
@@ -159,13 +203,25 @@ class Delivery:
         return [
             topic
             for topic, row in self._rows.items()
-            if row.is_judged and row.publishers and row.newest_s is None and (row.renewed or row.is_silent(now_s))
+            if row.is_judged and row.publishers and not row.came and (row.renewed or row.is_silent(now_s))
+        ]
+
+    def came_once(self, now_s: float) -> list[str]:
+        """Topics of signals that have a publisher and of which two subscriptions in a row gave one message each."""
+        return [
+            topic
+            for topic, row in self._rows.items()
+            if row.is_judged
+            and row.publishers
+            and row.single
+            and row.got <= 1
+            and (row.single > 1 or (row.got and row.was_prompt and now_s - row.last_s >= RENEW_AFTER_S))
         ]
 
     def never_received(self, topic: str) -> bool:
         """Whether nothing came of a topic on this connection."""
         row = self._rows.get(topic)
-        return row is None or row.newest_s is None
+        return row is None or not row.came
 
     def not_received(self, now_s: float) -> Mapping[str, tuple[str, ...]]:
         """Topic → its publishers, for topics without messages after a renewal while other topics arrive."""
@@ -173,6 +229,6 @@ class Delivery:
             topic: row.publishers
             for topic, row in sorted(self._rows.items())
             if row.publishers
-            and row.newest_s is None
+            and not row.came
             and (row.renewed > 1 or (row.renewed and now_s - row.since_s >= RENEW_AFTER_S))
         }

@@ -20,10 +20,22 @@ from monitor.trends import Trends
 from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
 from server.judge.frames import Frames
+from server.judge.pipeline import Delays
 from server.judge.reception_stats import Reception
 from server.judge.topics import Source
 
 log = logging.getLogger("catgraph.session")
+
+
+class Aged:
+    """The delay of a message whose age is known [s]."""
+
+    def __init__(self, age_s: float) -> None:
+        self._age_s = age_s
+
+    def receive(self, topic: str, at_s: float, stamp_s: float | None = None) -> float:
+        """As of `Delays`."""
+        return self._age_s
 
 
 class Judgement:
@@ -65,7 +77,9 @@ class Judgement:
         self.minute = CheckMinute()
         self.track_number += 1  # with the state begins another track
         self.topics: set[str] = set()  # that came and carry signals
-        self.last_message_s: float | None = None
+        self._filled: dict[str, tuple[Source, ...]] = {}  # topic → where its newest message went to
+        self.last_message_s: float | None = None  # of a signal
+        self.other_message_s: float | None = None  # of a topic that is only recorded
 
     @property
     def load(self) -> AlarmLoad:
@@ -85,6 +99,30 @@ class Judgement:
         """Decodes, applies and judges one message in one pass; the signals that changed."""
         self.topics.add(topic)
         self.last_message_s = now_s
+        return self._apply(sources, topic, message, note, now_s, self.transport)
+
+    def receive_again(
+        self, sources: tuple[Source, ...], topic: str, message: Any, note: str | None, now_s: float, *, came_s: float
+    ) -> tuple[str, ...]:
+        """Count a message that the bridge sent again, and that came first at `came_s`. It says nothing new to the
+        signals that have it; any other signal takes it at its age."""
+        filled = self._filled.get(topic, ())
+        others = tuple(source for source in sources if source not in filled)
+        changed = self._apply(others, topic, message, note, now_s, Aged(now_s - came_s)) if others else ()
+        for source in sources:
+            self.reception.tally(source.signal).repeats += 1
+        self._filled[topic] = sources
+        return changed
+
+    def correct_ages(self) -> None:
+        """Follow what becomes known of the age of topics' first messages."""
+        for topic, (at_s, age_s) in self.transport.older().items():
+            for source in self._filled.get(topic, ()):
+                self.state.age(source.signal, at_s, age_s)
+
+    def _apply(
+        self, sources: tuple[Source, ...], topic: str, message: Any, note: str | None, now_s: float, delays: Delays
+    ) -> tuple[str, ...]:
         changed = pipeline.receive(
             sources,
             message,
@@ -95,10 +133,11 @@ class Judgement:
             profile=self._tuning.profile,
             tyre_rad_per_unit=self.monitor.limits.steering.tyre_rad_per_unit,
             units=self._tuning.settings.units,
-            transport=self.transport,
+            transport=delays,
             frames=self.frames,
             limits=self.monitor.limits,
         )
+        self._filled[topic] = sources
         if changed:
             self.judge(now_s, changed)
             self.trends.receive(changed, self.state, now_s)

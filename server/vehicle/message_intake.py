@@ -8,6 +8,8 @@ from typing import Any
 
 from server.bus.bus import SessionBus
 from server.judge.frames import is_static
+from server.judge.topics import plain_type
+from server.recording import recorded_topics
 from server.recording.controller import SessionRecording
 from server.rosbridge.raw_frame import RawFrame
 from server.slowdown.command_target import GUARD_STATE
@@ -17,11 +19,14 @@ from server.vehicle.connection import Connection
 from server.vehicle.judgement import Judgement
 from server.vehicle.marks import Marks
 from server.vehicle.scan_feed import ScanFeed
+from server.vehicle.sent_again import Arrival, SentAgain
 from server.vehicle.subscription_table import TRANSFORMS_MS
 from server.vehicle.tick_parts import TickParts
 from server.vehicle.undelivered import CLIENT_COUNT
 
 RECORDING = "recording of messages"  # its name where it fails
+OF_ANY_NODE = recorded_topics.EVENTS | {"rosbridge_msgs/ConnectedClients", "rosgraph_msgs/Clock"}  # the bridge's too
+EACH_COUNTS = (GUARD_STATE, CLIENT_COUNT, car_marks.TOPIC)  # these have their own rules for what is sent again
 
 
 class MessageIntake:
@@ -45,10 +50,13 @@ class MessageIntake:
         self._recording = recording
         self._slow_down = slow_down
         self._tick_parts = tick_parts
-        self._button = marks.button(now(), read_s=judgement.transport.read_s)
+        self._button = marks.button(now(), read_s=self._read_s)
         self._now = now
         self._connection: Connection | None = None
         self.reset()
+
+    def _read_s(self, sent_s: float) -> float | None:
+        return self._judgement.transport.read_s(sent_s)
 
     def follow(self, connection: Connection) -> None:
         """From now on messages of this connection come; to be called once."""
@@ -58,6 +66,11 @@ class MessageIntake:
         """Another car's messages come."""
         self._scans = ScanFeed(self._vehicle, self._bus)
         self._transforms_s = -math.inf  # when transforms that move were parsed last
+        self._sent_again = SentAgain(self._read_s)
+
+    def subscribed(self, topic: str) -> None:
+        """A subscription to a topic was sent: what the bridge kept of it may come again."""
+        self._sent_again.subscribed(topic, self._now())
 
     def link_opened(self) -> None:
         """The car's messages come from the beginning, also those that are sent once."""
@@ -83,11 +96,14 @@ class MessageIntake:
         topics = connection.subscriptions
         if frame.topic not in topics.others:
             return False
-        if frame.topic in topics.table.transforms and self._places_sensors(frame.topic):
+        now_s, size = self._now(), len(frame.payload)
+        if frame.topic in topics.table.transforms and self._places_sensors(frame.topic, now_s):
             return False
-        topics.received(frame.topic)
-        if self._recording.is_on:
-            self._record(connection, frame.topic, frame, self._now(), len(frame.payload))
+        arrival = self._arrived(connection, frame.topic, frame, size, now_s)
+        if plain_type(topics.others[frame.topic]) not in OF_ANY_NODE and not (arrival and arrival.is_repeat):
+            self._judgement.other_message_s = now_s
+        if self._is_to_record(frame.topic, arrival, now_s):
+            self._record(connection, frame.topic, frame, now_s, size)
         return True
 
     def message_received(self, topic: str, message: Any, note: str | None) -> None:
@@ -97,17 +113,16 @@ class MessageIntake:
             return
         now_s = self._now()
         topics = connection.subscriptions
-        topics.received(topic)
+        size = 0 if connection.link is None else connection.link.frame_bytes
+        arrival = self._arrived(connection, topic, message, size, now_s)
         is_button = topic == car_marks.TOPIC and topic not in topics.others
         if is_button and self._button.receive(message, now_s, topics.table.button):
             return  # recorded as a mark
-        if self._recording.is_on and connection.link is not None:
-            self._record(connection, topic, message, now_s, connection.link.frame_bytes)
         if topic in topics.table.transforms:
-            self._judgement.frames.receive(topic, message)
-            if is_static(topic):
-                self._recording.hold(topic, topics.type_of(topic), message)
+            self._transforms_received(connection, topic, message, arrival, now_s)
             return
+        if self._is_to_record(topic, arrival, now_s) and connection.link is not None:
+            self._record(connection, topic, message, now_s, size)
         if is_button or self._slow_down.receive(topic, message) or topics.took(topic, message):
             return
         if topic in topics.others:
@@ -123,19 +138,62 @@ class MessageIntake:
             self._judgement.reception.unasked += 1
             return
         connection.prove()
+        if arrival is not None and arrival.is_repeat:
+            self._judgement.receive_again(sources, topic, message, note, now_s, came_s=arrival.sample.first_s)
+            return
         changed = self._judgement.receive(sources, topic, message, note, now_s)
         if "scan" in changed:
             self._show_scan(message, now_s)
 
-    def _places_sensors(self, topic: str) -> bool:
+    def _transforms_received(
+        self, connection: Connection, topic: str, message: Any, arrival: Arrival | None, now_s: float
+    ) -> None:
+        """Transforms place sensors; each part of a recording begins with those that are sent once."""
+        self._judgement.frames.receive(topic, message)
+        is_repeat = arrival is not None and arrival.is_repeat
+        if not is_repeat:
+            self._judgement.other_message_s = now_s
+        kind = connection.subscriptions.type_of(topic)
+        is_in_part = is_repeat and is_static(topic) and self._recording.hold(topic, kind, message)
+        if connection.link is not None and not is_in_part and self._is_to_record(topic, arrival, now_s):
+            self._record(connection, topic, message, now_s, connection.link.frame_bytes)
+        if is_static(topic):
+            self._recording.hold(topic, kind, message)
+
+    def _places_sensors(self, topic: str, now_s: float) -> bool:
         """Whether a message of transforms is to be parsed; of those that move, a few a second are enough."""
         if is_static(topic):
             return True
-        now_s = self._now()
         is_due = now_s - self._transforms_s >= TRANSFORMS_MS / 1000
         if is_due:
             self._transforms_s = now_s
         return is_due
+
+    def _arrived(self, connection: Connection, topic: str, message: Any, size: int, now_s: float) -> Arrival | None:
+        """Follow a topic's messages, and what its bridge sends again of them; None: each message of it counts."""
+        if topic in EACH_COUNTS:
+            connection.subscriptions.received(topic)
+            return None
+        arrival = self._sent_again.receive(topic, message, size, now_s)
+        if arrival.is_repeat:
+            connection.subscriptions.table.given(topic)
+            self._judgement.reception.repeats += 1
+        else:
+            connection.subscriptions.received(topic)
+        return arrival
+
+    def _is_to_record(self, topic: str, arrival: Arrival | None, now_s: float) -> bool:
+        """Whether a message belongs into the recording: each one once in a part."""
+        part = self._recording.part
+        if part is None or arrival is None:
+            return part is not None
+        sample = arrival.sample
+        if arrival.is_repeat and sample.part == part:
+            return arrival.may_be_new
+        if arrival.is_repeat:
+            self._judgement.transport.given(topic, now_s - sample.first_s)
+        sample.part = part
+        return True
 
     def _show_scan(self, message: Any, now_s: float) -> None:
         self._scans.count()

@@ -103,7 +103,8 @@ class MissingWatch:
         """Fetch whether the bridge subscribed to published signal topics that do not arrive; renew those that another
         client no longer blocks. Raises LinkDown."""
         needed = self._undelivered.needs_clients
-        self._undelivered.follow(self.delivery.never_came(self._now()), self._now())
+        now_s, delivery = self._now(), self.delivery
+        self._undelivered.follow(delivery.never_came(now_s), now_s, once=delivery.came_once(now_s))
         if self._undelivered.needs_clients != needed:
             self._resubscribe()
         if self._undelivered.needs_clients and not self._undelivered.bridges:

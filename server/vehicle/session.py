@@ -25,6 +25,7 @@ from server.system.supervision import Supervisor
 from server.vehicle import facts
 from server.vehicle.command_handler import CommandHandler
 from server.vehicle.judgement import Judgement
+from server.vehicle.link_marks import LinkMarks
 from server.vehicle.marks import NO_PLACE, MarksPlace
 from server.vehicle.restoration import Restoration
 from server.vehicle.session_parts import session_parts
@@ -207,7 +208,7 @@ class Session:
             self._clear()
         self._parts.event_log.started(target.url, target.shown, by=by, resumes=before is not None)
         self._parts.departure.dialled(self._wall_ms(), resumed=before is not None, by=by)
-        self._parts.connection.dial(target, self._parts.judgement.transport)
+        self._parts.connection.dial(target, LinkMarks(self._parts.judgement.transport, self._parts.intake.subscribed))
         if before is not None:
             self._parts.pause.go_on(self._parts.judgement.state, before, self._now(), self._wall_ms())
             if before.order is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +39,7 @@ OVERDUE_PERIODS = 3
 NO_MESSAGE_S = 5.0
 MOST_SUPPRESSED = 20
 FIRST_MESSAGE_S = 1.4  # where a part behind the bridge is known to have failed
+ONCE_AFTER_S = 2.0  # a topic that comes more often has a second message by then
 ROS_GONE_S = 2.5  # one unanswered question may be lost; three are a sign
 
 
@@ -65,6 +66,7 @@ class Facts:
     problem: Problem | None
     link: LiveSource | None
     last_message_s: float | None
+    other_message_s: float | None = None  # of a topic that is only recorded
     ros_answered_s: float | None
     ros_alive: bool | None
     offers_nothing: bool
@@ -83,6 +85,7 @@ class Facts:
     operators: OperatorsState
     marks: int = 0  # of this drive
     questions: Sequence[Question] = ()
+    of_unknown_age: Collection[str] = ()  # topics whose only message may have been kept for us
 
 
 def state_frame(facts: Facts, snapshot: Snapshot, monitor: Monitor) -> RecordedState:
@@ -199,7 +202,11 @@ def _behind_the_bridge(facts: Facts, snapshot: Snapshot) -> tuple[Cut | None, Pr
         )
     if facts.now_s - max(last_s, facts.since_s) < max(CAR_SILENT_S, OVERDUE_PERIODS * _shortest_period_s(snapshot)):
         return None, behind, None
-    return "bridge-car", behind or (connection_errors.ROS_GONE if ros_is_gone else connection_errors.CAR_SILENT), last_s
+    if ros_is_gone:
+        return "bridge-car", behind or connection_errors.ROS_GONE, last_s
+    others_come = facts.other_message_s is not None and facts.now_s - facts.other_message_s < CAR_SILENT_S
+    silent = connection_errors.SIGNALS_SILENT if others_come else connection_errors.CAR_SILENT
+    return "bridge-car", behind or silent, last_s
 
 
 def _shortest_period_s(snapshot: Snapshot) -> float:
@@ -240,6 +247,7 @@ def _signal(signal: Signal, facts: Facts, snapshot: Snapshot) -> SignalState[Sig
         "frame": facts.reception.frame_of(source.topic) if source else None,
         "note": (unusable.words if unusable else None)
         or (_scan_note(source, snapshot) if signal.name == "scan" else None)
+        or (_old_sample(facts, reading, tally, source) if reading and source else None)
         or (source.note if source else undecided)
         or (_unknown_part(reading.value) if reading else None)
         or (facts.reception.units.note(signal.name, source.topic) if source else None),
@@ -266,6 +274,15 @@ def _scan_note(source: Source | None, snapshot: Snapshot) -> str | None:
     mounting = scan.value.mounting if scan is not None else None
     notes = (source.note if source else None, mounting.note if mounting else None, habit_words(snapshot.scan_habit))
     return "; ".join(note for note in notes if note) or None
+
+
+def _old_sample(facts: Facts, reading: Reading[Any], tally: Tally, source: Source) -> str | None:
+    """What is known of a sample that the bridge kept for new subscriptions."""
+    if tally.repeats:
+        return "sent again by the bridge after a renewed subscription: not new"
+    if source.topic in facts.of_unknown_age and reading.silent_s(facts.now_s) > ONCE_AFTER_S:
+        return "one message since connecting: it may be older than its age here"
+    return None
 
 
 def _unknown_part(value: Any) -> str | None:

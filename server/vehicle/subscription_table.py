@@ -188,6 +188,16 @@ class SubscriptionTable:
             if kind in self._definitions.may_be_large and topic not in self._delivery.delivered
         ]
 
+    def given(self, topic: str) -> None:
+        """A sample from before came again on a topic."""
+        self.probation.heard(topic)
+        self._delivery.given(topic)
+
+    def renew_quiet(self) -> None:
+        """A recording begins, which needs what the bridge keeps of topics that came before."""
+        for topic in self._delivery.quiet(self._now()):
+            self._renew(topic)
+
     def renew_all(self) -> None:
         """A new roscore does not know the old subscriptions."""
         for row in self.rows:

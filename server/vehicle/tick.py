@@ -49,6 +49,7 @@ class Tick:
         self._ended_s = now()  # when the newest tick came to its end
         self.lag_s = 0.0  # how late the newest one began
         self._wall_ms = wall_ms
+        self._part: object = None  # of the recording, that messages were recorded in
         self._log_keeper = LogKeeper(parts.event_log, bus)
         self._open_files = OpenFilesWatch()
         self._clock_watch = ClockWatch(parts.event_log, wall_ms=wall_ms)
@@ -106,6 +107,7 @@ class Tick:
         ):
             self._attempts.attempt(part, partial(work, now_s))
         judgement, publisher = self._parts.judgement, self._parts.publisher
+        self._attempts.attempt("ages", judgement.correct_ages)
         judgement.monitor.failed_parts = self._attempts.failed
         judgement.judge(now_s)
         self._attempts.attempt("driving", partial(self._parts.driving.tick, now_s))
@@ -157,6 +159,10 @@ class Tick:
             link = LinkDelay(now_s, found.late_s, found.throttled, found.reduced)
             recording.delays(self._parts.judgement.transport.delays(), link)
         topics.record(recording.also)
+        if recording.part != self._part:
+            self._part = recording.part
+            if self._part is not None:
+                topics.table.renew_quiet()
         self._parts.judgement.state.recorder(recording.facts(now_s))
 
     def watch_control(self, now_s: float) -> None:

@@ -1,7 +1,10 @@
 """Published topics that a bridge does not deliver, and the cause, by rosapi's list of subscribers.
 
 A topics_glob prevents the bridge from subscribing. Another client's subscription can take the messages: then the
-bridge is subscribed, and we get none. The bridge reports neither. Pure: time is an argument.
+bridge is subscribed, and we get none. A bridge of ROS 2 whose subscription does not fit a publisher that came back
+gives one message to each new subscription, until all its clients have left. The bridge reports none of it.
+
+Pure: time is an argument.
 """
 
 from __future__ import annotations
@@ -31,6 +34,8 @@ class Passing:
     _asked_s: dict[str, float] = field(default_factory=dict)
     _is_subscribed: dict[str, bool] = field(default_factory=dict)  # by the bridge
     _freed: set[str] = field(default_factory=set)  # silent topics that another client may have stopped blocking
+    _freed_s: dict[str, float] = field(default_factory=dict)  # when such a topic was last renewed
+    _once: frozenset[str] = frozenset()  # of the silent topics, those of which each subscription gives one message
 
     def opened(self) -> None:
         """Another connection: another bridge may answer it."""
@@ -39,13 +44,18 @@ class Passing:
         self._asked_s.clear()
         self._is_subscribed.clear()
         self._freed.clear()
+        self._freed_s.clear()
+        self._once = frozenset()
 
-    def follow(self, silent: Collection[str], now_s: float) -> None:
-        """Judged topics with a publisher of which nothing came yet, on this connection."""
-        for known in (self._since_s, self._asked_s, self._is_subscribed):
+    def follow(self, silent: Collection[str], now_s: float, *, once: Collection[str] = ()) -> None:
+        """Judged topics with a publisher of which nothing came yet, on this connection; `once`: of which one message
+        came with each subscription."""
+        self._once = frozenset(once)
+        silent = self._once.union(silent)
+        for known in (self._since_s, self._asked_s, self._is_subscribed, self._freed_s):
             for topic in [topic for topic in known if topic not in silent]:
                 del known[topic]
-        self._freed &= set(silent)
+        self._freed &= silent
         for topic in silent:
             self._since_s.setdefault(topic, now_s)
 
@@ -70,7 +80,9 @@ class Passing:
 
     def to_renew(self, now_s: float) -> list[str]:
         """Returns, once, the topics that may arrive after a new subscription, because a client left them."""
-        freed, self._freed = sorted(self._freed), set()
+        freed = sorted(one for one in self._freed if now_s - self._freed_s.get(one, -math.inf) >= AGAIN_S)
+        self._freed -= set(freed)
+        self._freed_s.update(dict.fromkeys(freed, now_s))
         self._asked_s.update(dict.fromkeys(freed, now_s))  # the bridge needs a moment to subscribe
         return freed
 
@@ -90,12 +102,15 @@ class Passing:
     def problem(self, now_s: float) -> Problem | None:
         """What keeps the topics from us; None: nothing is known to."""
         hidden = sorted(topic for topic, is_subscribed in self._is_subscribed.items() if not is_subscribed)
+        hidden = [topic for topic in hidden if topic not in self._once]
         if hidden:
             return connection_errors.hidden_topics(hidden)
+        if self._once and self.clients:
+            return connection_errors.single_messages(sorted(self._once), self.clients)
         blocked = sorted(
             topic
             for topic, since_s in self._since_s.items()
-            if self._is_subscribed.get(topic) and now_s - since_s >= BLOCKED_AFTER_S
+            if topic not in self._once and self._is_subscribed.get(topic) and now_s - since_s >= BLOCKED_AFTER_S
         )
         if blocked and self.clients:
             return connection_errors.blocked_topics(blocked, self.clients)

@@ -293,7 +293,7 @@ def silent_car(state: dict[str, Any]) -> dict[str, Any]:
     """A state whose car fell silent."""
     problem = {
         "code": "car_silent", "title": "The car fell silent.", "mark": "silent",
-        "hint": "Server and bridge answer; no message comes from the car.",
+        "hint": "Server and bridge answer; no signal comes from the car.",
     }  # fmt: skip
     return _cut(state, "bridge-car", car_age_s=3.35, problem=problem)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -16,7 +17,7 @@ from server.vehicle.discovery import Offer
 
 def drive(
     delivery: Delivery,
-    publishers: dict[str, tuple[str, ...] | None],
+    publishers: Mapping[str, tuple[str, ...] | None],
     *,
     flows: dict[str, float],
     seconds: float,
@@ -119,6 +120,38 @@ def test_a_signal_s_topic_that_stops_is_subscribed_to_anew_while_its_publisher_i
         drive(delivery, {}, flows={"/vel": 0.1, "/brake": 0.1}, seconds=10.0)
         _, renewed = drive(delivery, {"/brake": nodes}, flows={"/vel": 0.1}, seconds=10.0, start_s=10.1)
         assert bool(renewed) is expected
+
+
+@pytest.mark.world(n=27)
+@pytest.mark.parametrize("before", [(), ("/car",)])
+def test_a_publisher_that_comes_back_after_many_renewals_is_renewed_soon(before: tuple[str, ...]) -> None:
+    delivery = Delivery()
+    delivery.follow(["/vel", "/brake"], [], 0.0)
+    drive(delivery, {}, flows={"/vel": 0.1, "/brake": 0.1}, seconds=10.0)
+    _, renewed = drive(delivery, {"/brake": ("/car",)}, flows={"/vel": 0.1}, seconds=600.0, start_s=10.1)
+    gaps = [later - sooner for (sooner, _), (later, _) in pairwise(renewed)]
+    assert 4 <= len(renewed) <= 8
+    assert all(later >= sooner - 1.0 for sooner, later in pairwise(gaps))
+    drive(delivery, {"/brake": before}, flows={"/vel": 0.1}, seconds=30.0, start_s=610.2)
+    _, renewed = drive(delivery, {"/brake": ("/new",)}, flows={"/vel": 0.1}, seconds=20.0, start_s=640.3)
+    assert len(renewed) >= 1
+
+
+@pytest.mark.world(n=27)
+def test_a_slow_topic_that_starts_with_one_message_is_soon_left_alone_and_nobody_is_blamed() -> None:
+    delivery = Delivery()
+    delivery.follow(["/vel", "/fuel"], [], 0.0)
+    renewed = []
+    for step in range(6000):
+        now_s = step / 10
+        delivery.heard("/vel", now_s)
+        if step % 200 == 30:
+            delivery.heard("/fuel", now_s)
+        for topic in delivery.to_ask(now_s):
+            if delivery.answered(topic, ("/car",), now_s):
+                renewed.append(now_s)
+        assert delivery.came_once(now_s) == []
+    assert len(renewed) <= 6
 
 
 @pytest.mark.world(n=9)

@@ -98,8 +98,10 @@ def silent(
     was_active: bool = False,
     slow_s: float | None = None,
     command_s: float | None = None,
+    position_s: float | None = None,
+    check: str = "car_silent",
 ) -> Finding:
-    """A car at 100 s whose fast signals are so old, and whose diagnostics, once a second, may be younger."""
+    """A car at 100 s whose fast signals are so old; diagnostics and position, once a second, may be younger."""
     names = ("speed", "brake", "steering", "distance")
     readings = {
         name: Reading(value=0, received_s=100.0 - age_s, horizon_s=1.0, period_s=0.05, count=9)
@@ -107,13 +109,13 @@ def silent(
     }
     if slow_s is not None:
         readings["diagnostics"] = Reading(value=0, received_s=100.0 - slow_s, horizon_s=10.0, period_s=1.0, count=9)
+    if position_s is not None:
+        readings["position"] = Reading(value=0, received_s=100.0 - position_s, horizon_s=10.0, period_s=1.0, count=9)
     if command_s is not None:
         readings["command"] = Reading(value=0, received_s=100.0 - command_s, horizon_s=1.0, period_s=0.05, count=9)
     heard_s = max((reading.received_s for reading in readings.values()), default=None)
     link = replace(OPEN, bridge_heard_s=bridge_s)
-    return ask(
-        "car_silent", Snapshot(now_s=100.0, readings=readings, link=link, heard_s=heard_s), was_active=was_active
-    )
+    return ask(check, Snapshot(now_s=100.0, readings=readings, link=link, heard_s=heard_s), was_active=was_active)
 
 
 @pytest.mark.parametrize(
@@ -132,10 +134,20 @@ def silent(
         pytest.param(silent(1.5, slow_s=0.1), OK, id="one fast signal alone is the signal's own alarm"),
         pytest.param(silent(1.5, slow_s=2.0, bridge_s=99.9), FAULT, id="one fast signal and nothing since"),
         pytest.param(silent(), UNKNOWN, id="never spoke"),
+        pytest.param(silent(1.5, 1.5, 1.5, bridge_s=99.9, position_s=0.4), OK, id="another signal goes on"),
+        pytest.param(silent(1.5, 1.5, 1.5, bridge_s=99.9, position_s=1.4), FAULT, id="it came last with the others"),
+        pytest.param(silent(4.0, 4.0, 4.0, bridge_s=99.9, position_s=2.0), FAULT, id="it has ended too"),
+        pytest.param(silent(1.5, 1.5, 1.5, was_active=True, position_s=0.1), OK, id="active, and another signal comes"),
     ],
 )
 def test_the_car_fell_silent(finding: Finding, verdict: Verdict) -> None:
     assert finding.verdict is verdict
+
+
+@pytest.mark.parametrize(("position_s", "verdict"), [(0.4, FAULT), (1.5, UNKNOWN)])
+def test_signals_that_stop_while_another_goes_on_are_silent_themselves(position_s: float, verdict: Verdict) -> None:
+    found = silent(1.5, 1.5, 1.5, bridge_s=99.9, position_s=position_s, check="signal_stale.speed")
+    assert found.verdict is verdict
 
 
 def test_what_came_before_the_link_was_lost_does_not_count() -> None:
@@ -145,6 +157,7 @@ def test_what_came_before_the_link_was_lost_does_not_count() -> None:
 
 def test_who_is_silent_is_said() -> None:
     assert (
-        silent(3.4, 3.4, 3.4, bridge_s=99.5).text == "No message for 3.4 s: the bridge answers, the car sends nothing"
+        silent(3.4, 3.4, 3.4, bridge_s=99.5).text
+        == "No message for 3.4 s: the bridge answers, no signal of the car comes"
     )
     assert silent(3.4, 3.4, 3.4).text == "No message for 3.4 s: neither car nor bridge answers"

@@ -12,7 +12,7 @@ from server.analysis.rehearse import rehearse
 from server.app.config import Config
 from server.judge.drive import Drive
 from server.judge.offline import OfflineRun
-from server.recording.delay import DelayWriter, LinkDelay, RecordedDelay, recorded_delay
+from server.recording.delay import MOST_S, DelayWriter, LinkDelay, RecordedDelay, recorded_delay
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import open_recording
 from server.rosbridge_server.server import RosBridge
@@ -132,3 +132,8 @@ def test_a_row_that_makes_no_sense_is_no_delay(row: dict[str, Any]) -> None:
     delay = delay_of([(1.0, row)])
     assert delay.receive("/vel", 2.0) == 0.0
     assert (delay.link(2.0).late_s, delay.link(2.0).throttled, delay.link(2.0).reduced) == (None, frozenset(), None)
+
+
+def test_a_sample_that_is_older_than_any_delay_is_read_as_the_oldest() -> None:
+    row = DelayWriter().row({"/fuel": 90_000.0}, LinkDelay())
+    assert delay_of([(5.0, row)]).receive("/fuel", 5.0) == MOST_S
