@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, Protocol
 
 from monitor.catalog import AllLimits
@@ -20,7 +21,7 @@ from server.judge.units import UNITS
 
 TICK_S = 0.05  # every check is judged this often
 
-NO_UNITS: Mapping[str, str] = {}
+NO_UNITS: Mapping[str, str] = MappingProxyType({})
 ByTopic = Mapping[str, tuple[Source, ...]]
 
 
