@@ -323,7 +323,7 @@ function mountDesk({ monitor, say, store, tabs }) {
 
 /** Fetches the screens that an operator may want when the server is gone. */
 function prefetch() {
-  for (const load of [() => import('./slowdown/slow-sheet.js'), () => import('./alarms/log.js'), () => import('./home/signals.js'), () => styled('sources'), () => import('./scan/scan.js'), () => import('./home/drive-screen.js')]) load().catch(() => {});
+  for (const load of [() => import('./slowdown/slow-sheet.js'), () => import('./alarms/log.js'), () => import('./home/signals.js'), () => styled('sources'), () => styled('menu'), () => import('./scan/scan.js'), () => import('./home/drive-screen.js')]) load().catch(() => {});
 }
 
 /**

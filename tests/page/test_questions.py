@@ -215,7 +215,7 @@ async def test_a_note_on_the_mounting_stands_on_scan_and_leads_to_its_settings(p
     await expect(note).to_be_hidden()
 
 
-@pytest.mark.parametrize("size", [(820, 1180), (1440, 900)])
+@pytest.mark.parametrize("size", [(820, 1080), (1440, 900)])
 async def test_on_a_wide_screen_keys_scale_and_note_cover_one_another_nowhere(
     phone: Phone, canned: Canned, size: tuple[int, int]
 ) -> None:
