@@ -214,11 +214,6 @@ class SessionRecording:
         self._parts.learn(definitions)
 
     @property
-    def is_on(self) -> bool:
-        """Whether a message of the car would be recorded."""
-        return self._state.session is not None and self._state.session.lost_s is None
-
-    @property
     def part(self) -> tuple[str, int] | None:
         """The part that a message of the car would be recorded in: its session and number; None: it would not be."""
         session = self._state.session

@@ -83,7 +83,7 @@ def test_what_is_no_mark_is_recorded_as_a_message() -> None:
         "car",
         cast("Any", None),
         cast("Any", SimpleNamespace(reception=reception, transport=transport)),
-        cast("Any", SimpleNamespace(is_on=True, take=lambda topic, type, message, *_: recorded.append(message))),
+        cast("Any", SimpleNamespace(part="1", take=lambda topic, type, message, *_: recorded.append(message))),
         cast("Any", None),
         TickParts("car"),
         cast("Any", SimpleNamespace(button=button)),
