@@ -115,3 +115,26 @@ def test_what_is_wrong_with_transforms_is_a_note_of_the_drive(tmp_path: Path) ->
         drive = judged_drive(recording)
         assert "The frame laser is below base_link and also below rear_link." in drive.notes
         assert recording.rejected == {}
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("turn_deg", range(0, 360, 45))
+@pytest.mark.parametrize("topic", ["/tf_static", "/tf"])
+def test_of_two_lasers_the_one_that_looks_ahead_is_taken(
+    tmp_path: Path, version: int, turn_deg: int, topic: str
+) -> None:
+    """The lasers look in opposite directions; where neither looks ahead, it is asked."""
+    rows: list[Row] = []
+    for number, name in enumerate(("one", "two")):
+        yaw_rad = math.radians(turn_deg + 180 * number)
+        laser = Laser(yaw_rad=yaw_rad, first_rad=-math.pi / 2, beams=181, increment_rad=math.pi / 180)
+        rows += [
+            (0.1 * n, f"/{name}/scan", "sensor_msgs/msg/LaserScan", laser.scan(POST, frame=name)) for n in range(100)
+        ]
+        rows.append(sent(3.0 + number, laser.transform(child=name), topic=topic))
+    with open_recording([written(tmp_path / "drive", version, rows)]) as recording:
+        choice = judged_drive(recording).epochs[0].choice
+    expected = {0: "/one/scan", 45: "/one/scan", 315: "/one/scan", 180: "/two/scan", 135: "/two/scan", 225: "/two/scan"}
+    source = choice.sources.get("scan")
+    assert (source and source.topic) == expected.get(turn_deg)
+    assert len(choice.questions) == (turn_deg not in expected)

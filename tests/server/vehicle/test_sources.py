@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import time
 from collections.abc import AsyncIterator, Callable
 from typing import Any
@@ -20,7 +21,7 @@ from tests.server.conftest import serving
 from tests.server.viewer import viewer
 
 FRONT, REAR = "/front_lidar/scan", "/rear_lidar/scan"
-ODOM, STAMPED = "nav_msgs/Odometry", "geometry_msgs/TwistStamped"
+ODOM, STAMPED, TF = "nav_msgs/Odometry", "geometry_msgs/TwistStamped", "tf2_msgs/TFMessage"
 Publish = Callable[[RosBridge, float], None]
 
 
@@ -93,6 +94,29 @@ async def test_two_lasers_are_asked_for_and_the_answer_makes_the_obstacle_alarm(
         assert state["questions"] == []
         laser = state["signals"]["scan"]
         assert (laser["topic"], laser["why"], laser["frame"]) == (FRONT, "chosen by the operator", "front")
+
+
+def static_tf(frame: str, yaw_rad: float) -> dict[str, Any]:
+    rotation = {"x": 0.0, "y": 0.0, "z": math.sin(yaw_rad / 2), "w": math.cos(yaw_rad / 2)}
+    header = {"seq": 0, "stamp": {"secs": 1, "nsecs": 0}, "frame_id": "base_link"}
+    transform = {"translation": dict(ZERO), "rotation": rotation}
+    return {"header": header, "child_frame_id": frame, "transform": transform}
+
+
+@pytest.mark.virtual_time
+@pytest.mark.parametrize(("front_rad", "ahead"), [(0.0, FRONT), (math.pi, REAR)])
+async def test_the_laser_that_looks_ahead_by_the_transforms_is_taken(front_rad: float, ahead: str) -> None:
+    tf = {"transforms": [static_tf("front", front_rad), static_tf("rear", front_rad + math.pi)]}
+    topics = {"/odom": ODOM, FRONT: "sensor_msgs/LaserScan", REAR: "sensor_msgs/LaserScan", "/tf_static": TF}
+
+    def publish(bridge: RosBridge, at_s: float) -> None:
+        two_lasers(bridge, at_s)
+        bridge.publish("/tf_static", tf)
+
+    async with car(topics, publish) as (_, base), viewer(base) as one:
+        state = await one.state(lambda s: s["signals"]["scan"]["freshness"] == "fresh")
+        assert (state["signals"]["scan"]["topic"], state["signals"]["scan"]["why"]) == (ahead, "looks ahead by TF")
+        assert state["questions"] == []
 
 
 @pytest.mark.virtual_time
