@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from monitor.freeze_detection import COMPARED, RepeatFollower, Wheels
-from monitor.rates import RateMeter
+from monitor.rates import Rate, RateMeter
 from monitor.reading import Reading
 from monitor.reading_history import ReadingHistory
 from monitor.signals import Signal
 from monitor.stamps import StampFollower
+
+RATES_EVERY_S = 0.5  # a rate over 5 s does not change faster
 
 
 class SignalStats:
@@ -72,3 +76,20 @@ class SignalStats:
             return False
         self.lowest, self.highest = min(self.lowest, number), max(self.highest, number)
         return True
+
+
+class MeasuredRates:
+    """The rates of all signals, measured every RATES_EVERY_S."""
+
+    def __init__(self, stats: Mapping[str, SignalStats]) -> None:
+        """`stats`: by signal."""
+        self._stats = stats
+        self._rates: Mapping[str, Rate] = MappingProxyType({})
+        self._at_s: float | None = None
+
+    def at(self, now_s: float) -> Mapping[str, Rate]:
+        """The rates by signal, at most RATES_EVERY_S old."""
+        if self._at_s is None or not 0.0 <= now_s - self._at_s < RATES_EVERY_S:
+            self._at_s = now_s
+            self._rates = MappingProxyType({name: stats.meter.rate(now_s) for name, stats in self._stats.items()})
+        return self._rates

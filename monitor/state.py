@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from copy import copy
 from types import MappingProxyType
 from typing import Any
 
@@ -13,14 +14,13 @@ from monitor.freeze_detection import Wheels
 from monitor.heard_modes import HeardModes
 from monitor.link import LinkFacts, Phase
 from monitor.phones import PhoneReport, Phones
-from monitor.rates import Rate
 from monitor.reach import ReachFacts
 from monitor.reading import Extent, Freshness, Reading
 from monitor.reading_history import ReadingHistory
 from monitor.reading_table import ReadingTable
 from monitor.recorder import RecorderFacts
 from monitor.scan_parts import Scans
-from monitor.signal_stats import SignalStats
+from monitor.signal_stats import MeasuredRates, SignalStats
 from monitor.signals import SIGNALS
 from monitor.slow_proof import ProofFollower
 from monitor.slowing import SlowingFacts
@@ -33,7 +33,6 @@ from monitor.values import Diagnostics, DriveMode, GpsFix, LaserScan, Twist, Val
 __all__ = ["Extent", "Freshness", "LinkFacts", "NotFresh", "Phase", "Reading", "Snapshot", "State", "TrackPoint"]
 
 CLOCK_BACK_S = 0.5
-RATES_EVERY_S = 0.5  # a rate over 5 s does not change faster
 
 
 class State:
@@ -52,8 +51,7 @@ class State:
         self._table = ReadingTable()
         self.age = self._table.age
         self._derived = DerivedSignals(self._table)
-        self._rates: Mapping[str, Rate] = MappingProxyType({})
-        self._rates_at_s: float | None = None
+        self._rates = MeasuredRates(self._stats)
         self._heard_s: float | None = None
         self._unusable: Mapping[str, Unusable] = MappingProxyType({})
         self._latest_s = -math.inf
@@ -214,7 +212,7 @@ class State:
             now_s=now_s,
             readings=table.readings(),
             link=self.link_facts,
-            rates=self._measure(now_s),
+            rates=self._rates.at(now_s),
             paused=self.paused,
             paused_since_s=self._paused_since_s,
             heard_s=self._heard_s,
@@ -241,11 +239,12 @@ class State:
 
     def glance(self, now_s: float) -> Snapshot:
         """Like `snapshot`, for display only: it does not affect later evaluations."""
-        kept = self._rates_at_s, self._rates, self._latest_s
+        kept = self._rates, self._latest_s
+        self._rates = copy(self._rates)
         try:
             return self._known(now_s)
         finally:
-            self._rates_at_s, self._rates, self._latest_s = kept
+            self._rates, self._latest_s = kept
 
     def _follow_clock(self, at_s: float) -> None:
         """Keep all ages when the clock goes back; otherwise old values would look new for a long time."""
@@ -278,13 +277,6 @@ class State:
         number = None if stats.headline is None else getattr(reading.value, stats.headline, None)
         if number is not None:
             self._extend(stats, signal, number)
-
-    def _measure(self, now_s: float) -> Mapping[str, Rate]:
-        at_s = self._rates_at_s
-        if at_s is None or not 0.0 <= now_s - at_s < RATES_EVERY_S:
-            self._rates_at_s = now_s
-            self._rates = MappingProxyType({name: stats.meter.rate(now_s) for name, stats in self._stats.items()})
-        return self._rates
 
     def _extend(self, stats: SignalStats, signal: str, number: float) -> None:
         if stats.widen(number):

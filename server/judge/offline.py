@@ -243,7 +243,8 @@ class OfflineRun:
 
     def _tick(self, now_s: float) -> None:
         run_state = self.run_state
-        run_state.state.link(self._observer.link(self._link(now_s), now_s))
+        facts = _link(self.drive, self._epoch, run_state, now_s)
+        run_state.state.link(self._observer.link(facts, now_s))
         run_state.state.slow(run_state.slow_down.facts(now_s, self._epoch.tuning.limits.slow_down))
         self._report(pipeline.judge(run_state.monitor, run_state.state, now_s, None), now_s)
         run_state.minute.note(run_state.monitor.findings, now_s)
@@ -303,25 +304,25 @@ class OfflineRun:
         if before:
             self._restore(before)
 
-    def _link(self, now_s: float) -> LinkFacts:
-        """A link that opened with the first message and answers as long as there is something to read."""
-        run_state, delay = self.run_state, self.drive.delay
-        found = delay.link(now_s) if delay is not None else None
-        return LinkFacts(
-            late_s=found.late_s if found is not None else None,
-            throttled=found.throttled if found is not None else frozenset(),
-            reduced=found.reduced if found is not None else None,
-            phase="monitoring",
-            since_s=run_state.opened_s,
-            bridge_heard_s=now_s,
-            bridge_answers=True,
-            topics_subscribed=len(self._epoch.published),
-            connected_s=run_state.opened_s,
-            last_message_s=run_state.last_message_s,
-            published=self._epoch.published,
-            undecided=self._epoch.undecided,
-            wall_zero_s=None if self.drive.clock_steps else self.drive.start_s,  # one that was set proves nothing
-        )
+
+def _link(drive: Drive, epoch: SettingsEpoch, run_state: RunState, now_s: float) -> LinkFacts:
+    """A link that opened with the first message and answers as long as there is something to read."""
+    found = drive.delay.link(now_s) if drive.delay is not None else None
+    return LinkFacts(
+        late_s=found.late_s if found is not None else None,
+        throttled=found.throttled if found is not None else frozenset(),
+        reduced=found.reduced if found is not None else None,
+        phase="monitoring",
+        since_s=run_state.opened_s,
+        bridge_heard_s=now_s,
+        bridge_answers=True,
+        topics_subscribed=len(epoch.published),
+        connected_s=run_state.opened_s,
+        last_message_s=run_state.last_message_s,
+        published=epoch.published,
+        undecided=epoch.undecided,
+        wall_zero_s=None if drive.clock_steps else drive.start_s,  # one that was set proves nothing
+    )
 
 
 def _answered(monitor: Monitor, event: Transition, now_s: float) -> tuple[Transition, ...]:

@@ -84,20 +84,11 @@ def receive(
         value = reception.read(source, message, note)
         if value is not None and source.signal in UNITS:
             basis = UnitBasis(profile=profile, chosen=units, tyre_rad_per_unit=tyre_rad_per_unit)
-            published = value
-            value = reception.in_unit(source, published, at_s, basis)
+            published, value = value, reception.in_unit(source, value, at_s, basis)
             if reception.units.is_void:
-                state.forget(source.signal)
-                if value is None and on_number is not None and (number := number_of(published)) is not None:
-                    on_number(source.signal, number, at_s, stamp)
+                _void(source, state, None if value is not None else published, at_s, stamp, on_number)
         if value is None:
-            tally = reception.tally(source.signal)
-            if tally.why_not_measured is not None:
-                state.refuse(source.signal, tally.why_not_measured, at_s, is_declared=True)
-                continue
-            is_proper = False
-            if source.decode is not None:
-                state.refuse(source.signal, tally.last_reason or "unreadable", at_s)
+            is_proper &= _without_value(source, reception, state, at_s)
             continue
         if source.carries:
             reception.units.see(source.signal, value, at_s)
@@ -111,6 +102,31 @@ def receive(
     if not is_proper:
         reception.rejected += 1
     return changed
+
+
+def _without_value(source: Source, reception: Reception, state: State, at_s: float) -> bool:
+    """A message has no value of a signal; whether it is proper all the same."""
+    tally = reception.tally(source.signal)
+    if tally.why_not_measured is not None:
+        state.refuse(source.signal, tally.why_not_measured, at_s, is_declared=True)
+        return True
+    if source.decode is not None:
+        state.refuse(source.signal, tally.last_reason or "unreadable", at_s)
+    return False
+
+
+def _void(
+    source: Source,
+    state: State,
+    published: Any | None,
+    at_s: float,
+    stamp: float | None,
+    on_number: Callable[[str, float, float, float | None], None] | None,
+) -> None:
+    """What was received of a signal is of another unit, or of none; `published`: a value whose unit is not known."""
+    state.forget(source.signal)
+    if published is not None and on_number is not None and (number := number_of(published)) is not None:
+        on_number(source.signal, number, at_s, stamp)
 
 
 def _refuse(sources: tuple[Source, ...], why: str, at_s: float, reception: Reception, state: State) -> None:

@@ -114,16 +114,13 @@ def session_parts(
 
     def subscriptions(link: LiveSource | None) -> Subscriptions:
         return Subscriptions(
-            link,
-            settings,
-            now=now,
-            proved=lambda: connection.prove(),
+            link, settings, now=now, proved=lambda: connection.prove(),
             recognised=lambda title: observer.settings_changed([f"Vehicle profile: {title}"], by=None),
             learned=recording.learn,
             noted=lambda text: event_log.note("not_received", text),
             timed=lambda asked_s, ros_s: judgement.transport.clock.answered(asked_s, now(), ros_s),
             place=lambda topic, scan: judgement.frames.looks_ahead(topic, scan),
-        )
+        )  # fmt: skip
 
     authorization = Authorization(event_log.note, fence=bus.last_event(vehicle))
     connection = Connection(vehicle, observer, intake, subscriptions, open_source, supervisor, now=now)

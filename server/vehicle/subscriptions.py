@@ -45,8 +45,7 @@ class Subscriptions:
         timed: Callable[[float, float], None] = lambda *_: None,
         place: Place | None = None,
     ) -> None:
-        """`link` None: no car is dialled. `timed`: the time of the call and the time of ROS; `place`: as of
-        `server.judge.sources.evidence.Evidence`."""
+        """`link` None: no car is dialled. `timed`: the time of the call and of ROS; `place`: as of `Evidence`."""
         self._link = link
         self._tuning = tuning
         self._now = now
@@ -88,11 +87,9 @@ class Subscriptions:
                 if self.table.tries_another():
                     self._subscribe()
                 if self._offer is not None:
-                    candidates = could_carry(self._offer.topics, self._tuning.settings.topics)
+                    found = could_carry(self._offer.topics, self._tuning.settings.topics)
                     commanded = {ros.commanded_on, self.signals.command_topic}
-                    await self._missing.look(
-                        asks, candidates, commanded=commanded, is_current=lambda: link is self._link
-                    )
+                    await self._missing.look(asks, found, commanded=commanded, is_current=lambda: link is self._link)
                 await self._missing.look_behind(asks)
             except LinkDown:
                 return

@@ -14,6 +14,11 @@ from server.recording.read.source import Channel
 _IDL_SEPARATOR = "=" * 80 + "\n"
 
 
+def definition_of(channel: Channel) -> str | None:
+    """In .msg or .idl text; a channel of JSON has none, even where a ROS type is named."""
+    return channel.definition or None if channel.encoding != "json" else None
+
+
 def definitions_of(channel: Channel, version: RosVersion, distro: str | None) -> dict[str, Any]:
     """Field definitions by type, as rosbags has them, of a channel's type and all it contains. Raises Undecodable."""
     if channel.format == "none":

@@ -18,7 +18,7 @@ from server.recording.mcap.mcap_file import McapFile
 from server.recording.own import PREFIX
 from server.recording.read.beforehand import beforehand
 from server.recording.read.decode import Decode, compile_decoder
-from server.recording.read.definitions import definitions_of
+from server.recording.read.definitions import definition_of, definitions_of
 from server.recording.read.errors import NoRoom, RecordingUnreadable, Undecodable
 from server.recording.read.open_file import open_file
 from server.recording.read.recognise import Found, FoundRecording, by_name, recognise
@@ -219,7 +219,7 @@ class Recording:
             self.topics[channel.topic] = TopicInfo(
                 type=type,
                 count=channel.count + (known.count if known else 0),
-                definition=_definition_of(channel) or (known.definition if known else None),
+                definition=definition_of(channel) or (known.definition if known else None),
                 is_latched=channel.is_latched or (known is not None and known.is_latched),
             )
         return readers
@@ -256,11 +256,6 @@ def _made_steady(sources: Sequence[FileSource]) -> list[ClockStep]:
         raise
     except Exception as error:
         raise RecordingUnreadable(_what_is_wrong(sources[0].path, error)) from None
-
-
-def _definition_of(channel: Channel) -> str | None:
-    """In .msg or .idl text; a channel of JSON has none, even where a ROS type is named."""
-    return channel.definition or None if channel.encoding != "json" else None
 
 
 def _nothing(raw: bytes) -> dict[str, Any]:
