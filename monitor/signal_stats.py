@@ -87,6 +87,12 @@ class MeasuredRates:
         self._rates: Mapping[str, Rate] = MappingProxyType({})
         self._at_s: float | None = None
 
+    def copy(self) -> MeasuredRates:
+        """Another one that has measured the same."""
+        other = MeasuredRates(self._stats)
+        other._rates, other._at_s = self._rates, self._at_s
+        return other
+
     def at(self, now_s: float) -> Mapping[str, Rate]:
         """The rates by signal, at most RATES_EVERY_S old."""
         if self._at_s is None or not 0.0 <= now_s - self._at_s < RATES_EVERY_S:

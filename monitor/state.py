@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from copy import copy
 from types import MappingProxyType
 from typing import Any
 
@@ -240,7 +239,7 @@ class State:
     def glance(self, now_s: float) -> Snapshot:
         """Like `snapshot`, for display only: it does not affect later evaluations."""
         kept = self._rates, self._latest_s
-        self._rates = copy(self._rates)
+        self._rates = self._rates.copy()
         try:
             return self._known(now_s)
         finally:

@@ -10,11 +10,12 @@ from typing import Protocol
 from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
 from server.judge.message import Json, RosVersion
+from server.judge.offers import offers
 from server.judge.recorded_events import NewSettings, RecordedEvents
 from server.judge.recorded_transforms import RecordedTransforms
 from server.judge.ros_names import BadName, canonical_name
 from server.judge.settings import BadSetting
-from server.judge.settings_override import SettingsOverride, recorded_override, tuning_for
+from server.judge.settings_override import NO_CHOICES, SettingsOverride, recorded_override, tuning_for
 from server.judge.sources import survey as source_survey
 from server.judge.sources.candidates import to_compare
 from server.judge.sources.choice import Choice, choose
@@ -25,6 +26,7 @@ from server.judge.unit_evidence import Evidence as UnitEvidence
 from server.judge.unit_survey import Surveyed, survey
 from server.judge.unit_watch import Key, UnitBasis
 from server.protocol.questions import Question
+from server.protocol.topic_offer import TopicOffer
 
 Row = tuple[float, str, str, Json]  # seconds since 1970, topic, type, message
 
@@ -121,8 +123,12 @@ class Drive:
         fallback: str = "",
         signals: Collection[str] | None = None,
         evidence: Evidence | None = None,
+        choices: SettingsOverride = NO_CHOICES,
     ) -> None:
-        """`evidence`: of the same recording, where it was gathered already."""
+        """`evidence`: of the same recording, where it was gathered already. `choices`: topics and units that are chosen
+        now, before those that were recorded."""
+        self._choices = choices
+        self._fallback = fallback
         self._signals = signals
         self._source = source
         self.evidence = evidence  # None: no topics compete, or not gathered yet
@@ -185,11 +191,29 @@ class Drive:
     def _recorded_epoch(self, toml: str) -> SettingsEpoch:
         override, left_out = recorded_override(toml)
         self.notes += left_out
+        topics, units = {**override.topics, **self._choices.topics}, {**override.units, **self._choices.units}
         try:
-            return self._epoch(override)
+            epoch = self._epoch(replace(override, topics=topics, units=units))
+            later = self._chosen_later(epoch)
+            return self._epoch(replace(override, topics=topics | later, units=units)) if later else epoch
         except BadSetting as why:
             self.notes.append(f"The settings cannot be used, so the defaults are: {why}")
             return self._epoch(SettingsOverride())
+
+    def _chosen_later(self, epoch: SettingsEpoch) -> dict[str, str]:
+        """Signal → topic that the operator chose since, of what the recorded settings leave open."""
+        if not epoch.undecided or not self._fallback:
+            return {}
+        chosen = recorded_override(self._fallback)[0].topics
+        return {
+            signal: topic
+            for signal, topic in chosen.items()
+            if signal in epoch.undecided and signal not in epoch.tuning.settings.topics and topic in self.offered
+        }
+
+    def offers(self, epoch: SettingsEpoch) -> dict[str, list[TopicOffer]]:
+        """Signal → the topics that can carry it, with what is known of each."""
+        return offers(self.offered, epoch.choice.reasons, self.evidence or Evidence())
 
     def _epoch(self, override: SettingsOverride) -> SettingsEpoch:
         """Raises BadSetting."""

@@ -24,6 +24,9 @@ class SettingsOverride:
     profile: str = AUTO
 
 
+NO_CHOICES = SettingsOverride()
+
+
 def recorded_override(toml: str) -> tuple[SettingsOverride, list[str]]:
     """What can be used of the settings in a recording, and a sentence for each that cannot."""
     left_out: list[str] = []

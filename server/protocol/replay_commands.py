@@ -8,6 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 Moment = Annotated[float, Field(allow_inf_nan=False, ge=-1e9, le=1e9)]
 
+Word = Annotated[str, Field(max_length=300)]
+
 
 class _Order(BaseModel):
     model_config = ConfigDict(extra="ignore", strict=True, frozen=True)
@@ -16,11 +18,14 @@ class _Order(BaseModel):
 
 
 class OpenReplay(_Order):
-    """Opens a recording by its id, at a moment [s since its beginning]."""
+    """Opens a recording by its id, at a moment [s since its beginning]. `topics` (signal → topic) and `units` (signal →
+    name) are chosen for this replay, before those that were recorded."""
 
     do: Literal["open"]
     recording: Annotated[str, Field(min_length=1, max_length=120)]
     at_s: Moment = 0.0
+    topics: dict[Word, Word] = Field(default_factory=dict, max_length=50)
+    units: dict[Word, Word] = Field(default_factory=dict, max_length=50)
 
 
 class OpenBeside(_Order):

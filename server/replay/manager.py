@@ -218,8 +218,9 @@ class ReplayClient:
                 self._on_new("state")
             case "scan":
                 self.scan = payload
-                self.numbers["scan"] += 1
-                self._on_new("scan")
+                if payload:  # before the first scan there is nothing to offer
+                    self.numbers["scan"] += 1
+                    self._on_new("scan")
             case "timeline":
                 self.timeline = payload
                 self._notes = orjson.loads(payload)["notes"]

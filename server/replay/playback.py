@@ -13,6 +13,7 @@ from typing import Any
 
 from server.judge.drive import Drive
 from server.judge.offline import OfflineRun
+from server.judge.settings_override import NO_CHOICES, SettingsOverride
 from server.protocol import drive_trends, serialize
 from server.protocol.messages import Timeline
 from server.protocol.state import RecordedState, ReplayPosition
@@ -45,6 +46,7 @@ class Playback:
         open_again: Callable[[], Recording],
         *,
         settings: str,
+        choices: SettingsOverride = NO_CHOICES,
         now_s: float,
         at_s: float = 0.0,
         sketch: Sequence[float | None] = (),
@@ -53,7 +55,11 @@ class Playback:
         self._recording = recording
         self._trends = trends
         self.drive = Drive(
-            recording, read_recorded_events(recording), delay=recorded_delay(recording), fallback=settings
+            recording,
+            read_recorded_events(recording),
+            delay=recorded_delay(recording),
+            fallback=settings,
+            choices=choices,
         )
         self._index_recording = open_again()
         self.index = Index(self._index_recording, self.drive, sketch)
@@ -239,7 +245,8 @@ class Playback:
         return replay_frames.scan_bytes(self._run)
 
     def answer(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Answer a page's queries as a session does: `track_points`, `trends`, `drive_trends` and `check`."""
+        """Answer a page's queries as a session does: `track_points`, `trends`, `drive_trends`, `check` and
+        `signals`."""
         run_state = self._run.run_state
         if message.get("kind") == "drive_trends":
             return self._drive_trends(drive_trends.Wanted.of(message))
@@ -247,26 +254,14 @@ class Playback:
         if message.get("kind") == "trends":
             return serialize.trends(run_state.trends.piece(run_state.at_s, after=after))
         if message.get("kind") == "check":
-            return self._check(str(message.get("check")))
+            return _check(self._run, self.index, str(message.get("check")))
+        if message.get("kind") == "signals":
+            mapped = {source.topic for source in self._run.epoch.sources.values()}
+            rest = {name: kind for name, kind in self.drive.offered.items() if name not in mapped}
+            return queries.signals(self.drive.offers(self._run.epoch), rest, run_state.reception)
         return queries.track_points(
             run_state.state.glance(run_state.at_s), number=self.seeks, after=after if isinstance(after, int) else 0
         )
-
-    def _check(self, name: str) -> Mapping[str, Any]:
-        """One check at the moment that has been reached, with its alarms until then."""
-        run_state = self._run.run_state
-        now_s, monitor = run_state.at_s, run_state.monitor
-        answer = check_answer(monitor, name, now_s, run_state.minute)
-        if name not in monitor.alarms:
-            return dict(answer)
-        history = self.index.history(name, now_s)
-        spec, start_s = monitor.alarms[name].spec, self.drive.start_s
-        events = [
-            serialize.event(one, spec, round((start_s + one.at_s) * 1000), now_s=one.at_s, settings_version=0)
-            for one in history or ()
-        ]
-        numbered = [{**event, "n": n} for n, event in enumerate(events, 1)]
-        return {**answer, "history": None if history is None else numbered}
 
     def _drive_trends(self, wanted: drive_trends.Wanted) -> drive_trends.DriveTrendsAnswer:
         """A part of the recording, as far as the time line has read it."""
@@ -282,3 +277,19 @@ class Playback:
         if is_read or self._trends is None:
             return drive_trends.answer(index.trends, wanted, facts)
         return drive_trends.of_sketch(self._trends, index.trends, wanted, facts)
+
+
+def _check(run: OfflineRun, index: Index, name: str) -> Mapping[str, Any]:
+    """One check at the moment that has been reached, with its alarms until then."""
+    now_s, monitor = run.run_state.at_s, run.run_state.monitor
+    answer = check_answer(monitor, name, now_s, run.run_state.minute)
+    if name not in monitor.alarms:
+        return dict(answer)
+    history = index.history(name, now_s)
+    spec, start_s = monitor.alarms[name].spec, run.drive.start_s
+    events = [
+        serialize.event(one, spec, round((start_s + one.at_s) * 1000), now_s=one.at_s, settings_version=0)
+        for one in history or ()
+    ]
+    numbered = [{**event, "n": n} for n, event in enumerate(events, 1)]
+    return {**answer, "history": None if history is None else numbered}

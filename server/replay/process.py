@@ -20,6 +20,7 @@ from typing import Any, BinaryIO
 
 import orjson
 
+from server.judge.settings_override import SettingsOverride
 from server.recording.read.read import RecordingUnreadable, open_recording
 from server.replay.playback import Playback
 from server.replay.protocol import Kind, record
@@ -84,6 +85,7 @@ class _Process:
                 recording,
                 lambda: open_recording(paths),
                 settings=opening["settings"],
+                choices=SettingsOverride(topics=opening.get("topics", {}), units=opening.get("units", {})),
                 now_s=time.monotonic(),
                 at_s=opening["at_s"],
                 sketch=opening["sketch"],
@@ -171,7 +173,7 @@ class _Process:
                 self._scan_key = (-1, -1.0)
             case "pass_gaps":
                 playback.passes_gaps = order["wanted"] is True
-            case "trends" | "track_points" | "drive_trends" | "check":
+            case "trends" | "track_points" | "drive_trends" | "check" | "signals":
                 self._is_urgent = False
                 return playback.answer(order)
         return {"ok": True}

@@ -161,6 +161,8 @@ class ViewSource:
             "at_s": order.at_s,
             "settings": settings.get("toml", ""),
             "settings_version": settings.get("version", 0),
+            "topics": order.topics if isinstance(order, OpenReplay) else {},
+            "units": order.units if isinstance(order, OpenReplay) else {},
         }
         return await self._replays.open(order.recording, opening, on_new=self._on_new)
 

@@ -15,10 +15,10 @@ from server.protocol import commands, serialize
 from server.protocol import drive_trends as drive
 from server.protocol.answers import SignalsAnswer, TrackPoints
 from server.protocol.messages import Answer
+from server.protocol.topic_offer import TopicOffer
 from server.rosbridge import connection_errors
 from server.rosbridge.address import BadAddress
 from server.vehicle.judgement import Judgement
-from server.vehicle.signal_map import SignalMap
 
 REFUSALS = (commands.NotUnderstood, BadAddress, Refused, BadSetting, Conflict, OSError)  # what `refusal` has words for
 
@@ -95,12 +95,14 @@ def _joins(point: TrackPoint) -> int:
     return 2 if point.is_jump else 1 if point.is_after_gap else 0
 
 
-def signals(signal_map: SignalMap, reception: Reception, offered: Mapping[str, str] | None = None) -> SignalsAnswer:
-    """Topics beyond the signals, unreadable frames, and the possible topics of each signal; `offered` None: the topics
-    are unknown."""
+def signals(
+    candidates: dict[str, list[TopicOffer]] | None, unmapped: Mapping[str, str], reception: Reception
+) -> SignalsAnswer:
+    """The possible topics of each signal (None: not known), topics beyond the signals (topic → type), unreadable
+    frames."""
     return {
-        "candidates": None if offered is None else signal_map.candidates(offered),
-        "topics": [{"topic": name, "type": kind} for name, kind in sorted(signal_map.unmapped.items())],
+        "candidates": candidates,
+        "topics": [{"topic": name, "type": kind} for name, kind in sorted(unmapped.items())],
         "rejected": {
             SIGNALS[name].label: dict(tally.reasons) for name, tally in reception.by_signal.items() if tally.rejected
         },

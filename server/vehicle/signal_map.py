@@ -6,10 +6,11 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Protocol
 
 from monitor.signals import SIGNALS
+from server.judge.offers import offers
 from server.judge.sources.candidates import to_compare
 from server.judge.sources.choice import Choice, choose
 from server.judge.sources.evidence import Evidence, Place
-from server.judge.topics import COMMAND, Source, candidates
+from server.judge.topics import COMMAND, Source
 from server.protocol.questions import Question
 from server.protocol.topic_offer import TopicOffer
 
@@ -106,20 +107,7 @@ class SignalMap:
 
     def candidates(self, offered: Mapping[str, str]) -> dict[str, list[TopicOffer]]:
         """Signal → the topics that can carry it, with what is known of each."""
-        found = candidates(offered)
-        reasons = {} if self._choice is None else self._choice.reasons
-        for signal, rows in found.items():
-            for row in rows:
-                known, why = self._evidence.of(row["topic"]), reasons.get(signal, {}).get(row["topic"])
-                if why:
-                    row["why"] = why
-                if known.count:
-                    row["frame"] = known.frame
-                if signal == "scan" and known.picture is not None:
-                    row["ranges_m"] = list(known.picture.ranges_m)
-                    row["angle_min_rad"] = known.picture.angle_min_rad
-                    row["angle_increment_rad"] = known.picture.angle_increment_rad
-        return found
+        return offers(offered, {} if self._choice is None else self._choice.reasons, self._evidence)
 
     @property
     def command_topic(self) -> str | None:

@@ -95,3 +95,9 @@ test('a note on the mounting leads to its settings', () => {
   for (const note of ['mounting not known: no transform', 'assumed to look ahead: no transforms, and no setting']) assert.ok(isOfMounting(note), note);
   for (const note of ['', 'not a number (ranges)']) assert.ok(!isOfMounting(note), note);
 });
+
+test('a replay is of this page alone: who is in control of the car does not matter', () => {
+  const control = /** @type {any} */ ({ holder: 'Pixel 8', page: 'p' });
+  assert.equal(mayAnswer({ isViewer: false, page: 'q', control, replaying: true }), true);
+  assert.equal(mayAnswer({ isViewer: true, page: 'q', control, replaying: true }), false);
+});

@@ -15,6 +15,7 @@ from server.judge.topic import Topic
 MOST_COMPARED = 12  # topics of one signal
 OWN_NAMES = {"speed": "/catvehicle/vel", "scan": "/catvehicle/front_laser_points"}  # names that say enough
 OTHER_CAR = "of another car"
+USUAL_NAME = "a usual name"
 NO_PUBLISHER = "no node publishes it"
 
 
@@ -148,7 +149,7 @@ def what_is_known(one: Candidate, signal: str, evidence: Evidence) -> str:
     if signal == "speed" and known.is_earth_fixed:
         words.append("its velocity is east and north")
     if one.is_named:
-        words.append("a usual name")
+        words.append(USUAL_NAME)
     if known.frame:
         words.append(f"frame {known.frame}")
     return ", ".join(words)

@@ -17,6 +17,7 @@ from server.judge.sources import questions
 from server.judge.sources.candidates import (
     OTHER_CAR,
     OWN_NAMES,
+    USUAL_NAME,
     Candidate,
     Pools,
     cars_of,
@@ -299,7 +300,8 @@ class _Chooser:
                     known = f"{OTHER_CAR}: {car}" if self._car else f"of the car {car}"
                 source = sources.get(signal)
                 if source is not None and source.topic == one.topic and source.why:
-                    known = ", ".join(dict.fromkeys([source.why, *known.split(", ")])).rstrip(", ")
+                    rest = [words for words in known.split(", ") if words != USUAL_NAME or source.why != BY_NAME]
+                    known = ", ".join(dict.fromkeys([source.why, *rest])).rstrip(", ")
                 rows[one.topic] = known
         return found
 

@@ -19,6 +19,7 @@ MAX_DEFINITION = 256 * 1024  # letters; the longest of the standard ones has 7 0
 _SEPARATOR = "=" * 80
 _BASIC = {"boolean": "bool", "float": "float32", "double": "float64", "octet": "byte"}  # rosapi of ROS 2 → .msg
 _STAMPS = {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"}
+_TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")  # of noetic, and not among rosbags' types of it
 _LOOSE = orjson.dumps({"type": "object", "additionalProperties": True})
 
 
@@ -35,8 +36,12 @@ class Schema:
 
 @cache
 def standard(version: RosVersion) -> Any:
-    """The messages of the distribution; the first time a tenth of a second of work, and never changed."""
-    return get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
+    """The messages of the distribution; the first time a tenth of a second of work, and never changed afterwards."""
+    store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
+    for type in _TRANSFORMS:
+        if version == 1 and type not in store.types:
+            store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", type))
+    return store
 
 
 class TypeBook:

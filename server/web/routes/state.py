@@ -90,8 +90,8 @@ async def state(request: Request, vehicle: VehicleName = None) -> Response:
 
 
 @router.get("/api/signals", tags=["vehicle"], summary="Topics for each signal and beyond, what was rejected and why")
-async def signals(request: Request, vehicle: VehicleName = None) -> Response:
-    return as_json(await ask(request, vehicle, {"kind": "signals"}))
+async def signals(request: Request, vehicle: VehicleName = None, replay: ReplayToken = None) -> Response:
+    return as_json(await ask_either(request, vehicle, replay, {"kind": "signals"}))
 
 
 @router.get("/api/driving", tags=["vehicle"], summary="Time and distance in each mode, interventions and alarms a km")

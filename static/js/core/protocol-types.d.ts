@@ -1320,13 +1320,15 @@ export interface OpenIntervention {
   kind_of: "to_manual" | "brake" | "steer";
 }
 
-/** Opens a recording by its id, at a moment [s since its beginning]. */
+/** Opens a recording by its id, at a moment [s since its beginning]. `topics` (signal → topic) and `units` (signal → name) are chosen for this replay, before those that were recorded. */
 export interface OpenReplay {
   kind: "replay";
   id?: string | null;
   do: "open";
   recording: string;
   at_s?: number;
+  topics?: Record<string, string>;
+  units?: Record<string, string>;
 }
 
 /** One answer to a question. */

@@ -13,6 +13,7 @@ import { addressOf } from '../files/files-model.js';
 /**
  * @typedef {import('../core/store.js').Store} Store
  * @typedef {(sentence: string, title?: string) => void} Say
+ * @typedef {import('../settings/question-layout.js').Choices} Choices
  */
 
 /** A long file that was never closed is read through before it is shown [ms]. */
@@ -69,6 +70,15 @@ export async function openReplay(id, store, say, { at_s = 0, staysOnTab = false 
   return true;
 }
 
+/**
+ * Judge the recording that is shown by other topics or units, from the same moment on.
+ * @param {Choices} change
+ * @returns {Promise<{ok: boolean, reason?: string}>}
+ */
+export async function judgeBy(change) {
+  return current?.judgeBy(change) ?? { ok: false, reason: 'This replay is over.' };
+}
+
 /** @param {Store} store @returns {Promise<void>} once the server greets again */
 function opened(store) {
   return new Promise((resolve) => {
@@ -88,6 +98,8 @@ class Replay {
   #seen = '';
   /** How it ran, for a socket that breaks. */
   #ran = { is_playing: false, rate: 1, at_s: 0 };
+  /** What was chosen for this replay. @type {{topics: Record<string, string>, units: Record<string, string>}} */
+  #choices = { topics: {}, units: {} };
   parts = build();
   band = new ReplayBand();
   sheet = liveSheet();
@@ -221,15 +233,27 @@ class Replay {
   /** The socket is there again: back to the moment, and on as it ran. Until then nothing live is shown as recorded. */
   async #again() {
     if (this.#isOpening) return;
+    const answer = await this.#reopen(this.#choices);
+    if (current === this && !answer.ok && this.store.socket.isOpen) void this.leave(answer.reason ?? 'Refused.');
+  }
+
+  /** @param {Choices} change */
+  async judgeBy({ topics = {}, units = {} }) {
+    const choices = { topics: { ...this.#choices.topics, ...topics }, units: { ...this.#choices.units, ...units } };
+    const answer = await this.#reopen(choices);
+    if (answer.ok) this.#choices = choices;
+    return answer;
+  }
+
+  /** Open it at the moment where it was, and on as it ran. @param {{topics: Record<string, string>, units: Record<string, string>}} choices */
+  async #reopen(choices) {
     const { is_playing, rate, at_s } = this.#ran;
     const { store } = this;
-    const answer = await store.ask('replay', { do: 'open', recording: this.id, at_s }, OPENS_MS);
-    if (current !== this || !answer.ok) {
-      if (current === this && store.socket.isOpen) void this.leave(answer.reason ?? 'Refused.');
-      return;
-    }
+    const answer = await store.ask('replay', { do: 'open', recording: this.id, at_s, ...choices }, OPENS_MS);
+    if (current !== this || !answer.ok) return answer;
     if (rate !== 1) void store.ask('replay', { do: 'rate', rate });
     if (is_playing) void store.ask('replay', { do: 'play' });
+    return answer;
   }
 
   /** @param {any} message */

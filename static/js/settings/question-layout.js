@@ -6,16 +6,18 @@ import { counted } from '../core/format.js';
  * @typedef {import('../core/protocol-types.js').Question} Question
  * @typedef {import('../core/protocol-types.js').Option} Option
  * @typedef {import('../core/protocol-types.js').ControlState} ControlState
- * @typedef {import('./settings-layout.js').Change} Change
+ * @typedef {{topics?: Record<string, string>, units?: Record<string, string>}} Choices signal → topic, or name of its unit
  */
 
 /**
  * Who answers: this page, or another one.
- * @param {{isViewer: boolean, page: string, control: ControlState | null}} seen
- * @returns {boolean} where nobody is in control, the first to act is
+ * @param {{isViewer: boolean, page: string, control: ControlState | null, replaying?: boolean}} seen
+ * @returns {boolean} where nobody is in control, the first to act is; a replay is of this page alone
  */
-export function mayAnswer({ isViewer, page, control }) {
-  if (isViewer || !control) return false;
+export function mayAnswer({ isViewer, page, control, replaying = false }) {
+  if (isViewer) return false;
+  if (replaying) return true;
+  if (!control) return false;
   return control.holder === null || (page !== '' && control.page === page);
 }
 
@@ -39,7 +41,7 @@ export function dealt(vehicle, questions, later) {
   return { asked: questions.filter((one) => !isLater(one)), waiting: questions.filter(isLater) };
 }
 
-/** The change of settings that answers. @param {Question} question @param {string} value of an option @returns {Change} */
+/** The change of settings that answers. @param {Question} question @param {string} value of an option @returns {Choices} */
 export function answerOf({ signal, kind }, value) {
   return kind === 'source' ? { topics: { [signal]: value } } : { units: { [signal]: value } };
 }

@@ -11,7 +11,10 @@ import { settingsOf } from './settings-model.js';
 /** The drawings are fetched again so long after the last answer [ms]. */
 const AGAIN_MS = 1000;
 
+const UNSENT = { ok: false, reason: 'It could not be loaded from the server. Try again.' };
+
 /**
+ * @typedef {{ok: boolean, reason?: string}} Outcome
  * @typedef {import('../core/store.js').Store} Store
  * @typedef {import('./question-layout.js').Question} Question
  * @typedef {(sentence: string, title?: string) => void} Say
@@ -123,20 +126,31 @@ class QuestionSheet {
     if (this.#isSent) return;
     this.#isSent = true;
     setText(this.bad, '');
-    if (!this.model.body) await this.model.load();
-    const outcome = await this.model.set(answerOf(this.question, value));
+    const { replaying } = this.store;
+    const outcome = await (replaying ? this.#judgeBy(value) : this.#keep(value)).catch(() => UNSENT);
     this.#isSent = false;
     if (outcome.ok) {
       this.does.answered();
       this.close();
-      this.does.say(`${this.label}: ${label}.${this.store.replaying ? ' A recording is judged by it when it is opened again.' : ''}`, 'Chosen');
+      this.does.say(`${this.label}: ${label}.${replaying ? ' This replay is judged by it.' : ''}`, 'Chosen');
     } else setWords(this.bad, `Not chosen. ${outcome.reason}`);
   }
 
-  /** Draws what each laser sees now, and again a moment later. In a replay only the live car could be asked. */
+  /** Into the settings of the car. @param {string} value @returns {Promise<Outcome>} */
+  async #keep(value) {
+    if (!this.model.body) await this.model.load();
+    return this.model.set(answerOf(this.question, value));
+  }
+
+  /** For this replay: the settings are those of the live car. @param {string} value @returns {Promise<Outcome>} */
+  async #judgeBy(value) {
+    return (await import('../replay/replay.js')).judgeBy(answerOf(this.question, value));
+  }
+
+  /** Draws what each laser sees, and again a moment later. */
   async #follow() {
     if (!this.sheet.open) return;
-    if (!this.store.isSilent && !this.store.replaying) await this.#draw().catch(() => {}); // the next attempt may succeed
+    if (!this.store.isSilent) await this.#draw().catch(() => {}); // the next attempt may succeed
     if (this.sheet.open) this.#timer = setTimeout(() => void this.#follow(), AGAIN_MS);
   }
 

@@ -192,7 +192,8 @@ export class SettingsModel {
    * @returns {Promise<{candidates: Record<string, Candidate[]> | null, unmapped: number}>}
    */
   async candidates() {
-    const { candidates, topics } = await fetched(this.#path('/api/signals'));
+    const { replay } = this.store.frame ?? {};
+    const { candidates, topics } = await fetched(`${this.#path('/api/signals')}${replay ? `&replay=${replay.token}` : ''}`);
     return { candidates, unmapped: topics.length };
   }
 

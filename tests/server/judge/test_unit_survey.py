@@ -11,6 +11,7 @@ import pytest
 from server.judge.drive import Drive as JudgedDrive
 from server.judge.offline import OfflineRun
 from server.judge.settings_override import SettingsOverride
+from server.judge.sources.evidence import Evidence
 from server.recording.event_channels import read_recorded_events
 from server.recording.read.read import open_recording
 from tests.reports.cases import judged
@@ -85,7 +86,7 @@ CATVEHICLE = {"/catvehicle/vel": TWIST, "/catvehicle/brake": WRENCH, "/catvehicl
 )
 def test_only_what_is_in_doubt_is_read_and_counted_once(types: dict[str, str], was_read: bool) -> None:
     source: Any = _Unread({name: kind.replace("/msg/", "/") for name, kind in types.items()})
-    drive = JudgedDrive(source, NOTHING, fallback="")
+    drive = JudgedDrive(source, NOTHING, fallback="", evidence=Evidence())
     assert source.was_read is False
     assert isinstance(drive.unit_evidence, dict)
     assert source.was_read is was_read

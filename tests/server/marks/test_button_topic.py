@@ -77,7 +77,7 @@ def test_what_is_no_mark_is_recorded_as_a_message() -> None:
 
         return CarMarks(place, lambda _: None, is_known=lambda _: True, read_s=read_s, now_s=now_s)
 
-    table = SimpleNamespace(button=Asked(10.0))
+    table = SimpleNamespace(button=Asked(10.0), transforms=frozenset())
     now_s = [10.1]
     intake = MessageIntake(
         "car",
