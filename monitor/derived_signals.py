@@ -1,10 +1,11 @@
-"""Derived signals: acceleration by the wheels, heading, track, standstill, GPS drift."""
+"""Derived signals: acceleration by the wheels, heading, track, standstill, GPS drift; and what is compared."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
+from monitor.compared import Comparisons
 from monitor.gps_watch import GpsFollower, GpsWatch
 from monitor.heading_fusion import HeadingFusion
 from monitor.motion import Slope, Standstill
@@ -30,6 +31,7 @@ class DerivedSignals:
         self.standstill = Standstill()
         self.track = Track()
         self.gps = GpsWatch()
+        self.comparisons = Comparisons()
 
     def receive(self, signal: str, reading: Reading[Any]) -> tuple[str, Reading[Any]] | None:
         """Follow a reading of `signal`, a value of a type in `SOURCES`.
@@ -37,6 +39,7 @@ class DerivedSignals:
         The name of the signal that is derived from it, and its reading, which is as old; None: nothing is.
         """
         value = reading.value
+        self.comparisons.receive(signal, reading)
         name, derived = "heading", None
         match value:
             case Twist():
@@ -77,6 +80,7 @@ class DerivedSignals:
             self._table.drop("acceleration")
         self._slope, self.slope_mps2 = Slope(), None
         self.standstill = Standstill()
+        self.comparisons.forget("speed")
 
     def _heading_on_course(self, reading: Reading[GpsFix]) -> Value | None:
         fix, at_s, table = reading.value, reading.received_s, self._table

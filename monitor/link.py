@@ -27,6 +27,7 @@ class LinkFacts:
     connected_s: float | None = None  # when the open connection was made
     last_message_s: float | None = None  # when the car last said anything
     published: frozenset[str] = frozenset()  # the signals that discovery found on the car
+    carriers: Mapping[str, str] = field(default_factory=dict)  # signal → the topic that carries it
     undecided: Mapping[str, str] = field(
         default_factory=dict
     )  # signals that no topic carries yet, and why, in few words

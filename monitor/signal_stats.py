@@ -11,6 +11,7 @@ from monitor.freeze_detection import COMPARED, RepeatFollower, Wheels
 from monitor.rates import Rate, RateMeter
 from monitor.reading import Reading
 from monitor.reading_history import ReadingHistory
+from monitor.reading_table import ReadingTable
 from monitor.signals import Signal
 from monitor.stamps import StampFollower
 
@@ -76,6 +77,20 @@ class SignalStats:
             return False
         self.lowest, self.highest = min(self.lowest, number), max(self.highest, number)
         return True
+
+
+def extend(signal: str, number: float, stats: SignalStats, table: ReadingTable) -> None:
+    """Include a headline number of a signal in its range."""
+    if stats.widen(number):
+        table.put_extent(signal, stats.lowest, stats.highest)
+
+
+def keep(signal: str, reading: Reading[Any], stats: SignalStats, table: ReadingTable) -> None:
+    """Put a reading that was derived into the table, and its headline number into the range."""
+    table.put(signal, reading)
+    number = None if stats.headline is None else getattr(reading.value, stats.headline, None)
+    if number is not None:
+        extend(signal, number, stats, table)
 
 
 class MeasuredRates:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, overload
 
+from monitor.compared import NOTHING_COMPARED, Compared
 from monitor.gps_watch import GpsWatch
 from monitor.heard_modes import HeardMode
 from monitor.link import LinkFacts
@@ -63,6 +64,7 @@ class Snapshot:
     track: tuple[TrackPoint, ...] = ()  # where the car was, thinned and bounded, oldest first
     track_m: float | None = None  # distance driven since connecting; None: never had a position
     gps: GpsWatch = field(default_factory=GpsWatch)  # the receiver's behaviour, by the newest fixes
+    compared: Compared = NOTHING_COMPARED  # further sources of signals, and the speeds that each shows
     phone: PhoneView = NO_PHONE  # the operator's phone beside the car
     phones: tuple[PhoneView, ...] = ()  # every phone that shares its position, in order of arrival
     scan_before: Reading[LaserScan] | None = None  # some 0.4 s before the newest

@@ -19,7 +19,7 @@ from monitor.reading_history import ReadingHistory
 from monitor.reading_table import ReadingTable
 from monitor.recorder import RecorderFacts
 from monitor.scan_parts import Scans
-from monitor.signal_stats import MeasuredRates, SignalStats
+from monitor.signal_stats import MeasuredRates, SignalStats, extend, keep
 from monitor.signals import SIGNALS
 from monitor.slow_proof import ProofFollower
 from monitor.slowing import SlowingFacts
@@ -111,7 +111,7 @@ class State:
         if stats.headline is not None:
             number = getattr(value, stats.headline, None)
             if number is not None and not stats.lowest <= number <= stats.highest:
-                self._extend(stats, signal, number)
+                extend(signal, number, stats, self._table)
         if kind not in SOURCES:
             return stats.alone
         if kind is GpsFix:
@@ -120,8 +120,15 @@ class State:
         derived = self._derived.receive(signal, reading)
         if derived is None:
             return stats.alone
-        self._keep_derived(*derived)
-        return signal, derived[0]
+        name, newer = derived
+        keep(name, newer, self._stats[name], self._table)
+        return signal, name
+
+    def receive_other(
+        self, signal: str, topic: str, value: Value, received_s: float, stamp_s: float | None, delay_s: float = 0.0
+    ) -> None:
+        """Take one decoded value of a further source of a signal, which is compared with the signal and is not it."""
+        self._derived.comparisons.receive_other(signal, topic, value, received_s, stamp_s, delay_s)
 
     def refuse(self, signal: str, reason: str, received_s: float, *, is_declared: bool = False) -> None:
         """A message without a usable value of this signal, and the reason. `is_declared`: it declares the value as not
@@ -169,6 +176,7 @@ class State:
                 stats.restart()
             self._clock_jump = None
             self._scans = Scans()
+            self._derived.comparisons.opened()
             self._components.opened(facts.opened_s)
             self._unusable = MappingProxyType({})
 
@@ -220,6 +228,7 @@ class State:
             track=derived.track.points,
             track_m=derived.track.distance_m,
             gps=derived.gps,
+            compared=derived.comparisons.known,
             phone=self._phones.view,
             phones=self._phones.views,
             scan_habit=self._scans.habit.usual,
@@ -258,6 +267,7 @@ class State:
         self._modes.forget()
         self._fix_s = -math.inf
         self._scans.forget_times()
+        self._derived.comparisons.restart()
         self._phones = Phones()  # they report again within seconds
         self._phones.ride(self._rides, at_s)
         self._table.shift(shift_s)
@@ -269,14 +279,3 @@ class State:
         self._clock_jump = None
         for stats in self._stats.values():
             stats.restart()
-
-    def _keep_derived(self, signal: str, reading: Reading[Any]) -> None:
-        self._table.put(signal, reading)
-        stats = self._stats[signal]
-        number = None if stats.headline is None else getattr(reading.value, stats.headline, None)
-        if number is not None:
-            self._extend(stats, signal, number)
-
-    def _extend(self, stats: SignalStats, signal: str, number: float) -> None:
-        if stats.widen(number):
-            self._table.put_extent(signal, stats.lowest, stats.highest)

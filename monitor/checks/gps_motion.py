@@ -28,10 +28,12 @@ from monitor.figures import beside
 from monitor.gps_watch import FIXES
 from monitor.motion import STANDS_BELOW_MPS
 from monitor.snapshot import Snapshot
+from monitor.speeds import is_in_dispute
 from monitor.values import STATUS_UNSET
 
 SIGMA_UNKNOWN_M = 2.5  # of a receiver without quality
 DRIFT_SIGMAS = 4.3
+DRIVES_OFF_MPS, DRIVES_OFF_M = 1.0, 10.0  # a position that starts as a car does: within so many metres it is faster
 
 
 class DriftLimits(Limits):
@@ -81,8 +83,19 @@ def drifts(snapshot: Snapshot, limits: DriftLimits, was_active: bool) -> Finding
     measured = Quantity(label="Drift", value=drift_m, unit="m")
     limit = Quantity(label="Allowed", value=allowed_m, unit="m")
     if min(watch.drift_m) > allowed_m * (0.8 if was_active else 1.0):
+        if not was_active and _drives_off(snapshot, drift_m - allowed_m, speed_mps):
+            return unknown(f"{text}: whether position or speed is wrong is not known", short="disputed")
         return fault(text, brief=f"{drift_m:.1f} m", measured=measured, limit=limit, causes=("position",))
     return ok(text, measured=measured, limit=limit)
+
+
+def _drives_off(snapshot: Snapshot, beyond_m: float, speed_mps: float) -> bool:
+    """Whether the position moves as a car that starts, so that it may be the speed that is wrong."""
+    watch = snapshot.gps
+    if watch.net_mps is None or not watch.is_smooth:
+        return False
+    is_starting = watch.net_mps > DRIVES_OFF_MPS and beyond_m < DRIVES_OFF_M
+    return is_starting or is_in_dispute(snapshot, watch.net_mps, speed_mps)
 
 
 def jumps(snapshot: Snapshot, limits: JumpLimits, was_active: bool) -> Finding:
@@ -101,6 +114,8 @@ def jumps(snapshot: Snapshot, limits: JumpLimits, was_active: bool) -> Finding:
     measured = Quantity(label="Position", value=watch.net_mps, unit="m/s")
     limit = Quantity(label="Allowed", value=allowed_mps, unit="m/s")
     if slowest_mps > speed_mps + limits.margin_mps * (0.8 if was_active else 1.0):
+        if not was_active and is_in_dispute(snapshot, watch.net_mps, speed_mps):
+            return unknown(f"{text}: which of them is wrong is not known", short="disputed")
         return fault(text, brief=f"{watch.net_mps:.0f} m/s", measured=measured, limit=limit, causes=("position",))
     return ok(text, measured=measured, limit=limit)
 

@@ -108,7 +108,11 @@ class _Injected:
         self.rejected = recording.rejected
         self._recording = recording
         self._faults = faults
-        self._signals = {topic: sources[0].signal for topic, sources in drive.epochs[0].listeners.items()}
+        self._signals = {
+            topic: sources[0].signal
+            for topic, sources in drive.epochs[0].listeners.items()
+            if sources[0].carries  # what carries a signal comes first
+        }
 
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
         """As those of the recording."""

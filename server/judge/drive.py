@@ -9,6 +9,7 @@ from typing import Protocol
 
 from server.judge import pipeline
 from server.judge.active_settings import ActiveSettings
+from server.judge.comparisons import comparison_sources
 from server.judge.message import Json, RosVersion
 from server.judge.offers import offers
 from server.judge.recorded_events import NewSettings, RecordedEvents
@@ -83,6 +84,7 @@ class SettingsEpoch:
     tuning: ActiveSettings
     choice: Choice
     listeners: Mapping[str, tuple[Source, ...]]  # by topic as the recording spells it
+    carriers: Mapping[str, str]  # signal → the topic that carries it
     competing: frozenset[str] = frozenset()  # topics as the recording spells them, of signals that none carries yet
 
     @property
@@ -219,8 +221,8 @@ class Drive:
         """Raises BadSetting."""
         tuning = tuning_for(override, self.offered, self.ros_version)
         choice = choose(self.offered, tuning.settings.topics, evidence=self._evidence_for(tuning.settings.topics))
-        sources, wanted = choice.sources, self._signals
-        by_topic = pipeline.by_topic(one for one in sources.values() if wanted is None or one.signal in wanted)
+        decoded, wanted = (*choice.sources.values(), *comparison_sources(self.offered, choice.sources)), self._signals
+        by_topic = pipeline.by_topic(one for one in decoded if wanted is None or one.signal in wanted)
         found = {topic: by_topic.get(name, ()) for topic, name in self._names.items()}
         listeners = {
             topic: sources for topic, sources in found.items() if any(source.decode is not None for source in sources)
@@ -229,6 +231,7 @@ class Drive:
             tuning=tuning,
             choice=choice,
             listeners=listeners,
+            carriers=pipeline.carriers(choice.sources.values()),
             competing=frozenset(topic for topic, name in self._names.items() if name in choice.competing),
         )
 

@@ -209,7 +209,8 @@ class OfflineRun:
             if topic in self._epoch.competing:
                 run_state.last_message_s = now_s  # the car sends, though nothing of it can be judged
             return
-        run_state.topics_received.add(topic)
+        if sources[0].carries:  # what carries a signal comes first
+            run_state.topics_received.add(topic)
         run_state.last_message_s = now_s
         changed = pipeline.receive(
             sources,
@@ -320,6 +321,7 @@ def _link(drive: Drive, epoch: SettingsEpoch, run_state: RunState, now_s: float)
         connected_s=run_state.opened_s,
         last_message_s=run_state.last_message_s,
         published=epoch.published,
+        carriers=epoch.carriers,
         undecided=epoch.undecided,
         wall_zero_s=None if drive.clock_steps else drive.start_s,  # one that was set proves nothing
     )

@@ -21,6 +21,7 @@ from server.judge.units import UNITS
 
 TICK_S = 0.05  # every check is judged this often
 
+OF_THE_CAR = (LaserScan, DriveMode)  # what their values mean depends on the car
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 ByTopic = Mapping[str, tuple[Source, ...]]
 
@@ -41,7 +42,12 @@ def by_topic(sources: Iterable[Source]) -> dict[str, tuple[Source, ...]]:
 
 def published(sources: Iterable[Source]) -> frozenset[str]:
     """The signals that the car has in a form that can be read."""
-    return frozenset(source.signal for source in sources if source.decode is not None)
+    return frozenset(source.signal for source in sources if source.decode is not None and source.carries)
+
+
+def carriers(sources: Iterable[Source]) -> dict[str, str]:
+    """Signal → the topic that carries it."""
+    return {source.signal: source.topic for source in sources if source.decode is not None and source.carries}
 
 
 def receive(
@@ -62,11 +68,11 @@ def receive(
     on_number: Callable[[str, float, float, float | None], None] | None = None,
     steady_stamp: Callable[[float], float] | None = None,
 ) -> tuple[str, ...]:
-    """One message of one topic into the state; the signals that changed by it. `at_s` is the receiver's clock;
-    `tyre_rad_per_unit` of the steering signal, 0: not known; `units` are the operator's choices, signal → name;
-    `transport` None: it came without delay, as far as is known. `frames` and `limits`: by which a laser is mounted;
-    None: at the nose. `on_value` receives each decoded value: signal, value, `at_s`, stamp; `on_number` each number
-    whose unit is not known, as it was published; `steady_stamp` corrects a stamp by a clock that was set.
+    """One message of one topic into the state; the signals that changed by it, none by what is only compared. `at_s` is
+    the receiver's clock; `tyre_rad_per_unit` of the steering signal, 0: not known; `units` are the operator's choices,
+    signal → name; `transport` None: it came without delay, as far as is known. `frames` and `limits`: by which a laser
+    is mounted; None: at the nose. `on_value` receives each decoded value: signal, value, `at_s`, stamp; `on_number`
+    each number whose unit is not known, as it was published; `steady_stamp` corrects a stamp by a clock that was set.
     """
     reception.received += 1
     stamp = stamp_s(message)
@@ -81,6 +87,10 @@ def receive(
             _refuse(sources, why_not, at_s, reception, state)
             return ()
     for source in sources:
+        if not source.carries:
+            if (other := reception.read_other(source, message, at_s, profile)) is not None:
+                state.receive_other(source.signal, source.topic, other, at_s, steady_s, delay_s)
+            continue
         value = reception.read(source, message, note)
         if value is not None and source.signal in UNITS:
             basis = UnitBasis(profile=profile, chosen=units, tyre_rad_per_unit=tyre_rad_per_unit)
@@ -90,18 +100,24 @@ def receive(
         if value is None:
             is_proper &= _without_value(source, reception, state, at_s)
             continue
-        if source.carries:
-            reception.units.see(source.signal, value, at_s)
-        if type(value) is LaserScan and frames is not None and limits is not None:
-            value = frames.mounted(source.topic, value, limits)
-        elif type(value) is DriveMode and (mode := profile.modes.get(value.said.casefold())) is not None:
-            value = DriveMode(mode=mode, said=value.said)
+        reception.units.see(source.signal, value, at_s)
+        if type(value) in OF_THE_CAR:
+            value = _of_the_car(value, source.topic, profile, frames, limits)
         if on_value is not None:
             on_value(source.signal, value, at_s, stamp)
         changed += state.receive(source.signal, value, at_s, steady_s, delay_s)
     if not is_proper:
         reception.rejected += 1
     return changed
+
+
+def _of_the_car(value: Any, topic: str, profile: Profile, frames: Frames | None, limits: AllLimits | None) -> Any:
+    """A scan from where the laser is mounted, a mode by the words of this kind of car."""
+    if type(value) is LaserScan and frames is not None and limits is not None:
+        return frames.mounted(topic, value, limits)
+    if type(value) is DriveMode and (mode := profile.modes.get(value.said.casefold())) is not None:
+        return DriveMode(mode=mode, said=value.said)
+    return value
 
 
 def _without_value(source: Source, reception: Reception, state: State, at_s: float) -> bool:
@@ -130,8 +146,9 @@ def _void(
 
 
 def _refuse(sources: tuple[Source, ...], why: str, at_s: float, reception: Reception, state: State) -> None:
-    reception.rejected += 1
-    for source in sources:
+    carrying = [source for source in sources if source.carries]
+    reception.rejected += bool(carrying)
+    for source in carrying:
         tally = reception.tally(source.signal)
         tally.received += 1
         tally.reject(why)

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from server.judge.message_fields import NotMeasured, Rejected
+from server.judge.profiles import Profile
 from server.judge.topics import Source
-from server.judge.unit_watch import UnitBasis, UnitWatch
+from server.judge.unit_watch import UnitBasis, UnitWatch, read
 
 MAX_REASONS = 20  # a hostile bridge must not fill the memory with reasons
 OTHER = "other reasons"
@@ -89,6 +90,16 @@ class Reception:
             # a decoder of ours did not foresee this shape: the message is refused all the same, and the shape is named
             tally.reject(f"unexpected shape: {type(error).__name__}")
         return None
+
+    def read_other(self, source: Source, message: Any, at_s: float, profile: Profile) -> Any | None:
+        """The value of a source that is only compared, in the unit of its signal; None where it has none, or its unit
+        is not known. No signal counts it. The operator's choice of a unit is that of the topic that carries the
+        signal."""
+        value = read(source, message)
+        try:
+            return None if value is None else self.units.convert(source, value, at_s, UnitBasis(profile, {}))
+        except Rejected:  # NotMeasured is one
+            return None
 
     def in_unit(self, source: Source, value: Any, at_s: float, basis: UnitBasis) -> Any | None:
         """A value that was read, in the unit of its signal; None where that is not known, which is counted as not

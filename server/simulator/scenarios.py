@@ -35,8 +35,9 @@ _SCENARIOS = (
         sentence="The car drives 12 m/s for some seconds, as soon as the lap allows it (at most half a minute).",
         duration_s=60.0,  # at most; it ends by itself after some seconds above the limit
         alarm="speed above limit",
-        # over a recording, where only the sent speed is another: nobody ordered it, and nobody keeps distance for it
-        consequences=("command without response", "nearest object"),
+        # over a recording, where only the sent speed is another: nobody ordered it, nobody keeps distance for it, and
+        # the position does not follow it
+        consequences=("command without response", "nearest object", "speed sources"),
         effect=Speeding,
         order=Order.HURRY,
         order_suffices=True,

@@ -109,7 +109,7 @@ class Judgement:
         filled = self._filled.get(topic, ())
         others = tuple(source for source in sources if source not in filled)
         changed = self._apply(others, topic, message, note, now_s, Aged(now_s - came_s)) if others else ()
-        for source in sources:
+        for source in (one for one in sources if one.carries):
             self.reception.tally(source.signal).repeats += 1
         self._filled[topic] = sources
         return changed
@@ -118,7 +118,8 @@ class Judgement:
         """Follow what becomes known of the age of topics' first messages."""
         for topic, (at_s, age_s) in self.transport.older().items():
             for source in self._filled.get(topic, ()):
-                self.state.age(source.signal, at_s, age_s)
+                if source.carries:
+                    self.state.age(source.signal, at_s, age_s)
 
     def _apply(
         self, sources: tuple[Source, ...], topic: str, message: Any, note: str | None, now_s: float, delays: Delays

@@ -6,6 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Protocol
 
 from monitor.signals import SIGNALS
+from server.judge import pipeline
+from server.judge.comparisons import comparison_sources
 from server.judge.offers import offers
 from server.judge.sources.candidates import to_compare
 from server.judge.sources.choice import Choice, choose
@@ -35,11 +37,13 @@ class SignalMap:
     def __init__(self, place: Place | None = None) -> None:
         """`place`: as of `Evidence`."""
         self.sources: Mapping[str, Source] = {}  # by signal
+        self.compared: tuple[Source, ...] = ()  # further topics, decoded to be compared with them
+        self.carriers: Mapping[str, str] = {}  # signal → the topic that carries it
         self.unmapped: Mapping[str, str] = {}  # topic → type of what carries no signal
         self.offers_nothing = False  # no topic of the car can be read
         self.undecided: Mapping[str, str] = {}  # signal → why none of its topics carries it
         self.questions: Sequence[Question] = ()
-        self.watched: Mapping[str, Source] = {}  # topic → what it may carry; compared, and not judged
+        self.watched: Mapping[str, Source] = {}  # topic → what it may carry, of signals that none carries yet
         self._evidence = Evidence(place)
         self._choice: Choice | None = None
         self._compared_since_s: float | None = None
@@ -76,6 +80,9 @@ class SignalMap:
             *(_instead(gone[signal], choice.sources[signal]) for signal in gone if signal in choice.sources),
             *choice.questions,
         ]
+        self.carriers = pipeline.carriers(self.sources.values())
+        was_compared = {source.topic for source in self.compared}
+        self.compared = comparison_sources(offered, self.sources, unpublished=unpublished, before=was_compared)
         mapped = {source.topic for source in self.sources.values()}
         self.unmapped = {name: kind for name, kind in offered.items() if name not in mapped}
         self.offers_nothing = not self.undecided and not any(source.decode for source in self.sources.values())
@@ -108,6 +115,11 @@ class SignalMap:
     def candidates(self, offered: Mapping[str, str]) -> dict[str, list[TopicOffer]]:
         """Signal → the topics that can carry it, with what is known of each."""
         return offers(offered, {} if self._choice is None else self._choice.reasons, self._evidence)
+
+    @property
+    def decoded(self) -> tuple[Source, ...]:
+        """What carries the signals, and what is compared with it."""
+        return (*self.sources.values(), *self.compared)
 
     @property
     def command_topic(self) -> str | None:

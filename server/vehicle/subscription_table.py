@@ -81,12 +81,14 @@ class SubscriptionTable:
         """
         watched = watched or {}
         known, too_large, compression = self._definitions, self.large.left, self.cbor.compression
+        carrying = {topic: sources for topic, sources in by_topic.items() if any(one.carries for one in sources)}
+        beside = {**{topic: (one,) for topic, one in watched.items()}, **by_topic}
         wanted = wanted_topics.judged(
-            by_topic, self.load, without=too_large, asked=known.asked, fit=known.fit, compression=compression
+            carrying, self.load, without=too_large, asked=known.asked, fit=known.fit, compression=compression
         )
         wanted |= wanted_topics.compared(
-            watched, self.load, without={*wanted, *too_large}, is_recorded=self.also != "none", asked=known.asked,
-            fit=known.fit, compression=compression,
+            beside, self.load, undecided=watched, without={*carrying, *too_large}, is_recorded=self.also != "none",
+            asked=known.asked, fit=known.fit, compression=compression,
         )  # fmt: skip
         self.judged = len(wanted)
         if offered is not None:

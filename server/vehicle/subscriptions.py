@@ -264,7 +264,7 @@ class Subscriptions:
 
     def _subscribe(self) -> None:
         if self._link is not None:
-            self.by_topic = pipeline.by_topic(self.signals.sources.values())
+            self.by_topic = pipeline.by_topic(self.signals.decoded)
             needs, watched = self._missing.needs_client_count, self.signals.watched
             self.table.subscribe(self.by_topic, self.offered, needs_client_count=needs, watched=watched)
 

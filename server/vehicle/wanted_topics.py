@@ -12,6 +12,7 @@ from server.recording.recorded_topics import Also
 from server.rosbridge.subscription import Subscription
 from server.vehicle.link_load import LinkLoad
 
+COMPARED_MS = 200  # at most one message in this of a topic that is only compared
 LASER_THROTTLE_MS = 500  # of a laser that is only compared
 Compression = Callable[[str, bool], str]  # topic and whether its type is fit for CBOR → "cbor" or "none"
 
@@ -51,33 +52,31 @@ def judged(
 
 
 def compared(
-    watched: Mapping[str, Source],
+    by_topic: Mapping[str, tuple[Source, ...]],
     load: LinkLoad,
     *,
+    undecided: Collection[str],
     without: Collection[str],
     is_recorded: bool,
     asked: Collection[str],
     fit: Collection[str],
     compression: Compression,
 ) -> dict[str, Subscription]:
-    """The subscriptions of topics that may carry a signal and are compared. `is_recorded`: all topics are recorded, so
-    that none is thinned out for it."""
-    found = judged(
-        {topic: (source,) for topic, source in watched.items()},
-        load,
-        without=without,
-        asked=asked,
-        fit=fit,
-        compression=compression,
-    )
-    if is_recorded:
-        return found
-    return {
-        topic: replace(row, throttle_ms=max(row.throttle_ms, LASER_THROTTLE_MS))
-        if watched[topic].signal == "scan"
-        else row
-        for topic, row in found.items()
-    }
+    """The subscriptions of topics that carry no signal and are compared.
+
+    `undecided`: those that may carry one, of which each message counts, but for lasers; `is_recorded`: all topics are
+    recorded, so that none is thinned out for it.
+    """
+    found = judged(by_topic, load, without=without, asked=asked, fit=fit, compression=compression)
+    for topic, row in found.items():
+        if is_recorded and load.level.records_others:
+            queue_length = 1 if load.step else recorded_topics.QUEUE_LENGTH
+            found[topic] = replace(row, queue_length=queue_length)
+        elif topic not in undecided:
+            found[topic] = replace(row, throttle_ms=max(row.throttle_ms, COMPARED_MS), queue_length=1)
+        elif any(source.signal == "scan" for source in by_topic[topic]):
+            found[topic] = replace(row, throttle_ms=max(row.throttle_ms, LASER_THROTTLE_MS))
+    return found
 
 
 def recorded(

@@ -238,6 +238,9 @@ BY_TIME = {
 
 # Checks without a limit that a noisy measurement could hover about, each with the reason.
 WITHOUT = {
+    "position_receiver": "a receiver has a fix or it has none, for three seconds",
+    "position_sources": "both errors, with a deadband of a fifth: test_position_sources.py",
+    "speed_sources": "means of 3 s, with a deadband of a fifth: test_speed_sources.py",
     "scan_shape": "whole beams",
     "gps_quality": "known or not",
     "signal_unusable": "a value can be used or it cannot",
@@ -288,6 +291,9 @@ THRESHOLDS = {
     **{f"signals.{name}_hz": "rate" for name in SIGNALS},
 }
 NO_LIMIT = {
+    "speed_sources.apart_mps": "means of 3 s, with a deadband of a fifth: test_speed_sources.py",
+    "speed_sources.apart_percent": "means of 3 s, with a deadband of a fifth: test_speed_sources.py",
+    "position_sources.least_m": "places of a slow filter, with a deadband of a fifth: test_position_sources.py",
     "obstacle.time_to_collision_s": "a gap that closes is soon met or opens: it cannot hover",
     "obstacle.wheelbase_m": "a measure of the car",
     "obstacle.laser_ahead_m": "a measure of the car",

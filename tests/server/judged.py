@@ -14,6 +14,7 @@ from monitor.state import State
 from monitor.values import PhoneFix
 from server.analysis.faults import Faults
 from server.judge import pipeline
+from server.judge.comparisons import comparison_sources
 from server.judge.profiles import GENERIC
 from server.judge.reception_stats import Reception
 from server.judge.topics import map_signals
@@ -48,11 +49,14 @@ def judged(
     own = [one for one in plan if one.scenario.bridge is None]
     bridge = Faults([one for one in plan if one.scenario.bridge is not None])
     car = SimulatedCar(seed=seed, plan=own)
-    sources = pipeline.by_topic(map_signals({p.topic: p.type for p in car.published}).values())
+    offered = {p.topic: p.type for p in car.published}
+    chosen = map_signals(offered)
+    sources = pipeline.by_topic((*chosen.values(), *comparison_sources(offered, chosen)))
     monitor = Monitor(limits=catalog.changed(AllLimits(), limits or {}))
     reception, state = Reception(), State()
     raised: list[Raised] = []
     start_s, tick_s, last_s, phone_s = car.now_s, 0.0, None, 0.0
+    carriers = pipeline.carriers(chosen.values())
     published = pipeline.published(source for group in sources.values() for source in group)
 
     def note(transitions: Iterable[Transition]) -> None:
@@ -67,6 +71,7 @@ def judged(
             last_message_s=last_s,
             topics_subscribed=len(sources),
             published=published,
+            carriers=carriers,
             wall_zero_s=start_s,
         )
         return bridge.link(facts, now_s)

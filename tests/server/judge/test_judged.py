@@ -96,6 +96,9 @@ ELSEWHERE = {
     "slow_down_unconfirmed": "tests/server/slowdown/test_sender.py::test_a_rival_is_named_and_the_order_not_confirmed",
     "slow_down_rivals": "tests/server/slowdown/test_sender.py::test_a_rival_is_named_and_the_order_not_confirmed",
     "slow_down_hold_ended": "tests/server/slowdown/test_sender.py::test_a_hold_that_nobody_releases_ends",
+    "speed_sources": "tests/monitor/checks/test_speed_sources.py::test_a_drive_whose_sources_disagree_is_one_alarm",
+    "position_receiver": "tests/monitor/checks/test_position_sources.py::test_the_sentences",
+    "position_sources": "tests/monitor/checks/test_position_sources.py::test_positions_that_part_are_noticed",
     "phone_missing": "tests/monitor/checks/test_phone.py::test_each_reason_is_said_after_10_s",
     "phone_tracks": "tests/monitor/checks/test_phone.py::test_the_correlation_has_a_deadband_and_a_setting",
 }

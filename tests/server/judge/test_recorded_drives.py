@@ -50,7 +50,7 @@ def test_a_real_laser_in_a_room_raises_what_is_true_and_no_more(recordings: Path
 
 # Scenario → what it raises over the real drive, and how soon. None: the drive has no message that it could change.
 OVER_THE_DRIVE: dict[str, tuple[list[str], float] | None] = {
-    "speeding": (["obstacle_nearest", "no_response", "speed_limit"], 1.5),
+    "speeding": (["obstacle_nearest", "no_response", "speed_limit", "speed_sources"], 1.5),
     "obstacle": (["obstacle_nearest"], 0.2),
     "near-object": (["obstacle_nearest"], 0.2),
     "command-ignored": (["no_response"], 2.2),

@@ -1,0 +1,182 @@
+"""Further sources of what a signal shows: kept beside it, to be compared with it and never to take its place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from monitor.geo import offset_m
+from monitor.pace import Pace, PlaceFollower, SpeedFollower
+from monitor.rates import RateMeter
+from monitor.reading import Reading
+from monitor.values import GpsFix, Odometry, Twist
+
+MOST_OTHERS = 8  # of one signal
+SIGMA_UNKNOWN_M = 2.5  # of a receiver without quality
+POSE_SIGMA_M = 0.5  # of a pose, whose own error is often left out
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Other:
+    """A further source of a signal."""
+
+    topic: str
+    reading: Reading[Any]  # the newest
+    stated: Pace | None = None  # by the speed that it states
+    made: Pace | None = None  # by its places
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Compared:
+    """What may be compared, at one moment."""
+
+    others: Mapping[str, tuple[Other, ...]] = field(default_factory=dict)  # by signal, in the order they came
+    stated: Mapping[str, Pace | None] = field(default_factory=dict)  # by the signal's own speeds
+    made: Mapping[str, Pace | None] = field(default_factory=dict)  # by the signal's own places
+
+    def of(self, signal: str) -> tuple[Other, ...]:
+        """The further sources of a signal."""
+        return self.others.get(signal, ())
+
+
+NOTHING_COMPARED = Compared()
+
+
+class SourceFollower:
+    """Follows the motion that one source shows."""
+
+    __slots__ = ("_last", "_places", "_speeds", "_x_m", "_y_m")
+
+    def __init__(self) -> None:
+        self._speeds: SpeedFollower | None = None
+        self._places: PlaceFollower | None = None
+        self._last: GpsFix | None = None
+        self._x_m = self._y_m = 0.0
+
+    @property
+    def stated(self) -> Pace | None:
+        return None if self._speeds is None else self._speeds.pace
+
+    @property
+    def made(self) -> Pace | None:
+        return None if self._places is None else self._places.pace
+
+    def receive(self, reading: Reading[Any]) -> bool:
+        """One reading; values that show no motion are left out. Whether it showed another pace."""
+        value = reading.value
+        speeds, places = self._speeds, self._places
+        stated, made = None if speeds is None else speeds.pace, None if places is None else places.pace
+        kind = type(value)
+        if kind is Twist:
+            self._state(reading.received_s, value.speed_mps)
+        elif kind is Odometry:
+            if value.speed_mps is not None:
+                self._state(reading.received_s, value.speed_mps)
+            self._place(reading, value.x_m, value.y_m, POSE_SIGMA_M)
+        elif kind is GpsFix:
+            self._fix(reading, value)
+        return self.stated is not stated or self.made is not made
+
+    def _state(self, at_s: float, mps: float) -> None:
+        if self._speeds is None:
+            self._speeds = SpeedFollower()
+        self._speeds.add(at_s, mps)
+
+    def _fix(self, reading: Reading[Any], fix: GpsFix) -> None:
+        if fix.status < 0 or not (math.isfinite(fix.lat_deg) and math.isfinite(fix.lon_deg)):
+            self._last = None
+            if self._places is not None:
+                self._places.restart()
+            return
+        if self._places is not None and not self._places.is_due(_time_s(reading)):
+            return
+        last, self._last = self._last, fix
+        if last is not None:
+            east_m, north_m = offset_m(last.lat_deg, last.lon_deg, fix.lat_deg, fix.lon_deg)
+            self._x_m, self._y_m = self._x_m + east_m, self._y_m + north_m
+        self._place(reading, self._x_m, self._y_m, SIGMA_UNKNOWN_M if fix.sigma_m is None else fix.sigma_m)
+
+    def _place(self, reading: Reading[Any], x_m: float, y_m: float, sigma_m: float) -> None:
+        if self._places is None:
+            self._places = PlaceFollower()
+        self._places.add(_time_s(reading), x_m, y_m, sigma_m)
+
+
+def _time_s(reading: Reading[Any]) -> float:
+    """By the source's own stamps, since Wi-Fi bunches arrivals."""
+    return reading.received_s if reading.stamp_s is None else reading.stamp_s
+
+
+class Comparisons:
+    """Follows the sources of one vehicle: those of the signals, and at most eight others of each signal."""
+
+    def __init__(self) -> None:
+        self._own: dict[str, SourceFollower] = {}
+        self._others: dict[str, dict[str, tuple[RateMeter, SourceFollower, Other]]] = {}
+        self._known: Compared | None = NOTHING_COMPARED
+
+    def receive(self, signal: str, reading: Reading[Any]) -> None:
+        """A reading of the signal itself."""
+        follower = self._own.get(signal)
+        if follower is None:
+            follower = self._own[signal] = SourceFollower()
+        if follower.receive(reading):
+            self._known = None
+
+    def receive_other(
+        self, signal: str, topic: str, value: Any, received_s: float, stamp_s: float | None, delay_s: float
+    ) -> None:
+        """A value of a further source; of more than eight topics of one signal the later ones are left out."""
+        known = self._others.setdefault(signal, {})
+        if topic not in known and len(known) >= MOST_OTHERS:
+            return
+        meter, follower, before = known.get(topic) or (RateMeter(None), SourceFollower(), None)
+        meter.receive(received_s)
+        reading = Reading(
+            value=value,
+            received_s=received_s,
+            stamp_s=stamp_s,
+            horizon_s=meter.horizon_s,
+            period_s=meter.period_s,
+            count=1 if before is None else before.reading.count + 1,
+            delay_s=delay_s,
+        )
+        follower.receive(reading)
+        known[topic] = (
+            meter,
+            follower,
+            Other(topic=topic, reading=reading, stated=follower.stated, made=follower.made),
+        )
+        self._known = None
+
+    def forget(self, signal: str) -> None:
+        """The values of the signal itself are void: their unit was another."""
+        self._own.pop(signal, None)
+        self._known = None
+
+    def restart(self) -> None:
+        """The clock went back: no age of what came before is known."""
+        self._own.clear()
+        self.opened()
+
+    def opened(self) -> None:
+        """The link opens: the others must come anew."""
+        self._others.clear()
+        self._known = None
+
+    @property
+    def known(self) -> Compared:
+        """What may be compared now; later messages do not change it."""
+        found = self._known
+        if found is None:
+            found = self._known = Compared(
+                others=MappingProxyType(
+                    {signal: tuple(row[2] for row in rows.values()) for signal, rows in self._others.items()}
+                ),
+                stated=MappingProxyType({signal: one.stated for signal, one in self._own.items()}),
+                made=MappingProxyType({signal: one.made for signal, one in self._own.items()}),
+            )
+        return found

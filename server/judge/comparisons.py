@@ -1,0 +1,122 @@
+"""Which further topics of a car are watched to compare them with the source of a signal. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
+
+from monitor.values import Odometry, Twist
+from server.judge.message_fields import NotMeasured, finite, inner, number
+from server.judge.plausible import FASTEST_KMH, plausible_speed
+from server.judge.signals.odometry import odometry
+from server.judge.signals.position import nav_sat_fix
+from server.judge.topic import Decode
+from server.judge.topics import BY_SIGNAL, Source, plain_type
+
+MOST = 4  # further topics of one signal
+FIX, ODOMETRY = "sensor_msgs/NavSatFix", "nav_msgs/Odometry"
+TWISTS = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
+VELOCITY_OF_A_RECEIVER = "vel"  # beside its NavSatFix, as the drivers of receivers name it
+OF_A_ROBOT = frozenset({FIX, ODOMETRY, "sensor_msgs/LaserScan", "sensor_msgs/Imu"})
+ALIKE = 2  # so many kinds of topics that two namespaces have alike make them two robots
+LOST_M2 = 1000.0  # the covariance by which an odometry declares itself lost
+
+
+def size_of_twist(message: Any) -> Twist:
+    """The size of a horizontal velocity in the unit of its topic, the same in the frame of the body and in east and
+    north; its turning is not known."""
+    vector = message if "linear" in message else inner(message, "twist")
+    x, y = finite(vector, "linear", "x"), number(vector, "linear", "y")
+    return Twist(speed_mps=plausible_speed(math.hypot(x, 0.0 if math.isnan(y) else y), FASTEST_KMH))
+
+
+def odometry_that_is_not_lost(message: Any) -> Odometry:
+    """Raises NotMeasured where the covariance of the pose says that nothing is known of it."""
+    covariance = inner(message, "pose").get("covariance")
+    try:
+        if number({"covariance": covariance[0]}, "covariance") > LOST_M2:
+            raise NotMeasured("lost")
+    except (TypeError, KeyError, IndexError):
+        pass
+    return odometry(message)
+
+
+def comparison_sources(
+    found: Mapping[str, str],
+    sources: Mapping[str, Source],
+    *,
+    unpublished: Collection[str] = (),
+    before: Collection[str] = (),
+) -> tuple[Source, ...]:
+    """Further topics of position, odometry and speed, at most four of each, none of which carries its signal.
+
+    `found`: topic → type of all topics; `sources`: what carries each signal; `unpublished`: topics without a publisher;
+    `before`: topics that were compared until now, which come first.
+    """
+    usable = {topic: plain_type(kind) for topic, kind in found.items() if topic not in unpublished}
+    result: list[Source] = []
+    for signal, decode, is_fit in _kinds(usable):
+        carrier = sources.get(signal)
+        if carrier is None or carrier.decode is None:
+            continue
+        taken = {carrier.topic, _topic(sources, "command"), _topic(sources, "speed")}
+        topics = [
+            topic
+            for topic, kind in usable.items()
+            if topic not in taken and is_fit(topic, kind) and not _is_of_another_robot(topic, carrier.topic, usable)
+        ]
+        own = _folder(carrier.topic)
+        order = sorted((topic not in before, _folder(topic) != own, topic) for topic in topics)
+        result += [
+            Source(signal=signal, topic=topic, type=found[topic], decode=decode, why="to compare", carries=False)
+            for _, _, topic in order[:MOST]
+        ]
+    return tuple(result)
+
+
+def _kinds(usable: Mapping[str, str]) -> Iterator[tuple[str, Decode, Any]]:
+    """Signal, decoder, and which topics show it: a plain number has no unit, and a Twist may be a command."""
+    receivers = {_folder(topic) for topic, kind in usable.items() if kind == FIX}
+    names = {name.lower() for name in BY_SIGNAL["speed"].names}
+    yield "position", nav_sat_fix, lambda topic, kind: kind == FIX
+    yield "odometry", odometry_that_is_not_lost, lambda topic, kind: kind == ODOMETRY
+    yield (
+        "speed",
+        size_of_twist,
+        lambda topic, kind: (
+            kind in TWISTS
+            and (
+                topic.lower() in names
+                or (_folder(topic) in receivers and topic.rpartition("/")[2] == VELOCITY_OF_A_RECEIVER)
+            )
+        ),
+    )
+
+
+def _topic(sources: Mapping[str, Source], signal: str) -> str | None:
+    source = sources.get(signal)
+    return None if source is None else source.topic
+
+
+def _folder(topic: str) -> str:
+    return topic.rpartition("/")[0]
+
+
+def _root(topic: str) -> str:
+    """The first part of a name with more than one, else nothing."""
+    first, _, rest = topic.lstrip("/").partition("/")
+    return first if rest else ""
+
+
+def _is_of_another_robot(topic: str, carrier: str, usable: Mapping[str, str]) -> bool:
+    """Whether the namespaces of two topics hold several kinds of topics under the same names; names without one are
+    alike."""
+    one, other = _root(topic), _root(carrier)
+    if one == other:
+        return False
+    below_one, below_other = (
+        {(name.lstrip("/")[len(root) :].lstrip("/"), kind) for name, kind in usable.items() if _root(name) == root}
+        for root in (one, other)
+    )
+    return len({kind for _, kind in below_one & below_other if kind in OF_A_ROBOT}) >= ALIKE
