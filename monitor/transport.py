@@ -198,7 +198,7 @@ class TransportDelay:
         """The bridge sent a message again that came `age_s` ago."""
         known = self._topics.get(topic)
         if known is not None:
-            known.older_s = age_s
+            known.older_s, known.first = age_s, None
 
     def older(self) -> dict[str, tuple[float, float]]:
         """Topics of which one message came on this connection: when it came, and how old it was then by all that is

@@ -64,7 +64,7 @@ def _why_not(snapshot: Snapshot, was_active: bool) -> Finding | None:
     if snapshot.get("position") is None and "position" not in snapshot.link.published:
         return absent("Position is not published")
     if not _others(snapshot):
-        return ok(ONE_SOURCE.text) if was_active else ONE_SOURCE
+        return unknown("No other source of the position sends any more", short="not sent") if was_active else ONE_SOURCE
     if snapshot.need("position").status < 0:
         return unknown("The receiver has no fix", short="no fix")
     return None

@@ -11,6 +11,8 @@ from server.judge.message_fields import NotMeasured, finite, inner, number
 from server.judge.plausible import FASTEST_KMH, plausible_speed
 from server.judge.signals.odometry import odometry
 from server.judge.signals.position import nav_sat_fix
+from server.judge.sources.candidates import cars_of, pools_of
+from server.judge.sources.namespaces import namespace_of
 from server.judge.topic import Decode
 from server.judge.topics import BY_SIGNAL, Source, plain_type
 
@@ -55,6 +57,7 @@ def comparison_sources(
     `before`: topics that were compared until now, which come first.
     """
     usable = {topic: plain_type(kind) for topic, kind in found.items() if topic not in unpublished}
+    cars = cars_of(pools_of(found, unpublished))
     result: list[Source] = []
     for signal, decode, is_fit in _kinds(usable):
         carrier = sources.get(signal)
@@ -64,7 +67,10 @@ def comparison_sources(
         topics = [
             topic
             for topic, kind in usable.items()
-            if topic not in taken and is_fit(topic, kind) and not _is_of_another_robot(topic, carrier.topic, usable)
+            if topic not in taken
+            and is_fit(topic, kind)
+            and namespace_of(topic, cars) in (None, namespace_of(carrier.topic, cars))
+            and not _is_of_another_robot(topic, carrier.topic, usable)
         ]
         own = _folder(carrier.topic)
         order = sorted((topic not in before, _folder(topic) != own, topic) for topic in topics)

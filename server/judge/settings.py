@@ -91,7 +91,8 @@ def change(
             raise BadSetting(f"topics.{signal}", "A topic name has 1 to 300 printable characters.")
         else:
             new_topics[signal] = topic
-    new_units = {**settings.units}
+    moved = {signal for signal in topics or {} if new_topics.get(signal) != settings.topics.get(signal)}
+    new_units = {signal: unit for signal, unit in settings.units.items() if signal not in moved}  # it was of the topic
     for signal, unit in (units or {}).items():
         known = [row.name for row in UNITS.get(signal, ())]
         if unit is None:

@@ -9,7 +9,8 @@ from server.judge.speed_ways import Ways
 from server.judge.units import Unit, UnitRule
 
 REST = 0.005  # a number so near to zero is the same in every unit, as far as it is shown
-GLITCHES = 2  # values beyond a unit that is known beforehand are single wrong values, up to so many
+GLITCHES = 2  # values beyond a unit are single wrong values, up to so many
+CLEARLY = 2.0  # times the most of a unit: one value is enough to show that it is another one
 ALTERNATES = 6  # such steps within the newest PAIRS: two publishers of different units on one topic
 PAIRS = 40
 STEP_OF_UNITS = {"speed": 3.6}  # between two units of a signal; of all others:
@@ -105,7 +106,7 @@ def decide(rule: UnitRule, evidence: Evidence, *, chosen: Unit | None, profiled:
     possible = [unit for unit in rule.by_values if unit in fits]
     if rule.definition in possible:
         return Decision(unit=rule.definition, why="by definition", fits=fits)
-    if len(possible) == 1:
+    if len(possible) == 1 and all(one in possible or _is_clearly_beyond(one, evidence) for one in rule.by_values):
         return Decision(unit=possible[0], why="by its values", fits=fits)
     if not possible and rule.by_values:
         return _unknown(f"values beyond {' and '.join(unit.label for unit in rule.by_values)}", fits)
@@ -129,6 +130,12 @@ def _by_way(rule: UnitRule, evidence: Evidence, known: Unit | None, by: str) -> 
 
 def _is_beyond(unit: Unit, evidence: Evidence) -> bool:
     return max(-evidence.lowest, evidence.highest) > unit.most
+
+
+def _is_clearly_beyond(unit: Unit, evidence: Evidence) -> bool:
+    """Whether another unit follows: a single value a little beyond may be wrong."""
+    is_far = max(-evidence.lowest, evidence.highest) > CLEARLY * unit.most
+    return is_far or evidence.beyond.get(unit.name, 0) > GLITCHES
 
 
 def _unknown(why: str, fits: tuple[Unit, ...]) -> Decision:

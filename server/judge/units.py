@@ -64,7 +64,9 @@ class UnitRule:
     source: str
 
 
-_VALUES = "all values at most 1: not known; one above 1: 0 to 100 %; one above 100, or below 0: not known"
+_VALUES = (
+    "all values at most 1: not known; three above 1, or one above 2: 0 to 100 %; one above 100, or below 0: not known"
+)
 _WAY = (
     "m/s; km/h where the way that follows from it is 3.6 times (±10 %) that of the odometry's pose or the receiver's "
     "positions over 20 m faster than 2 m/s; not known where these contradict each other"
@@ -146,7 +148,8 @@ RULES: tuple[UnitRule, ...] = (
         units=_PEDAL,
         definition=SHARE,
         by_values=_PEDAL,
-        decided="0 to 1; 0 to 100 % as soon as one value is above 1, also for values below 1; one above 100: not known",
+        decided="0 to 1; 0 to 100 % as soon as three values are above 1, or one above 2, also for values below 1; one "
+        "above 100: not known",
         source="sensor_msgs/BatteryState: charge percentage on 0 to 1 range",
     ),
     UnitRule(

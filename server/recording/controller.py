@@ -166,6 +166,10 @@ class SessionRecording:
         kept."""
         return self._parts.hold(topic, type, message)
 
+    def release(self) -> None:
+        """What was held is of an earlier opening of the link."""
+        self._parts.release()
+
     def own(self, channel: Own, said: Mapping[str, Any]) -> None:
         """Something of ours, on one of our channels."""
         self._parts.own(channel, said)

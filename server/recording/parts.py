@@ -153,6 +153,10 @@ class RecordingParts:
             return True
         return False
 
+    def release(self) -> None:
+        """What was held is of an earlier opening of the link: the next one sends it anew."""
+        self._held.clear()
+
     def own(self, channel: Own, said: Mapping[str, Any]) -> None:
         """An entry of one of our own channels."""
         session = self._state.session

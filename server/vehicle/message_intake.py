@@ -75,6 +75,7 @@ class MessageIntake:
     def link_opened(self) -> None:
         """The car's messages come from the beginning, also those that are sent once."""
         self._judgement.frames.forget()
+        self._recording.release()
 
     def junk_received(self, why: str) -> None:
         """Something came that is no message."""

@@ -36,7 +36,7 @@ class TopicEvidence:
     kind: str
     frame: str | None = None  # that its messages name; None: none, or no message yet
     count: int = 0
-    has_twist: bool = False  # a component of its twist was not zero
+    has_twist: bool = False  # its horizontal velocity was not zero
     way: Way = field(default_factory=Way)  # of its pose
     earth_votes: int = 0
     body_votes: int = 0
@@ -169,9 +169,8 @@ class Evidence:
         return False
 
     def _twist(self, known: TopicEvidence, twist: Any, at_s: float) -> tuple[float, float]:
-        parts = [number(twist, part, axis) for part in ("linear", "angular") for axis in "xyz" if axis in twist[part]]
-        known.has_twist |= any(part != 0.0 for part in parts)  # NaN too: it is filled, and says that it is not known
         x, y = number(twist, "linear", "x"), number(twist, "linear", "y")
+        known.has_twist |= x != 0.0 or y != 0.0  # NaN too: it is filled, and says that it is not known
         known.velocity = (at_s, x, 0.0 if math.isnan(y) else y)
         return x, known.velocity[2]
 

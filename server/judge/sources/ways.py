@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 HAS_MOVED_M = 1.0
+GAP_S = 3.0  # between two poses of one way
 FASTEST_MPS = 80.0  # a step that is faster is a jump of the estimate
 METRES_A_DEGREE = 111_200.0
 
@@ -27,6 +28,9 @@ class Way:
             return
         before_s, step = self.at_s, (x_m - self.x_m, y_m - self.y_m)
         self.at_s, self.x_m, self.y_m = at_s, x_m, y_m
+        if before_s is not None and at_s - before_s > GAP_S:
+            self.made_m = self.largest_m = (0.0, 0.0)  # how it came here was not seen
+            return
         if before_s is None or not math.hypot(*step) <= FASTEST_MPS * max(0.01, at_s - before_s):
             return
         self.made_m = (self.made_m[0] + step[0], self.made_m[1] + step[1])

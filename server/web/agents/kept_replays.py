@@ -10,6 +10,7 @@ import orjson
 from fastapi import APIRouter, Body, HTTPException, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from server.protocol.replay_commands import Word
 from server.replay.manager import NoReplay, ReplayClient, ReplayManager
 from server.web.agents.kept import REPLAYS
 
@@ -27,6 +28,8 @@ class Opening(BaseModel):
     at_s: float | int | None = None
     settings: str = Field("", max_length=100_000)
     settings_version: int = 0
+    topics: dict[Word, Word] = Field(default_factory=dict, max_length=50)  # as of `OpenReplay`
+    units: dict[Word, Word] = Field(default_factory=dict, max_length=50)
 
 
 class OpenKept(BaseModel):

@@ -22,6 +22,14 @@ export function mayAnswer({ isViewer, page, control, replaying = false }) {
 }
 
 /**
+ * Of what a question is asked: a car, or a recording of it, whose questions are others.
+ * @param {{vehicle: string, frame?: {replay?: {id: string}} | null}} store
+ */
+export function placeOf({ vehicle, frame }) {
+  return frame?.replay ? `${vehicle} ${frame.replay.id}` : vehicle;
+}
+
+/**
  * A question of a car keeps its key when options come and go: what was put off once is not asked again.
  * @param {string} vehicle
  * @param {Question} question

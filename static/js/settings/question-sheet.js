@@ -4,7 +4,7 @@ import { html, setText, setWords, show } from '../core/dom.js';
 import { Meant } from '../core/meant.js';
 import { styled } from '../core/style-sheet.js';
 import { addSheet, closeSheet, openSheet } from '../shell/sheet.js';
-import { answerOf, keyOf, mayAnswer, meanwhileWords, restWords } from './question-layout.js';
+import { answerOf, keyOf, mayAnswer, meanwhileWords, placeOf, restWords } from './question-layout.js';
 import { ScanSketch, reachOf, sketchedOf } from './scan-sketch.js';
 import { settingsOf } from './settings-model.js';
 
@@ -56,7 +56,7 @@ class QuestionSheet {
     this.question = question;
     this.does = does;
     this.model = settingsOf(store);
-    this.which = keyOf(store.vehicle, question);
+    this.which = keyOf(placeOf(store), question);
     this.label = store.signal(question.signal)?.label ?? question.signal;
     this.asks = html('span');
     this.heading = html('h2', { id: 'question-title', tabindex: '-1' }, this.asks);
@@ -93,7 +93,7 @@ class QuestionSheet {
   /** It may be answered, or another page in control, while this sheet stands; and its options may be others. */
   #look() {
     const { store } = this;
-    const now = store.frame?.questions?.find((one) => keyOf(store.vehicle, one) === this.which);
+    const now = store.frame?.questions?.find((one) => keyOf(placeOf(store), one) === this.which);
     if (!now || !mayAnswer(store)) this.close();
     else this.#fill(now);
   }

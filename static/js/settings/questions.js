@@ -4,7 +4,7 @@
 import { html, icon, need, setAttribute, setWords, show } from '../core/dom.js';
 import { Meant } from '../core/meant.js';
 import { styled } from '../core/style-sheet.js';
-import { dealt, keyOf, mayAnswer, meanwhileWords, waitingWords } from './question-layout.js';
+import { dealt, keyOf, mayAnswer, placeOf, meanwhileWords, waitingWords } from './question-layout.js';
 
 const STORED = 'catgraph.later';
 /** So many put-off questions are remembered. */
@@ -54,7 +54,7 @@ class Questions {
   #now() {
     const { store } = this;
     const questions = store.isSilent ? [] : (store.frame?.questions ?? []);
-    return { questions, ...dealt(store.vehicle, questions, this.#later) };
+    return { questions, ...dealt(placeOf(store), questions, this.#later) };
   }
 
   draw() {
@@ -67,7 +67,7 @@ class Questions {
     show(this.others, !may && questions.length > 0);
     const label = (/** @type {string} */ signal) => store.signal(signal)?.label ?? signal;
     if (may && first) {
-      const key = keyOf(store.vehicle, first);
+      const key = keyOf(placeOf(store), first);
       if (key !== this.#asked) this.meant.moved();
       this.#asked = key;
       setWords(this.title, first.words);
@@ -81,14 +81,14 @@ class Questions {
   /** @param {Question | undefined} question */
   #putOff(question) {
     if (!question) return;
-    this.#later.add(keyOf(this.store.vehicle, question));
+    this.#later.add(keyOf(placeOf(this.store), question));
     remember([...this.#later].slice(-MOST_STORED));
     this.draw();
   }
 
   /** Should it be asked again one day, it is asked with a card. @param {Question} question */
   #answered(question) {
-    if (this.#later.delete(keyOf(this.store.vehicle, question))) remember([...this.#later]);
+    if (this.#later.delete(keyOf(placeOf(this.store), question))) remember([...this.#later]);
   }
 
   /** @param {Question | undefined} question */
@@ -110,8 +110,8 @@ class Questions {
 
   /** The same question of the newest frame. @param {Question | undefined} question */
   #same(question) {
-    const { vehicle } = this.store;
-    return question && this.#now().questions.find((one) => keyOf(vehicle, one) === keyOf(vehicle, question));
+    const place = placeOf(this.store);
+    return question && this.#now().questions.find((one) => keyOf(place, one) === keyOf(place, question));
   }
 }
 

@@ -186,3 +186,10 @@ def transform(parent: str, child: str, yaw_rad: float) -> dict[str, Any]:
     found = {"translation": {"x": 0.0, "y": 0.0, "z": 0.0}, "rotation": rotation}
     header = {"seq": 0, "stamp": {"secs": 1, "nsecs": 0}, "frame_id": parent}
     return {"header": header, "child_frame_id": child, "transform": found}
+
+
+@pytest.mark.parametrize("cars", [("/agv1", "/agv2"), ("/fleet/a7", "/fleet/b2")])
+def test_another_car_of_the_bridge_is_not_compared(cars: tuple[str, str]) -> None:
+    one, other = cars
+    found = {f"{one}/odom": ODOMETRY, f"{other}/odom": ODOMETRY, f"{other}/scan": SCAN}
+    assert compared(found, {"speed": f"{one}/odom", "odometry": f"{one}/odom"}) == set()

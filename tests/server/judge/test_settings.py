@@ -467,3 +467,12 @@ async def test_the_log_is_paged_filtered_and_exported(bridge: RosBridge, server:
         rows = (await client.get("/api/log.csv")).text.splitlines()
         assert rows[0].startswith("n,time,change")
         assert len(rows) == len(everything) + 1
+
+
+def test_a_unit_is_of_its_topic() -> None:
+    settings = change(Settings(), GENERIC, topics={"brake": "/a"}, units={"brake": "share"})
+    assert settings.units == {"brake": "share"}
+    assert change(settings, GENERIC, topics={"speed": "/v"}).units == {"brake": "share"}
+    assert change(settings, GENERIC, topics={"brake": "/a"}).units == {"brake": "share"}
+    assert change(settings, GENERIC, topics={"brake": "/b"}).units == {}
+    assert change(settings, GENERIC, topics={"brake": None}).units == {}

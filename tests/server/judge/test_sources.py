@@ -349,3 +349,27 @@ def test_the_choice_depends_on_no_order_and_every_source_has_a_reason(seed: int)
     assert (chosen(again), again.questions, again.undecided) == (chosen(first), first.questions, first.undecided)
     assert all(source.why for source in first.sources.values())
     assert not set(first.sources) & set(first.undecided)
+
+
+def test_a_twist_that_only_turns_is_not_filled() -> None:
+    turning = [odometry(float(n), 0.0) for n in range(6)]
+    for message in turning:
+        message["twist"]["twist"]["angular"]["z"] = 0.1
+    evidence = shown({"/odom": ODOM}, *[("/odom", one, n * 0.1) for n, one in enumerate(turning)])
+    assert "speed" not in chosen(choose({"/odom": ODOM}, evidence=evidence))
+
+
+def test_a_way_that_was_driven_unseen_shows_nothing_of_the_twist() -> None:
+    """A recording is looked at in windows: the car stands in each of them, and drove between them."""
+    windows = [(0.0, 0.0), (20.0, 90.0), (60.0, 300.0)]
+    standing = [("/odom", odometry(way_m, 0.0), at_s + n * 0.1) for at_s, way_m in windows for n in range(10)]
+    choice = choose({"/odom": ODOM}, evidence=shown({"/odom": ODOM}, *standing))
+    assert chosen(choice)["speed"] == "/odom"
+
+
+def test_the_laser_in_use_stays_while_the_transforms_come_anew() -> None:
+    evidence = frames(front="a", rear="b")
+    choice = choose(LASERS, evidence=evidence, in_use={"scan": "/rear/scan"})
+    assert (chosen(choice)["scan"], choice.questions) == ("/rear/scan", ())
+    contradicted = frames({"a": True, "b": False}, front="a", rear="b")
+    assert chosen(choose(LASERS, evidence=contradicted, in_use={"scan": "/rear/scan"}))["scan"] == "/front/scan"

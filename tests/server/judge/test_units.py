@@ -141,12 +141,15 @@ VALUES: dict[str, tuple[str, str, list[float], list[float | None]]] = {
     "battery, share": ("fuel", BATTERY, [1.0, 0.5, 0.02], [100.0, 50.0, 2.0]),
     "battery, slightly over": ("fuel", BATTERY, [1.02, 0.9], [102.0, 90.0]),
     "battery, percent": ("fuel", BATTERY, [12.0, 0.6], [12.0, 0.6]),
-    "battery, percent late": ("fuel", BATTERY, [0.9, 1.4, 0.9], [90.0, 1.4, 0.9]),
+    "battery, percent late": ("fuel", BATTERY, [0.9, 2.4, 0.9], [90.0, 2.4, 0.9]),
+    "battery, percent by three values": ("fuel", BATTERY, [0.9, 1.4, 1.3, 1.2, 0.9], [90.0, None, None, 1.2, 0.9]),
+    "battery, one wrong value": ("fuel", BATTERY, [0.9, 1.4, 0.5], [90.0, None, None]),
+    "pedal of one, one wrong value": ("brake", FLOAT, [0.9, 1.3, 0.9], [None, None, None]),
     "battery, empty": ("fuel", BATTERY, [0.0], [0.0]),
     "battery, permille": ("fuel", BATTERY, [900.0, 80.0], [None, None]),
     "tank, percent": ("fuel", FLOAT, [30.0, 0.5], [30.0, 0.5]),
     "tank, open": ("fuel", FLOAT, [0.5, 0.4], [None, None]),
-    "tank, open until above 1": ("fuel", FLOAT, [0.5, 2.0, 0.4], [None, 2.0, 0.4]),
+    "tank, open until above 1": ("fuel", FLOAT, [0.5, 3.0, 0.4], [None, 3.0, 0.4]),
     "tank, millilitres": ("fuel", FLOAT, [4000.0, 50.0], [None, None]),
     "pedal at rest": ("brake", FLOAT, [0.0, 0.0], [0.0, 0.0]),
     "pedal open": ("brake", FLOAT, [0.0, 0.3, 0.0], [0.0, None, None]),
@@ -216,7 +219,7 @@ def test_a_decision_never_changes_back(numbers: list[float], signal: str) -> Non
 def test_what_was_taken_for_a_share_is_void_once_it_is_percent() -> None:
     car = Car({"fuel": BATTERY})
     assert car.say("fuel", 0.9) == [90.0]
-    assert car.say("fuel", 1.5) == [1.5]
+    assert car.say("fuel", 2.5) == [2.5]
     note = car.reception.units.note("fuel", "/fuel")
     assert note == "published in 0 to 100 %, by its values; what came before was taken as 0 to 1 and is void"
 
