@@ -161,10 +161,13 @@ class SessionRecording:
         """A message of the car, or the RawFrame that holds it."""
         self._parts.take(topic, type, message, now_s, size)
 
-    def hold(self, topic: str, type: str | None, message: Any) -> bool:
-        """A message that is sent once and holds for the whole drive: every later part begins with it. False: it is not
-        kept."""
-        return self._parts.hold(topic, type, message)
+    def hold(self, topic: str, type: str | None, message: Any) -> None:
+        """A message that is sent once and holds for the whole drive: every later part begins with it."""
+        self._parts.hold(topic, type, message)
+
+    def holds(self, topic: str, message: Any) -> bool:
+        """Whether a message is held, so that the part that is open has it."""
+        return self._parts.holds(topic, message)
 
     def release(self) -> None:
         """What was held is of an earlier opening of the link."""

@@ -142,16 +142,15 @@ class RecordingParts:
         if session.is_open and self.recorder is not None:
             self.recorder.take(topic, type, message, self._clock.ns(now_s), size, now_s)
 
-    def hold(self, topic: str, type: str | None, message: Any) -> bool:
-        """Transforms that are sent once: a later part begins with them, for they are not sent again. False: there are
-        too many, and these are not kept."""
-        rows = message.get("transforms") if isinstance(message, Mapping) else None
-        children = [row.get("child_frame_id") for row in rows or () if isinstance(row, Mapping)]
-        key = (topic, *map(str, children[:MOST_HELD]))
+    def hold(self, topic: str, type: str | None, message: Any) -> None:
+        """Transforms that are sent once: a later part begins with them, for they are not sent again."""
+        key = _held_as(topic, message)
         if key in self._held or len(self._held) < MOST_HELD:
             self._held[key] = topic, type, message
-            return True
-        return False
+
+    def holds(self, topic: str, message: Any) -> bool:
+        """Whether transforms are held, so that each part of this opening of the link has them."""
+        return _held_as(topic, message) in self._held
 
     def release(self) -> None:
         """What was held is of an earlier opening of the link: the next one sends it anew."""
@@ -259,3 +258,10 @@ class RecordingParts:
     def _finished(self, path: Path) -> None:
         self._state.saved = id_of(path), self._ended_ms or self._wall_ms()
         self._on_finished(path)
+
+
+def _held_as(topic: str, message: Any) -> tuple[str, ...]:
+    """Transforms of the same frames replace each other."""
+    rows = message.get("transforms") if isinstance(message, Mapping) else None
+    children = [row.get("child_frame_id") for row in rows or () if isinstance(row, Mapping)]
+    return (topic, *map(str, children[:MOST_HELD]))

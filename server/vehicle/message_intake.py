@@ -155,7 +155,7 @@ class MessageIntake:
         if not is_repeat:
             self._judgement.other_message_s = now_s
         kind = connection.subscriptions.type_of(topic)
-        is_in_part = is_repeat and is_static(topic) and self._recording.hold(topic, kind, message)
+        is_in_part = is_repeat and is_static(topic) and self._recording.holds(topic, message)
         if connection.link is not None and not is_in_part and self._is_to_record(topic, arrival, now_s):
             self._record(connection, topic, message, now_s, connection.link.frame_bytes)
         if is_static(topic):

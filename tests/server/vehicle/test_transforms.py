@@ -134,3 +134,26 @@ async def test_each_recording_holds_the_transforms_that_were_sent_once(
             run = rehearse(recording)
             assert "obstacle" in {episode.alarm_id for episode in run.episodes}
             assert run.snapshot.need("scan").mounting.origin == "transforms"  # type: ignore[union-attr]
+
+
+@pytest.mark.virtual_time
+async def test_a_part_that_begins_after_an_outage_holds_them_too(bridge: RosBridge, tmp_path: Path) -> None:
+    """The bridge sends again what it kept: no new sample, but this part does not have it yet."""
+    bridge.advertise("/tf_static", TF, latch=True)
+    bridge.publish("/tf_static", tf(BACKWARDS.transform()))
+    config = Config(vehicles=(Vehicle(name="car", address=bridge.address),), data=tmp_path)  # type: ignore[attr-defined]
+    async with serving(config) as base, scanning(bridge), viewer(base) as one:
+        assert (await one.ask(kind="set", values={"recording.hold_s": 0.0}))["ok"]
+        await one.state(is_alarmed)
+        await bridge.kill()
+        await one.state(lambda s: s["session"]["phase"] == "lost")
+        await bridge.revive()
+        await one.state(lambda s: s["session"]["phase"] == "monitoring")
+        await one.state(lambda s: s["recording"]["state"] == "recording" and s["recording"]["messages"] > 40)
+        assert (await one.ask(kind="disconnect"))["ok"]
+        await one.state(lambda s: s["recording"]["state"] == "off")
+    made = sorted((tmp_path / "recordings").rglob("*.mcap"))
+    assert len(made) == 2
+    for path in made:
+        with open_recording([path]) as recording:
+            assert recording.topics["/tf_static"].count == 1
