@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help demo fleet test test-field check world format lint types imports tsc node bench soak mutation sbom screenshots clean vendor-missing
+.PHONY: help demo fleet test test-field check world format lint types imports compiled tsc node bench soak mutation sbom screenshots clean vendor-missing
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -23,7 +23,7 @@ fleet: $(VENV)/.ready-test static/built/built.json ## a broker, five simulated c
 test: $(VENV)/.ready-test static/built/built.json ## the gate: what must pass before a change goes in (docs/testing.md)
 	$(PY) -m tests.chromium
 	$(PY) -m tests.vehicle.ros2_environment
-	$(MAKE) --no-print-directory -j 2 --output-sync format lint types imports tsc node
+	$(MAKE) --no-print-directory -j 2 --output-sync types compiled format lint imports tsc node
 	$(PY) -m tests.stages test
 
 test-field: $(VENV)/.ready-test static/built/built.json ## all tests of processes, real time, widths and real ROS nodes
@@ -32,7 +32,7 @@ test-field: $(VENV)/.ready-test static/built/built.json ## all tests of processe
 	$(PY) -m tests.stages test-field
 
 check: $(VENV)/.ready-test ## the quick part of the gate, without a browser
-	$(MAKE) --no-print-directory -j 2 --output-sync format lint types imports tsc node
+	$(MAKE) --no-print-directory -j 2 --output-sync types compiled format lint imports tsc node
 	$(PY) -m tests.stages check
 
 world: $(VENV)/.ready-test static/built/built.json ## what failed on real bridges and for real operators, by its points (docs/world.md)
@@ -74,6 +74,9 @@ imports: $(VENV)/.ready-test
 
 tsc: $(VENV)/.ready-test
 	node_modules/.bin/tsc -p .
+
+compiled: $(VENV)/.ready-test # the modules of the tests, once, so that not every worker compiles all of them
+	$(PYTEST) --collect-only -q > /dev/null
 
 node: $(VENV)/.ready-test
 	files=$$(find tests/page -name '*.test.js' | sort); [ -z "$$files" ] || node --test --test-reporter dot $$files

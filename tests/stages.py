@@ -41,7 +41,8 @@ class Alone:
     failed: tuple[str, ...]
 
 
-TWO, THREE = (("-n", number, "--dist", "worksteal") for number in "23")
+# More workers than the machine has cores: some tests wait for processes, browsers and timers.
+THREE, FOUR = (("-n", number, "--dist", "worksteal") for number in "34")
 NOT_PAGE = "--ignore=tests/page"
 TARGETS = {
     # asyncio's debug mode is on here only, and in the tests' own process only: it takes a fifth more time.
@@ -49,8 +50,8 @@ TARGETS = {
         Stage("quick", (NOT_PAGE, *THREE, "-q", "-m", "not (browser or slow or field or soak)"), ("--asyncio-debug",)),
     ),
     "test": (
-        Stage("server", (NOT_PAGE, *THREE, "-m", "not (browser or field or soak)")),  # some wait for processes
-        Stage("page", ("tests/page", *TWO, "-m", "gate and not soak")),
+        Stage("server", (NOT_PAGE, *FOUR, "-m", "not (browser or field or soak)")),
+        Stage("page", ("tests/page", *THREE, "-m", "gate and not soak")),
     ),
     "test-field": (
         Stage("field", (NOT_PAGE, *THREE, "-m", "field and not (browser or soak)")),

@@ -328,12 +328,18 @@ async def test_older_wishes_give_way_when_there_are_too_many(
     source: Source, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("server.web.maps.tile_proxy.LONGEST_QUEUE", 4)
-    source.be(after_s=0.2)
     async with serving(source.upstream(), tmp_path / "data") as one:
         tiles = (await one.layer())["tiles"]
-        answers = await asyncio.gather(*(one.client.get(tiles.format(z=6, x=x, y=0)) for x in range(12)))
-        assert sum(answer.status_code == 200 for answer in answers) == 6
-        assert answers[11].status_code == 200, "the newest is of what is in sight"
+        source.be(held=True)
+        older = {asyncio.create_task(one.client.get(tiles.format(z=6, x=x, y=0))) for x in range(11)}
+        while sum(task.done() for task in older) < 5:  # two are fetched, four wait
+            await asyncio.wait({task for task in older if not task.done()}, return_when=asyncio.FIRST_COMPLETED)
+        newest = asyncio.create_task(one.client.get(tiles.format(z=6, x=11, y=0)))
+        while sum(task.done() for task in older) < 6:
+            await asyncio.wait({task for task in older if not task.done()}, return_when=asyncio.FIRST_COMPLETED)
+        source.be()
+        assert sorted([(await task).status_code for task in older]) == [200] * 5 + [204] * 6
+        assert (await newest).status_code == 200, "the newest is of what is in sight"
 
 
 async def test_nobody_fetches_a_whole_country(source: Source, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

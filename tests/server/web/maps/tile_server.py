@@ -1,6 +1,7 @@
 """A little server of tiles as a process of its own: `python tile_server.py FOLDER [PORT]`.
 
-FOLDER/mood.json says how it answers now; FOLDER/asked.jsonl holds what it was asked: path, headers, how many at once.
+FOLDER/mood.json says how it answers now, `held` not before the mood changes. FOLDER/asked.jsonl holds what it was
+asked: path, headers, how many at once.
 Every tile is a picture of its own.
 """
 
@@ -44,6 +45,9 @@ class Tiles(BaseHTTPRequestHandler):
                 row = {"path": self.path, "headers": dict(self.headers), "at_once": Tiles.at_once}
                 asked.write(json.dumps(row) + "\n")
         try:
+            while mood.get("held"):
+                time.sleep(0.02)
+                mood = json.loads((self.folder / "mood.json").read_text())
             time.sleep(mood.get("after_s", 0))
             self.answer(mood)
         except OSError:
