@@ -8,7 +8,8 @@ from typing_extensions import TypedDict
 
 from server.protocol.doc import doc
 
-SlowDownPhase = Literal["not_available", "safe", "armed", "ordered", "holding"]
+SlowDownPhase = Literal["not_available", "not_armed", "armed", "ordered", "holding"]
+FORMER_PHASES: dict[str, SlowDownPhase] = {"safe": "not_armed"}  # as older agents state them
 GuardPhase = Literal["unguarded", "guarded", "operator", "slowing", "holding"]
 
 

@@ -19,7 +19,7 @@ MOST_ALARMS = 20  # each with a line of its own; more of them are one line
 MOST_LIMITS = 20
 _SLOW_DOWN: dict[SlowDownPhase, str] = {
     "not_available": "Slow-down is not available",
-    "safe": "Slow-down is off",
+    "not_armed": "Slow-down is not armed",
     "armed": "Slow-down is armed",
     "ordered": "The car is being slowed",
     "holding": "The car is held",

@@ -7,7 +7,7 @@ import { alarm, state } from './frames.js';
 const worst = (more = {}) => ({ id: 'speed_limit', occurrence: 3, title: 'Speed above limit', priority: 'critical', state: 'UNACKED', active: true, raised_ms: 93_000, sound: 'high', ...more });
 const summary = (more = {}) => ({
   phase: 'monitoring', paused: false, link: { cut: null, bridge_age_s: 0.1, car_age_s: 0.1, trying_for_s: 0, connected_for_s: 60 }, worst: null, waiting: 0,
-  speed: { value_mps: 4.2, freshness: 'fresh', age_s: 0.1, horizon_s: 1 }, holder: null, page: null, recording: 'recording', recording_for_s: 252, slow_down: 'safe', ...more,
+  speed: { value_mps: 4.2, freshness: 'fresh', age_s: 0.1, horizon_s: 1 }, holder: null, page: null, recording: 'recording', recording_for_s: 252, slow_down: 'not_armed', ...more,
 });
 /** @param {Record<string, any>} all @param {number} [lag_s] */
 const rows = (all, lag_s = 0.1) => rowsOf(/** @type {any} */ ({

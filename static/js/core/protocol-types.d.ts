@@ -177,7 +177,7 @@ export interface CarSummary {
   page: string | null;
   recording: "off" | "recording" | "saving" | "held" | "stopped";
   recording_for_s: number | null;
-  slow_down: "not_available" | "safe" | "armed" | "ordered" | "holding";
+  slow_down: "not_available" | "not_armed" | "armed" | "ordered" | "holding";
   /** when it was made, by the clock that its other times are of */
   time_ms?: number;
   /** null: it needs nobody */
@@ -2269,7 +2269,7 @@ export interface SlowDownOrder {
 
 export interface SlowDownState {
   /** ordered: on its ramp; holding: zeros are held */
-  state: "not_available" | "safe" | "armed" | "ordered" | "holding";
+  state: "not_available" | "not_armed" | "armed" | "ordered" | "holding";
   /** why it is not available, as a sentence */
   why: string | null;
   topic?: string | null;
