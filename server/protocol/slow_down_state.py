@@ -33,7 +33,7 @@ class SlowDownOrder(TypedDict):
     ordered_mps: float | None
     deceleration_mps2: float
     sending: Annotated[
-        bool, doc("false: its commands are not sent; it goes on when the link is back, if it is not released")
+        bool, doc("false: its commands are not sent; it continues when the link is back, if it is not released")
     ]
     confirmed: Annotated[
         bool | None,

@@ -171,7 +171,7 @@ test('a file that cannot hold settings is not sent', () => {
 });
 
 test('a trial of a sound says plainly where this phone cannot sound', () => {
-  assert.match(trialWords('missing', 'high'), /has no sound: this phone sounds no alarms/);
+  assert.match(trialWords('missing', 'high'), /has no sound: this device sounds no alarms/);
   assert.match(trialWords('blocked', 'high'), /no alarm can be heard/);
   assert.match(trialWords('busy', 'low'), /An alarm sounds now/);
   assert.match(trialWords('sounding', 'medium'), /three rising pulses/);

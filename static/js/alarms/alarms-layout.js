@@ -70,7 +70,23 @@ function rowWords(alarm) {
   const { active, verdict, measured, limit } = alarm;
   if (!active) return alarm.trip_text || alarm.text;
   const isCompared = verdict === 'fault' && measured && limit && measured.unit === limit.unit && measured.value !== null && limit.value !== null;
-  return isCompared ? `${fixed(measured.value)} of ${fixed(limit.value)} ${measured.unit}` : snackWords(alarm);
+  return isCompared ? comparedWords(measured, limit) : snackWords(alarm);
+}
+
+// What is read before a measured value, by its label; "of": a count of a whole.
+const BEFORE = /** @type {Record<string, string>} */ ({ 'Silent for': 'no message for', 'Lost for': 'lost for', 'Missing for': 'missing for', 'Paused for': 'paused for', 'Unchanged for': 'unchanged for', 'Standing for': 'standing for', 'Without a usable value for': 'no usable value for', Waited: 'waited', Late: 'late by', Behind: 'behind by' });
+const BESIDE = /** @type {Record<string, string>} */ ({ Expected: 'expected', 'Normal up to': 'normal up to', 'At least': 'at least', Needed: 'needed' });
+
+/**
+ * "no message for 16.4 s (limit 1.0 s)", "12.6 m/s (limit 11.0 m/s)", "5 of 7".
+ * @param {Pick<import('../core/protocol-types.js').Quantity, 'label' | 'value' | 'unit'>} measured
+ * @param {Pick<import('../core/protocol-types.js').Quantity, 'label' | 'value' | 'unit'>} limit
+ */
+export function comparedWords(measured, limit) {
+  if (limit.label === 'Of') return `${fixed(measured.value, 0)} of ${fixed(limit.value, 0)}`;
+  const before = BEFORE[measured.label];
+  const amount = (/** @type {typeof measured} */ { value, unit }) => `${fixed(value)} ${unit}`.trim();
+  return `${before ? `${before} ` : ''}${amount(measured)} (${BESIDE[limit.label] ?? 'limit'} ${amount(limit)})`;
 }
 
 /** @param {Suppressed} one @returns {Row} */

@@ -208,6 +208,11 @@ export function releaseOf({ isViewer, mayControl, holder, car }) {
   return { can: true, label: `Release ${car || 'the car'}`, why: '' };
 }
 
+/** The key that leaves the order as it is. @param {string | undefined} state of the slow-down */
+export function keepWords(state) {
+  return state === 'holding' ? 'Keep holding' : 'Keep slowing';
+}
+
 /**
  * The sheet behind the slide: how it stands, what will be commanded, and what this page may do.
  * @param {Seen} seen
@@ -237,7 +242,7 @@ export function sheetOf(seen, lag_s) {
     : isArmed ? `${by} Any operator can slow the car: slide to the end and let go.`.trim()
       : 'When armed, one slide slows the car. The steering angle is held, and speed 0 is commanded until the car is released.';
   if (order) return { ...plain, title, text, facts, act: null, says: '' };
-  if (isViewer) return { ...plain, title, text, facts, act: null, says: 'This phone is paired as a viewer: it can watch but not make changes.' };
+  if (isViewer) return { ...plain, title, text, facts, act: null, says: 'This device is paired as a viewer: it can watch but not make changes.' };
   if (!mayControl) return { ...plain, title, text, facts, act: 'ask', says: `${holder ?? 'Another'} is in control and can ${isArmed ? 'disarm' : 'arm'} it.` };
   return { ...plain, title, text, facts, act: isArmed ? 'disarm' : 'arm', says: '' };
 }
