@@ -73,20 +73,18 @@ function rowWords(alarm) {
   return isCompared ? comparedWords(measured, limit) : snackWords(alarm);
 }
 
-// What is read before a measured value, by its label; "of": a count of a whole.
-const BEFORE = /** @type {Record<string, string>} */ ({ 'Silent for': 'no message for', 'Lost for': 'lost for', 'Missing for': 'missing for', 'Paused for': 'paused for', 'Unchanged for': 'unchanged for', 'Standing for': 'standing for', 'Without a usable value for': 'no usable value for', Waited: 'waited', Late: 'late by', Behind: 'behind by' });
-const BESIDE = /** @type {Record<string, string>} */ ({ Expected: 'expected', 'Normal up to': 'normal up to', 'At least': 'at least', Needed: 'needed' });
+const LIMITS = new Set(['', 'Allowed', 'At most', 'Limit', 'Reported after']);
 
 /**
- * "no message for 16.4 s (limit 1.0 s)", "12.6 m/s (limit 11.0 m/s)", "5 of 7".
- * @param {Pick<import('../core/protocol-types.js').Quantity, 'label' | 'value' | 'unit'>} measured
- * @param {Pick<import('../core/protocol-types.js').Quantity, 'label' | 'value' | 'unit'>} limit
+ * "no message for 16.4 s (limit 1.0 s)", "12.6 m/s (limit 11.0 m/s)", "5.0 Hz (expected 20.0 Hz)", "5 of 7".
+ * @param {import('../core/protocol-types.js').Quantity} measured
+ * @param {import('../core/protocol-types.js').Quantity} limit
  */
 export function comparedWords(measured, limit) {
   if (limit.label === 'Of') return `${fixed(measured.value, 0)} of ${fixed(limit.value, 0)}`;
-  const before = BEFORE[measured.label];
-  const amount = (/** @type {typeof measured} */ { value, unit }) => `${fixed(value)} ${unit}`.trim();
-  return `${before ? `${before} ` : ''}${amount(measured)} (${BESIDE[limit.label] ?? 'limit'} ${amount(limit)})`;
+  const before = measured.label === 'Silent for' ? 'no message for ' : / for$/.test(measured.label) ? `${measured.label.toLowerCase()} ` : '';
+  const [now, least] = [measured, limit].map(({ value, unit }) => `${fixed(value)} ${unit}`.trim());
+  return `${before}${now} (${LIMITS.has(limit.label) ? 'limit' : limit.label.toLowerCase()} ${least})`;
 }
 
 /** @param {Suppressed} one @returns {Row} */
