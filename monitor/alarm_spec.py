@@ -64,7 +64,12 @@ class AlarmSpec:
     grace_s: float = 0.0  # once this alarm's condition has gone, what it explains gets this long to go too
     repeat_after_s: float = 0.0  # an intermittent alarm is not announced again within this time
     latches: bool = False  # stays active until acknowledged although its condition has gone
+    ended: str = ""  # its title once its condition has gone; "": the title and "ended"
     place_after: Place | None = None  # where it shows once its condition has gone; None: where it was
+
+    @property
+    def ended_title(self) -> str:
+        return self.ended or f"{self.title}: ended"
 
     @property
     def shelvable(self) -> bool:

@@ -30,7 +30,9 @@ __all__ = [
     "Verdict",
     "absent",
     "fault",
+    "fits_tile",
     "ok",
+    "on_tile",
     "threshold",
     "unknown",
 ]
@@ -65,14 +67,24 @@ class Finding(NamedTuple):
     causes: tuple[str, ...] = ()  # the faulty parts, if one alarm covers several; a new one re-alarms
     level: int = 0  # how bad, where a check knows degrees; a higher one re-alarms
     applies: bool = True  # False: there is nothing here to check (an optional signal that is not published)
+    ended: str = ""  # title of its alarm once that has ended, where the declared one would not be true of this finding
 
 
 OK = Finding(verdict=Verdict.OK, text="OK", brief="OK")
 
 
-def ok(text: str, *, measured: Quantity | None = None, limit: Quantity | None = None) -> Finding:
+def ok(text: str, *, measured: Quantity | None = None, limit: Quantity | None = None, ended: str = "") -> Finding:
     """The verdict OK, with `text`."""
-    return Finding(verdict=Verdict.OK, text=text, brief="OK", measured=measured, limit=limit)
+    return Finding(verdict=Verdict.OK, text=text, brief="OK", measured=measured, limit=limit, ended=ended)
+
+
+def on_tile(brief: str) -> str:
+    """FAULT and what follows it on a tile: "FAULT 12.6 m/s", "FAULT: another node"."""
+    return f"FAULT{':' if brief[:1].isalpha() else ''} {brief}" if brief else "FAULT"
+
+
+def fits_tile(brief: str) -> bool:
+    return len(on_tile(brief)) <= BRIEF_LETTERS
 
 
 def fault(
@@ -84,12 +96,12 @@ def fault(
     causes: tuple[str, ...] = (),
     level: int = 0,
 ) -> Finding:
-    """The verdict FAULT. `brief` follows the word FAULT on the tile ("12.6 m/s"); it is truncated to fit."""
-    short = f"FAULT {brief}" if brief else "FAULT"
+    """The verdict FAULT. `brief` follows the word FAULT on the tile ("12.6 m/s"), where it fits."""
+    short = on_tile(brief)
     return Finding(
         verdict=Verdict.FAULT,
         text=text,
-        brief=short if len(short) <= BRIEF_LETTERS else "FAULT",
+        brief=short if fits_tile(brief) else "FAULT",
         measured=measured,
         limit=limit,
         causes=causes,

@@ -192,7 +192,7 @@ SIGNALS: dict[str, Signal] = _declare(
         headline=None,
         optional=True,
         event_like=True,
-        about="Who drives, as the car says: autonomous, manual or unknown.",
+        about="Who drives, as the car reports it: autonomous, manual or unknown.",
     ),
 )
 

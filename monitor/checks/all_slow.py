@@ -29,7 +29,7 @@ def find(snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
     percent = min(100.0, limits.slow_below_percent + (DEADBAND_PERCENT if was_active else 0.0))
     judged, slow = len(shares), sum(share < percent / 100.0 for share in shares)
     if judged < AT_LEAST:
-        return absent(f"{judged} signals with a known rate are too few to compare", brief="too few")
+        return absent(_too_few(judged), brief="too few")
     text = f"{slow} of {judged} signals come slower than expected"
     needed = max(AT_LEAST, (SHARE_WHILE_ACTIVE if was_active else SHARE) * judged)
     if slow < needed:
@@ -41,6 +41,12 @@ def find(snapshot: Snapshot, limits: SlowLimits, was_active: bool) -> Finding:
         limit=Quantity(label="Of", value=judged, unit=""),
         causes=("load",),
     )
+
+
+def _too_few(judged: int) -> str:
+    if judged == 0:
+        return "No signal has a known rate"
+    return f"Only {judged} signal{'s have' if judged > 1 else ' has'} a known rate, {AT_LEAST} are compared"
 
 
 def _shares(snapshot: Snapshot, limits: SlowLimits) -> list[float]:
@@ -69,6 +75,7 @@ CHECKS = (
         group=GROUP,
         alarm=AlarmSpec(
             title="Most signals are slow",
+            ended="Most signals were slow",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,

@@ -37,6 +37,7 @@ CHECKS = (
         checked_when="Checked while the bridge is connected.",
         alarm=AlarmSpec(
             title="Fault between bridge and car",
+            ended="Fault between bridge and car ended",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,

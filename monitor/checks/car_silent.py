@@ -56,6 +56,7 @@ CHECKS = (
         checked_when="Checked once the first message has come.",
         alarm=AlarmSpec(
             title="The car fell silent",
+            ended="The car was silent",
             priority=Priority.CRITICAL,
             place=Place.DIALOG,
             sound=Sound.HIGH,

@@ -10,7 +10,6 @@ from collections.abc import Collection, Sequence
 from functools import partial
 
 from monitor.check import (
-    BRIEF_LETTERS,
     Action,
     AlarmSpec,
     Check,
@@ -21,6 +20,7 @@ from monitor.check import (
     Sound,
     absent,
     fault,
+    fits_tile,
     ok,
 )
 from monitor.snapshot import Snapshot
@@ -42,7 +42,7 @@ def find(levels: Collection[int], snapshot: Snapshot, limits: Limits, was_active
     brief = bad[0].name if len(bad) == 1 else f"{len(bad)} parts"
     return fault(
         _text(bad),
-        brief=brief if len(f"FAULT {brief}") <= BRIEF_LETTERS else f"{len(bad)} part",
+        brief=brief if fits_tile(brief) else f"{len(bad)} part",
         causes=tuple(sorted({component.name for component in bad})),
     )
 

@@ -150,6 +150,7 @@ CHECKS = (
         checked_when="Checked while Speed and Position are fresh and the receiver has a fix.",
         alarm=AlarmSpec(
             title="GPS runs away",
+            ended="GPS ran away",
             priority=Priority.WARNING,
             place=Place.DIALOG,
             sound=Sound.MEDIUM,

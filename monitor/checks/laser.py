@@ -111,14 +111,15 @@ def agrees(snapshot: Snapshot, limits: Limits, was_active: bool) -> Finding:
     if off and usual is None:
         return unknown(f"{text}: how its driver counts is not yet known", short="waiting")
     if usual is not None and off not in usual:
-        was = f"{text}; so far {' or '.join(str(expected + one) for one in sorted(usual))}"
+        was = f"{text}; before {' or '.join(str(expected + one) for one in sorted(usual))}"
         return fault(was, brief=f"{scan.beams} beams", causes=("off by one",), level=1)
     return ok(f"{text}: {habit_words(usual)}" if off else text, measured=measured, limit=limit)
 
 
-def _alarm(title: str, advice: str, *, on_delay_s: float, actions: tuple[Action, ...]) -> AlarmSpec:
+def _alarm(title: str, ended: str, advice: str, *, on_delay_s: float, actions: tuple[Action, ...]) -> AlarmSpec:
     return AlarmSpec(
         title=title,
+        ended=ended,
         priority=Priority.WARNING,
         place=Place.SNACKBAR,
         sound=Sound.MEDIUM,
@@ -138,6 +139,7 @@ CHECKS = (
         checked_when="Checked while the laser is published and fresh.",
         alarm=_alarm(
             "The laser cannot see",
+            "The laser could not see",
             "Obstacles are not checked: watch ahead, and look for sun, dirt or a cover on the laser.",
             on_delay_s=1.0,
             actions=(Action.ACKNOWLEDGE,),  # it explains why obstacles are not checked: never hidden
@@ -153,6 +155,7 @@ CHECKS = (
         checked_when="Checked while the laser is fresh and has more than one beam.",
         alarm=_alarm(
             "The scan contradicts itself",
+            "The scan contradicted itself",
             "Returns may be drawn and evaluated in the wrong place: check the laser's driver.",
             on_delay_s=0.5,
             actions=(Action.SHELVE, Action.ACKNOWLEDGE),

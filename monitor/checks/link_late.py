@@ -93,6 +93,7 @@ def _judge(snapshot: Snapshot, limit_s: float, was_active: bool) -> Finding:
 def _alarm(priority: Priority, place: Place, sound: Sound, advice: str, *, by: tuple[str, ...]) -> AlarmSpec:
     return AlarmSpec(
         title="The link is too slow",
+        ended="The link was too slow",
         priority=priority,
         place=place,
         sound=sound,

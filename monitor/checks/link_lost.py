@@ -45,6 +45,7 @@ CHECKS = (
         checked_when="Checked while the bridge is connected, or was and got lost.",
         alarm=AlarmSpec(
             title="Connection lost",
+            ended="Connection was lost, now back",
             priority=Priority.CRITICAL,
             place=Place.DIALOG,
             sound=Sound.HIGH,

@@ -35,6 +35,7 @@ CHECKS = (
         checked_when="Always checked.",
         alarm=AlarmSpec(
             title="Alarm log not stored",
+            ended="Alarm log was not stored",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,

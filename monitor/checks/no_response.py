@@ -86,6 +86,7 @@ CHECKS = (
         checked_when="Checked while commands come on the car's topic and Speed is fresh.",
         alarm=AlarmSpec(
             title="Car ignores brake command",
+            ended="Car ignored brake command",
             priority=Priority.CRITICAL,
             place=Place.DIALOG,
             sound=Sound.HIGH,

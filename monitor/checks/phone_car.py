@@ -150,6 +150,7 @@ CHECKS = (
         checked_when="Checked while the car has a fix and a phone in it shares its position.",
         alarm=AlarmSpec(
             title="Phone and car disagree",
+            ended="Phone and car disagreed",
             priority=Priority.WARNING,
             place=Place.DIALOG,
             sound=Sound.MEDIUM,

@@ -100,7 +100,7 @@ def receives(snapshot: Snapshot, limits: PositionLimits, was_active: bool) -> Fi
             lost.append((one.topic, f"No fix at {one.topic}"))
     if lost:
         goes_on = "the position" if carrier is None else f"the position of {carrier}"
-        text = f"{'; '.join(words for _, words in lost)}; {goes_on} goes on without it"
+        text = f"{'; '.join(words for _, words in lost)}; {goes_on} continues without it"
         return fault(text, brief="no receiver", causes=tuple(topic for topic, _ in lost))
     if unclear:
         return unknown("; ".join(unclear), short="unclear")
@@ -176,6 +176,7 @@ CHECKS = (
         group="position_sources",
         alarm=AlarmSpec(
             title="GPS: a receiver has no fix",
+            ended="A GPS receiver had no fix",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,
@@ -197,6 +198,7 @@ CHECKS = (
         checked_when="Checked while Position and a second source of it are fresh and have a fix.",
         alarm=AlarmSpec(
             title="Sources of the position disagree",
+            ended="Sources of the position disagreed",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,

@@ -36,9 +36,11 @@ def find(snapshot: Snapshot, limits: ReachLimits, was_active: bool) -> Finding:
     facts = snapshot.reach
     if facts is None:
         return absent("Alarm reach is not monitored here", brief="not monitored")
-    measured = Quantity(label="Can hear alarms", value=facts.can, unit="")
+    measured = Quantity(label="Audible on", value=facts.can, unit="")
     if facts.can > 0:
-        return ok(f"{facts.can} of {facts.of} operators can hear alarms", measured=measured)
+        pages = f"operator page{'' if facts.of == 1 else 's'}"
+        text = f"Alarms audible on {facts.can} of {facts.of} {pages}"
+        return ok(text, measured=measured, ended="Alarms can be heard again")
     why = f"none of {facts.of} ({facts.why})" if facts.of else "no operator's phone is connected"
     speed = snapshot.get("speed")
     if speed is None:
@@ -46,7 +48,8 @@ def find(snapshot: Snapshot, limits: ReachLimits, was_active: bool) -> Finding:
     if not speed.is_fresh(snapshot.now_s):
         return unknown(f"Nobody can hear alarms: {why}; whether the car moves is unknown", short="no speed")
     if not moves(snapshot, was_active):
-        return ok(f"Nobody can hear alarms: {why}; the car stands", measured=measured)
+        text = f"Nobody can hear alarms: {why}; the car stands"
+        return ok(text, measured=measured, ended="Nobody can hear alarms, car stands")
     text = f"The car moves at {abs(speed.value.speed_mps):.1f} m/s and nobody can hear alarms: {why}"
     return fault(text, brief="nobody", measured=measured, causes=("reach",))
 
@@ -68,6 +71,7 @@ CHECKS = (
         checked_when="Checked of a live car, while Speed is fresh.",
         alarm=AlarmSpec(
             title="Nobody can hear alarms",
+            ended="Nobody could hear alarms",
             priority=Priority.WARNING,
             place=Place.LIST,  # the strip shows it on every tab; a page without sound shows that itself
             sound=Sound.MEDIUM,

@@ -11,7 +11,6 @@ from __future__ import annotations
 from functools import partial
 
 from monitor.check import (
-    BRIEF_LETTERS,
     Action,
     AlarmSpec,
     Check,
@@ -23,6 +22,7 @@ from monitor.check import (
     Sound,
     absent,
     fault,
+    fits_tile,
     ok,
     unknown,
 )
@@ -99,7 +99,7 @@ def _frozen(signal: Signal, what: str, held_s: float, limits: SlowLimits) -> Fin
     return fault(
         f"{signal.label}: messages arrive, but with {what} for {held_s:.1f} s"
         + (" of driving" if what == "one value" else ""),
-        brief=brief if len(f"FAULT {brief}") <= BRIEF_LETTERS else signal.label,
+        brief=brief if fits_tile(brief) else signal.label,
         measured=Quantity(label="Unchanged for", value=held_s, unit="s"),
         limit=Quantity(label="Allowed", value=limits.frozen_after_s, unit="s"),
         causes=(signal.name,),
@@ -118,6 +118,7 @@ def check(signal: Signal) -> Check[Limits]:
         group=GROUP,
         alarm=AlarmSpec(
             title=f"{signal.label} frozen",
+            ended=f"{signal.label} was frozen",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,

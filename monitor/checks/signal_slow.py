@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 from monitor.check import (
-    BRIEF_LETTERS,
     Action,
     AlarmSpec,
     Check,
@@ -17,6 +16,7 @@ from monitor.check import (
     Sound,
     absent,
     fault,
+    fits_tile,
     ok,
     unknown,
 )
@@ -62,7 +62,7 @@ def find(signal: Signal, snapshot: Snapshot, limits: SlowLimits, was_active: boo
 
 def _brief(signal: Signal, hz: float) -> str:
     long = f"{signal.label} {hz:.0f} Hz"
-    return long if len(f"FAULT {long}") <= BRIEF_LETTERS else signal.label
+    return long if fits_tile(long) else signal.label
 
 
 def check(signal: Signal) -> Check[Limits]:
@@ -75,6 +75,7 @@ def check(signal: Signal) -> Check[Limits]:
         group=GROUP,
         alarm=AlarmSpec(
             title=f"{signal.label} slower than expected",
+            ended=f"{signal.label} was slower than expected",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.LOW,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 from monitor.check import (
-    BRIEF_LETTERS,
     Action,
     AlarmSpec,
     Check,
@@ -17,6 +16,7 @@ from monitor.check import (
     Sound,
     absent,
     fault,
+    fits_tile,
     ok,
     unknown,
 )
@@ -123,7 +123,7 @@ def _is_event_like(signal: Signal, limits: SlowLimits) -> bool:
 
 def _brief(signal: Signal, age_s: float) -> str:
     long = f"{signal.label} {age_s:.0f} s"
-    return long if len(f"FAULT {long}") <= BRIEF_LETTERS else signal.label
+    return long if fits_tile(long) else signal.label
 
 
 def check(signal: Signal) -> Check[Limits]:
@@ -136,6 +136,7 @@ def check(signal: Signal) -> Check[Limits]:
         group=GROUP,
         alarm=AlarmSpec(
             title=f"{signal.label} silent",
+            ended=f"{signal.label} was silent",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 from monitor.check import (
-    BRIEF_LETTERS,
     Action,
     AlarmSpec,
     Check,
@@ -17,6 +16,7 @@ from monitor.check import (
     Sound,
     absent,
     fault,
+    fits_tile,
     ok,
     unknown,
 )
@@ -44,7 +44,7 @@ def find(signal: Signal, snapshot: Snapshot, limits: Limits, was_active: bool) -
         return unknown(f"{signal.label}: {found.words}", short="unusable")
     return fault(
         f"{signal.label}: {found.words}, {found.count} messages in {for_s:.1f} s",
-        brief=signal.label if len(f"FAULT {signal.label}") <= BRIEF_LETTERS else "",
+        brief=signal.label if fits_tile(signal.label) else "",
         measured=Quantity(label="Without a usable value for", value=for_s, unit="s"),
         causes=(signal.name,),
     )
@@ -96,6 +96,7 @@ def check(signal: Signal) -> Check[Limits]:
         checked_when="Checked once messages of the signal come.",
         alarm=AlarmSpec(
             title=f"{signal.label} unusable",
+            ended=f"{signal.label} was unusable",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,
@@ -121,6 +122,7 @@ CHECKS = (
         checked_when="Checked once messages of the car come.",
         alarm=AlarmSpec(
             title="No usable values",
+            ended="There were no usable values",
             priority=Priority.CRITICAL,
             place=Place.DIALOG,
             sound=Sound.HIGH,

@@ -170,7 +170,7 @@ def is_alone(snapshot: Snapshot, limits: SlowDownLimits, was_active: bool) -> Fi
     names = ", ".join(facts.rivals[:3]) + (f" and {len(facts.rivals) - 3} more" if len(facts.rivals) > 3 else "")
     return fault(
         f"{names} also command{'s' if len(facts.rivals) == 1 else ''} the car on {facts.topic}: the last message wins",
-        brief=f"{len(facts.rivals)} more",
+        brief="another node" if len(facts.rivals) == 1 else f"{len(facts.rivals)} other nodes",
         causes=facts.rivals,
     )
 
@@ -196,6 +196,7 @@ CHECKS = (
         tile=TILE,
         alarm=AlarmSpec(
             title="Slow-down NOT CONFIRMED",
+            ended="Slow-down was NOT CONFIRMED",
             priority=Priority.CRITICAL,
             place=Place.DIALOG,
             sound=Sound.HIGH,
@@ -218,6 +219,7 @@ CHECKS = (
         tile=TILE,
         alarm=AlarmSpec(
             title="Hold ended by itself",
+            ended="Hold had ended by itself",
             priority=Priority.CRITICAL,
             place=Place.DIALOG,
             sound=Sound.HIGH,
@@ -237,6 +239,7 @@ CHECKS = (
         tile=TILE,
         alarm=AlarmSpec(
             title="Another node is driving the car",
+            ended="Another node was driving the car",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.LOW,

@@ -115,6 +115,7 @@ CHECKS = (
         checked_when="Checked while Speed is fresh and a second source shows a speed: the position, or an odometry.",
         alarm=AlarmSpec(
             title="Sources of the speed disagree",
+            ended="Sources of the speed disagreed",
             priority=Priority.WARNING,
             place=Place.SNACKBAR,
             sound=Sound.MEDIUM,

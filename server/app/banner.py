@@ -8,10 +8,12 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from shlex import quote
 
 import segno
 
-from server.app.config import Config
+from server.app.config import Config, default_data
 from server.tls.setup import SetupAddresses
 
 _WHITE_ON_BLACK, _AS_BEFORE = "\x1b[97;40m", "\x1b[0m"  # the blocks are the light modules
@@ -28,6 +30,7 @@ class Pairing:
     token: str
     pin: str
     minutes: int
+    command: str = "catgraph pair"  # what makes the next invitation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,12 +85,17 @@ def _pairing(said: Announcement, *, draws: bool) -> Iterator[str]:
     if draws:
         yield from invitation(said.url, said.pairing, f"  {step}Pair a device:")
     else:  # what is not read by a person at a terminal ends in a log, where no PIN belongs
-        yield f"  {step}Pair a device: on this machine `catgraph pair` shows a code and a PIN."
+        yield f"  {step}Pair a device: on this machine `{said.pairing.command}` shows a code and a PIN."
+
+
+def pair_command(data: Path | None) -> str:
+    """As it finds the server that uses this data folder."""
+    return "catgraph pair" if data is None or data == default_data() else f"catgraph pair --data {quote(str(data))}"
 
 
 def invitation(url: str, pairing: Pairing, lead: str) -> Iterator[str]:
     """How the next device gets in, for a person before a terminal."""
-    yield f"{lead} {url} with PIN {pairing.pin}, one device within {pairing.minutes} min; later: catgraph pair"
+    yield f"{lead} {url} with PIN {pairing.pin}, one device within {pairing.minutes} min; later: {pairing.command}"
     yield from code(f"{url}#pair={pairing.token}")
 
 

@@ -22,7 +22,7 @@ import uvicorn
 from server.access.invitations import LASTS_S
 from server.app import store_options, tls_options
 from server.app.app import create_app
-from server.app.banner import Announcement, Pairing, addresses, invitation, lines
+from server.app.banner import Announcement, Pairing, addresses, invitation, lines, pair_command
 from server.app.config import Config, Tls, default_data
 from server.app.tls_process import Secured, Server, secure, serve_secured
 from server.storage.data_folder import DataFolderRefused
@@ -189,7 +189,7 @@ def _announce(
     """Print the addresses; the first line is for scripts too."""
     said = Announcement(config=config, url=_plain_url(config.host, port))
     if not config.is_open:
-        said = replace(said, pairing=_pairing(running))
+        said = replace(said, pairing=_pairing(running, config))
     if secured is not None:
         setup_port = explainer.getsockname()[1] if explainer is not None else port
         where = SetupAddresses(hosts=secured.hosts(), port=port, setup_port=setup_port)
@@ -207,18 +207,20 @@ def _announce(
     running.access.listens_at(said.url)
     if draws and not config.is_open:
         running.access.on_paired = lambda name, role: _print_invitation(
-            running, said.url, f"{name} was paired as {role}."
+            running, config, said.url, f"{name} was paired as {role}."
         )
 
 
-def _print_invitation(running: Services, url: str, what: str) -> None:
-    for line in invitation(url, _pairing(running), f"  {what} The next device:"):
+def _print_invitation(running: Services, config: Config, url: str, what: str) -> None:
+    for line in invitation(url, _pairing(running, config), f"  {what} The next device:"):
         print(line, flush=True)
 
 
-def _pairing(running: Services) -> Pairing:
+def _pairing(running: Services, config: Config) -> Pairing:
     next_one = running.access.invitation()
-    return Pairing(token=next_one.token, pin=next_one.pin, minutes=round(LASTS_S / 60))
+    return Pairing(
+        token=next_one.token, pin=next_one.pin, minutes=round(LASTS_S / 60), command=pair_command(config.data)
+    )
 
 
 def _plain_url(host: str, port: int) -> str:

@@ -6,7 +6,9 @@ import argparse
 import os
 import sys
 from dataclasses import replace
+from pathlib import Path
 
+from server.app.config import default_data
 from server.app.process import CannotServe, add_common_arguments, serve
 from server.app.process import run as run_server
 from server.cli.serve import common_config
@@ -26,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a fault at T s for D s; see catgraph simulate --help",
     )
     add_common_arguments(parser)
+    parser.set_defaults(data=demo_data())
 
 
 def run(args: argparse.Namespace) -> int:
@@ -46,7 +49,7 @@ async def _demo(args: argparse.Namespace) -> int:
         common_config(args),
         vehicles=(Vehicle(name="demo", address=address),),
         found=(Vehicle(name="Simulated car", address=address),),
-        next_steps=next_steps(args.host, sys.argv[0]),
+        next_steps=(records_into(args.data), *next_steps(args.host, sys.argv[0])),
     )
     console = Console.of_stdin(service)
     console.open()
@@ -55,6 +58,15 @@ async def _demo(args: argparse.Namespace) -> int:
     finally:
         console.close()
         await service.stop()
+
+
+def demo_data() -> Path:
+    """Apart from the data folder of real cars, whose list of recordings stays free of simulated drives."""
+    return default_data().with_name(f"{default_data().name}-demo")
+
+
+def records_into(data: Path) -> str:
+    return f"It records into {data}/recordings; remove {data} when you are done."
 
 
 def next_steps(host: str, program: str) -> tuple[str, ...]:

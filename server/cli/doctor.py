@@ -263,7 +263,7 @@ def _print(offer: discovery.Offer, choice: Choice, ear: _Listener, seconds: floa
     for topic in others:
         print(f"  {topic:<44}{offer.topics[topic]}")
     for words in ear.words[:10]:
-        print(f"The bridge says {words}")
+        print(f"The bridge reports {words}")
     if ear.reception.frames.rejected:
         print(
             f"{ear.reception.frames.rejected} frames were no rosbridge operations: {ear.reception.frames.last_reason}"

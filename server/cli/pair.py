@@ -11,7 +11,7 @@ from server.access import pending_invitations
 from server.access.access import FOLDER
 from server.access.identity import Role
 from server.access.invitations import LASTS_S
-from server.app.banner import Pairing, invitation
+from server.app.banner import Pairing, invitation, pair_command
 from server.app.config import default_data
 
 
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
         reason = why.strerror or why
         print(f"catgraph: the data folder {args.data} cannot be used: {reason}. Ask its owner.", file=sys.stderr)
         return 2
-    pairing = Pairing(token=made.token, pin=made.pin, minutes=round(LASTS_S / 60))
+    pairing = Pairing(token=made.token, pin=made.pin, minutes=round(LASTS_S / 60), command=pair_command(args.data))
     shown = list(invitation(address, pairing, f"Pair {'a viewer' if args.viewer else 'an operator'}:"))
     if not sys.stdout.isatty():  # not a terminal: a code cannot be scanned
         shown = [shown[0], f"{address}#pair={made.token}"]

@@ -106,7 +106,7 @@ USUAL = (  # of a car whose profile has no list
         title="Sound armed",
         kind="sound",
         need=1.0,
-        fix="An alarm would be heard by nobody. Touch a phone that shows this car, and turn its volume up.",
+        fix="No operator would hear an alarm. Touch a phone that shows this car, and turn its volume up.",
     ),
 )
 

@@ -88,7 +88,7 @@ class RecordedSlowDown:
         """The `decelerate` of a replay's state; `start_s`: since 1970."""
         order = self.order
         ordered_mps = _commanded(order, now_s, limits) if order else None
-        state: SlowDownPhase = "safe" if self.armed_by is None else "armed"
+        state: SlowDownPhase = "not_armed" if self.armed_by is None else "armed"
         if order is not None:
             state = "holding" if ordered_mps == 0.0 and order.ramp_s is not None else "ordered"
         return {

@@ -45,6 +45,7 @@ class StandingAlarm(TypedDict):
     id: str
     occurrence: Annotated[int, doc("counts announcements; below")]
     title: str
+    ended_title: NotRequired[Annotated[str, doc("its title once it is not active; not from older agents")]]
     priority: Priority
     place: Annotated[Place, doc("where it is shown now")]
     sound: Sound

@@ -22,6 +22,7 @@ class CarAlarm(TypedDict):
     id: str
     occurrence: int
     title: str
+    ended_title: NotRequired[Annotated[str, doc("its title once it is not active; not from older agents")]]
     priority: Priority
     state: AlarmState
     active: bool

@@ -204,6 +204,7 @@ def alarm(alarm: Alarm, now_s: float, wall_ms: int) -> StandingAlarm:
         "id": alarm.id,
         "occurrence": alarm.occurrence,
         "title": spec.title,
+        "ended_title": (finding.ended if finding else "") or spec.ended_title,
         "priority": spec.priority,
         "place": place,
         "sound": spec.sound,

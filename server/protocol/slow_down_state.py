@@ -8,7 +8,8 @@ from typing_extensions import TypedDict
 
 from server.protocol.doc import doc
 
-SlowDownPhase = Literal["not_available", "safe", "armed", "ordered", "holding"]
+SlowDownPhase = Literal["not_available", "not_armed", "armed", "ordered", "holding"]
+FORMER_PHASES: dict[str, SlowDownPhase] = {"safe": "not_armed"}  # as older agents state them
 GuardPhase = Literal["unguarded", "guarded", "operator", "slowing", "holding"]
 
 
@@ -32,7 +33,7 @@ class SlowDownOrder(TypedDict):
     ordered_mps: float | None
     deceleration_mps2: float
     sending: Annotated[
-        bool, doc("false: its commands are not sent; it goes on when the link is back, if it is not released")
+        bool, doc("false: its commands are not sent; it continues when the link is back, if it is not released")
     ]
     confirmed: Annotated[
         bool | None,

@@ -13,7 +13,7 @@ class TopicOffer(TypedDict):
     topic: str
     type: str
     frame: NotRequired[Annotated[str | None, doc("that its messages name; null: none, or not known")]]
-    why: NotRequired[Annotated[str, doc("what speaks for it and against it, in few words")]]
+    why: NotRequired[Annotated[str, doc("evidence for and against it, in few words")]]
     ranges_m: NotRequired[
         Annotated[
             list[float | None],

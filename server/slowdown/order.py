@@ -73,7 +73,7 @@ class SlowDown:
             return "holding" if at_zero and self.order.ramp is not None else "ordered"
         if target.problem is not None:
             return "not_available"
-        return "safe" if self.armed_by is None else "armed"
+        return "not_armed" if self.armed_by is None else "armed"
 
     def arm(self, target: CommandTarget, by: str) -> bool:
         """Whether it was not armed before. Raises Refused."""

@@ -127,6 +127,7 @@ def worst(standing: Iterable[Alarm], now_s: float, wall_ms: int) -> CarAlarm | N
         "id": first["id"],
         "occurrence": first["occurrence"],
         "title": first["title"],
+        "ended_title": first["ended_title"],
         "priority": first["priority"],
         "state": first["state"],
         "active": first["active"],

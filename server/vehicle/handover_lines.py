@@ -19,7 +19,7 @@ MOST_ALARMS = 20  # each with a line of its own; more of them are one line
 MOST_LIMITS = 20
 _SLOW_DOWN: dict[SlowDownPhase, str] = {
     "not_available": "Slow-down is not available",
-    "safe": "Slow-down is off",
+    "not_armed": "Slow-down is not armed",
     "armed": "Slow-down is armed",
     "ordered": "The car is being slowed",
     "holding": "The car is held",
@@ -30,10 +30,10 @@ _DRIVES: dict[Mode, str] = {
     "unknown": "Who drives is not known",
 }
 _WHY: dict[WhyUnknown, str] = {
-    "no_source": "The car has no topic that says it.",
-    "silent": "The topic that says it is silent.",
+    "no_source": "The car has no topic for it.",
+    "silent": "The topic for it is silent.",
     "flickers": "The mode flickers.",
-    "unclear": "The car does not say.",
+    "unclear": "The car does not report it.",
 }
 
 
@@ -44,7 +44,7 @@ def alarm_lines(standing: Sequence[StandingAlarm]) -> list[Line]:
         Line(
             key=f"alarm:{alarm['id']}:{alarm['occurrence']}",
             kind="alarm",
-            title=alarm["title"] if alarm["active"] else f"{alarm['title']}: ended",
+            title=alarm["title"] if alarm["active"] else alarm["ended_title"],
             text=f"{alarm['text'] or alarm['trip_text']} {_answered(alarm)}".strip(),
             priority=alarm["priority"],
             since_ms=alarm["raised_ms"],

@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from server.bus import nats_wire as wire
 from server.bus.bus import SUMMARY
 from server.protocol.cars_state import CarSummary
+from server.protocol.slow_down_state import FORMER_PHASES
 
 LONGEST_SUMMARY = 6000  # bytes; it goes to every page
 _SUMMARY: TypeAdapter[CarSummary] = TypeAdapter(CarSummary)
@@ -40,6 +41,8 @@ def state(vehicle: str, payload: str | bytes, time_ms: int) -> str:
     if found.get("kind") != "state" or found.get("vehicle") != vehicle or not isinstance(found.get("server"), dict):
         raise wire.Malformed(f"no state of {vehicle}")
     found["server"]["time_ms"] = time_ms
+    if isinstance(slow_down := found.get("decelerate"), dict):
+        _rename(slow_down, "state")
     try:
         return orjson.dumps(found).decode()
     except (TypeError, ValueError) as error:  # nested too deeply to be written
@@ -52,12 +55,20 @@ def summary(payload: str | bytes, time_ms: int) -> str:
     if len(payload) > LONGEST_SUMMARY:
         raise wire.Malformed(f"a summary of {len(payload)} bytes")
     try:
-        found = _SUMMARY.validate_python(_loaded(payload))
+        loaded = _loaded(payload)
+        _rename(loaded, "slow_down")
+        found = _SUMMARY.validate_python(loaded)
         if (made_ms := found.get("time_ms")) is not None:
             _shift(found, time_ms - made_ms)
         return orjson.dumps(found).decode()
     except (ValidationError, TypeError, ValueError) as error:  # a number may be too large to be written
         raise wire.Malformed(str(error)[:200]) from None
+
+
+def _rename(found: dict[str, Any], field: str) -> None:
+    """Put the present name of a phase in place of a former one."""
+    if isinstance(phase := found.get(field), str):
+        found[field] = FORMER_PHASES.get(phase, phase)
 
 
 def _shift(found: CarSummary, by_ms: int) -> None:

@@ -203,7 +203,7 @@ class Page {
   openPhone() {
     import('./phone/this-phone.js').then(({ openThisPhone }) => {
       if (this.#phone) openThisPhone(this.store, this.#phone.arming, this.#phone.status);
-    }).catch(() => this.say('The details of this phone could not be loaded.', 'Not opened'));
+    }).catch(() => this.say('The details of this device could not be loaded.', 'Not opened'));
   }
 
   /** Greys what a viewer may not do, once the page is a viewer's. */

@@ -64,7 +64,7 @@ def test_one_silent_signal_is_one_alarm_within_a_second() -> None:
     car.to(13.0)
     assert car.announced == ["signal_stale.brake"]
     assert 10.9 <= car.happened[0].at_s <= 11.2
-    assert brief(car, "signals") == "FAULT Brake 3 s"
+    assert brief(car, "signals") == "FAULT: Brake 3 s"
     car.silent = set()
     car.to(20.0)
     assert car.announced == ["signal_stale.brake"]
@@ -79,7 +79,7 @@ def test_a_slow_signal_is_told_and_clears() -> None:
     car.to(30.0)
     assert car.announced == ["signal_slow.scan"]
     assert car.happened[0].at_s < 18.0
-    assert brief(car, "rates") == "FAULT Laser 40 Hz"
+    assert brief(car, "rates") == "FAULT: Laser 40 Hz"
     car.hz["scan"] = 75.0
     car.to(45.0)
     assert standing(car) == {"signal_slow.scan": AlarmState.RTN_UNACKED}

@@ -58,7 +58,11 @@ test('who took the sound is said, and until when', () => {
 test('a row says what is measured of what is allowed, where both are known', () => {
   const quantity = (/** @type {number} */ value, unit = 'm/s') => ({ label: '', value, unit });
   const words = (/** @type {any} */ more) => shown([alarm('a', { verdict: 'fault', measured: quantity(12.6), limit: quantity(11), ...more })])[0]?.words;
-  assert.equal(words({}), '12.6 of 11.0 m/s');
+  assert.equal(words({}), '12.6 m/s (limit 11.0 m/s)');
+  const labelled = (/** @type {string} */ label, /** @type {number} */ value, unit = 's') => ({ label, value, unit });
+  assert.equal(words({ measured: labelled('Silent for', 16.4), limit: labelled('Allowed', 1) }), 'no message for 16.4 s (limit 1.0 s)');
+  assert.equal(words({ measured: labelled('Rate', 5, 'Hz'), limit: labelled('Expected', 20, 'Hz') }), '5.0 Hz (expected 20.0 Hz)');
+  assert.equal(words({ measured: labelled('Slow', 3, ''), limit: labelled('Of', 5, '') }), '3 of 5');
   assert.equal(words({ limit: quantity(3, 's') }), 'now');
   assert.match(words({ verdict: 'unknown', text: 'Speed is 4.2 s old' }) ?? '', /^Not checked now: Speed is 4.2 s old/);
   assert.equal(words({ state: 'RTN_UNACKED', active: false }), 'then');

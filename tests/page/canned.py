@@ -145,8 +145,8 @@ def slow(state: str, **more: Any) -> Json:
     """How the slow-down stands."""
     return {
         "state": state, "why": None, "topic": "/catvehicle/cmd_vel", "type": "geometry_msgs/Twist", "rivals": [],
-        "armed_by": None if state in ("not_available", "safe") else "Pixel 7", "deceleration_mps2": 1.5, "order": None,
-        "countdown": None, "guard": None, **more,
+        "armed_by": None if state in ("not_available", "not_armed") else "Pixel 7", "deceleration_mps2": 1.5,
+        "order": None, "countdown": None, "guard": None, **more,
     }  # fmt: skip
 
 

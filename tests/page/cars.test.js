@@ -7,7 +7,7 @@ import { alarm, state } from './frames.js';
 const worst = (more = {}) => ({ id: 'speed_limit', occurrence: 3, title: 'Speed above limit', priority: 'critical', state: 'UNACKED', active: true, raised_ms: 93_000, sound: 'high', ...more });
 const summary = (more = {}) => ({
   phase: 'monitoring', paused: false, link: { cut: null, bridge_age_s: 0.1, car_age_s: 0.1, trying_for_s: 0, connected_for_s: 60 }, worst: null, waiting: 0,
-  speed: { value_mps: 4.2, freshness: 'fresh', age_s: 0.1, horizon_s: 1 }, holder: null, page: null, recording: 'recording', recording_for_s: 252, slow_down: 'safe', ...more,
+  speed: { value_mps: 4.2, freshness: 'fresh', age_s: 0.1, horizon_s: 1 }, holder: null, page: null, recording: 'recording', recording_for_s: 252, slow_down: 'not_armed', ...more,
 });
 /** @param {Record<string, any>} all @param {number} [lag_s] */
 const rows = (all, lag_s = 0.1) => rowsOf(/** @type {any} */ ({
@@ -42,7 +42,8 @@ test('a row says what asks, for how long, who is in control, and how old its spe
   const [one] = rows({ serval: summary({ worst: worst(), waiting: 2, holder: 'Ann', page: 'my-page' }) });
   assert.equal(one?.text, 'Speed above limit, 7.1 s +1');
   assert.deepEqual([one?.operator, one?.speed, one?.chain?.word, one?.isFilled, one?.recording], ['You', { ink: 'fresh', value_mps: 4.2 }, 'Live', true, '04:12']);
-  assert.equal(rows({ serval: summary({ worst: worst({ active: false, state: 'RTN_UNACKED' }) }) })[0]?.text, 'Speed above limit: ended');
+  assert.equal(rows({ serval: summary({ worst: worst({ active: false, state: 'RTN_UNACKED' }) }) })[0]?.text, 'Speed above limit: ended', 'an older agent');
+  assert.equal(rows({ serval: summary({ worst: worst({ active: false, state: 'RTN_UNACKED', ended_title: 'The car was silent' }) }) })[0]?.text, 'The car was silent');
   assert.equal(rows({ serval: summary({ worst: worst({ state: 'ACKED' }) }) })[0]?.text, 'Speed above limit, acknowledged');
 });
 

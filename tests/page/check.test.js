@@ -37,14 +37,14 @@ test('the alarms of a drive, newest first: when, how long, the worst, who answer
   const found = episodesOf([
     event(9, 'raised', 100, worst(12.6)), event(4, 'cleared', 29, worst(11.9)), event(2, 'raised', 20, worst(11.2)), event(3, 'acknowledged', 21.1, { by: 'Desk 1', ...worst(11.9) }),
   ]);
-  assert.deepEqual(found.map((one) => episodeWords(one, 102_300)).map(({ text, lasted }) => [text, lasted]), [['active, highest 12.6 m/s', '2.3 s'], ['highest 11.9 m/s, Desk 1 in 1.1 s', '9.0 s']]);
+  assert.deepEqual(found.map((one) => episodeWords(one, 102_300)).map(({ text, lasted }) => [text, lasted]), [['active, highest 12.6 m/s', '2.3 s'], ['highest 11.9 m/s, acknowledged by Desk 1 after 1.1 s', '9.0 s']]);
   assert.equal(totalWords(found, 102_300), '2 times, 11.3 s in all');
   assert.equal(totalWords([], 0), 'no alarm');
 });
 
 test('what was raised before the first event that is known is left out; an answer after the end still counts', () => {
   const found = episodesOf([event(1, 'cleared', 5), event(2, 'raised', 10, worst(3, 'below')), event(3, 'cleared', 12), event(4, 'acknowledged', 15, { by: 'Ann' })]);
-  assert.deepEqual(found.map((one) => episodeWords(one, 0).text), ['lowest 3.0 m/s, Ann in 5.0 s']);
+  assert.deepEqual(found.map((one) => episodeWords(one, 0).text), ['lowest 3.0 m/s, acknowledged by Ann after 5.0 s']);
   const unanswered = episodesOf([event(2, 'raised', 10), event(3, 'cleared', 12)]);
   assert.equal(episodeWords(/** @type {any} */ (unanswered[0]), 0).text, 'not acknowledged');
 });

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { askedOf, chipOf, noticeOf, reachOf, seconds, sheetOf } from '../../static/js/control/control-layout.js';
+import { askedOf, chipOf, controlWords, noticeOf, reachOf, seconds, sheetOf } from '../../static/js/control/control-layout.js';
 import { isApple } from '../../static/js/phone/device-status.js';
 import { phoneOf } from '../../static/js/map/map-text.js';
 import { nameOf, othersOn, phoneRow, phonesLine } from '../../static/js/phone/phones-layout.js';
@@ -22,8 +22,21 @@ test('the chip says you, a name, no one, or that nobody knows', () => {
   assert.equal(chipOf({ holder: null }, 'page-a', false).text, 'No one');
 });
 
+test('the key of the control sheet names what it offers, or who is in control', () => {
+  const chip = (/** @type {any} */ control, duty = /** @type {any} */ (null)) => chipOf(control, 'page-a', false, duty);
+  const free = chip({ holder: null });
+  assert.equal(controlWords(free, 'demo', false), 'Take control of demo');
+  assert.equal(controlWords(free, 'demo', true), 'No one is in control of demo', 'a viewer cannot take it');
+  assert.equal(controlWords(chip({ holder: null }, { me: { name: 'Ann' } }), 'demo', false), 'Take control of demo');
+  assert.equal(controlWords(chip(ANNS), 'demo', false), 'You are in control of demo');
+  assert.equal(controlWords(chip(ANNS, { me: { name: 'Ann' } }), 'demo', false), 'You are in control of demo, on duty as Ann');
+  assert.equal(controlWords(chipOf(ANNS, 'page-b', false), 'demo', false), 'Ann is in control of demo');
+  assert.match(controlWords(chipOf(null, 'page-a', true), 'demo', false), /unknown who is in control$/);
+});
+
 test('how many hear alarms', () => {
-  assert.deepEqual(reachOf({ can: 2, of: 3, why: 'sound off', pages: [], left_out: 0 }), { text: '2 of 3 operators can hear alarms', why: 'sound off', isBad: false });
+  assert.deepEqual(reachOf({ can: 2, of: 3, why: 'sound off', pages: [], left_out: 0 }), { text: 'Alarms audible on 2 of 3 operator pages', why: 'sound off', isBad: false });
+  assert.equal(reachOf({ can: 1, of: 1, why: '', pages: [], left_out: 0 }).text, 'Alarms audible on 1 of 1 operator page');
   assert.equal(reachOf({ can: 0, of: 1, why: '', pages: [], left_out: 0 }).text, 'Nobody can hear alarms (1 operator)');
   assert.deepEqual(reachOf({ can: 0, of: 0, why: '', pages: [], left_out: 0 }), { text: 'Nobody can hear alarms (no operator)', why: '', isBad: true });
   assert.equal(reachOf(null).isBad, false);
@@ -102,7 +115,7 @@ test('battery, network and position: low, far and missing', () => {
   assert.deepEqual(tags({ lag_s: 1.5 })['Network'].slice(0, 2), ['Slow', 'warn']);
   assert.match(tags({ network: 'cellular' })['Network'][2], /join the car’s Wi-Fi/);
   assert.match(tags({ position: 'missing', isSecure: false })['Position'][2], /needs HTTPS/);
-  assert.match(tags({ positionSays: 'The phone finds no position.', rides: true })['Position'][2], /finds no position\. This phone is in the car\./);
+  assert.match(tags({ positionSays: 'The phone finds no position.', rides: true })['Position'][2], /finds no position\. This device is in the car\./);
   assert.match(tags({ screen: 'missing', isSecure: false })['Screen stays awake'][2], /needs HTTPS/);
 });
 

@@ -30,7 +30,7 @@ test('after a gap the page says what happened meanwhile, once', () => {
   assert.equal(log.caughtUp(), null); // one is missing still
   log.take([event(4, 'cleared')]);
   const gap = log.caughtUp();
-  assert.equal(gap && gapWords(gap), 'Blind 14 s: 2 alarms raised, 1 cleared');
+  assert.equal(gap && gapWords(gap), 'No data for 14 s; 2 alarms began, 1 ended');
   assert.equal(log.caughtUp(), null);
   log.take([event(5)]);
   assert.equal(log.rows.find((row) => row.gap)?.gap?.raised, 2);
@@ -44,7 +44,7 @@ test('a short flicker is no gap, and a quiet gap says so', () => {
   assert.equal(log.caughtUp(), null);
   log.greet('a', 3, 8, 0);
   const gap = log.caughtUp();
-  assert.equal(gap && gapWords(gap), 'Blind 8 s: no alarm was raised or cleared');
+  assert.equal(gap && gapWords(gap), 'No data for 8 s; no alarm began or ended');
 });
 
 test('a server that counts afresh after a restart is heard from its first event on', () => {

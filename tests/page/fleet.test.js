@@ -11,7 +11,7 @@ const worst = (more = {}) => ({ id: 'speed_limit', occurrence: 1, title: 'Speed 
 const item = (more = {}) => ({ since_ms: NOW - 7000, assigned: null, offered: null, escalates_ms: NOW + 23_000, escalated_ms: null, ...more });
 const summary = (more = {}) => ({
   phase: 'monitoring', paused: false, link: { cut: null, bridge_age_s: 0.1, car_age_s: 0.1, trying_for_s: 0, connected_for_s: 60 }, worst: null, waiting: 0,
-  speed: { value_mps: 4.2, freshness: 'fresh', age_s: 0.1, horizon_s: 1 }, holder: null, page: null, recording: 'recording', recording_for_s: 252, slow_down: 'safe',
+  speed: { value_mps: 4.2, freshness: 'fresh', age_s: 0.1, horizon_s: 1 }, holder: null, page: null, recording: 'recording', recording_for_s: 252, slow_down: 'not_armed',
   attention: null, place: null, energy_percent: 64, people: [], ...more,
 });
 const needy = (more = {}, of = {}) => summary({ worst: worst(of), waiting: 1, attention: item(more) });

@@ -84,25 +84,28 @@ test('days are told as people tell them', () => {
 
 test('an acknowledgement tells how long the alarm waited for it', () => {
   const rows = /** @type {any} */ ([row(event(12, { change: 'acknowledged' })), GAP, row(event(10, { occurrence: 2 })), row(event(9))]);
-  assert.equal(tookWords(event(12, { change: 'acknowledged' }), rows), 'in 3.0 s');
+  assert.equal(tookWords(event(12, { change: 'acknowledged' }), rows), 'after 3.0 s');
   assert.equal(tookWords(event(12, { change: 'acknowledged', occurrence: 3 }), rows), '');
   assert.equal(tookWords(event(12, { change: 'cleared' }), rows), '');
 });
 
 test('a dialog tells with what it began, and never speaks in the present of what is over or not checked', () => {
   const near = { ...ALARM, active: true, verdict: 'fault', text: '4.1 m', trip_text: '4.8 m', raised_ms: noon_ms, for_s: 3.5, advice: 'Brake.', measured: null, limit: null };
-  assert.equal(dialogWords(near), '4.1 m. Active for 3.5 s, since 12:00:00 with 4.8 m. Brake.');
-  assert.equal(dialogWords({ ...near, measured: {}, limit: {}, trip_text: '4.1 m' }), 'Active for 3.5 s, since 12:00:00. Brake.');
+  assert.equal(dialogWords(near), '4.1 m. Active for 3.5 s. Began 12:00:00: 4.8 m. Brake.');
+  assert.equal(dialogWords({ ...near, measured: {}, limit: {}, trip_text: '4.1 m' }), 'Active for 3.5 s. Began 12:00:00. Brake.');
+  assert.match(dialogWords({ ...near, trip_text: 'Obstacle 3.5 m ahead' }), / Began 12:00:00: obstacle 3.5 m ahead\./);
+  assert.match(dialogWords({ ...near, trip_text: 'GPS has no fix' }), / Began 12:00:00: GPS has no fix\./, 'an abbreviation');
+  assert.match(dialogWords({ ...near, trip_text: 'Lidar error', causes: ['Lidar'] }), / Began 12:00:00: Lidar error\./, 'a name');
   const lost = { ...near, verdict: 'unknown', text: 'No link to the car.' };
-  assert.equal(dialogWords(lost), 'Not checked now: No link to the car. Active for 3.5 s, since 12:00:00 with 4.8 m. Brake.');
-  assert.equal(dialogWords({ ...lost, active: false }), 'It has returned to normal; it began at 12:00:00 with 4.8 m. Brake.');
+  assert.equal(dialogWords(lost), 'Not checked now: No link to the car. Active for 3.5 s. Began 12:00:00: 4.8 m. Brake.');
+  assert.equal(dialogWords({ ...lost, active: false }), 'It has returned to normal. Began 12:00:00: 4.8 m. Brake.');
 });
 
 test('a dialog tells how bad it was, where that is not what is measured now', () => {
   const speed = (/** @type {number} */ value) => ({ label: 'Speed', value, unit: 'm/s' });
   const fast = { ...ALARM, active: true, verdict: 'fault', trip_text: ALARM.text, raised_ms: noon_ms, for_s: 3.5, advice: 'Brake.', measured: speed(12.6), limit: speed(11), worst: { ...speed(12.84), side: 'above' } };
-  assert.equal(dialogWords(fast), 'Active for 3.5 s, since 12:00:00. Highest 12.8 m/s. Brake.');
-  assert.equal(dialogWords({ ...fast, measured: speed(12.81) }), 'Active for 3.5 s, since 12:00:00. Brake.', 'what reads the same is not said twice');
-  assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It has returned to normal; it began at 12:00:00. Highest 12.8 m/s. Brake.');
+  assert.equal(dialogWords(fast), 'Active for 3.5 s. Began 12:00:00. Highest 12.8 m/s. Brake.');
+  assert.equal(dialogWords({ ...fast, measured: speed(12.81) }), 'Active for 3.5 s. Began 12:00:00. Brake.', 'what reads the same is not said twice');
+  assert.equal(dialogWords({ ...fast, active: false, measured: speed(12.84) }), 'It has returned to normal. Began 12:00:00. Highest 12.8 m/s. Brake.');
   assert.match(dialogWords({ ...fast, worst: { ...speed(3.9), side: 'below' } }), /Lowest 3\.9 m\/s\./);
 });

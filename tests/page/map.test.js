@@ -241,7 +241,7 @@ test('every reason of a phone is said; a coarse fix is still one of now', () => 
   assert.deepEqual([coarse.isLive, coarse.label, coarse.says], [true, 'Phone ±80 m', 'To 80 m only.']);
   assert.equal(phoneOf(frameOf(FIX, { ...PHONE, lat_deg: null, lon_deg: null, age_s: null, used: false, why: 'denied', why_text: 'No' }), 0).place, null);
   assert.equal(phoneOf(frameOf(FIX, PHONE), 4.5).isLive, false); // the page itself has heard nothing for so long
-  assert.match(phoneOf(frameOf(FIX, { ...PHONE, count: 3 }), 0).says, /^It is the position of Pixel 7 · a3f2, one of 3 phones\.$/);
+  assert.match(phoneOf(frameOf(FIX, { ...PHONE, count: 3 }), 0).says, /^Compared with Pixel 7 · a3f2, one of 3 phones\.$/);
 });
 
 test('apart is as the server compared them at one moment; where it did not, as the two fixes have it', () => {

@@ -51,7 +51,7 @@ test('a removal says whose pages end, and that the last operator goes', () => {
   const [a, b] = [device('a', 'operator'), device('b', 'viewer')];
   assert.equal(removalWords(b, 'a', [a, b])[0], 'Remove b?');
   assert.doesNotMatch(removalWords(b, 'a', [a, b])[1], /last operator/);
-  assert.equal(removalWords(a, 'a', [a, b])[0], 'Remove this phone?');
+  assert.equal(removalWords(a, 'a', [a, b])[0], 'Remove this device?');
   assert.match(removalWords(a, 'a', [a, b])[1], /last operator/);
   assert.doesNotMatch(removalWords(a, 'b', [a, device('c', 'operator')])[1], /last operator/);
 });

@@ -148,7 +148,7 @@ test('where a person drives is a band', () => {
 test('the number of alarms is no promise while the recording is still read', () => {
   const line = { marks: [mark(1), mark(2)], marks_left_out: 3, is_done: true };
   assert.equal(countWords(line), '5 alarms');
-  assert.equal(countWords({ ...line, is_done: false }), '5 so far');
+  assert.equal(countWords({ ...line, is_done: false }), '5 alarms, still reading');
   assert.equal(countWords({ ...line, marks: [], marks_left_out: 0, is_done: false }), 'Alarms', 'not: none');
   assert.equal(countWords(null), 'Alarms');
 });

@@ -193,7 +193,7 @@ async def slow_down_off(server: Canned, page: Page) -> None:
 
 @scene("slow-down-arm")
 async def slow_down_arm(server: Canned, page: Page) -> None:
-    server.state = live() | {"decelerate": slow("safe", rivals=["/lap_driver"])}
+    server.state = live() | {"decelerate": slow("not_armed", rivals=["/lap_driver"])}
     await page.wait_for_timeout(400)
     await page.tap(".board > .rail .slide")
     await page.wait_for_selector("#sheet-slow[open]")
@@ -526,7 +526,7 @@ def car(name: str, speed_mps: float, *, holder: str | None = None, cut: str | No
 async def _several_cars(server: Canned, page: Page, *others: Any) -> None:
     server.vehicle = "Ocelot"
     server.cars = [car("Ocelot", 4.2, holder="You"), *others]
-    server.state = live() | {"decelerate": slow("safe")}
+    server.state = live() | {"decelerate": slow("not_armed")}
     await page.goto("about:blank")
     await page.goto(f"{server.address}/#home")
     await page.wait_for_selector("#monitor:not([hidden])")

@@ -8,6 +8,7 @@ import { topicWords } from '../../static/js/settings/settings-topics.js';
 import { optionsOf } from '../../static/js/settings/topic-picker.js';
 import { trialWords } from '../../static/js/shell/preferences.js';
 import { chooseSpeedUnit } from '../../static/js/core/units.js';
+import { decimalOf, markOf } from '../../static/js/core/decimal.js';
 
 afterEach(() => chooseSpeedUnit('m/s'));
 
@@ -94,6 +95,26 @@ test('a typed number: comma or point, with or without its unit', () => {
   assert.deepEqual(readNumber(',7', speed), { value: 0.7 });
 });
 
+test('what could be thousands is refused, in either language, and never read as a thousandth of it', () => {
+  const read = (/** @type {string} */ typed, mark = '.') => /** @type {any} */ (readNumber(typed, rate, mark));
+  for (const mark of ['.', ',']) {
+    for (const typed of ['1.100', '1,100', '11.000', '+1.500', '1.100 Hz']) assert.match(read(typed, mark).refused, /could be 1\d+ or 1/, `${typed} with ${mark}`);
+    for (const typed of ['1.1', '1,1', '1.10', '1,10', '1.1000', '0.100', '0,125']) assert.ok('value' in read(typed, mark), `${typed} with ${mark}`);
+  }
+  assert.deepEqual([read('1.125').value, read('1,125', ',').value], [1.125, 1.125], 'as this language writes it');
+  assert.match(read('1.125', ',').refused, /could be 1125 or 1,125/);
+  assert.match(read('1,125').refused, /could be 1125 or 1\.125/);
+});
+
+test('a number in a field has the mark of the language', () => {
+  assert.deepEqual(['de-DE', 'de-AT', 'fr-FR', 'en-GB', 'ja-JP', 'no such language'].map(markOf), [',', ',', ',', '.', '.', '.']);
+  assert.deepEqual([textOf(9.5, speed, ','), endText(0.5, speed, ','), textOf(9.5, speed, '.')], ['9,5', '0,5', '9.5']);
+  assert.deepEqual(readNumber(textOf(9.5, speed, ','), speed, ','), { value: 9.5 });
+  assert.match(/** @type {any} */ (readNumber('90', speed, ',')).refused, /0,5 to 40 m\/s is allowed/);
+  assert.deepEqual(['1,5', '1.5', ' 2 '].map((typed) => decimalOf(typed, ',')), [1.5, 1.5, 2]);
+  assert.ok(['1.100', '', 'x', '1,2,3'].every((typed) => Number.isNaN(decimalOf(typed, ','))));
+});
+
 test('what cannot be set is refused in words', () => {
   const why = (/** @type {string} */ typed) => /** @type {any} */ (readNumber(typed, speed)).refused;
   assert.equal(why(''), 'Speed limit: a number is required.');
@@ -171,7 +192,7 @@ test('a file that cannot hold settings is not sent', () => {
 });
 
 test('a trial of a sound says plainly where this phone cannot sound', () => {
-  assert.match(trialWords('missing', 'high'), /has no sound: this phone sounds no alarms/);
+  assert.match(trialWords('missing', 'high'), /has no sound: this device sounds no alarms/);
   assert.match(trialWords('blocked', 'high'), /no alarm can be heard/);
   assert.match(trialWords('busy', 'low'), /An alarm sounds now/);
   assert.match(trialWords('sounding', 'medium'), /three rising pulses/);

@@ -29,8 +29,8 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
   };
   assert.equal(words(slow('not_available', { why: 'No link to the car.' })), 'off: Slow-down off No link to the car');
   assert.equal(words(slow('not_available', { why: 'The steering of this kind of car is not known, and a command would turn its wheels.' })), 'off: Slow-down off press for the reason');
-  assert.equal(words(slow('safe')), 'off: Slow-down not armed press to arm');
-  assert.equal(words(slow('safe'), { isViewer: true }), 'off: Slow-down not armed not for viewers');
+  assert.equal(words(slow('not_armed')), 'off: Slow-down not armed press to arm');
+  assert.equal(words(slow('not_armed'), { isViewer: true }), 'off: Slow-down not armed not for viewers');
   assert.equal(words(slow('armed'), { car: 'Ocelot', vehicle: 'Ocelot' }), 'armed: Slide to slow Ocelot');
   assert.equal(words(slow('armed')), 'armed: Slide to slow the car');
   assert.equal(words(slow('armed'), { isViewer: true }), 'off: Slow-down armed not for viewers');
@@ -47,7 +47,7 @@ test('the slide: off with the reason, armed, or filled; silent or looked at only
 
 test('one word of its state, never a comfortable one', () => {
   const word = (/** @type {any} */ now, more = {}) => stateWord(seen(now, more));
-  assert.deepEqual(['not_available', 'safe', 'armed', 'else'].map((name) => word(slow(name))), ['NOT AVAILABLE', 'NOT ARMED', 'ARMED', 'NOT AVAILABLE']);
+  assert.deepEqual(['not_available', 'not_armed', 'armed', 'else'].map((name) => word(slow(name))), ['NOT AVAILABLE', 'NOT ARMED', 'ARMED', 'NOT AVAILABLE']);
   assert.equal(word(slow('armed'), { isSilent: true }), 'NOT KNOWN');
   assert.deepEqual([true, null, false].map((confirmed) => word(ordered({ confirmed }))), ['SLOWING', 'ORDERED', 'NOT CONFIRMED']);
   assert.equal(word(ordered({ sending: false })), 'NOT SENDING');
@@ -64,7 +64,7 @@ test('the strip: armed where nothing else stands, the order above warnings, a cr
   const warning = alarm({ id: 'gps', title: 'GPS drift', priority: 'warning', place: 'snackbar' });
   assert.deepEqual(strip({ decelerate: slow('armed') }), { kind: 'armed', icon: 'slow', text: 'Armed', end: 'an aid, not an emergency stop', opens: 'alarms' });
   assert.equal(strip({ decelerate: slow('armed'), alarms: [warning] }).text, 'GPS drift');
-  assert.equal(strip({ decelerate: slow('safe') }).text, 'No alarms');
+  assert.equal(strip({ decelerate: slow('not_armed') }).text, 'No alarms');
   assert.deepEqual(strip({ decelerate: ordered() }), { kind: 'order', icon: 'slow', text: 'Slowing the car', end: '−1.5 m/s² ordered', opens: 'alarms' });
   assert.equal(strip({ decelerate: ordered(), alarms: [warning] }).end, '−1.5 m/s² · 1 alarm');
   assert.equal(strip({ decelerate: ordered(), alarms: [alarm({ state: 'ACKED' })] }).text, 'Speed above limit');
@@ -113,23 +113,23 @@ test('the count-down ends at 0 and is none once the order stands; its sound is o
 test('the guard: only one that is heard and guards is said to', () => {
   const says = (/** @type {any} */ guard, lag_s = 0) => guardWords(guard && { why: '', hold: 0, age_s: 0.2, ...guard }, lag_s);
   assert.match(says(null).text, /link loss will NOT slow the car$/);
-  for (const [name, isSafe] of /** @type {const} */ ([['guarded', true], ['operator', true], ['slowing', true], ['holding', true], ['unguarded', false], ['new', false]])) {
-    const { text, isSafe: told } = says({ state: name });
-    assert.equal(told, isSafe, name);
-    assert.match(text, isSafe ? /^GUARDED/ : /^UNGUARDED.*will NOT slow the car$/);
+  for (const [name, isGuarded] of /** @type {const} */ ([['guarded', true], ['operator', true], ['slowing', true], ['holding', true], ['unguarded', false], ['new', false]])) {
+    const { text, isGuarded: told } = says({ state: name });
+    assert.equal(told, isGuarded, name);
+    assert.match(text, isGuarded ? /^GUARDED/ : /^UNGUARDED.*will NOT slow the car$/);
   }
   assert.match(says({ state: 'guarded', age_s: 3.2 }).text, /^No message from the guard for 3\.2 s: link loss may NOT slow the car$/);
-  assert.equal(says({ state: 'guarded' }, 2).isSafe, false, 'the page’s own silence counts');
-  assert.equal(says({ state: 'guarded', age_s: null }).isSafe, false);
+  assert.equal(says({ state: 'guarded' }, 2).isGuarded, false, 'the page’s own silence counts');
+  assert.equal(says({ state: 'guarded', age_s: null }).isGuarded, false);
 });
 
 test('a release ends the order, or what the guard holds by itself, by its number', () => {
   const guard = (/** @type {string} */ name) => ({ state: name, why: 'heartbeat stopped', hold: 7, age_s: 0.1 });
   assert.deepEqual(holdOf(ordered()), { number: 3, isGuards: false });
-  assert.deepEqual(holdOf(slow('safe', { guard: guard('holding') })), { number: 7, isGuards: true });
+  assert.deepEqual(holdOf(slow('not_armed', { guard: guard('holding') })), { number: 7, isGuards: true });
   assert.equal(holdOf(slow('armed', { guard: guard('guarded') })), null);
   assert.equal(holdOf(null), null);
-  assert.equal(stripWords(slow('safe', { guard: guard('slowing') }), 0)?.text, 'The guard slows the car');
+  assert.equal(stripWords(slow('not_armed', { guard: guard('slowing') }), 0)?.text, 'The guard slows the car');
   assert.equal(stripWords(slow('armed', { guard: guard('holding') }), 0)?.text, 'The guard holds the car');
 });
 
@@ -141,27 +141,27 @@ test('who may release, and who instead', () => {
 
 test('the sheet: what would be commanded, who competes, and the one thing this page may do', () => {
   const sheet = (/** @type {any} */ now, more = {}) => sheetOf(seen(now, more), 0);
-  const safe = sheet(slow('safe', { rivals: ['/lap_driver', '/joy'] }));
-  assert.deepEqual([safe.title, safe.act], ['Arm the slow-down?', 'arm']);
-  assert.deepEqual(safe.facts[0], ['Commanded on', '/catvehicle/cmd_vel', false]);
-  assert.deepEqual(safe.facts[2], ['Slows at', '1.5 m/s²', false]);
-  assert.deepEqual(safe.facts[3], ['Other publishers', '/lap_driver, /joy: the last message wins, so the car may not slow', true]);
-  assert.match(safe.aid, /^An aid, not an emergency stop/);
-  assert.equal(safe.isGuarded, false);
-  assert.equal(sheet(slow('safe', { rivals: null })).facts[3]?.[2], true, 'not known is no "none"');
-  assert.equal(sheet(slow('safe')).facts[3]?.[1], 'none');
-  const other = sheet(slow('safe'), { mayControl: false, holder: 'Ben' });
+  const notArmed = sheet(slow('not_armed', { rivals: ['/lap_driver', '/joy'] }));
+  assert.deepEqual([notArmed.title, notArmed.act], ['Arm the slow-down?', 'arm']);
+  assert.deepEqual(notArmed.facts[0], ['Commanded on', '/catvehicle/cmd_vel', false]);
+  assert.deepEqual(notArmed.facts[2], ['Slows at', '1.5 m/s²', false]);
+  assert.deepEqual(notArmed.facts[3], ['Other publishers', '/lap_driver, /joy: the last message wins, so the car may not slow', true]);
+  assert.match(notArmed.aid, /^An aid, not an emergency stop/);
+  assert.equal(notArmed.isGuarded, false);
+  assert.equal(sheet(slow('not_armed', { rivals: null })).facts[3]?.[2], true, 'not known is no "none"');
+  assert.equal(sheet(slow('not_armed')).facts[3]?.[1], 'none');
+  const other = sheet(slow('not_armed'), { mayControl: false, holder: 'Ben' });
   assert.deepEqual([other.act, other.says], ['ask', 'Ben is in control and can arm it.']);
   assert.equal(sheet(slow('armed')).act, 'disarm');
   assert.match(sheet(slow('armed')).text, /^Armed by Ann\./);
-  assert.deepEqual([sheet(slow('armed'), { isViewer: true }).act, sheet(slow('safe'), { isReplay: true }).act, sheet(slow('safe'), { isSilent: true }).act, sheet(ordered()).act], [null, null, null, null]);
+  assert.deepEqual([sheet(slow('armed'), { isViewer: true }).act, sheet(slow('not_armed'), { isReplay: true }).act, sheet(slow('not_armed'), { isSilent: true }).act, sheet(ordered()).act], [null, null, null, null]);
   const none = sheet(slow('not_available', { why: 'No link to the car.', topic: null }));
   assert.deepEqual([none.title, none.text, none.facts, none.act], ['Slow-down not available', 'No link to the car.', [], null]);
 });
 
 test('its row on the connect screen', () => {
   assert.equal(connectRow(slow('armed'), false).tag, 'Off');
-  assert.deepEqual([connectRow(slow('armed'), true).tag, connectRow(slow('safe'), true).tag, connectRow(ordered(), true).tag], ['Armed', 'Off', 'Slowing']);
+  assert.deepEqual([connectRow(slow('armed'), true).tag, connectRow(slow('not_armed'), true).tag, connectRow(ordered(), true).tag], ['Armed', 'Off', 'Slowing']);
   assert.deepEqual(connectRow(slow('not_available', { why: 'No link to the car.' }), true), { tag: 'Not available', kind: 'unk', cost: 'No link to the car' });
 });
 

@@ -195,7 +195,7 @@ async def test_another_car_is_shown_without_a_reload_and_nothing_of_the_first(br
 
 
 FOR_ANOTHER = "signed for another car" if IS_PARTED else "This was meant for Caracal, and this is Margay"
-NOT_ORDERED = {"armed", "safe"}  # safe: for a moment not armed, where a busy machine makes the link late
+NOT_ORDERED = {"armed", "not_armed"}  # not_armed: for a moment, where a busy machine makes the link late
 
 
 async def drag(phone: Phone, share: float) -> None:

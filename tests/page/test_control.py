@@ -234,7 +234,7 @@ async def test_two_of_three_operators_can_hear_alarms(browser: Browser, car: Pro
         for name in ("Ann", "Ben"):
             await one[name].f("sound-off").tap()
         assert reach(await one.until(lambda s: reach(s) == (2, 3))) == (2, 3)
-        await expect(line).to_contain_text("2 of 3 operators can hear alarms")
+        await expect(line).to_contain_text("Alarms audible on 2 of 3 operator pages")
         await expect(one["Cem"].page.locator('[data-part="reach"]')).to_contain_text("2 of 3 operators")
 
         await hide(one["Ann"], True)
@@ -272,7 +272,7 @@ async def test_nobody_who_hears_while_the_car_moves_is_a_warning_on_every_page(
             sheet = phone.page.locator("#sheet-this-phone")
             await expect(sheet).to_be_visible()
             await sheet.locator('[data-f="arm"]').tap()
-            await expect(sheet).to_contain_text("This phone sounds alarms while this page is in the foreground.")
+            await expect(sheet).to_contain_text("This device sounds alarms while this page is in the foreground.")
             async with httpx.AsyncClient() as client:
                 async with asyncio.timeout(10):
                     while True:

@@ -171,7 +171,7 @@ async def test_the_phones_own_mail_program_gets_links_where_it_takes_no_files(
     await sheet.get_by_label("To").fill("ann@example.org")
     await sheet.get_by_label("Message").fill("Hello & <b>Ann</b>")
     await sheet.get_by_role("button", name="Open in my mail app").tap()
-    await expect(sheet.get_by_role("status")).to_contain_text("gets links, because this phone cannot share files")
+    await expect(sheet.get_by_role("status")).to_contain_text("gets links, because this device cannot share files")
     asked = await phone.page.evaluate("window.asked")
     assert asked.startswith("mailto:ann@example.org?subject=")
     link = f"{watch.address}{AT_AGENT}/api/recordings/{DRIVE}/file.mcap"

@@ -232,7 +232,7 @@ async def test_marks_of_a_stopped_server_are_delivered_once(hearing: Browser, ca
     async with drive(hearing, tmp_path, car) as one:
         page = one.phone.page
         await one.watch.kill()
-        await expect(one.key).to_contain_text("stored on this phone", timeout=15_000)
+        await expect(one.key).to_contain_text("stored on this device", timeout=15_000)
         # The dialog that the connection is lost may cover it.
         await one.key.evaluate("(key) => { key.click(); setTimeout(() => key.click(), 100); }")
         await expect(page.locator('[data-f="marks-wait"]')).to_have_text("2 wait")

@@ -83,7 +83,7 @@ async def type_pin(phone: Phone, pin: str) -> None:
 async def test_a_pin_lets_a_phone_in_and_it_stays_in_over_a_reload(browser: Browser, site: Site) -> None:
     async with another_phone(browser) as phone:
         await phone.open(site.address)
-        await expect(phone.page.locator("#pairing h1")).to_have_text("Pair this phone")
+        await expect(phone.page.locator("#pairing h1")).to_have_text("Pair this device")
         await expect(phone.page.locator("#monitor")).to_be_hidden()
         pin, _ = await site.invitation()
         says = phone.f("pair-says", "#pairing")
@@ -109,7 +109,7 @@ async def test_too_many_wrong_pins_are_told_with_the_time_to_wait_and_the_link_s
         await phone.open(site.address)
         wrong = f"{(int(pin) + 1) % 10**6:06d}"
         for _ in range(3):
-            await expect(phone.f("pair-go", "#pairing")).to_have_text("Pair this phone")
+            await expect(phone.f("pair-go", "#pairing")).to_have_text("Pair this device")
             await type_pin(phone, wrong)
             await expect(phone.f("pair-says", "#pairing")).not_to_be_empty()
         await expect(phone.f("pair-go", "#pairing")).to_have_text(re.compile(r"Wait [12] seconds?"))
@@ -141,7 +141,7 @@ async def test_a_link_pairs_a_viewer_and_is_gone_from_the_address_before_anythin
         pause = phone.f("pause")
         await expect(pause).to_have_attribute("aria-disabled", "true")
         await pause.tap(force=True)
-        await expect(phone.page.locator(".snack.note")).to_contain_text("This phone is paired as a viewer.")
+        await expect(phone.page.locator(".snack.note")).to_contain_text("This device is paired as a viewer.")
         await phone.page.locator("#tab-settings").tap()
         await expect(phone.page.locator('#panel-settings .set input[type="range"]').first).to_have_attribute(
             "aria-disabled", "true", timeout=12_000
@@ -149,7 +149,7 @@ async def test_a_link_pairs_a_viewer_and_is_gone_from_the_address_before_anythin
         group = phone.page.locator('[data-part="devices"]')
         await group.locator("summary").scroll_into_view_if_needed()
         await group.locator("summary").tap()
-        await expect(group).to_contain_text("This phone is paired as a viewer, under the name")
+        await expect(group).to_contain_text("This device is paired as a viewer, under the name")
         refused = await phone.page.evaluate(
             "fetch('/api/pause', {method: 'POST'}).then(async answer => [answer.status, (await answer.json()).code])"
         )
@@ -172,7 +172,7 @@ async def test_an_operator_pairs_another_changes_its_role_and_removes_it(browser
         await group.locator("summary").scroll_into_view_if_needed(timeout=12_000)
         await group.locator("summary").tap()
         await expect(group.locator("li")).to_have_count(1)
-        await expect(group.locator("li")).to_contain_text("This phone")
+        await expect(group.locator("li")).to_contain_text("This device")
 
         await boss.f("pair-another", "#panel-settings").tap()
         sheet = boss.page.locator("#sheet-invite")
@@ -182,7 +182,7 @@ async def test_an_operator_pairs_another_changes_its_role_and_removes_it(browser
         guests_pin = re.sub(r"\D", "", await sheet.locator("[data-f=invite-pin]").inner_text())
         await sheet.locator("[data-f=no]").tap()
         await pair_by_pin(guest, site, guests_pin)
-        row = group.locator("li", has_not_text="This phone")
+        row = group.locator("li", has_not_text="This device")
         await expect(row).to_contain_text("here now")
         await expect(row.locator('[data-role-key="viewer"]')).to_have_attribute("aria-pressed", "true")
 

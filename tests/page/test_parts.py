@@ -264,7 +264,7 @@ async def test_a_page_that_does_not_draw_says_so_over_its_old_values(phone: Phon
 async def test_a_phone_that_is_not_paired_sees_nothing_of_the_car(phone: Phone, canned: Canned) -> None:
     canned.access = "paired"
     await phone.open(canned.address)
-    await expect(phone.page.locator("#pairing h1")).to_have_text("Pair this phone")
+    await expect(phone.page.locator("#pairing h1")).to_have_text("Pair this device")
     await expect(phone.page.locator("#monitor")).to_be_hidden()
     await phone.f("pair-go", "#pairing").tap()
     await expect(phone.f("pair-says", "#pairing")).to_have_text("The PIN has 6 digits.")

@@ -483,7 +483,7 @@ async def test_each_alarm_sound_can_be_tried_before_a_car_is_connected(phone: Ph
 
 async def test_the_slow_down_goes_under_the_left_thumb_and_stop_to_the_far_corner(phone: Phone, watch: Process) -> None:
     await settings(phone, watch)
-    await phone.page.get_by_role("button", name="Preferences of this phone").tap()
+    await phone.page.get_by_role("button", name="Preferences of this device").tap()
     await phone.page.locator("[data-hand-key=left]").tap()
     await phone.page.locator("#sheet-preferences [data-f=no]").tap()
     boxes = [await phone.page.locator(f".board > .rail [data-f={f}]").bounding_box() for f in ("slow", "pause", "stop")]
@@ -496,7 +496,7 @@ async def test_the_slow_down_goes_under_the_left_thumb_and_stop_to_the_far_corne
 async def test_a_phone_that_cannot_sound_is_told_plainly(phone: Phone, watch: Process) -> None:
     await phone.page.add_init_script("delete window.AudioContext")
     await settings(phone, watch)
-    await phone.page.get_by_role("button", name="Preferences of this phone").tap()
+    await phone.page.get_by_role("button", name="Preferences of this device").tap()
     await phone.page.locator("[data-sound-key=high]").tap()
     await expect(phone.page.locator("[data-f=sound-says]")).to_contain_text("This browser has no sound")
 

@@ -227,7 +227,7 @@ async def test_a_phone_says_that_the_server_is_gone_and_comes_back_by_itself(
         await page.reload()
         says = page.locator("#offline")
         await expect(says).to_contain_text("The server does not answer")
-        await expect(says).to_contain_text("This phone monitors nothing now.")
+        await expect(says).to_contain_text("This device monitors nothing now.")
         await expect(says.locator('[data-f="where"]')).to_have_text(one.shown)
         await expect(says.locator('[data-f="answered"]')).to_have_text(re.compile(r"\d\d:\d\d:\d\d, \d+ s ago"))
         await expect(says.locator('[data-f="then"]')).to_have_text(

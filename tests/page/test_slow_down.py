@@ -223,7 +223,7 @@ async def test_off_it_says_why_or_arms(thumb: Thumb, car: Canned) -> None:
     sheet = thumb.phone.page.locator("#sheet-slow")
     await expect(sheet).to_contain_text("Slow-down not available")
     await expect(sheet.locator("[data-act]")).to_have_count(0)
-    car.state["decelerate"] = slow("safe", rivals=["/lap_driver"])
+    car.state["decelerate"] = slow("not_armed", rivals=["/lap_driver"])
     await expect(sheet).to_contain_text("Arm the slow-down?")
     for words in (
         "geometry_msgs/Twist", "/lap_driver: the last message wins, so the car may not slow", "1.5 m/s²",
@@ -242,7 +242,7 @@ async def test_off_it_says_why_or_arms(thumb: Thumb, car: Canned) -> None:
 
 @pytest.mark.gate
 async def test_who_is_not_in_control_asks_for_it(thumb: Thumb, car: Canned) -> None:
-    car.state |= {"decelerate": slow("safe"), "control": {"holder": "Ben", "page": "another", "fence": 7}}
+    car.state |= {"decelerate": slow("not_armed"), "control": {"holder": "Ben", "page": "another", "fence": 7}}
     await expect(thumb.phone.f("who-name")).to_have_text("Ben")
     await thumb.slide().tap()
     sheet = thumb.phone.page.locator("#sheet-slow")
@@ -284,7 +284,7 @@ async def test_the_car_is_released_only_once_that_is_confirmed(thumb: Thumb, car
 
 @pytest.mark.gate
 async def test_in_the_dialog_of_an_alarm(thumb: Thumb, car: Canned) -> None:
-    car.state |= {"decelerate": slow("safe"), "alarms": [SPEEDING]}
+    car.state |= {"decelerate": slow("not_armed"), "alarms": [SPEEDING]}
     sheet = thumb.phone.page.locator("#sheet-alarm")
     await thumb.slide(DIALOG).tap()
     await expect(sheet).to_contain_text("Not slowed: the slow-down is not armed")

@@ -32,7 +32,7 @@ async def test_a_viewer_may_take_the_file_and_orders_no_other_form_of_it(browser
             asked: list[str] = []
             phone.page.on("request", lambda request: asked.append(f"{request.method} {request.url}"))
             await tables.tap(force=True)
-            await expect(phone.page.locator(".snack.note")).to_contain_text("This phone is paired as a viewer.")
+            await expect(phone.page.locator(".snack.note")).to_contain_text("This device is paired as a viewer.")
             assert [one for one in asked if one.startswith("POST")] == []
         finally:
             await context.close()

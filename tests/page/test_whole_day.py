@@ -158,7 +158,7 @@ async def marked_without_server(day: Day) -> None:
     """The server is killed; what is marked meanwhile is delivered when it is back."""
     key = mark_key(day.ann)
     await day.watch.kill()
-    await expect(key).to_contain_text("stored on this phone", timeout=15_000)
+    await expect(key).to_contain_text("stored on this device", timeout=15_000)
     await tapped_through(day.ann, key)
     day.truth_ms["without server"] = await day.ann.page.evaluate("presses.at(-1)")
     await expect(day.ann.page.locator('[data-f="marks-wait"]')).to_have_text("1 waits")

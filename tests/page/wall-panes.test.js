@@ -19,7 +19,7 @@ test('signals that are not fresh are listed first; those nobody publishes are no
 test('who is in control stands first, then this page; why one cannot hear an alarm is said', () => {
   const reach = /** @type {any} */ ({ can: 2, of: 3, left_out: 0, pages: [person('c', 'Field 2', { can: false, why_text: 'sound is off' }), person('b', 'Desk 2'), person('a', 'Desk 1')] });
   const { head, lines } = peopleLines(reach, /** @type {any} */ ({ page: 'a' }), 'b');
-  assert.equal(head, '3 pages, 2 can hear alarms');
-  assert.deepEqual(lines.map(({ cells }) => cells.slice(0, 3)), [['Desk 1', 'in control', 'hears alarms'], ['Desk 2, you', 'watching', 'hears alarms'], ['Field 2', 'watching', 'sound is off']]);
+  assert.equal(head, '3 pages, alarms audible on 2');
+  assert.deepEqual(lines.map(({ cells }) => cells.slice(0, 3)), [['Desk 1', 'in control', 'alarms audible'], ['Desk 2, you', 'watching', 'alarms audible'], ['Field 2', 'watching', 'sound is off']]);
   assert.deepEqual(peopleLines(null, null, 'a'), { head: 'unknown', lines: [] });
 });

@@ -61,5 +61,5 @@ async def test_the_guard_slows_the_car_when_the_server_dies_and_not_when_monitor
 
 async def test_without_a_guard_the_page_is_told_so() -> None:
     async with simulated() as (service, address), watching(service, address) as car:
-        state = await car.until(lambda s: s["decelerate"]["state"] == "safe")
+        state = await car.until(lambda s: s["decelerate"]["state"] == "not_armed")
         assert state["decelerate"]["guard"] is None

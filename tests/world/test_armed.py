@@ -32,7 +32,7 @@ async def test_where_only_we_may_command_nothing_is_said_to_be_missing(
         await listener.subscribe(COMMAND, type="geometry_msgs/Twist")
         config = Config(vehicles=(Vehicle(name="car", address=f"ws://127.0.0.1:{port}"),), data=tmp_path)
         async with driving(bridge, steers=True), serving(config) as base, viewer(base, name="Ann") as one:
-            await one.state(lambda s: s["decelerate"]["state"] == "safe", SOON_S)
+            await one.state(lambda s: s["decelerate"]["state"] == "not_armed", SOON_S)
             reply = await one.ask(kind="arm")
             assert reply["ok"], reply
             await one.state(lambda s: s["decelerate"]["state"] == "armed", SOON_S)

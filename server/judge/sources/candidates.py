@@ -142,7 +142,9 @@ def what_is_known(one: Candidate, signal: str, evidence: Evidence) -> str:
             words.append("looks ahead by TF" if ahead else "looks elsewhere by TF")
         elif looks(f"{one.topic} {known.frame or ''}"):
             words.append(
-                "its name says ahead" if looks(f"{one.topic} {known.frame or ''}") < 0 else "its name says not ahead"
+                "its name suggests ahead"
+                if looks(f"{one.topic} {known.frame or ''}") < 0
+                else "its name suggests another direction"
             )
     if signal in ("speed", "odometry") and known.is_twist_empty:
         words.append("its twist is never filled")

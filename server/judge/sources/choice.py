@@ -223,7 +223,7 @@ class _Chooser:
         order = sorted(found, key=lambda one: one not in ahead)
         used = next((one for one in found if one.topic == self._in_use.get("scan")), None)
         if used is not None and all(evidence.of(one.topic).looks_ahead is None for one in found):
-            return used.source("scan", why="in use, and nothing speaks against it")
+            return used.source("scan", why="in use; no evidence against it")
         if not evidence.is_settled:
             return _Open(why="lasers are being compared", among=order)
         return _Open(why=f"{_lower(questions.title('scan', found))}, none chosen", among=order)

@@ -1,5 +1,6 @@
 // Which alarm shows where: one rule a place, none an alarm. Pure functions.
 
+import { titleOf } from './alarm-title.js';
 import { stripWords } from '../slowdown/slow-layout.js';
 import { fixed, timeOfDay } from '../core/format.js';
 
@@ -22,14 +23,7 @@ const isAsking = (alarm) => alarm.state === 'UNACKED' || alarm.state === 'RTN_UN
 export const isAboutLink = (alarm) => LINK_ACTIONS.some((action) => alarm.actions.includes(action));
 const LINK_ACTIONS = /** @type {const} */ (['reconnect', 'exit', 'change_address']);
 
-/**
- * An alarm's title; of one that returned to normal, that it did.
- * @param {Pick<Alarm, 'title' | 'active'>} alarm
- */
-export function titleOf({ title, active }) {
-  if (active) return title;
-  return title === 'Connection lost' ? 'Connection was lost, now back' : `${title}: ended`;
-}
+export { titleOf };
 
 /**
  * What still stands before what has returned; then by danger, then the newest.

@@ -70,7 +70,21 @@ function rowWords(alarm) {
   const { active, verdict, measured, limit } = alarm;
   if (!active) return alarm.trip_text || alarm.text;
   const isCompared = verdict === 'fault' && measured && limit && measured.unit === limit.unit && measured.value !== null && limit.value !== null;
-  return isCompared ? `${fixed(measured.value)} of ${fixed(limit.value)} ${measured.unit}` : snackWords(alarm);
+  return isCompared ? comparedWords(measured, limit) : snackWords(alarm);
+}
+
+const LIMITS = new Set(['', 'Allowed', 'At most', 'Limit', 'Reported after']);
+
+/**
+ * "no message for 16.4 s (limit 1.0 s)", "12.6 m/s (limit 11.0 m/s)", "5.0 Hz (expected 20.0 Hz)", "5 of 7".
+ * @param {import('../core/protocol-types.js').Quantity} measured
+ * @param {import('../core/protocol-types.js').Quantity} limit
+ */
+export function comparedWords(measured, limit) {
+  if (limit.label === 'Of') return `${fixed(measured.value, 0)} of ${fixed(limit.value, 0)}`;
+  const before = measured.label === 'Silent for' ? 'no message for ' : / for$/.test(measured.label) ? `${measured.label.toLowerCase()} ` : '';
+  const [now, least] = [measured, limit].map(({ value, unit }) => `${fixed(value)} ${unit}`.trim());
+  return `${before}${now} (${LIMITS.has(limit.label) ? 'limit' : limit.label.toLowerCase()} ${least})`;
 }
 
 /** @param {Suppressed} one @returns {Row} */

@@ -111,7 +111,7 @@ export function episodeWords({ at_ms, ended_ms, worst, unit, side, by, took_s },
   const said = [
     ended_ms === null ? 'active' : '',
     worst === null ? '' : `${side === 'above' ? 'highest' : 'lowest'} ${fixed(worst)} ${unit}`.trim(),
-    by === null ? (ended_ms === null ? '' : 'not acknowledged') : `${by} in ${age(took_s)}${(took_s ?? 0) < 59.95 ? ' s' : ''}`,
+    by === null ? (ended_ms === null ? '' : 'not acknowledged') : `acknowledged by ${by} after ${age(took_s)}${(took_s ?? 0) < 59.95 ? ' s' : ''}`,
   ];
   const lasted_s = ((ended_ms ?? now_ms) - at_ms) / 1000;
   return { at: timeOfDay(at_ms), text: said.filter(Boolean).join(', ') || 'ended', lasted: `${age(lasted_s)}${lasted_s < 59.95 ? ' s' : ''}` };

@@ -109,13 +109,13 @@ function midnight(date) {
 }
 
 /**
- * How the row of an acknowledgement says how long it took: "12.6 m/s · by Ann · in 2.3 s".
+ * How the row of an acknowledgement says how long it took: "12.6 m/s · by Ann · after 2.3 s".
  * @param {AlarmEvent} event an acknowledgement
  * @param {Row[]} rows
  */
 export function tookWords(event, rows) {
   if (event.change !== 'acknowledged') return '';
   const raised = rows.find((row) => row.event && row.event.alarm === event.alarm && row.event.occurrence === event.occurrence && RISES.has(row.event.change));
-  return raised?.event ? `in ${age((event.at_ms - raised.event.at_ms) / 1000)} s` : '';
+  return raised?.event ? `after ${age((event.at_ms - raised.event.at_ms) / 1000)} s` : '';
 }
 const RISES = new Set(['raised', 'recaused', 'unsuppressed']);

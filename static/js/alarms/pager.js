@@ -14,7 +14,7 @@ export class PagedList {
     this.list = list;
     this.onTurn = onTurn;
     const key = (/** @type {string} */ name, /** @type {string} */ label) => html('button', { type: 'button', class: 'key', 'aria-label': label, 'data-f': name }, icon(name === 'before' ? 'back' : 'next'));
-    this.before = key('before', 'Page before');
+    this.before = key('before', 'Previous page');
     this.after = key('after', 'Next page');
     this.words = html('span', { role: 'status', 'data-f': 'pages' });
     this.element = html('div', { class: 'turn' }, this.before, this.words, this.after);

@@ -27,12 +27,13 @@ export function snackWords(alarm) {
  */
 export function dialogWords(alarm) {
   const at = timeOfDay(alarm.raised_ms);
-  const began = alarm.trip_text && alarm.trip_text !== alarm.text ? ` with ${bare(alarm.trip_text)}` : '';
+  const trip = alarm.trip_text && alarm.trip_text !== alarm.text ? `: ${lowered(bare(alarm.trip_text), alarm.causes ?? [])}` : '';
+  const began = `Began ${at}${trip}.`;
   const worst = worstWords(alarm);
-  if (!alarm.active) return [`It has returned to normal; it began at ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
+  if (!alarm.active) return ['It has returned to normal.', began, worst, alarm.advice].filter(Boolean).join(' ');
   const isBlind = alarm.verdict === 'unknown';
   const cause = isBlind ? `Not checked now: ${bare(alarm.text)}.` : alarm.verdict === 'ok' ? `Returning to normal: ${bare(alarm.text)}.` : alarm.measured && alarm.limit ? '' : `${bare(alarm.text)}.`;
-  return [cause, `Active for ${age(alarm.for_s)} s, since ${at}${began}.`, worst, alarm.advice].filter(Boolean).join(' ');
+  return [cause, `Active for ${age(alarm.for_s)} s.`, began, worst, alarm.advice].filter(Boolean).join(' ');
 }
 
 /** How bad it was, where that is not what is measured now. @param {import('../core/protocol-types.js').StandingAlarm} alarm */
@@ -40,6 +41,15 @@ function worstWords({ active, verdict, measured, worst }) {
   if (!worst) return '';
   const isNow = active && verdict !== 'unknown' && measured && fixed(measured.value) === fixed(worst.value);
   return isNow ? '' : `${worst.side === 'above' ? 'Highest' : 'Lowest'} ${fixed(worst.value)} ${worst.unit}.`;
+}
+
+/**
+ * A sentence within another one: its first letter is small, unless it begins with a name or an abbreviation.
+ * @param {string} sentence @param {string[]} names what may be a name in it
+ */
+function lowered(sentence, names) {
+  const isName = names.some((name) => sentence.startsWith(name)) || !/^[A-Z][a-z]*[ :,]/.test(sentence);
+  return isName ? sentence : sentence.charAt(0).toLowerCase() + sentence.slice(1);
 }
 
 /** A sentence without its end. @param {string} sentence */

@@ -42,7 +42,7 @@ function begin() {
 
   function draw() {
     const last = lastAnswer();
-    write(answered, last === null ? 'not known on this phone' : `${clock(last.at_ms)}, ${ago(Date.now() - last.at_ms)}`);
+    write(answered, last === null ? 'not known on this device' : `${clock(last.at_ms)}, ${ago(Date.now() - last.at_ms)}`);
     write(then, last?.isMonitoring ? 'A car was being monitored then. It may still be moving.' : '');
     write(network, navigator.onLine ? 'has a network' : 'has no network');
     write(next, isTrying ? 'Trying the server now.' : 'This page tries again every 3 s.');

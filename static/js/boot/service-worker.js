@@ -26,7 +26,7 @@ export function holdsReload(frame, { isSilent, isMonitoring, hasDialog }) {
   if (alarms.some(({ priority, state }) => priority === 'critical' || (priority === 'warning' && state !== 'ACKED'))) return 'an alarm is active';
   if (hasDialog) return 'a dialog is open';
   if (frame.replay) return 'a recording is shown';
-  if (!['off', 'not_available', 'safe', 'armed'].includes(frame.decelerate.state)) return 'the car is being slowed';
+  if (!['off', 'not_available', 'not_armed', 'armed'].includes(frame.decelerate.state)) return 'the car is being slowed';
   const speed_mps = frame.signals.speed?.value?.speed_mps;
   if (isMonitoring && !(typeof speed_mps === 'number' && Math.abs(speed_mps) < STANDING_MPS)) return 'the car moves';
   return null;

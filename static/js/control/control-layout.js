@@ -26,14 +26,25 @@ export function chipOf(control, page, isSilent, duty = null) {
 }
 
 /**
- * The line that says whom an alarm would reach.
+ * The key that opens the control sheet of a car: what it offers, or who is in control.
+ * @param {ReturnType<typeof chipOf>} chip
+ * @param {string} car
+ * @param {boolean} isViewer
+ */
+export function controlWords({ label, is }, car, isViewer) {
+  if (!car || is === 'unknown') return label;
+  if (is === 'free') return isViewer ? `No one is in control of ${car}` : `Take control of ${car}`;
+  return `${label} of ${car}`.replace(/(in control)(.*)( of .*)$/, '$1$3$2');
+}
+
+/**
+ * The line on which pages an alarm would sound.
  * @param {ReachNow | null | undefined} reach
  */
 export function reachOf(reach) {
-  if (!reach) return { text: 'Unknown who can hear alarms', why: '', isBad: false };
-  const operators = counted(reach.of, 'operator', 'operators');
-  if (reach.can === 0) return { text: `Nobody can hear alarms (${reach.of === 0 ? 'no operator' : operators})`, why: reach.why, isBad: true };
-  return { text: `${reach.can} of ${operators} can hear alarms`, why: reach.why, isBad: false };
+  if (!reach) return { text: 'Not known where alarms are audible', why: '', isBad: false };
+  if (reach.can === 0) return { text: `Nobody can hear alarms (${reach.of === 0 ? 'no operator' : counted(reach.of, 'operator', 'operators')})`, why: reach.why, isBad: true };
+  return { text: `Alarms audible on ${reach.can} of ${counted(reach.of, 'operator page')}`, why: reach.why, isBad: false };
 }
 
 /**

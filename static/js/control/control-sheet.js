@@ -59,7 +59,7 @@ class ControlSheet {
 
   /** @param {ReturnType<typeof sheetOf>['handTo'][number]} person */
   #personRow({ page, name, can, why_text }) {
-    const hearing = can ? 'can hear alarms' : `cannot hear alarms: ${why_text ?? 'unknown'}`;
+    const hearing = can ? 'alarms audible' : `alarms not audible: ${why_text ?? 'unknown'}`;
     const button = html('button', { type: 'button', 'data-page': page }, icon('operator'), html('span', {}, `Hand over to ${name}`, html('br'), html('span', { class: 'small sub' }, hearing)));
     button.addEventListener('click', () => void this.control.handOver(page).then(({ ok }) => ok && this.sheet.close()));
     return html('li', {}, button);

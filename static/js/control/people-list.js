@@ -22,7 +22,7 @@ import { counted } from '../core/format.js';
 export async function mount(place, group, store, say, head) {
   await styled('people');
   if (store.isViewer) {
-    place.replaceChildren(html('p', { class: 'state' }, 'This phone is paired as a viewer: an operator sees and changes the list of people.'));
+    place.replaceChildren(html('p', { class: 'state' }, 'This device is paired as a viewer: an operator sees and changes the list of people.'));
     return;
   }
   new PeopleGroup(place, group, store, say, head);

@@ -5,7 +5,7 @@ import { styled } from '../core/style-sheet.js';
 import { need } from '../core/dom.js';
 import { isAsked } from '../shell/sheet.js';
 
-export const WHY = 'This phone is paired as a viewer. An operator can change that: Settings, Paired devices.';
+export const WHY = 'This device is paired as a viewer. An operator can change that: Settings, Paired devices.';
 
 /** The keys of an operator. One that is missing here is refused by the server, in the same words. */
 const KEYS = [

@@ -105,7 +105,8 @@ export function words(sentence) {
 }
 
 /**
- * Set an attribute, if it is not so yet; null, undefined and false take it away.
+ * Set an attribute, if it is not so yet; null, undefined and false take it away. True is "true" for ARIA, to which an empty
+ * value is none, and empty for all others.
  * @param {Element} element
  * @param {string} name
  * @param {string | number | boolean | null | undefined} value
@@ -115,7 +116,7 @@ export function setAttribute(element, name, value) {
     if (element.hasAttribute(name)) element.removeAttribute(name);
     return;
   }
-  const text = value === true ? '' : String(value);
+  const text = value === true && !name.startsWith('aria-') ? '' : String(value);
   if (element.getAttribute(name) !== text) element.setAttribute(name, text);
 }
 

@@ -89,11 +89,11 @@ export class EventLog {
 }
 
 /**
- * "Blind 14 s: 2 alarms raised, 1 cleared".
+ * "No data for 14 s; 2 alarms began, 1 ended".
  * @param {Gap} gap
  */
 export function gapWords(gap) {
   const blind = gap.blind_s < 120 ? `${Math.round(gap.blind_s)} s` : `${Math.round(gap.blind_s / 60)} min`;
-  if (!gap.raised && !gap.cleared) return `Blind ${blind}: no alarm was raised or cleared`;
-  return `Blind ${blind}: ${gap.raised} ${gap.raised === 1 ? 'alarm' : 'alarms'} raised, ${gap.cleared} cleared`;
+  if (!gap.raised && !gap.cleared) return `No data for ${blind}; no alarm began or ended`;
+  return `No data for ${blind}; ${gap.raised} ${gap.raised === 1 ? 'alarm' : 'alarms'} began, ${gap.cleared} ended`;
 }

@@ -125,6 +125,8 @@ export interface CarAlarm {
   id: string;
   occurrence: number;
   title: string;
+  /** its title once it is not active; not from older agents */
+  ended_title?: string;
   priority: Priority;
   state: AlarmState;
   active: boolean;
@@ -177,7 +179,7 @@ export interface CarSummary {
   page: string | null;
   recording: "off" | "recording" | "saving" | "held" | "stopped";
   recording_for_s: number | null;
-  slow_down: "not_available" | "safe" | "armed" | "ordered" | "holding";
+  slow_down: "not_available" | "not_armed" | "armed" | "ordered" | "holding";
   /** when it was made, by the clock that its other times are of */
   time_ms?: number;
   /** null: it needs nobody */
@@ -2257,7 +2259,7 @@ export interface SlowDownOrder {
   from_mps: number | null;
   ordered_mps: number | null;
   deceleration_mps2: number;
-  /** false: its commands are not sent; it goes on when the link is back, if it is not released */
+  /** false: its commands are not sent; it continues when the link is back, if it is not released */
   sending: boolean;
   /** by a change of the car's own speed; null: not known; false: not confirmed, use the physical stop */
   confirmed: boolean | null;
@@ -2269,7 +2271,7 @@ export interface SlowDownOrder {
 
 export interface SlowDownState {
   /** ordered: on its ramp; holding: zeros are held */
-  state: "not_available" | "safe" | "armed" | "ordered" | "holding";
+  state: "not_available" | "not_armed" | "armed" | "ordered" | "holding";
   /** why it is not available, as a sentence */
   why: string | null;
   topic?: string | null;
@@ -2301,6 +2303,8 @@ export interface StandingAlarm {
   /** counts announcements; below */
   occurrence: number;
   title: string;
+  /** its title once it is not active; not from older agents */
+  ended_title?: string;
   priority: Priority;
   /** where it is shown now */
   place: Place;
@@ -2539,7 +2543,7 @@ export interface TopicOffer {
   type: string;
   /** that its messages name; null: none, or not known */
   frame?: string | null;
-  /** what speaks for it and against it, in few words */
+  /** evidence for and against it, in few words */
   why?: string;
   /** of a laser that is compared: the nearest range in each of at most 72 parts of its newest scan */
   ranges_m?: Array<number | null>;

@@ -1,5 +1,6 @@
 // The list of the departure check in Settings: add, change, remove, reorder, and back to the one of the vehicle profile.
 
+import { decimalOf } from '../core/decimal.js';
 import { added, isSame, moved, rowOf } from './departure-layout.js';
 import { styled } from '../core/style-sheet.js';
 import { request, sentenceOf } from '../control/request.js';
@@ -172,7 +173,7 @@ function path(vehicle, as = '') {
 }
 
 /** Not a number where it is none: the server says what it wants. @param {HTMLInputElement | null} field */
-const numberIn = (field) => Number((field?.value ?? '').replace(',', '.'));
+const numberIn = (field) => decimalOf(field?.value ?? '');
 
 /** @param {string} label @param {string} of @param {string} value @param {number} longest */
 function input(label, of, value, longest) {

@@ -153,6 +153,6 @@ function levelPath(levels) {
 function storedWords(mark, speed) {
   const { voice, photo } = mark;
   const with_ = [...(voice ? [voice.note || `${fixed(voice.length_s)} s of voice`] : []), ...(photo ? [photo.note || 'with a photo'] : []), ...(speed ? [speed] : [])];
-  const where = refusedWords(mark) || (stepOf(mark) === null ? 'stored' : mark.stored ? 'being stored' : 'stored on this phone');
+  const where = refusedWords(mark) || (stepOf(mark) === null ? 'stored' : mark.stored ? 'being stored' : 'stored on this device');
   return [...with_, where].join(' · ');
 }

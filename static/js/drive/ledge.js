@@ -86,10 +86,10 @@ class Ledge {
     this.#shown = shown;
     const isHeld = this.key.dataset['held'] !== undefined;
     setShape(this.icon, isHeld ? 'mic' : 'flag');
-    setText(this.word, isHeld ? 'let go: stored' : !isAway ? 'hold: voice' : marks.isDurable ? 'stored on this phone' : 'until the page closes');
+    setText(this.word, isHeld ? 'let go: stored' : !isAway ? 'hold: voice' : marks.isDurable ? 'stored on this device' : 'until the page closes');
     show(this.wait, waiting > 0 && isAway);
     setText(this.wait, waitWords(waiting));
-    setAttribute(this.key, 'aria-label', ['Mark this moment', isAway ? 'stored on this phone' : 'hold to speak', ...(waiting && isAway ? [waitWords(waiting)] : [])].join('; '));
+    setAttribute(this.key, 'aria-label', ['Mark this moment', isAway ? 'stored on this device' : 'hold to speak', ...(waiting && isAway ? [waitWords(waiting)] : [])].join('; '));
   }
 
   stop() {

@@ -109,7 +109,7 @@ class MarkList {
   #row({ id, head, more, isWaiting, isOwn, isRefused, voice }) {
     const text = [html('b', { class: 't' }, ...words(head)), html('bdi', { class: 'm' }, ...words(more.join(' · ')))];
     const what = isOwn ? html('button', { type: 'button', class: 'row', 'data-mark': id }, shape('flag'), ...text) : html('div', { class: 'row' }, shape('flag'), ...text);
-    const state = html('span', { class: 'state', 'data-state': isWaiting ? 'waits' : 'stored' }, icon(isWaiting ? 'phone' : 'ok', 's'), isWaiting ? (isRefused ? 'Refused' : 'Waits on this phone') : 'Stored');
+    const state = html('span', { class: 'state', 'data-state': isWaiting ? 'waits' : 'stored' }, icon(isWaiting ? 'phone' : 'ok', 's'), isWaiting ? (isRefused ? 'Refused' : 'Waits on this device') : 'Stored');
     const item = html('li', {}, what, state);
     if (voice && !isOwn) {
       const player = new PlayKey(() => partOf(id, 'voice', this.marks.store.vehicle), this.say);

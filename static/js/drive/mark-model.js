@@ -132,8 +132,8 @@ export function moreWords(mark) {
   if (voice) said.push(voice.note || `voice ${fixed(voice.length_s)} s`);
   if (photo) said.push(photo.note || `photo ${fixed(photo.bytes / 1e6)} MB`);
   if (shift_s) said.push(`moved by ${signed(shift_s)} s`);
-  if (clock === 'unknown') said.push('by the clock of this phone, which was not compared with the server’s');
-  else if (Math.abs(ahead_ms) >= TOLD_MS) said.push(`clock of this phone ${signed(ahead_ms / 1000, 2)} s, corrected`);
+  if (clock === 'unknown') said.push('by the clock of this device, which was not compared with the server’s');
+  else if (Math.abs(ahead_ms) >= TOLD_MS) said.push(`clock of this device ${signed(ahead_ms / 1000, 2)} s, corrected`);
   const refused = refusedWords(mark);
   if (refused) said.push(refused);
   return said;
@@ -160,7 +160,7 @@ export function countWords(waiting, stored) {
 export function waitingWords(waiting, isDurable, isAway) {
   const bytes = waiting.reduce((sum, { voice, photo }) => sum + (voice?.blob?.size ?? 0) + (photo?.blob?.size ?? 0), 0);
   return {
-    title: `${counted(waiting.length, 'mark')} ${waiting.length === 1 ? 'waits' : 'wait'} on this phone`,
+    title: `${counted(waiting.length, 'mark')} ${waiting.length === 1 ? 'waits' : 'wait'} on this device`,
     text: [
       isDurable ? 'They survive closing the page.' : 'This browser stores nothing: they are lost if the page is closed now.',
       ...(bytes ? [`${bytes < 1e5 ? 'Less than 0.1' : fixed(bytes / 1e6)} MB of voice and photos.`] : []),

@@ -22,7 +22,7 @@ const RECALLS_EVERY_MS = 30_000;
 /** A storage that hangs holds nothing up for longer [ms]. */
 const WRITES_MS = 2000;
 const MEMORY = 'This browser stores nothing. A mark is lost if the page is closed before the server has it.';
-const FULL = 'The storage of this phone is full. The mark is stored; its voice and photo are lost if the page is closed before the server has them.';
+const FULL = 'The storage of this device is full. The mark is stored; its voice and photo are lost if the page is closed before the server has them.';
 
 export class Marks {
   /** @type {Map<string, Mark>} */

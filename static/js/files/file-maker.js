@@ -64,7 +64,7 @@ export class FileMaker {
     if (this.#job !== job || !this.#dialog.isOpen) return;
     if (over.state === 'done') {
       save(job.address);
-      this.#dialog.show(`${label} of ${nameOf(row, Date.now())}`, [html('p', { role: 'status' }, `Done. It is in this phone’s downloads.${over.is_whole === false ? ' The export is incomplete:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#dialog.key('Save again', () => save(job.address)), this.#dialog.key('Back', () => this.download(row, back))]);
+      this.#dialog.show(`${label} of ${nameOf(row, Date.now())}`, [html('p', { role: 'status' }, `Done. It is in this device’s downloads.${over.is_whole === false ? ' The export is incomplete:' : ''}`), ...(over.notes ?? []).map((note) => html('p', {}, ...words(note)))], [], [this.#dialog.key('Save again', () => save(job.address)), this.#dialog.key('Back', () => this.download(row, back))]);
     } else if (over.state === 'cancelled') this.download(row, back);
     else this.#dialog.refuse('Not made', over.sentence ?? 'The server could not prepare it.', back);
   }

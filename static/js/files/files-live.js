@@ -1,6 +1,7 @@
 // What is recorded now, above the list: it counts, says why where nothing is recorded, and is begun and ended by hand.
 
 import { liveOf } from './files-layout.js';
+import { record } from '../shell/record-key.js';
 import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
 
 export class FilesLive {
@@ -18,12 +19,7 @@ export class FilesLive {
     this.dot = html('span', { class: 'thumb none' }, icon('rec', 'l'));
     this.row = html('div', { class: 'file', 'data-live': '', hidden: true }, this.dot, html('div', { class: 'tx' }, this.name, this.mark, this.facts, this.missing), this.key);
     this.element = html('section', { 'aria-label': 'The recorder' }, this.row);
-    this.stop = listen(this.key, 'click', async () => {
-      const on = this.key.dataset['on'] === 'true';
-      const answer = await store.ask('record', { on });
-      if (!answer.ok) say(answer.reason ?? 'Refused.', on ? 'Not recorded' : 'Not ended');
-      else if (!on) say('The recording is saved and listed. The car is still monitored.', 'Recording ended');
-    });
+    this.stop = listen(this.key, 'click', () => record(this.key.dataset['on'] === 'true', store, say));
   }
 
   /** @param {boolean} isWanted not among what was searched for, and not in the trash */

@@ -27,7 +27,7 @@ export async function share({ row, name, address, say, offer, link, done }) {
   }
   const trial = new File([new Uint8Array(1)], fileName, { type });
   if (!navigator.canShare?.({ files: [trial] }) || row.size_bytes > MOST_BYTES) {
-    const why = row.size_bytes > MOST_BYTES ? `${sizeWords(row.size_bytes)} is too large for this phone to share` : 'This phone cannot share such files';
+    const why = row.size_bytes > MOST_BYTES ? `${sizeWords(row.size_bytes)} is too large for this device to share` : 'This device cannot share such files';
     say(`${why}: a link is shared instead. It works for anyone who can reach this server.`);
     offer('Share the link', () => hand({ title: name, url: address }, say, done));
     return;

@@ -1,5 +1,6 @@
 // How this server sends mail: host, login, sender, who may be written to. Saved as a whole, tried with a key; the password goes one way.
 
+import { decimalOf } from '../core/decimal.js';
 import { keptAt } from '../core/kept-at.js';
 import { request, sentenceOf } from '../control/request.js';
 import { html, icon, listen, setAttribute, setText, setWords, show } from '../core/dom.js';
@@ -142,7 +143,7 @@ class MailForm {
 
   async #save() {
     const port = Number(this.port.value);
-    const limit = Number(this.limit.value.replace(',', '.'));
+    const limit = decimalOf(this.limit.value);
     if (!Number.isInteger(port) || this.port.value.trim() === '') {
       this.#refuse('The port is a number from 1 to 65535.', 'port');
       return;

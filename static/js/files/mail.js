@@ -213,7 +213,7 @@ class MailSheet {
       const answer = await fetch(address);
       if (!answer.ok) throw new Error('It could not be loaded from the server. Try again.');
       this.#file = new File([await answer.blob()], `${id}.${ending}`, { type });
-      setWords(this.status, 'Ready. Press again: the phone opens the file only after a press.');
+      setWords(this.status, 'Ready. Press again: the device opens the file only after a press.');
       setText(/** @type {HTMLElement} */ (this.own.lastElementChild), 'Open it in my mail app');
     } catch (error) {
       setText(this.status, '');
@@ -245,7 +245,7 @@ class MailSheet {
   #mailto() {
     const links = this.#ids.map((id) => new URL(keptAt(pathOf(id, this.#format)), location.href).href);
     const link = html('a', { href: mailtoOf({ to: recipientsOf(this.to.value), subject: this.subject.value, text: this.text.value, links }) });
-    setWords(this.status, 'Your mail app gets links, because this phone cannot share files with it. The links work for anyone who can reach this server.');
+    setWords(this.status, 'Your mail app gets links, because this device cannot share files with it. The links work for anyone who can reach this server.');
     link.click();
   }
 }

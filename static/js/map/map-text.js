@@ -92,7 +92,7 @@ export function phoneOf(frame, lag_s, page = '') {
   // A coarse fix is one of now all the same; every other reason says that there is none of now.
   const isLive = place !== null && (phone.used || phone.why === 'coarse') && age_s !== null && age_s <= PHONE_LIVES_S;
   const name = phone.count > 1 ? nameOf(phone, page) : 'Phone'; // among several each has its own
-  const whose = phone.count > 1 && phone.label ? ` It is the position of ${phone.label}, one of ${phone.count} phones.` : '';
+  const whose = phone.count > 1 && phone.label ? ` Compared with ${phone.label}, one of ${phone.count} phones.` : '';
   let says = '';
   if (phone.why_text) says = `${phone.why_text}.`;
   else if (place && !isLive) says = `The phone’s newest fix is ${age(age_s)} s old.`;

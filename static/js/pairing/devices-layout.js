@@ -30,7 +30,7 @@ export function seenWords({ seen_ms, sockets }, now_ms) {
 export function removalWords(device, you, all) {
   const isLast = device.role === 'operator' && all.filter(({ role }) => role === 'operator').length === 1;
   const last = isLast ? ' It is the last operator: only the server’s terminal can pair another.' : '';
-  if (device.id === you) return ['Remove this phone?', `This page closes now, and this phone must be paired again.${last}`];
+  if (device.id === you) return ['Remove this device?', `This page closes now, and this device must be paired again.${last}`];
   return [`Remove ${device.name}?`, `Its pages close now, and it must be paired again.${last}`];
 }
 

@@ -26,7 +26,7 @@ const ROLES = /** @type {const} */ ([['viewer', 'Viewer'], ['operator', 'Operato
 export async function mount(place, group, store, say, head) {
   await styled('access');
   if (store.isViewer) {
-    place.replaceChildren(html('p', { class: 'state' }, `This phone is paired as a viewer, under the name ${store.who?.name ?? ''}. An operator sees who is paired, and can make it an operator.`));
+    place.replaceChildren(html('p', { class: 'state' }, `This device is paired as a viewer, under the name ${store.who?.name ?? ''}. An operator sees who is paired, and can make it an operator.`));
     return;
   }
   new Devices(place, group, say, head).start();
@@ -92,7 +92,7 @@ class Devices {
     const about = html('span', { class: 'm' });
     setWords(about, seenWords(device, now_ms));
     return html('li', { 'data-id': device.id },
-      html('span', { class: 'tx' }, html('bdi', { class: 't' }, device.name), ...(isYou ? [html('span', { class: 'tag' }, 'This phone')] : []), about),
+      html('span', { class: 'tx' }, html('bdi', { class: 't' }, device.name), ...(isYou ? [html('span', { class: 'tag' }, 'This device')] : []), about),
       html('div', { class: 'seg', role: 'group', 'aria-label': `Role of ${device.name}` }, ...ROLES.map(([role, label]) => html('button', {
         type: 'button', 'data-role-key': role, 'data-key': `${device.id} ${role}`, 'aria-pressed': String(device.role === role),
       }, label))),

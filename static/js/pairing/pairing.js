@@ -95,9 +95,9 @@ class PairingScreen {
     show(byPin, this.#token === null);
     setWords(where, this.#token === null
       ? 'The server’s terminal shows a PIN of 6 digits and a QR code. A paired operator can show one too: Settings, Paired devices.'
-      : 'The scanned code pairs this phone, once.');
+      : 'The scanned code pairs this device, once.');
     setAttribute(go, 'data-busy', this.#isBusy || left_s > 0);
-    setWords(go, this.#isBusy ? 'Pairing' : left_s > 0 ? waitWords(left_s) : 'Pair this phone');
+    setWords(go, this.#isBusy ? 'Pairing' : left_s > 0 ? waitWords(left_s) : 'Pair this device');
     if (left_s > 0) setTimeout(() => this.draw(), 250);
   }
 }
@@ -133,8 +133,8 @@ function build(root, why, name) {
   const byPin = html('div', { class: 'by-pin' }, html('div', { class: 'lab-row' }, html('label', { for: 'pair-pin' }, 'PIN')), html('div', { class: 'field pin' }, pin), pad);
   const form = html('form', { class: 'form', novalidate: true, 'data-f': 'pair-form' },
     html('div', { class: 'view' },
-      html('div', { class: 'hero' }, html('h1', { tabindex: -1 }, 'Pair this phone')), reason, where,
-      html('div', { class: 'lab-row' }, html('label', { for: 'pair-name' }, 'Name of this phone')), html('div', { class: 'field' }, own),
+      html('div', { class: 'hero' }, html('h1', { tabindex: -1 }, 'Pair this device')), reason, where,
+      html('div', { class: 'lab-row' }, html('label', { for: 'pair-name' }, 'Name of this device')), html('div', { class: 'field' }, own),
       byPin, says),
     html('div', { class: 'bottom' }, go));
   root.replaceChildren(html('header', { class: 'top' }, html('span', { class: 'link' }, 'catgraph')), form);

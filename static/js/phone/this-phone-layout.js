@@ -30,12 +30,12 @@ const SLOW_S = 1;
 
 /** Whether an alarm would be heard from this phone now, and what is in the way. @param {PhoneFacts} facts */
 export function verdictOf(facts) {
-  if (!facts.isOnline) return { can: false, text: 'This phone is offline and receives no alarms.' };
-  if (facts.lag_s > 2) return { can: false, text: 'No data from the server: this phone receives no alarms.' };
+  if (!facts.isOnline) return { can: false, text: 'This device is offline and receives no alarms.' };
+  if (facts.lag_s > 2) return { can: false, text: 'No data from the server: this device receives no alarms.' };
   if (facts.isReplaying) return { can: false, text: 'This page shows a recording, so it does not count as a page that can sound alarms.' };
-  if (facts.sound === 'ready') return { can: true, text: 'This phone sounds alarms while this page is in the foreground.' };
+  if (facts.sound === 'ready') return { can: true, text: 'This device sounds alarms while this page is in the foreground.' };
   const why = { refused: 'sound was not allowed', asks: 'the page was not touched yet', missing: 'this browser has no sound', interrupted: 'a call or another app uses the sound' }[facts.sound];
-  return { can: false, text: `This phone cannot sound alarms: ${why}.` };
+  return { can: false, text: `This device cannot sound alarms: ${why}.` };
 }
 
 /** @param {PhoneFacts} facts @returns {Row[]} */
@@ -60,7 +60,7 @@ function soundRow({ sound, isApple }) {
     case 'interrupted': return { ...row, tag: 'Interrupted', kind: 'warn', says: 'A call or another app uses the sound: return here and touch the page.' };
     case 'missing': return { ...row, tag: 'Not available', kind: 'warn', says: 'This browser has no sound: alarms are shown without sound.' };
     case 'refused': return { ...row, tag: 'Refused', kind: 'warn', says: 'Alarms are shown without sound. Touch the key below.' };
-    default: return { ...row, tag: 'Asks', kind: 'unk', says: 'Browsers allow sound only after a touch.' };
+    default: return { ...row, tag: 'Will ask', kind: 'unk', says: 'Browsers allow sound only after a touch.' };
   }
 }
 
@@ -68,16 +68,16 @@ function soundRow({ sound, isApple }) {
 function screenRow({ screen, isApple, isSecure }) {
   const row = { icon: 'awake', what: 'Screen stays awake' };
   if (screen === 'ready') return { ...row, tag: 'Ready', kind: 'plain', says: 'The screen stays on while this page is in the foreground.' };
-  if (screen === 'asks') return { ...row, tag: 'Asks', kind: 'unk', says: 'Requested with the first touch.' };
+  if (screen === 'asks') return { ...row, tag: 'Will ask', kind: 'unk', says: 'Requested with the first touch.' };
   if (screen === 'refused') return { ...row, tag: 'Refused', kind: 'warn', says: 'The phone may go to sleep, and then it sounds no alarm. Turn battery saving off.' };
   const why = !isSecure ? 'It needs HTTPS.' : isApple ? 'iPhones support it from iOS 16.4 on.' : 'This browser does not support it.';
-  return { ...row, tag: 'Not available', kind: 'warn', says: `${why} Set the phone’s own screen time-out to never.` };
+  return { ...row, tag: 'Not available', kind: 'warn', says: `${why} Set the device’s own screen time-out to never.` };
 }
 
 /** @param {PhoneFacts} facts @returns {Row} */
 function vibrationRow({ vibrates, isApple }) {
   const row = { icon: 'phone', what: 'Vibration' };
-  if (vibrates) return { ...row, tag: 'Ready', kind: 'plain', says: 'Unless the phone is set to never vibrate.' };
+  if (vibrates) return { ...row, tag: 'Ready', kind: 'plain', says: 'Unless the device is set to never vibrate.' };
   return { ...row, tag: 'Not available', kind: 'unk', says: isApple ? 'On an iPhone no page can vibrate.' : 'This browser cannot vibrate the device.' };
 }
 
@@ -103,9 +103,9 @@ function networkRow({ isOnline, network, lag_s }) {
 /** @param {PhoneFacts} facts @returns {Row} */
 function positionRow({ position, positionSays, isSecure, rides }) {
   const row = { icon: 'gps', what: 'Position' };
-  const riding = rides ? ' This phone is in the car.' : '';
+  const riding = rides ? ' This device is in the car.' : '';
   if (position === 'missing') return { ...row, tag: 'Not available', kind: 'warn', says: `${isSecure ? 'This browser has no position.' : 'It needs HTTPS.'}${riding}` };
   if (position === 'refused') return { ...row, tag: 'Refused', kind: 'warn', says: `Allow it for this page in the browser’s settings.${riding}` };
-  if (position === 'asks') return { ...row, tag: 'Asks', kind: 'unk', says: `Requested with Connect.${riding}` };
+  if (position === 'asks') return { ...row, tag: 'Will ask', kind: 'unk', says: `Requested with Connect.${riding}` };
   return positionSays ? { ...row, tag: 'No fix', kind: 'warn', says: `${positionSays}${riding}` } : { ...row, tag: 'Ready', kind: 'plain', says: riding.trim() };
 }

@@ -17,7 +17,7 @@ export function openThisPhone(store, arming, deviceStatus) {
   const arm = html('button', { type: 'button', class: 'key solid wide', 'data-f': 'arm' }, 'Turn on alarms');
   const test = html('button', { type: 'button', class: 'key wide', 'data-f': 'test' }, 'Test the sound');
   const sheet = /** @type {HTMLDialogElement} */ (html('dialog', { class: 'sheet scrimmed tall', id: 'sheet-this-phone', 'aria-labelledby': 'this-phone-title', 'aria-describedby': 'this-phone-words' },
-    html('div', { class: 'bd' }, html('h2', { id: 'this-phone-title' }, 'This phone'), verdict), html('div', { class: 'menu-list' }, list),
+    html('div', { class: 'bd' }, html('h2', { id: 'this-phone-title' }, 'This device'), verdict), html('div', { class: 'menu-list' }, list),
     html('div', { class: 'keys' }, html('div', { class: 'pair' }, test, arm), html('button', { type: 'button', class: 'key', 'data-f': 'no' }, 'Close'))));
   let shown = '';
   let said = '';

@@ -234,7 +234,7 @@ export function countWords(line) {
   if (!line) return 'Alarms';
   const count = line.marks.length + line.marks_left_out;
   if (line.is_done) return counted(count, 'alarm');
-  return count ? `${count} so far` : 'Alarms';
+  return count ? `${counted(count, 'alarm')}, still reading` : 'Alarms';
 }
 
 /**

@@ -272,7 +272,7 @@ class Replay {
   /** A second recording is chosen among the files. */
   #chooseSecond() {
     location.hash = '#files';
-    this.say('Press the recording that is shown beside this one, then “Compare with the replay”.', 'Compare');
+    this.say('Choose the recording to compare.', 'Compare');
   }
 
   #openJumps() {

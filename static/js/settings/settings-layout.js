@@ -1,6 +1,7 @@
 // Settings as numbers and words: pure functions. What may be set, how a slider maps it, how it is read and typed.
 
 import { shownIn, wireOf } from '../core/units.js';
+import { isInDoubt, local, markOf } from '../core/decimal.js';
 import { fixed } from '../core/format.js';
 
 /**
@@ -66,41 +67,47 @@ export function stepped(value, steps, field) {
  * How a value is read: with the decimals of its steps, and more only where it lies between them.
  * @param {number | null | undefined} value in SI
  * @param {Field} field
+ * @param {string} [mark] the decimal mark
  */
-export function textOf(value, field) {
+export function textOf(value, field, mark) {
   if (value === null || value === undefined || !Number.isFinite(value)) return fixed(null);
   const { value: shown, unit } = shownIn(value, field.unit);
   const most = unit === field.unit ? 4 : 2; // a round number of m/s is none of mph
   let digits = decimals(scaleOf(field).step);
   while (digits < most && Math.abs(Number(shown.toFixed(digits)) - shown) > 2e-5) digits += 1;
-  return fixed(shown, digits);
+  return local(fixed(shown, digits), mark);
 }
 
-/** An end of the range, as short as it can be. @param {number} value in SI @param {Field} field */
-export function endText(value, field) {
+/** An end of the range, as short as it can be. @param {number} value in SI @param {Field} field @param {string} [mark] the decimal mark */
+export function endText(value, field, mark) {
   const { value: shown } = shownIn(value, field.unit);
-  return fixed(Number(shown.toFixed(2)), decimals(Number(shown.toFixed(2))));
+  return local(fixed(Number(shown.toFixed(2)), decimals(Number(shown.toFixed(2)))), mark);
 }
 
 /**
  * A typed number, with a comma or a point: its value in SI, or a sentence of why it cannot be set.
  * @param {string} typed
  * @param {Field} field
+ * @param {string} [mark] the decimal mark of the language
  * @returns {{value: number} | {refused: string}}
  */
-export function readNumber(typed, field) {
+export function readNumber(typed, field, mark = markOf()) {
   const { low, high, unit } = scaleOf(field);
   const text = typed.replace(/[\s\u00a0\u202f]/g, '').replace('−', '-');
   if (text === '') return { refused: `${field.title}: a number is required.` };
   const bare = text.toLowerCase().endsWith(unit.toLowerCase()) ? text.slice(0, -unit.length) : text;
   if (!/^[+-]?(\d+([.,]\d*)?|[.,]\d+)$/.test(bare)) return { refused: `${field.title}: “${typed.trim().slice(0, 20)}” is not a number.` };
+  if (isInDoubt(bare, mark)) {
+    const [many, few] = [bare.replace(/[.,]/, ''), bare.replace(',', '.')].map(Number);
+    return { refused: `${field.title}: “${bare}” could be ${many} or ${local(String(few), mark)}. Type the one you mean.` };
+  }
   const number = Number(bare.replace(',', '.'));
   // An end that is not round in the unit of this phone can be typed as it is read.
   const near = unit === field.unit ? 0 : 0.005;
   if (Math.abs(number - low) <= near) return { value: field.minimum };
   if (Math.abs(number - high) <= near) return { value: field.maximum };
   if (!(number >= low && number <= high)) {
-    return { refused: `${field.title}: ${endText(field.minimum, field)} to ${endText(field.maximum, field)} ${unit} is allowed.` };
+    return { refused: `${field.title}: ${endText(field.minimum, field, mark)} to ${endText(field.maximum, field, mark)} ${unit} is allowed.` };
   }
   return { value: toWire(number, field) };
 }

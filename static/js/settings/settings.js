@@ -78,7 +78,7 @@ class SettingsTab {
     const groups = html('div', { class: 'groups' });
     const none = html('p', { class: 'nothing', hidden: true });
     const all = html('fieldset', { class: 'all' }, groups, none, this.topics.element, this.file.element);
-    const phone = html('button', { type: 'button', class: 'key wide' }, icon('phone'), 'Preferences of this phone');
+    const phone = html('button', { type: 'button', class: 'key wide' }, icon('phone'), 'Preferences of this device');
     const keys = html('div', { class: 'keys' }, phone);
     this.panel.replaceChildren(
       html('div', { class: 'find' }, html('div', { class: 'field' }, icon('search'), search), undo), state,

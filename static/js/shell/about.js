@@ -111,7 +111,7 @@ export function mountAbout(root, store) {
 const NOT_KNOWN = '–';
 /** What of this page the phone keeps; shell.js finds out. @type {Record<string, string>} */
 const KEEPING = {
-  kept: 'this phone reports it: it stores the page’s shell',
+  kept: 'this device reports it: it stores the page’s shell',
   missing: 'the browser’s own error: it cannot store the page, or the page has no HTTPS',
   refused: 'the browser’s own error: it stored nothing, for example because it does not trust the certificate',
   off: 'the browser’s own error: this server does not allow phones to store the page',

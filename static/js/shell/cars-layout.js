@@ -1,6 +1,7 @@
 // The cars of this server as the page shows them: short names, their order, what each needs. Pure functions, no DOM.
 
 import { byUrgency } from '../alarms/alarm-layout.js';
+import { titleOf } from '../alarms/alarm-title.js';
 import { chipOf } from '../control/control-layout.js';
 import { freshnessStyle } from '../core/freshness.js';
 import { chainOf } from '../core/link.js';
@@ -135,7 +136,7 @@ function stateOf({ phase, paused, waiting }, worst, for_s) {
   }
   const { priority, state, title, active } = worst;
   const isAsking = state === 'UNACKED' || state === 'RTN_UNACKED';
-  const words = !active ? `${title}: ended` : isAsking ? `${title}, ${age(for_s)} s` : `${title}, acknowledged`;
+  const words = !active ? titleOf(worst) : isAsking ? `${title}, ${age(for_s)} s` : `${title}, acknowledged`;
   const more = waiting > 1 ? ` +${waiting - 1}` : '';
   return {
     rank: isAsking ? (active ? 60 : 35) + 10 * (PRIORITY[priority] - 1) : 25 + PRIORITY[priority],

@@ -2,7 +2,7 @@
 
 import { drawChain } from './chain.js';
 import { addSheet, closeSheet, openSheet } from './sheet.js';
-import { chipOf } from '../control/control-layout.js';
+import { chipOf, controlWords } from '../control/control-layout.js';
 import { dutyWords } from '../control/duty-layout.js';
 import { html, icon, setAttribute, setIcon, setText, setWords, show, svg } from '../core/dom.js';
 import { write } from '../core/ink.js';
@@ -53,8 +53,8 @@ export function openCars(store, { rows, open, openControl, openDuty }) {
       list.replaceChildren(...wanted);
       if (focused instanceof HTMLElement && list.contains(focused)) focused.focus();
     }
-    const { label } = chipOf(store.control, store.page, store.isSilent, store.duty);
-    setText(/** @type {Element} */ (control.lastElementChild), store.vehicle ? `${label} of ${store.vehicle}` : label);
+    const chip = chipOf(store.control, store.page, store.isSilent, store.duty);
+    setText(/** @type {Element} */ (control.lastElementChild), controlWords(chip, store.vehicle, store.isViewer));
     setText(/** @type {Element} */ (duty.lastElementChild), dutyWords(store.duty));
     show(duty, store.duty !== null && !store.isViewer);
     show(fleet, now.length > 1);

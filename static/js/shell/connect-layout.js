@@ -16,7 +16,7 @@ const KEPT = 8;
  */
 export function armWords(what, state) {
   if (state === 'ready') return { tag: 'Ready', kind: 'plain', cost: '' };
-  if (state === 'asks') return { tag: 'Asks', kind: 'unk', cost: '' };
+  if (state === 'asks') return { tag: 'Will ask', kind: 'unk', cost: '' };
   const cost = {
     sound: 'alarms are shown without sound',
     screen: 'the screen may turn off and hide alarms',

@@ -1,5 +1,6 @@
-// What only a wide window or a keyboard uses, fetched as one script once the first values stand.
+// What only a wide window, a keyboard or the Back key uses, fetched as one script once the first values stand.
 
+import { mount as mountBack } from './back.js';
 import { mount as mountKeys } from './keys.js';
 import { mount as mountPanes } from './panes.js';
 
@@ -12,4 +13,5 @@ import { mount as mountPanes } from './panes.js';
 export function mount(monitor, store, tabs, say) {
   mountPanes(monitor, store);
   mountKeys(monitor, store, tabs, say);
+  mountBack(monitor, tabs);
 }

@@ -1,5 +1,6 @@
 // The attention queue of all cars: what needs a person, in which order, who has it, and what may be done. Pure functions, no DOM.
 
+import { titleOf } from '../alarms/alarm-title.js';
 import { counted, duration, timeOfDay } from '../core/format.js';
 import { requestItem, supervisorWords } from './fleet-requests.js';
 import { speedWords } from '../core/units.js';
@@ -123,19 +124,13 @@ function itemOf(name, summary, seen) {
   const said = isCut ? lastWords(summary.speed.value_mps, summary.link.car_age_s ?? summary.link.bridge_age_s, seen) : worst?.text ?? '';
   return {
     key: name, cars: [name], name, icon: isCut ? 'link-off' : worst ? ICON[worst.priority] : 'info', kind: worst ? KIND[worst.priority] : 'warn',
-    isFilled: Boolean(worst?.active && isAsking), title: titleOf(worst), detail: `${said}${more}`.replace(/^, /, ''),
+    isFilled: Boolean(worst?.active && isAsking), title: worst ? titleOf(worst) : 'Needs a person', detail: `${said}${more}`.replace(/^, /, ''),
     since_s: Math.max(0, (seen.now_ms - since_ms) / 1000),
     who: whoOf(summary, seen.page), next: nextOf(summary, seen.now_ms), timer, keys: keysOf(summary, seen),
     order: [...stepOf(summary, seen), -(worst ? PRIORITY[worst.priority] : 0), raised_s],
     cause: worst?.id ?? '', raised_s, isUnassigned,
     sound: isUnassigned && worst?.state === 'UNACKED' ? worst.sound : 'none',
   };
-}
-
-/** @param {CarAlarm | null} worst */
-function titleOf(worst) {
-  if (!worst) return 'Needs a person';
-  return worst.active ? worst.title : `${worst.title}: ended`;
 }
 
 /** For how long nothing was heard of a car [s]; null: it was never heard. @param {ListedCar} car @param {Seen} seen */

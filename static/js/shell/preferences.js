@@ -23,10 +23,10 @@ export function openPreferences() {
  * @param {Loud} sound
  */
 export function trialWords(result, sound) {
-  if (result === 'missing') return 'This browser has no sound: this phone sounds no alarms. Use another browser.';
-  if (result === 'blocked') return 'This phone blocks the page’s sound: no alarm can be heard. Allow sound for this page, then try again.';
+  if (result === 'missing') return 'This browser has no sound: this device sounds no alarms. Use another browser.';
+  if (result === 'blocked') return 'This device blocks the page’s sound: no alarm can be heard. Allow sound for this page, then try again.';
   if (result === 'busy') return 'An alarm sounds now: acknowledge it first.';
-  return `Sounding now: ${PULSES[sound]}. If you hear nothing, turn the phone’s media volume up and silent mode off.`;
+  return `Sounding now: ${PULSES[sound]}. If you hear nothing, turn the device’s media volume up and silent mode off.`;
 }
 
 /**

@@ -61,11 +61,10 @@ export function mount(root, store, say) {
     setText(keyWords, order === false ? 'End the recording' : 'Start recording');
   }
 
-  async function obey() {
+  function obey() {
     closeSheet(menu);
-    if (order === null) return;
-    const answer = await store.ask('record', { on: order });
-    if (!answer.ok) say(answer.reason ?? 'Refused.', order ? 'Not recording' : 'Recording continues');
+    const on = order;
+    if (on !== null) import('./record-key.js').then(({ record }) => record(on, store, say)).catch(() => say('It could not be loaded from the server. Try again.', 'Nothing was changed'));
   }
 
   if (store.frame) draw(); // before the first frame it is not shown

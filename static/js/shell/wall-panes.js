@@ -40,9 +40,9 @@ export function peopleLines(reach, control, page) {
   const rank = (/** @type {string} */ one) => (one === control?.page ? 0 : one === page ? 1 : 2);
   const lines = [...reach.pages].sort((a, b) => rank(a.page) - rank(b.page)).map((one) => ({
     key: one.page,
-    cells: [`${one.name}${one.page === page ? ', you' : ''}`, one.page === control?.page ? 'in control' : 'watching', one.can ? 'hears alarms' : one.why_text ?? 'hears no alarm', one.heard_s === null ? NOTHING : `${age(one.heard_s)} s`],
+    cells: [`${one.name}${one.page === page ? ', you' : ''}`, one.page === control?.page ? 'in control' : 'watching', one.can ? 'alarms audible' : one.why_text ?? 'alarms not audible', one.heard_s === null ? NOTHING : `${age(one.heard_s)} s`],
   }));
-  return { head: `${counted(reach.pages.length + reach.left_out, 'page')}, ${reach.can} can hear alarms`, lines };
+  return { head: `${counted(reach.pages.length + reach.left_out, 'page')}, alarms audible on ${reach.can}`, lines };
 }
 
 /** A list of lines, as many as are seen whole. */

@@ -1,7 +1,7 @@
 // The key that releases the car from a slow-down, and the sheet that confirms it.
 
 import { field, listen, need, setAttribute, setText, setWords, show } from '../core/dom.js';
-import { holdOf, nameOf, releaseOf, seenOf } from './slow-layout.js';
+import { holdOf, keepWords, nameOf, releaseOf, seenOf } from './slow-layout.js';
 
 export class ReleaseKey {
   /**
@@ -41,6 +41,7 @@ export class ReleaseKey {
     if (!can) return this.say(why, 'Not released', seen.isViewer ? undefined : { label: 'Request control', act: () => void this.control.order('request') });
     this.sheet.dataset['order'] = String(hold.number);
     this.sheet.dataset['vehicle'] = this.store.vehicle;
+    setText(field(this.sheet, 'no'), keepWords(seen.now?.state));
     setText(field(this.sheet, 'release-title'), `Release ${nameOf(this.store.vehicle) || 'the car'}?`);
     const standing = this.store.frame?.alarms.filter((alarm) => alarm.priority === 'critical' && alarm.active) ?? [];
     setWords(field(this.sheet, 'alarms'), standing.length ? `Still active: ${standing.map(({ title }) => title).join(', ')}.` : '');

@@ -27,7 +27,7 @@ const GUARD_HEARD_S = 2;
 /** A longer reason does not fit the slide; the sheet behind it gives it whole [characters]. */
 const BRIEF = 44;
 
-const STATES = /** @type {Record<string, string>} */ ({ not_available: 'NOT AVAILABLE', safe: 'NOT ARMED', armed: 'ARMED', ordered: 'SLOWING', holding: 'HOLDING' });
+const STATES = /** @type {Record<string, string>} */ ({ not_available: 'NOT AVAILABLE', not_armed: 'NOT ARMED', armed: 'ARMED', ordered: 'SLOWING', holding: 'HOLDING' });
 
 /** The facts that decide how this page shows the slow-down now. @param {import('../core/store.js').Store} store @param {string} [car] its short name @returns {Seen} */
 export function seenOf(store, car = store.vehicle) {
@@ -87,7 +87,7 @@ export function slideOf(seen) {
     if (isViewer) return off('Slow-down armed', 'not for viewers');
     return { kind: 'armed', title: 'Slide to slow', why: seen.car || 'the car', label: `Slide to slow ${seen.vehicle || 'the car'}. With a keyboard hold Enter for 1 second` };
   }
-  if (now.state === 'safe') return off('Slow-down not armed', isViewer ? 'not for viewers' : 'press to arm');
+  if (now.state === 'not_armed') return off('Slow-down not armed', isViewer ? 'not for viewers' : 'press to arm');
   const why = bare(now.why ?? 'not available');
   return off('Slow-down off', why.length > BRIEF ? 'press for the reason' : why);
 }
@@ -184,17 +184,17 @@ export function countdownOf(now, lag_s) {
  * Whether the car slows by itself when the link is lost.
  * @param {Guard | null | undefined} guard
  * @param {number} lag_s
- * @returns {{text: string, isSafe: boolean}}
+ * @returns {{text: string, isGuarded: boolean}}
  */
 export function guardWords(guard, lag_s = 0) {
-  if (!guard) return { text: 'No guard on the car: link loss will NOT slow the car', isSafe: false };
+  if (!guard) return { text: 'No guard on the car: link loss will NOT slow the car', isGuarded: false };
   const age_s = guard.age_s === null ? Infinity : guard.age_s + lag_s;
-  if (age_s > GUARD_HEARD_S) return { text: `No message from the guard for ${age(age_s)} s: link loss may NOT slow the car`, isSafe: false };
+  if (age_s > GUARD_HEARD_S) return { text: `No message from the guard for ${age(age_s)} s: link loss may NOT slow the car`, isGuarded: false };
   const why = guard.why ? `: ${bare(guard.why)}` : '';
-  if (guard.state === 'slowing') return { text: `GUARDED: the guard slows the car by itself${why}`, isSafe: true };
-  if (guard.state === 'holding') return { text: `GUARDED: the guard holds the car${why}`, isSafe: true };
-  if (guard.state === 'guarded' || guard.state === 'operator') return { text: 'GUARDED: the guard on the car slows it when the link is lost', isSafe: true };
-  return { text: `UNGUARDED: the guard receives no heartbeat${why}: link loss will NOT slow the car`, isSafe: false };
+  if (guard.state === 'slowing') return { text: `GUARDED: the guard slows the car by itself${why}`, isGuarded: true };
+  if (guard.state === 'holding') return { text: `GUARDED: the guard holds the car${why}`, isGuarded: true };
+  if (guard.state === 'guarded' || guard.state === 'operator') return { text: 'GUARDED: the guard on the car slows it when the link is lost', isGuarded: true };
+  return { text: `UNGUARDED: the guard receives no heartbeat${why}: link loss will NOT slow the car`, isGuarded: false };
 }
 
 /**
@@ -208,6 +208,11 @@ export function releaseOf({ isViewer, mayControl, holder, car }) {
   return { can: true, label: `Release ${car || 'the car'}`, why: '' };
 }
 
+/** The key that leaves the order as it is. @param {string | undefined} state of the slow-down */
+export function keepWords(state) {
+  return state === 'holding' ? 'Keep holding' : 'Keep slowing';
+}
+
 /**
  * The sheet behind the slide: how it stands, what will be commanded, and what this page may do.
  * @param {Seen} seen
@@ -218,7 +223,7 @@ export function sheetOf(seen, lag_s) {
   const { now, isSilent, isViewer, isReplay, mayControl, holder } = seen;
   const order = orderOf(now);
   const guard = guardWords(now?.guard, lag_s);
-  const plain = { aid: AID, guard: `${guard.text}.`, isGuarded: guard.isSafe };
+  const plain = { aid: AID, guard: `${guard.text}.`, isGuarded: guard.isGuarded };
   /** @type {[string, string, boolean][]} */
   const facts = now?.topic ? [
     ['Commanded on', now.topic, false],
@@ -237,7 +242,7 @@ export function sheetOf(seen, lag_s) {
     : isArmed ? `${by} Any operator can slow the car: slide to the end and let go.`.trim()
       : 'When armed, one slide slows the car. The steering angle is held, and speed 0 is commanded until the car is released.';
   if (order) return { ...plain, title, text, facts, act: null, says: '' };
-  if (isViewer) return { ...plain, title, text, facts, act: null, says: 'This phone is paired as a viewer: it can watch but not make changes.' };
+  if (isViewer) return { ...plain, title, text, facts, act: null, says: 'This device is paired as a viewer: it can watch but not make changes.' };
   if (!mayControl) return { ...plain, title, text, facts, act: 'ask', says: `${holder ?? 'Another'} is in control and can ${isArmed ? 'disarm' : 'arm'} it.` };
   return { ...plain, title, text, facts, act: isArmed ? 'disarm' : 'arm', says: '' };
 }
@@ -260,7 +265,7 @@ export function connectRow(now, isMonitoring) {
   const { text } = guardWords(now.guard);
   if (orderOf(now)) return { tag: 'Slowing', kind: 'warn', cost: 'the car is being slowed now' };
   if (now.state === 'armed') return { tag: 'Armed', kind: 'plain', cost: text };
-  if (now.state === 'safe') return { tag: 'Off', kind: 'unk', cost: `can be armed on Home. ${text}` };
+  if (now.state === 'not_armed') return { tag: 'Off', kind: 'unk', cost: `can be armed on Home. ${text}` };
   return { tag: 'Not available', kind: 'unk', cost: bare(now.why ?? 'not available') };
 }
 

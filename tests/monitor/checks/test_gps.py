@@ -140,7 +140,7 @@ def test_not_published_and_silent(id: str) -> None:
     assert ask(id, known(age_s=2.0, position=moved(HERE, 0, 0, 1.0))).verdict == "unknown"
 
 
-@pytest.mark.parametrize(("status", "brief"), [(-1, "FAULT no fix"), (-2, "FAULT fix unset"), (-3, "FAULT no fix")])
+@pytest.mark.parametrize(("status", "brief"), [(-1, "FAULT: no fix"), (-2, "FAULT: fix unset"), (-3, "FAULT: no fix")])
 def test_without_a_fix_nothing_else_is_judged(status: int, brief: str) -> None:
     """−2 is "status is not yet set" of ROS 2's NavSatStatus: nobody says that there is no fix."""
     fix = GpsFix(lat_deg=math.nan, lon_deg=math.nan, status=status)

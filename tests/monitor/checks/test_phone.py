@@ -173,25 +173,25 @@ def test_the_correlation_has_a_deadband_and_a_setting() -> None:
 # -- missing -----------------------------------------------------------------------------------------------------------
 
 WHYS: dict[Why, tuple[str, str, str]] = {
-    "denied": ("Location permission denied on the phone", "not checked: denied", "FAULT permission"),
+    "denied": ("Location permission denied on the phone", "not checked: denied", "FAULT: permission"),
     "insecure": (
         "The page on the phone was not opened over HTTPS, which a position needs",
         "not checked: HTTPS",
-        "FAULT needs HTTPS",
+        "FAULT: needs HTTPS",
     ),
-    "unavailable": ("No position found by the phone", "not checked: no fix", "FAULT no fix"),
-    "timeout": ("No GPS fix on the phone for 10 s", "not checked: no fix", "FAULT no fix"),
+    "unavailable": ("No position found by the phone", "not checked: no fix", "FAULT: no fix"),
+    "timeout": ("No GPS fix on the phone for 10 s", "not checked: no fix", "FAULT: no fix"),
     "hidden": (
         "The page on the phone is in the background, where it gets no position",
         "not checked: hidden",
-        "FAULT background",
+        "FAULT: background",
     ),
     "coarse": (
         "Position of the phone is accurate to 800 m only; 50 m is needed",
         "not checked: coarse",
         "FAULT ±800 m",
     ),
-    "late": ("Positions of the phone arrive too late over the radio", "not checked: late", "FAULT comes late"),
+    "late": ("Positions of the phone arrive too late over the radio", "not checked: late", "FAULT: comes late"),
 }
 
 
@@ -218,7 +218,7 @@ def test_a_fix_that_grew_old_and_a_phone_that_fell_silent() -> None:
     assert asked("phone_missing", old).text == "The newest fix of the phone is 12 s old"
     silent = view(received_s=NOW_S - 14.0, measured_s=NOW_S - 14.0, usable_s=NOW_S - 14.0)
     assert asked("phone_missing", silent).text == "No position from the phone for 14 s"
-    assert asked("phone_missing", silent).brief == "FAULT silent"
+    assert asked("phone_missing", silent).brief == "FAULT: silent"
 
 
 def test_a_position_is_in_order() -> None:
@@ -245,7 +245,7 @@ def test_a_computer_on_a_desk_is_not_nagged(why: Why) -> None:
 
 
 def test_a_refusal_is_told_even_from_a_desk() -> None:
-    assert asked("phone_missing", without("denied", 10.0, is_handheld=False)).brief == "FAULT permission"
+    assert asked("phone_missing", without("denied", 10.0, is_handheld=False)).brief == "FAULT: permission"
 
 
 # -- nothing to check --------------------------------------------------------------------------------------------------

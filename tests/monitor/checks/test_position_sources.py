@@ -59,11 +59,11 @@ ANSWERS = {
 
 def test_the_sentences() -> None:
     lost = ask(RECEIVER, beside(("/gps/fix", LOST)))
-    assert lost.text == "No fix at /gps/fix; the position of /gps/filtered goes on without it"
+    assert lost.text == "No fix at /gps/fix; the position of /gps/filtered continues without it"
     silent = ask(RECEIVER, beside(FIX, age_s=12.0))
-    assert silent.text == "Nothing from /gps/fix for 12 s; the position of /gps/filtered goes on without it"
+    assert silent.text == "Nothing from /gps/fix for 12 s; the position of /gps/filtered continues without it"
     both = ask(RECEIVER, beside(("/a/fix", LOST), ("/b/fix", LOST)))
-    assert both.text == "No fix at /a/fix; No fix at /b/fix; the position of /gps/filtered goes on without it"
+    assert both.text == "No fix at /a/fix; No fix at /b/fix; the position of /gps/filtered continues without it"
     assert both.causes == ("/a/fix", "/b/fix")
     apart = ask(APART, beside(("/gps/fix", moved(HERE, 30.0, 0.0, 0.3))))
     assert apart.text == "The position is 30.1 m from that of /gps/fix; up to 5.5 m is normal"
@@ -179,7 +179,7 @@ def test_a_fix_lost_at_the_receiver_is_noticed_though_the_filter_goes_on() -> No
     car = Car().go(10.0).go(2.5, receiver=LOST)
     assert car.raised == []
     car.go(1.5, receiver=LOST)
-    assert car.raised == [(RECEIVER, "No fix at /gps/fix; the position of /gps/filtered goes on without it")]
+    assert car.raised == [(RECEIVER, "No fix at /gps/fix; the position of /gps/filtered continues without it")]
     car.go(6.0)
     assert car.ended == [RECEIVER]
     assert len(car.raised) == 1

@@ -29,8 +29,8 @@ def at(facts: ReachFacts | None, speed_mps: float | None = 4.2, **more: Any) -> 
 @pytest.mark.parametrize(
     ("facts", "speed_mps", "was_active", "verdict", "says"),
     [
-        (HEARD, 4.2, False, OK, "2 of 3 operators can hear alarms"),
-        (HEARD, None, False, OK, "2 of 3 operators can hear alarms"),
+        (HEARD, 4.2, False, OK, "Alarms audible on 2 of 3 operator pages"),
+        (HEARD, None, False, OK, "Alarms audible on 2 of 3 operator pages"),
         (DEAF, 4.2, False, FAULT, "The car moves at 4.2 m/s and nobody can hear alarms: none of 3 (2 × sound off, not"),
         (DEAF, -1.0, False, FAULT, "moves at 1.0 m/s"),  # backwards
         (ALONE, 4.2, False, FAULT, "nobody can hear alarms: no operator's phone is connected"),
@@ -49,6 +49,17 @@ def test_who_hears(
     found = ask("reach", at(facts, speed_mps), was_active=was_active)
     assert found.verdict is verdict
     assert says in found.text
+
+
+@pytest.mark.parametrize(
+    ("facts", "ended"),
+    [
+        (HEARD, "Alarms can be heard again"),
+        (ALONE, "Nobody can hear alarms, car stands"),  # it ended, and still nobody can
+    ],
+)
+def test_an_ended_alarm_claims_only_what_is_true_now(facts: ReachFacts, ended: str) -> None:
+    assert ask("reach", at(facts, 0.0, standing_since_s=97.0), was_active=True).ended == ended
 
 
 def test_it_is_over_once_the_car_rests() -> None:

@@ -76,8 +76,8 @@ def test_diagnostics_of_which_nothing_came_are_never_called_fine(
 
 def test_what_is_said_of_a_silent_signal() -> None:
     found = stale("brake", snapshot(brake=heard(3.4)))
-    assert (found.text, found.brief, found.causes) == ("Brake: no message for 3.4 s", "FAULT Brake 3 s", ("brake",))
-    assert stale("distance", snapshot(distance=heard(3.4))).brief == "FAULT Nearest object"
+    assert (found.text, found.brief, found.causes) == ("Brake: no message for 3.4 s", "FAULT: Brake 3 s", ("brake",))
+    assert stale("distance", snapshot(distance=heard(3.4))).brief == "FAULT: Nearest object"
 
 
 NOT_FOUND = replace(OPEN, published=frozenset())
@@ -91,7 +91,7 @@ JUST_OPENED = replace(OPEN, since_s=97.0)
         pytest.param("odometry", NOT_FOUND, UNKNOWN, False, "not published", id="optional, not published"),
         pytest.param("fuel", NOT_FOUND, UNKNOWN, False, "not published", id="event-like, not published"),
         pytest.param("speed", JUST_OPENED, UNKNOWN, True, "not checked: waiting", id="wanted, just connected"),
-        pytest.param("speed", OPEN, FAULT, True, "FAULT Speed", id="wanted, published, never came"),
+        pytest.param("speed", OPEN, FAULT, True, "FAULT: Speed", id="wanted, published, never came"),
         pytest.param("odometry", OPEN, UNKNOWN, False, "nothing received", id="optional, published, never came"),
         pytest.param("command", OPEN, UNKNOWN, False, "nothing received", id="event-like, published, never came"),
     ],
@@ -178,7 +178,7 @@ def test_slow(of: Rate, was_active: bool, age_s: float, verdict: Verdict) -> Non
 
 def test_what_is_said_of_a_slow_signal() -> None:
     found = slow(rate(12.0))
-    assert (found.text, found.brief) == ("Brake: 12.0 Hz, expected 20.0 Hz", "FAULT Brake 12 Hz")
+    assert (found.text, found.brief) == ("Brake: 12.0 Hz, expected 20.0 Hz", "FAULT: Brake 12 Hz")
 
 
 @pytest.mark.parametrize(("percent", "verdict"), [(59.0, OK), (61.0, FAULT)])

@@ -170,7 +170,7 @@ async def drives_armed(who: Person, car: Car) -> None:
     ends_s = time.monotonic() + PATIENCE_S
     while who.slowing().get("state") != "armed" or car.speed_mps() < DRIVES_MPS:
         assert time.monotonic() < ends_s, f"{who.name} at {car.speed_mps()} m/s: {who.slowing()}"
-        if who.slowing().get("state") == "safe":
+        if who.slowing().get("state") == "not_armed":
             await take(who)
             await who.ask("arm", vehicle="ocelot")
         elif hold := held(who.slowing()):  # on a busy machine a heartbeat may be late

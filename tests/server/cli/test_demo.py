@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import sys
 from pathlib import Path
 
 import pytest
 
+from server.app.banner import pair_command
+from server.app.config import default_data
+from server.cli import demo
 from server.cli.demo import next_steps
 from tests.tree import PROJECT
 
@@ -22,6 +26,33 @@ from tests.tree import PROJECT
 )
 def test_a_phone_gets_in_by_what_is_printed(host: str, program: str, said: str) -> None:
     assert said in next_steps(host, program)[-1]
+
+
+def parsed(*given: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    demo.add_arguments(parser)
+    return parser.parse_args(given)
+
+
+def test_it_records_into_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    data = parsed().data
+    assert data.parent == tmp_path
+    assert data != default_data()
+    assert not data.is_relative_to(default_data()), "no simulated drive among those of real cars"
+    assert parsed("--data", str(tmp_path / "x")).data == tmp_path / "x"
+    assert str(data / "recordings") in demo.records_into(data)
+    assert pair_command(data) == f"catgraph pair --data {data}", "a phone is let in at the server of the demo"
+    assert pair_command(default_data()) == "catgraph pair"
+
+
+def test_the_readme_tries_it_with_one_command() -> None:
+    """Who tries it runs no tests: those are for who changes it."""
+    text = (PROJECT / "README.md").read_text(encoding="utf-8")
+    blocks = [block.strip() for block in text.split("```")[1::2]]
+    assert blocks[0] == "make demo"
+    assert "serve" in blocks[1]
+    assert "make test" not in text
 
 
 async def test_the_scenario_that_it_names_can_be_typed(tmp_path: Path) -> None:
@@ -40,6 +71,7 @@ async def test_the_scenario_that_it_names_can_be_typed(tmp_path: Path) -> None:
             assert lines[0].startswith("catgraph listens on http://127.0.0.1:")
             while "Ctrl-C to stop" not in lines[-1]:
                 lines.append((await process.stdout.readline()).decode())
+            assert f"  It records into {tmp_path}/recordings; remove {tmp_path} when you are done.\n" in lines
             (step,) = (line for line in lines if "An alarm:" in line)
             process.stdin.write(f"{step.split('`')[1]}\n".encode())
             assert (await process.stdout.readline()).decode() == "speeding started for 20 s.\n"

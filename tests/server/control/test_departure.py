@@ -30,7 +30,7 @@ READY = Seen(
     accelerator_percent=0.0,
     tyre_rad=0.0,
     speed_mps=0.0,
-    slow_down="safe",
+    slow_down="not_armed",
 )
 WALL_MS = 1_800_000_000_000
 

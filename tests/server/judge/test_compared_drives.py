@@ -121,7 +121,7 @@ def test_without_a_fix_another_odometry_contradicts_them(tmp_path: Path) -> None
 def test_a_fix_lost_at_the_receiver_is_noticed_behind_the_filter(tmp_path: Path) -> None:
     report, raised = check(tmp_path, drive(filtered=True, status=lambda t: -1 if 14.0 < t < 25.0 else 0))
     assert raised == ["position_receiver"]
-    assert texts(report, "position_receiver") == ["No fix at /gps/fix; the position of /fix goes on without it"]
+    assert texts(report, "position_receiver") == ["No fix at /gps/fix; the position of /fix continues without it"]
 
 
 def test_a_receiver_that_dies_is_noticed(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def at(now_s: float) -> RecordedSlowDown:
 @pytest.mark.parametrize(
     ("now_s", "state", "ordered_mps", "confirmed", "sending"),
     [
-        (0.5, "safe", None, None, None),
+        (0.5, "not_armed", None, None, None),
         (1.0, "armed", None, None, None),
         (5.05, "ordered", None, None, False),
         (5.1, "ordered", 6.0, None, True),
@@ -50,7 +50,7 @@ def at(now_s: float) -> RecordedSlowDown:
         (10.2, "holding", 0.0, True, True),
         (12.5, "holding", 0.0, True, True),
         (13.5, "armed", None, None, None),
-        (14.5, "safe", None, None, None),
+        (14.5, "not_armed", None, None, None),
     ],
 )
 def test_each_moment_is_shown_as_it_was(
@@ -84,6 +84,19 @@ def test_a_recording_that_begins_in_the_middle_of_an_order_knows_it_from_the_nex
     assert recorded is not None
     shown = RecordedSlowDown().after(recorded, 2.0).as_json(2.5, START_S, LIMITS)
     assert (shown["state"], shown["order"]["by"], shown["order"]["sending"]) == ("ordered", "Ann", False)
+
+
+def test_a_log_of_before_the_present_name_of_a_phase_is_read() -> None:
+    """Rows as they were written when a slow-down that is not armed was called safe."""
+    state = RecordedSlowDown()
+    for row, shown in [
+        ({"change": "armed", "by": "Ann", "state": "armed", "text": "Slow-down armed: /cmd_vel"}, "armed"),
+        ({"change": "disarmed", "state": "safe", "text": "Slow-down disarmed."}, "not_armed"),
+    ]:
+        recorded = recorded_slowdown.read(row)
+        assert recorded is not None
+        state = state.after(recorded, 1.0)
+        assert state.as_json(1.0, START_S, LIMITS)["state"] == shown
 
 
 @pytest.mark.parametrize(

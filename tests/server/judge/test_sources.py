@@ -78,7 +78,7 @@ def test_two_lasers_are_asked_for_whatever_their_names_say(evidence: Evidence) -
     (question,) = choice.questions
     assert question["words"] == "Two lasers: which looks ahead?"
     assert [one["value"] for one in question["options"]] == ["/front/scan", "/rear/scan"]
-    assert "its name says ahead" in question["options"][0]["why"]
+    assert "its name suggests ahead" in question["options"][0]["why"]
     assert [one.topic for one in choice.watched["scan"]] == ["/front/scan", "/rear/scan"]
     assert not any(one.carries for one in choice.watched["scan"])
 

@@ -17,7 +17,10 @@ STATES = {
     "live": canned.live(),
     "idle": canned.idle(),
     "connecting": canned.idle("connecting"),
-    **{f"slow-down {name}": canned.live() | {"decelerate": canned.slow(name)} for name in ("safe", "armed", "holding")},
+    **{
+        f"slow-down {name}": canned.live() | {"decelerate": canned.slow(name)}
+        for name in ("not_armed", "armed", "holding")
+    },
     "slowed": canned.live() | {"decelerate": canned.slowed()},
     "alarm": canned.live() | {"alarms": [canned.alarm("speed_limit", "Speed above limit")]},
 }

@@ -79,7 +79,7 @@ class Field:
 
     async def armed(self, speed_mps: float = 4.0) -> None:
         """Drives, and slow-down is armed."""
-        await self.until(lambda state: state["decelerate"]["state"] == "safe")
+        await self.until(lambda state: state["decelerate"]["state"] == "not_armed")
         await self.until(lambda state: state["decelerate"]["rivals"] is not None)
         await self.until_car(lambda: self.speed_mps >= speed_mps)
         assert (await self.post("arm")).status_code == 200

@@ -132,7 +132,7 @@ async def test_whatever_is_called_nothing_is_published_that_was_not_ordered(brid
         websockets.connect(base.replace("http", "ws") + "/ws") as page,
     ):
         async with asyncio.timeout(20):
-            while (await client.get("/api/state")).json()["decelerate"]["state"] != "safe":
+            while (await client.get("/api/state")).json()["decelerate"]["state"] != "not_armed":
                 await asyncio.sleep(0.05)
         walked = 0
         for method, path in all_routes():

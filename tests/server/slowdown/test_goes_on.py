@@ -106,7 +106,7 @@ def test_armed_ends_ten_seconds_after_the_last_operators_page_has_gone() -> None
     assert rig.slowing.frame()["state"] == "armed"
     rig.now_s += 0.2
     rig.slowing.watch_operators(None)
-    assert rig.slowing.frame()["state"] == "safe"
+    assert rig.slowing.frame()["state"] == "not_armed"
     assert rig.notes[-1] == "disarmed: Slow-down disarmed: the last operator's page has been gone for 10 s."
 
 
@@ -124,7 +124,7 @@ def test_a_page_that_is_there_keeps_it_armed_and_an_order_is_not_ended_by_an_emp
     assert order is not None
     rig.slowing.obey(slowing_commands.Release(kind="release", number=order["number"]), by="Ann")
     rig.slowing.watch_operators(None)
-    assert rig.slowing.frame()["state"] == "safe"
+    assert rig.slowing.frame()["state"] == "not_armed"
 
 
 def test_armed_by_a_program_without_any_page_it_stays_armed_and_so_it_does_where_nobody_is_the_rule() -> None:

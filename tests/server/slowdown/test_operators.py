@@ -58,7 +58,7 @@ async def phone(car: Field, name: str) -> AsyncIterator[Phone]:
 
 async def test_anybody_may_slow_the_car_and_only_the_one_in_control_releases_it() -> None:
     async with field() as car, phone(car, "Ann") as ann, phone(car, "Ben") as ben:
-        await car.until(lambda state: state["decelerate"]["state"] == "safe")
+        await car.until(lambda state: state["decelerate"]["state"] == "not_armed")
         await car.until_car(lambda: car.speed_mps > 4.0)
         assert (await ann.order("arm"))["ok"]  # and takes control by it
         refused = await ben.order("disarm")
@@ -95,7 +95,7 @@ async def test_what_was_pressed_too_long_ago_is_refused(late: dict[str, float], 
 async def test_an_order_outlives_the_phone_that_gave_it() -> None:
     async with field() as car:
         async with phone(car, "Ann") as ann:
-            await car.until(lambda state: state["decelerate"]["state"] == "safe")
+            await car.until(lambda state: state["decelerate"]["state"] == "not_armed")
             await car.until_car(lambda: car.speed_mps > 4.0)
             await ann.order("arm")
             assert (await ann.slow())["ok"]

@@ -129,10 +129,10 @@ def test_the_way_is_known_or_its_problem_said(
     assert (way.kind is not None) == (way.problem is None)
 
 
-def test_it_is_safe_until_it_is_armed_and_armed_until_it_is_ordered() -> None:
+def test_it_is_not_armed_until_it_is_armed_and_armed_until_it_is_ordered() -> None:
     life = SlowDown()
     assert life.state(NO_WAY, 0.0) == "not_available"
-    assert life.state(WAY, 0.0) == "safe"
+    assert life.state(WAY, 0.0) == "not_armed"
     with pytest.raises(Refused, match="not armed"):
         life.begin(WAY, by="Ann", why="by hand", deceleration_mps2=1.5, now_s=0.0, pressed_s=None)
     with pytest.raises(Refused, match="No car"):

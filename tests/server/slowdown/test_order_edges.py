@@ -44,12 +44,12 @@ def test_every_refusal_says_why() -> None:
     assert refusal(life.release, 2) == "A newer slow-down order was given meanwhile: check again."
 
 
-def test_disarmed_is_safe() -> None:
+def test_disarmed_is_not_armed() -> None:
     life = SlowDown()
     assert not life.disarm()
     life.arm(WAY, "Ann")
     assert life.disarm()
-    assert (life.armed_by, life.state(WAY, 0.0)) == (None, "safe")
+    assert (life.armed_by, life.state(WAY, 0.0)) == (None, "not_armed")
 
 
 def test_it_holds_once_zero_is_commanded_and_goes_out() -> None:

@@ -56,7 +56,7 @@ class Heard:
                     slow = (await client.get("/api/state")).json()["decelerate"]
                     order = slow["order"] or {}
                     if {
-                        "safe": slow["state"] == "safe",
+                        "not_armed": slow["state"] == "not_armed",
                         "sends": order.get("sending"),
                         "cut": order.get("sending") is False,
                     }[what]:
@@ -64,7 +64,7 @@ class Heard:
                     assert time.monotonic() < ends_s, slow
                     await asyncio.sleep(0.05)
 
-            await until("safe")
+            await until("not_armed")
             assert (await client.post("/api/slow-down/arm")).is_success
             assert (await client.post("/api/slow-down/order")).is_success
             for outage in range(outages):

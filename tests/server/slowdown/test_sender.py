@@ -66,7 +66,7 @@ async def test_it_keeps_its_rate() -> None:
 @pytest.mark.parametrize("body", [None, {"number": 1}])
 async def test_what_is_not_armed_or_not_ordered_is_refused(body: dict[str, int] | None) -> None:
     async with field() as car:
-        await car.until(lambda state: state["decelerate"]["state"] == "safe")
+        await car.until(lambda state: state["decelerate"]["state"] == "not_armed")
         refused = await car.post("order") if body is None else await car.post("release", **body)
         assert refused.status_code == 409
         assert refused.json()["detail"] == (
@@ -139,7 +139,7 @@ async def test_what_was_released_before_the_restart_stays_released(tmp_path: Pat
             await car.post("order")
             await car.post("release", number=(await car.slow())["order"]["number"])
         async with watching(service, address, tmp_path) as car:
-            await car.until(lambda state: state["decelerate"]["state"] == "safe")
+            await car.until(lambda state: state["decelerate"]["state"] == "not_armed")
             await asyncio.sleep(0.5)
             assert (await car.slow())["order"] is None
             assert car.speeds == []

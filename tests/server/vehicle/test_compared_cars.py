@@ -82,7 +82,7 @@ async def test_a_position_that_goes_on_without_its_receiver_is_named() -> None:
             assert state["signals"]["position"]["topic"] == "/gps/filtered"
             assert state["signals"]["position"]["freshness"] == "fresh"
             found = (await http.get(f"{base}/api/checks/position_receiver")).json()
-            expected = "No fix at /gps/fix; the position of /gps/filtered goes on without it"
+            expected = "No fix at /gps/fix; the position of /gps/filtered continues without it"
             assert (found["verdict"], found["text"]) == ("fault", expected)
             assert not ids(state) & {"speed_sources", "position_sources", "gps_jump", "gps_drift"}
 

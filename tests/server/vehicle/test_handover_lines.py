@@ -25,7 +25,7 @@ def test_who_drives() -> None:
     one = driving_line(mode("autonomous"))
     assert (one.key, one.title, one.text, one.since_ms) == ("driving:autonomous:", "The car drives itself", "", 5)
     one = driving_line(mode("unknown", "silent"))
-    assert (one.title, one.text) == ("Who drives is not known", "The topic that says it is silent.")
+    assert (one.title, one.text) == ("Who drives is not known", "The topic for it is silent.")
     assert one.since_ms is None, "since when nobody knows is no fact"
     assert one.key != driving_line(mode("unknown", "flickers")).key
 

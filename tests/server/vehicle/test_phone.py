@@ -260,7 +260,7 @@ def test_case_07_a_permission_that_is_taken_away_is_told_with_its_name() -> None
     ]
     assert found.events[0].text == "Location permission denied on the phone"
     assert 28.0 < found.events[0].at_s < 31.0
-    assert "FAULT permission" in found.briefs["phone_missing"]
+    assert "FAULT: permission" in found.briefs["phone_missing"]
 
 
 def test_without_a_phone_nothing_is_said_of_one() -> None:

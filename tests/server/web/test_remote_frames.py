@@ -27,7 +27,7 @@ CAR: dict[str, Any] = {
     "page": None,
     "recording": "recording",
     "recording_for_s": 3.0,
-    "slow_down": "safe",
+    "slow_down": "not_armed",
 }
 
 

@@ -60,6 +60,14 @@ def test_an_older_agent_is_understood() -> None:
     assert "attention" not in listed(taken)
 
 
+@pytest.mark.parametrize(("was", "now"), [("safe", "not_armed"), ("not_armed", "not_armed"), ("armed", "armed")])
+def test_a_phase_of_an_older_agent_has_its_present_name(was: str, now: str) -> None:
+    summary = orjson.dumps({**orjson.loads(OLDER), "slow_down": was})
+    assert listed(str(READ("ocelot", SUMMARY, summary, 0.0)))["slow_down"] == now
+    state = {"kind": "state", "vehicle": "ocelot", "server": {"time_ms": 1}, "decelerate": {"state": was}}
+    assert orjson.loads(READ("ocelot", "state", orjson.dumps(state), 0.0))["decelerate"]["state"] == now
+
+
 def test_a_newer_agent_is_understood() -> None:
     unknown = {
         **NEWER,

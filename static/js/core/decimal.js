@@ -1,0 +1,36 @@
+// Decimal numbers as they are typed and shown in fields, with the mark of this browser's language. Pure functions, no DOM.
+
+/** The decimal mark of a language: "," in German, "." in English. @param {string} [language] of the browser */
+export function markOf(language = globalThis.navigator?.language) {
+  try {
+    return new Intl.NumberFormat(language).formatToParts(1.5).find(({ type }) => type === 'decimal')?.value === ',' ? ',' : '.';
+  } catch {
+    return '.'; // no language of this name
+  }
+}
+
+/** A number in the way a program writes it, as this language writes it. @param {string} text @param {string} [mark] */
+export function local(text, mark = markOf()) {
+  return text.replace('.', mark);
+}
+
+/**
+ * Could its mark separate thousands? "1.100" is 1.1 to one reader and 1100 to another. In the language's own mark only what
+ * ends with a needless zero is in doubt.
+ * @param {string} text a typed number
+ * @param {string} [mark] of the language
+ */
+export function isInDoubt(text, mark = markOf()) {
+  const found = /^[+-]?[1-9]\d{0,2}([.,])\d\d(\d)$/.exec(text);
+  return found !== null && (found[1] !== mark || found[2] === '0');
+}
+
+/**
+ * A typed number with comma or point; NaN: none, or one in doubt.
+ * @param {string} typed
+ * @param {string} [mark] of the language
+ */
+export function decimalOf(typed, mark = markOf()) {
+  const text = typed.trim();
+  return text === '' || isInDoubt(text, mark) ? NaN : Number(text.replace(',', '.'));
+}
