@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from monitor.catalog import AllLimits
@@ -11,7 +11,17 @@ from monitor.mounting import Mounting
 from monitor.values import LaserScan
 from server.judge.signals.scan import LOOKS_AHEAD
 from server.judge.topics import plain_type
-from server.judge.transforms import TYPES, Contradiction, FrameTree, Pose, Rotation, frame_name, rotated
+from server.judge.transforms import (
+    TYPES,
+    Contradiction,
+    FrameTree,
+    Pose,
+    Rotation,
+    frame_name,
+    is_body,
+    is_world,
+    rotated,
+)
 
 MAX_SENSORS = 64  # topics and frames whose mounting is kept
 MAX_TREES = 8  # namespaces with transforms of their own
@@ -30,6 +40,21 @@ def is_static(topic: str) -> bool:
     return topic.endswith("tf_static")
 
 
+BY_NAME, BY_TRANSFORMS = "by its name", "by transforms"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axes:
+    """Of a frame in which a sensor gives vectors."""
+
+    turn: Rotation | None = None  # in the body frame; None: not turned, or no transform says
+    ground: str | None = None  # BY_NAME or BY_TRANSFORMS: it is fixed to the ground, and not to the car
+    why_unknown: str | None = None
+
+
+AS_THE_BODY = Axes()
+
+
 class Frames:
     """What is known of the frames of one car; small, so that it can be kept with the state of a run."""
 
@@ -37,11 +62,11 @@ class Frames:
         self._trees: dict[str, FrameTree] = {}  # by namespace
         self._changes = 0  # of all trees: what is kept is worked out anew with each
         self._kept: dict[tuple[str, str], tuple[int, Any, Mounting]] = {}  # by topic and frame
-        self._turns: dict[tuple[str, str], tuple[int, Rotation | str | None]] = {}  # by topic and frame
+        self._axes: dict[tuple[str, str], tuple[int, Axes]] = {}  # by topic and frame
         self._located: dict[str, str] = {}  # topic → the frame whose place its transforms gave
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"_trees": self._trees, "_changes": self._changes, "_kept": {}, "_turns": {}, "_located": self._located}
+        return {"_trees": self._trees, "_changes": self._changes, "_kept": {}, "_axes": {}, "_located": self._located}
 
     def forget(self) -> None:
         """The link opens again: what is latched is sent again, and may be of another calibration by now."""
@@ -82,26 +107,35 @@ class Frames:
         pose = None if body is None else tree.pose(frame, body)
         return None if body is None or pose is None else (body, pose)
 
-    def turn(self, topic: str, frame: str) -> Rotation | str | None:
-        """How a sensor's axes are turned in the body frame; None: not at all, or no transform says; a text: why that
-        cannot be known."""
-        if not self._trees:
-            return None
-        kept = self._turns.get((topic, frame))
+    def axes(self, topic: str, frame: str) -> Axes:
+        """What is known of the axes of a frame in which a topic gives vectors."""
+        kept = self._axes.get((topic, frame))
         if kept is None or kept[0] != self._changes:
-            if len(self._turns) >= MAX_SENSORS:
-                self._turns.clear()
-            kept = self._turns[topic, frame] = self._changes, self._turn(topic, frame_name(frame))
+            if len(self._axes) >= MAX_SENSORS:
+                self._axes.clear()
+            name = frame_name(frame)
+            try:
+                found = self._find_axes(topic, name)
+            except Contradiction as why:
+                found = Axes(why_unknown=f"its axes are not known: {why}")
+            kept = self._axes[topic, frame] = self._changes, found
         return kept[1]
 
-    def _turn(self, topic: str, frame: str) -> Rotation | str | None:
-        try:
-            located = self.locate(topic, frame) if frame else None
-        except Contradiction as why:
-            return f"its axes are not known: {why}"
-        if located is None or not Pose(rotation=located[1].rotation).differs(Pose()):
-            return None  # how far a sensor is from the axle does not matter here
-        return located[1].rotation
+    def _find_axes(self, topic: str, frame: str) -> Axes:
+        """Raises Contradiction."""
+        if not frame:
+            return AS_THE_BODY
+        tree = self.tree_of(topic)
+        body = None if tree is None else tree.body_of(frame)
+        if tree is None or body is None:
+            return Axes(ground=BY_NAME) if is_world(frame) else AS_THE_BODY
+        is_on_car = is_body(frame) or tree.is_on_car(frame, body)
+        if is_on_car is False or (is_on_car is None and is_world(frame)):
+            return Axes(ground=BY_TRANSFORMS)
+        pose = tree.pose(frame, body)
+        if pose is None or not Pose(rotation=pose.rotation).differs(Pose()):
+            return AS_THE_BODY  # how far a sensor is from the axle does not matter here
+        return Axes(turn=pose.rotation)
 
     def looks_ahead(self, topic: str, scan: LaserScan) -> bool | None:
         """Whether the laser of a topic looks ahead, see the function; None: no transform says."""
