@@ -160,15 +160,8 @@ class Drive:
                 self._recorded_epoch(event.toml) for _, event in recorded.events if isinstance(event, NewSettings)
             ]
         listened = frozenset(topic for epoch in self.epochs for topic in epoch.listeners)
-        scans = {
-            topic: one.topic
-            for epoch in self.epochs
-            for topic, sources in epoch.listeners.items()
-            for one in sources
-            if one.signal == "scan"
-        }
-        # Topics of transforms to be followed: a laser is placed by them.
-        self.moving_transforms = self._transforms.follow(scans)
+        # Topics of transforms to be followed: what is measured is placed by them.
+        self.moving_transforms = self._transforms.follow({topic: self._names[topic] for topic in sorted(listened)})
         self.frames = self._transforms.frames
         self.notes += self.frames.notes
         self.topics = listened | self.moving_transforms

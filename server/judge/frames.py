@@ -107,6 +107,13 @@ class Frames:
         pose = None if body is None else tree.pose(frame, body)
         return None if body is None or pose is None else (body, pose)
 
+    def is_settled(self, topic: str, frame: str) -> bool:
+        """Whether static transforms alone place a sensor's frame, so that those that move can change nothing about it."""
+        try:
+            return not frame_name(frame) or (self.tree_of(topic) or FrameTree()).is_settled(frame)
+        except Contradiction:
+            return False
+
     def axes(self, topic: str, frame: str) -> Axes:
         """What is known of the axes of a frame in which a topic gives vectors."""
         kept = self._axes.get((topic, frame))

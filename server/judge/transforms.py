@@ -207,14 +207,13 @@ class FrameTree:
         return found
 
     def is_settled(self, frame: str) -> bool:
-        """Whether static transforms place a frame below base_link, so that no others can change that."""
-        for name in self._above(frame_name(frame)):
-            if _last(name) == BODIES[0]:
-                return True
-            link = self._links.get(name)
-            if link is None or not link.is_static:
-                return False
-        return False
+        """Whether static transforms place a frame below base_link. Raises Contradiction."""
+        chain = self._chain(frame_name(frame))
+        body = next((name for name in chain if _last(name) == BODIES[0]), None)
+        if body is None or not all(self._links[name].is_static for name in chain[: chain.index(body)]):
+            return False
+        self._down(chain, body)
+        return True
 
     def is_on_car(self, frame: str, body: str) -> bool | None:
         """Whether a frame is fixed to the car, and not to the ground that it drives on, as `odom` is; None: what was
