@@ -108,7 +108,7 @@ class Frames:
         return None if body is None or pose is None else (body, pose)
 
     def is_settled(self, topic: str, frame: str) -> bool:
-        """Whether static transforms alone place a sensor's frame, so that those that move can change nothing about it."""
+        """Whether static transforms alone place a sensor's frame, so that those that move can change nothing there."""
         try:
             return not frame_name(frame) or (self.tree_of(topic) or FrameTree()).is_settled(frame)
         except Contradiction:
@@ -172,7 +172,7 @@ class Frames:
                 found = _by_pose(*located)
             else:
                 found = self._without(topic, frame)
-        return _by_settings(found, limits)
+        return _from_bumper(_by_settings(found, limits), limits)
 
     def _without(self, topic: str, frame: str) -> Mounting:
         """Of a frame whose place no transform gives."""
@@ -230,6 +230,14 @@ def _by_settings(found: Mounting, limits: AllLimits) -> Mounting:
     )
     words = f"mounted by the settings, {turn_words(mounting)}"
     return replace(mounting, note=f"{words}, not by the car's transforms" if by_transforms else words)
+
+
+def _from_bumper(found: Mounting, limits: AllLimits) -> Mounting:
+    """With what gaps are counted from, where it is not the bumper: no transform names that."""
+    if limits.obstacle.bumper_ahead_m > 0.0 or found.origin == "profile" or found.why_unknown is not None:
+        return found
+    is_behind = found.x_m is not None and found.x_m < 0.0
+    return replace(found, gap_from="the rear axle" if is_behind else "the laser")
 
 
 def place_words(mounting: Mounting) -> str:

@@ -64,7 +64,11 @@ async def test_a_latched_transform_turns_the_laser(bridge: RosBridge, server: st
         (alarm,) = (alarm for alarm in state["alarms"] if alarm["id"] == "obstacle")
         assert alarm["trip_text"].startswith("Obstacle 3.0 m ahead, 11° left")  # the nearer of two beams
         assert "by the car's transforms turned by 180°, 0.50 m ahead of base_link" in note_of(state)
-        assert state["signals"]["scan"]["value"]["mounting"] is None
+        assert "gap from the laser: no bumper set" in note_of(state)
+        assert state["signals"]["scan"]["value"]["mounting"] == "gap from the laser: no bumper set"
+        assert alarm["trip_text"].endswith(
+            "gap from the laser: no bumper set; steering unknown, checked straight ahead"
+        )
         await one.until(lambda: one.scans)
         frame = scan_frames.read(one.scans[-1])
         assert frame.gap_m == pytest.approx(3.0, abs=0.05)
@@ -80,7 +84,9 @@ async def test_transforms_that_come_later_count_from_then_on(bridge: RosBridge, 
     async with scanning(bridge), viewer(server) as one:
         state = await one.state(lambda s: "assumed to look ahead" in note_of(s))
         assert not is_alarmed(state)
-        assert state["signals"]["scan"]["value"]["mounting"] == "laser assumed to look ahead"
+        assert state["signals"]["scan"]["value"]["mounting"] == (
+            "laser assumed to look ahead · gap from the laser: no bumper set"
+        )
         bridge.advertise("/tf", TF)
         async with asyncio.timeout(60):
             while not is_alarmed(one.states[-1]):
