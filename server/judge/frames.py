@@ -64,13 +64,22 @@ class Frames:
         self._kept: dict[tuple[str, str], tuple[int, Any, Mounting]] = {}  # by topic and frame
         self._axes: dict[tuple[str, str], tuple[int, Axes]] = {}  # by topic and frame
         self._located: dict[str, str] = {}  # topic → the frame whose place its transforms gave
+        self._asked: set[tuple[str, str]] = set()  # topics and frames that were asked for
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"_trees": self._trees, "_changes": self._changes, "_kept": {}, "_axes": {}, "_located": self._located}
+        return {
+            "_trees": self._trees,
+            "_changes": self._changes,
+            "_kept": {},
+            "_axes": {},
+            "_located": self._located,
+            "_asked": set(),
+        }
 
     def forget(self) -> None:
         """The link opens again: what is latched is sent again, and may be of another calibration by now."""
         self._trees.clear()
+        self._asked.clear()
         self._changes += 1
 
     def receive(self, topic: str, message: Any) -> None:
@@ -114,6 +123,15 @@ class Frames:
         except Contradiction:
             return False
 
+    @property
+    def needs_moving(self) -> bool:
+        """Whether transforms that move may place a sensor that was asked for."""
+        return not all(self.is_settled(topic, frame) for topic, frame in self._asked)
+
+    def _ask(self, topic: str, frame: str) -> None:
+        if len(self._asked) < MAX_SENSORS:
+            self._asked.add((topic, frame))
+
     def axes(self, topic: str, frame: str) -> Axes:
         """What is known of the axes of a frame in which a topic gives vectors."""
         kept = self._axes.get((topic, frame))
@@ -121,6 +139,7 @@ class Frames:
             if len(self._axes) >= MAX_SENSORS:
                 self._axes.clear()
             name = frame_name(frame)
+            self._ask(topic, name)
             try:
                 found = self._find_axes(topic, name)
             except Contradiction as why:
@@ -147,6 +166,7 @@ class Frames:
     def looks_ahead(self, topic: str, scan: LaserScan) -> bool | None:
         """Whether the laser of a topic looks ahead, see the function; None: no transform says."""
         tree = self.tree_of(topic)
+        self._ask(topic, frame_name(scan.frame_id))
         return None if tree is None else looks_ahead(tree, frame_name(scan.frame_id), scan)
 
     def mounted(self, topic: str, scan: LaserScan, limits: AllLimits) -> LaserScan:
@@ -156,6 +176,7 @@ class Frames:
         if kept is None or kept[0] != self._changes or kept[1] is not limits:
             if len(self._kept) >= MAX_SENSORS:
                 self._kept.clear()
+            self._ask(topic, frame_name(scan.frame_id))
             kept = self._kept[key] = self._changes, limits, self._mounting(topic, frame_name(scan.frame_id), limits)
         return mounted(scan, kept[2])
 
