@@ -52,7 +52,8 @@ class MessageSource(Protocol):
     def topics(self) -> Mapping[str, HasType]: ...
 
     def rows(self, start_s: float = 0.0, topics: Collection[str] | None = None) -> Iterator[Row]:
-        """From `start_s` after the beginning on, in time order; messages of topics not named may be empty."""
+        """From `start_s` after the beginning on, in time order; messages of topics not named may be empty, and with a
+        mapping, those that hold none of the words of their topic (None: any)."""
         ...
 
     def only(self, topics: Collection[str]) -> Iterator[Row]:

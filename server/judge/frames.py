@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,6 +27,8 @@ from server.judge.transforms import (
 MAX_SENSORS = 64  # topics and frames whose mounting is kept
 MAX_TREES = 8  # namespaces with transforms of their own
 _DEFAULTS = AllLimits()
+PLAIN = re.compile(r"[\w./-]+", re.ASCII)  # a name that is the same in every encoding but for its slashes
+NOTHING = b"\x00no frame\x00"  # of no message
 AHEAD_RAD = math.radians(60.0)
 ROAD_RAD = math.radians(15.0)  # on either side of ahead: the corridor from 5 m on
 
@@ -65,16 +68,11 @@ class Frames:
         self._axes: dict[tuple[str, str], tuple[int, Axes]] = {}  # by topic and frame
         self._located: dict[str, str] = {}  # topic → the frame whose place its transforms gave
         self._asked: set[tuple[str, str]] = set()  # topics and frames that were asked for
+        self._noted = (0, 0)  # of how many frames and sensors the needed names were noted
 
     def __getstate__(self) -> dict[str, Any]:
-        return {
-            "_trees": self._trees,
-            "_changes": self._changes,
-            "_kept": {},
-            "_axes": {},
-            "_located": self._located,
-            "_asked": set(),
-        }
+        kept = ("_trees", "_changes", "_located", "_asked")
+        return {"_kept": {}, "_axes": {}, "_noted": (0, 0)} | {name: getattr(self, name) for name in kept}
 
     def forget(self) -> None:
         """The link opens again: what is latched is sent again, and may be of another calibration by now."""
@@ -127,6 +125,23 @@ class Frames:
     def needs_moving(self) -> bool:
         """Whether transforms that move may place a sensor that was asked for."""
         return not all(self.is_settled(topic, frame) for topic, frame in self._asked)
+
+    def note_needed(self, names: set[bytes]) -> None:
+        """Change `names` to those of which a serialized message of transforms that may count holds one, if it is not of
+        the same frames as before; of all where a name may be spelled in another way there."""
+        known = (sum(tree.size for tree in self._trees.values()), len(self._asked))
+        if names and known == self._noted:
+            return
+        self._noted = known
+        asked = [one for one in self._asked if not self.is_settled(*one)]
+        needed = {name for topic, frame in asked for name in (self.tree_of(topic) or FrameTree()).needed(frame)}
+        found = {name.rpartition("/")[2].encode() if PLAIN.fullmatch(name) else b"" for name in needed}
+        names.clear()
+        names.update(found or {NOTHING})
+
+    def ask(self, topic: str, frame: str) -> None:
+        """A sensor's frame is to be placed."""
+        self._ask(topic, frame_name(frame))
 
     def _ask(self, topic: str, frame: str) -> None:
         if len(self._asked) < MAX_SENSORS:

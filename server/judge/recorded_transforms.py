@@ -50,9 +50,15 @@ class RecordedTransforms:
         """The topics of transforms that move if what is placed on the car, of the topics `listened` to (as the
         recording spells one → as a bridge would), may be placed by them: a run has to follow them; `frames` then has
         their first messages."""
-        if all(self._is_settled(topic, name) for topic, name in listened.items()):
+        measured = [(name, frame) for topic, name in listened.items() for frame in self._frames_of(topic, name)]
+        # Those that move may contradict the static ones, or be of a nearer namespace.
+        if not self._moving or all(
+            frames.is_settled(*one) for one in measured for frames in (self.frames, self._with_moving)
+        ):
             return frozenset()
         self.frames = self._with_moving
+        for name, frame in measured:
+            self.frames.ask(name, frame)
         return self._moving
 
     @cached_property
@@ -65,14 +71,11 @@ class RecordedTransforms:
         for _, topic, _, message in islice(self._source.only(topics) if topics else (), most):
             frames.receive(self._names[topic], message)
 
-    def _is_settled(self, topic: str, name: str) -> bool:
-        """Whether those that move can change nothing about the place of what a topic measures, by the frames of its
-        first messages."""
+    def _frames_of(self, topic: str, name: str) -> set[str]:
+        """The frames of what a topic measures, by its first messages; none of what has no place on the car."""
         if plain_type(self._types[name]) not in PLACED or not self._moving:
-            return True
-        found = {_frame(message) for _, _, _, message in islice(self._source.only({topic}), FIRST_MEASURED)}
-        # Those that move may contradict the static ones, or be of a nearer namespace.
-        return all(frames.is_settled(name, frame) for frame in found for frames in (self.frames, self._with_moving))
+            return set()
+        return {_frame(message) for _, _, _, message in islice(self._source.only({topic}), FIRST_MEASURED)}
 
 
 def _frame(message: Any) -> str:

@@ -215,6 +215,21 @@ class FrameTree:
         self._down(chain, body)
         return True
 
+    @property
+    def size(self) -> int:
+        """How many frames are known below others."""
+        return len(self._links)
+
+    def needed(self, frame: str) -> set[str]:
+        """Frames of which each transform that counts for the place of this one names at least one."""
+        found: list[str] = []
+        for name in self._above(frame):
+            if _last(name) == BODIES[0]:
+                return set(found)
+            found.append(name)
+        is_connected = len(found) > 1 or any(link.parent == frame for link in self._links.values())
+        return {*found, *(BODIES if is_connected else ())}  # a body may be beside it
+
     def is_on_car(self, frame: str, body: str) -> bool | None:
         """Whether a frame is fixed to the car, and not to the ground that it drives on, as `odom` is; None: what was
         sent does not show it. Raises Contradiction."""

@@ -247,3 +247,41 @@ def test_what_is_not_measured_on_the_car_needs_no_transforms(tmp_path: Path) -> 
     ]
     with open_recording([written(tmp_path / "drive", 2, rows)]) as recording:
         assert judged_drive(recording).moving_transforms == frozenset()
+
+
+def wheels(seconds: float) -> list[Row]:
+    turned = (0.0, math.sin(0.3), 0.0, math.cos(0.3))
+    names = [f"wheel_{n}" for n in range(4)]
+    return [
+        sent(0.02 * n, *(row("base_link", name, 0.02 * n, rotation=turned) for name in names), topic="/tf")
+        for n in range(round(seconds * 50))
+    ]
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("chain", [["imu"], ["mast", "imu"], ["robot1/top plate", "mast", "imu"], ["chassis", "imu"]])
+def test_of_what_moves_only_what_places_a_sensor_is_decoded_also_if_it_comes_late(
+    tmp_path: Path, version: int, chain: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Long after the first messages, and each link for itself."""
+    rows, parents = [*measuring(12.0), *wheels(12.0)], ["base_link", *chain]
+    for number, child in enumerate(chain):
+        laser = OPPOSITE if number == 0 else STRAIGHT
+        rows += [
+            sent(9.0 + 0.2 * n + 0.01 * number, laser.transform(parents[number], child), topic="/tf") for n in range(10)
+        ]
+    received: list[Any] = []
+    whole = Frames.receive
+    monkeypatch.setattr(
+        Frames, "receive", lambda self, topic, message: received.append(message) or whole(self, topic, message)
+    )
+    with open_recording([written(tmp_path / "drive", version, rows)]) as recording:
+        run = OfflineRun(recording, drive := judged_drive(recording))
+        assert drive.moving_transforms == {"/tf"}
+        received.clear()
+        run.advance(8.0)
+        assert received == []
+        assert run.run_state.state.snapshot(8.0).need("speed").speed_mps < 0.0, "as without transforms"
+        run.advance(11.0)
+        assert run.run_state.state.snapshot(11.0).need("speed").speed_mps > 0.0
+        assert len(received) < (600 if " " in chain[0] else 120)  # a name with a space may be spelled in another way
