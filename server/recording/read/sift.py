@@ -19,7 +19,17 @@ def sifted(decode: Decode, topic: str, topics: Collection[str] | None) -> Decode
     if topic not in topics:
         return _nothing
     words: Collection[bytes] | None = topics[topic] if isinstance(topics, Mapping) else None
-    return decode if words is None else lambda raw: decode(raw) if any(word in raw for word in words) else {}
+    return decode if words is None else _sifting(decode, words)
+
+
+def _sifting(decode: Decode, words: Collection[bytes]) -> Decode:
+    def decode_some(raw: bytes) -> dict[str, Any]:
+        for word in words:
+            if word in raw:
+                return decode(raw)
+        return {}
+
+    return decode_some
 
 
 def _nothing(raw: bytes) -> dict[str, Any]:
