@@ -65,10 +65,11 @@ def _from_ground(message: Mapping[str, Any], frame: str) -> tuple[Any, str | Non
     found, why = dict(message), f"its axes are not known: its twist is in {frame}"
     header, pose, twist = (message.get(name) for name in ("header", "pose", "twist"))
     inner = pose.get("pose") if has_fields(pose) else None
-    moving = twist.get("twist") if has_fields(twist) else None
     orientation = inner.get("orientation") if has_fields(inner) else None
-    if not has_fields(moving) or not has_fields(linear := moving.get("linear")):
-        return message, None  # no twist: to be refused by the decoder
+    if not has_fields(twist) or not has_fields(moving := twist.get("twist")):
+        return message, None  # to be refused by the decoder
+    if not has_fields(linear := moving.get("linear")):
+        return message, None
     above = frame_name(header.get("frame_id") if has_fields(header) else None)
     if above != frame:
         return message, f"{why}, and its pose in {above or 'no frame'}"
